@@ -1,0 +1,165 @@
+// What detection adds to a step: time per step, and the error of the events that
+// the same run finds on the ball of the source paper.
+#include <benchmark/benchmark.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <limits>
+#include <vector>
+
+#include "problems.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/network.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate/methods.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "score.hpp"
+#include "timing.hpp"
+
+namespace {
+
+using namespace ricochet;
+using bench::Problem;
+
+using Array = std::array<double, 2>;
+
+Eigen::VectorXd dynamic(double a, double b)
+{
+    Eigen::VectorXd x(2);
+    x << a, b;
+    return x;
+}
+
+const Network& network()
+{
+    static const Network instance(load_model(std::filesystem::path(RICOCHET_MODELS) /
+                                             "bouncing-ball-step-0.01.safetensors"));
+    return instance;
+}
+
+/// Times a run without events, and reports the cost of one step and its counts.
+template <class System, class X, class Stepping, class Detector>
+void per_step(benchmark::State& state, const System& system, const X& x0, const Options& options,
+              const Stepping& stepping, const Detector& detector)
+{
+    const auto check = integrate(system, x0, options, stepping, detector);
+    if (check.outcome != Outcome::reached_end || check.statistics.events != 0) {
+        state.SkipWithError("the run met an event, or did not reach its end");
+        return;
+    }
+    for (auto _ : state) {
+        auto run = integrate(system, x0, options, stepping, detector);
+        bench::keep(run);
+    }
+    using benchmark::Counter;
+    const auto steps = static_cast<double>(check.statistics.steps);
+    state.counters["steps"] = steps;
+    state.counters["flow/step"] = static_cast<double>(check.statistics.flow_calls) / steps;
+    state.counters["guard/step"] = static_cast<double>(check.statistics.guard_calls) / steps;
+    state.counters["time/step"] =
+        Counter(steps, Counter::kIsIterationInvariantRate | Counter::kInvert);
+}
+
+/// Largest error [s] of the 13 impacts at step 0.01 with this detector.
+template <class X, class Detector>
+double event_error(const X& x0, const Detector& detector)
+{
+    const bench::BallProblem problem = bench::b1();
+    const auto run = integrate(problem.system, x0, {.t_end = problem.t_end, .step = 0.01},
+                               FixedStep<Rk4>{}, detector);
+    std::vector<double> times;
+    for (const auto& event : run.events) times.push_back(event.t);
+    const bench::Score score = bench::score(times, problem.events);
+    return score.complete() ? score.error : std::numeric_limits<double>::infinity();
+}
+
+/// A flight of 305 steps of 0.01 s, launched at 15 m/s, inside the network's box.
+const Options flight{.t_end = 3.05, .step = 0.01, .record_events = false};
+
+template <class X, class Detector>
+void ball_rk4(benchmark::State& state, const X& launch, const X& drop, const Detector& detector)
+{
+    const double error = event_error(drop, detector);
+    per_step(state, BouncingBall(), launch, flight, FixedStep<Rk4>{}, detector);
+    state.counters["event_error_s"] = error;
+}
+
+template <class X>
+void ball_rk4_unguarded(benchmark::State& state, const X& launch)
+{
+    const bench::Unguarded<BouncingBall> system{BouncingBall()};
+    per_step(state, system, launch, flight, FixedStep<Rk4>{}, Ends{});
+}
+
+/// Error control from far above the floor; the parabola itself needs no small
+/// steps, so the step is held to 0.1 s.
+template <class System, class Detector>
+void controlled(benchmark::State& state, const System& system, const Array& x0, double h_max,
+                const Detector& detector)
+{
+    const Options options{
+        .t_end = 20, .rtol = 1e-8, .atol = 1e-8, .h_max = h_max, .record_events = false};
+    per_step(state, system, x0, options, ErrorControlled<Dopri5>{}, detector);
+}
+
+void register_all()
+{
+    const auto add = [](const char* name, auto body) {
+        benchmark::RegisterBenchmark(name, body);
+    };
+    using S = benchmark::State;
+    const Array launch{0, 15};
+    const Array drop{10, 0};
+
+    add("odeint_step/ball/rk4", [](S& state) {
+        const bench::Work work = bench::yardstick();
+        constexpr std::size_t batch = 1000;
+        for (auto _ : state) work(batch);
+        state.counters["time/step"] = benchmark::Counter(
+            batch, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+    });
+    add("step/ball/rk4/array/none", [=](S& s) { ball_rk4_unguarded(s, launch); });
+    add("step/ball/rk4/array/ends", [=](S& s) { ball_rk4(s, launch, drop, Ends{}); });
+    add("step/ball/rk4/array/extremum", [=](S& s) { ball_rk4(s, launch, drop, Extremum{}); });
+    add("step/ball/rk4/array/network", [=](S& s) { ball_rk4(s, launch, drop, network()); });
+
+    const Eigen::VectorXd vector_launch = dynamic(0, 15);
+    const Eigen::VectorXd vector_drop = dynamic(10, 0);
+    add("step/ball/rk4/vectorxd/none", [=](S& s) { ball_rk4_unguarded(s, vector_launch); });
+    add("step/ball/rk4/vectorxd/ends",
+        [=](S& s) { ball_rk4(s, vector_launch, vector_drop, Ends{}); });
+    add("step/ball/rk4/vectorxd/extremum",
+        [=](S& s) { ball_rk4(s, vector_launch, vector_drop, Extremum{}); });
+    add("step/ball/rk4/vectorxd/network",
+        [=](S& s) { ball_rk4(s, vector_launch, vector_drop, network()); });
+
+    const Array high{1e6, 0};
+    const BouncingBall ball;
+    const bench::Unguarded<BouncingBall> free_fall{ball};
+    add("step/ball/dopri5/none", [=](S& s) { controlled(s, free_fall, high, 0.1, Ends{}); });
+    add("step/ball/dopri5/ends", [=](S& s) { controlled(s, ball, high, 0.1, Ends{}); });
+    add("step/ball/dopri5/extremum", [=](S& s) { controlled(s, ball, high, 0.1, Extremum{}); });
+
+    const Array swing{1, 0};
+    constexpr double any = std::numeric_limits<double>::infinity();
+    const bench::WatchedPendulum watched;
+    const bench::Unguarded<bench::WatchedPendulum> pendulum{watched};
+    add("step/pendulum/dopri5/none", [=](S& s) { controlled(s, pendulum, swing, any, Ends{}); });
+    add("step/pendulum/dopri5/ends", [=](S& s) { controlled(s, watched, swing, any, Ends{}); });
+    add("step/pendulum/dopri5/extremum",
+        [=](S& s) { controlled(s, watched, swing, any, Extremum{}); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+    register_all();
+    benchmark::Initialize(&argc, argv);
+    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+    benchmark::RunSpecifiedBenchmarks();
+    benchmark::Shutdown();
+    return 0;
+}

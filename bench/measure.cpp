@@ -1,0 +1,110 @@
+// ricochet_measure: target, measured value and verdict of every check, one line
+// each, with the command that repeats it.
+#include "measure.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+
+namespace {
+
+using ricochet::bench::Check;
+using ricochet::bench::Measured;
+
+/// A part's checks join here.
+std::vector<Check> all_checks()
+{
+    std::vector<Check> checks;
+    for (const auto& part : {ricochet::bench::checks_of_part_1()}) {
+        checks.insert(checks.end(), part.begin(), part.end());
+    }
+    return checks;
+}
+
+std::string_view verdict(const Check& check, const Measured& measured)
+{
+    if (measured.pass) return "pass";
+    return check.required ? "FAIL" : "not reached";
+}
+
+Measured run(const Check& check)
+{
+    try {
+        return check.run();
+    } catch (const std::exception& error) {
+        return {.pass = false, .text = fmt::format("stopped: {}", error.what())};
+    }
+}
+
+int run(int argc, char** argv)
+{
+    CLI::App app("Runs what the library must show. Exit status 1 if a check fails.");
+    int part = 0;
+    std::string only;
+    std::string json_file;
+    bool list = false;
+    app.add_option("--part", part, "only the checks of this part")->check(CLI::PositiveNumber);
+    app.add_option("--only", only, "only the check of this name");
+    app.add_option("--json", json_file, "also write the results to this file");
+    app.add_flag("--list", list, "names and sentences of the checks, nothing is run");
+    CLI11_PARSE(app, argc, argv);
+
+    nlohmann::json results = nlohmann::json::array();
+    bool all_passed = true;
+    bool any = false;
+    for (const Check& check : all_checks()) {
+        if ((part != 0 && check.part != part) || (!only.empty() && check.id != only)) continue;
+        any = true;
+        if (list) {
+            fmt::print("{:<4}{:<24}{}\n", check.part, check.id, check.sentence);
+            continue;
+        }
+        const std::string command =
+            fmt::format("{} --part {} --only {}", argv[0], check.part, check.id);
+        const Measured measured = run(check);
+        fmt::print("{:<11} {} | target: {} | measured: {} | {}\n", verdict(check, measured),
+                   check.sentence, check.target, measured.text, command);
+        for (const std::string& line : measured.details) fmt::print("            {}\n", line);
+        std::fflush(stdout);
+        all_passed = all_passed && (measured.pass || !check.required);
+        results.push_back({{"part", check.part},
+                           {"id", check.id},
+                           {"sentence", check.sentence},
+                           {"target", check.target},
+                           {"measured", measured.text},
+                           {"pass", measured.pass},
+                           {"required", check.required},
+                           {"command", command},
+                           {"details", measured.details}});
+    }
+    if (!any) {
+        throw std::invalid_argument(
+            fmt::format("no check of {}{}; --list shows all",
+                        part == 0 ? "any part" : fmt::format("part {}", part),
+                        only.empty() ? "" : fmt::format(" is named '{}'", only)));
+    }
+    if (!json_file.empty()) {
+        std::ofstream file(json_file);
+        file << results.dump(2) << '\n';
+        if (!file) throw std::runtime_error("cannot write " + json_file);
+    }
+    return all_passed ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+    try {
+        return run(argc, argv);
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "ricochet_measure: {}\n", error.what());
+        return 2;
+    }
+}

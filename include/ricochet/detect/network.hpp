@@ -1,0 +1,86 @@
+// The bare network: a prediction decides whether the guard is looked at.
+//
+// Before a step the network is asked whether the step will meet the event surface
+// (Saunders, Steyer and Kuether, SAND2023-06682C, eq. 4). If not, the guard is not
+// evaluated, and "no event" is only assumed. If so, the end of the step is checked:
+//
+//   false alarm   the guard is still on its side: counted, the step stands
+//   late event    the guard had left its side before the step began, so the network
+//                 missed the event: located at the start of the step, and marked late
+//
+// A wrong network therefore loses time or accuracy; `Ends` and `Extremum` lose
+// neither and are there for comparison.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/features.hpp"
+#include "ricochet/nn/classifier.hpp"
+
+namespace ricochet {
+
+namespace detail {
+
+/// @throws std::invalid_argument: the model does not predict events of this system.
+void check_model(const Model& model, Recipe recipe, std::size_t features, bool offered);
+/// @throws std::invalid_argument: h [s] is outside the steps the model was trained for.
+void check_model_step(const Model& model, double smallest, double largest);
+
+}  // namespace detail
+
+class Network {
+public:
+    static constexpr bool uses_rates = false;
+    static constexpr std::size_t max_features = 16;
+
+    /// @throws std::invalid_argument if the model names an unknown recipe or has
+    /// more features than `max_features`.
+    explicit Network(Model model);
+
+    [[nodiscard]] const Model& model() const noexcept { return classifier_->model(); }
+
+    /// Whether this network can be asked about `system` in steps between `smallest`
+    /// and `largest` [s].
+    ///
+    /// @throws std::invalid_argument naming the model's system, features or steps
+    /// and what they would have to be.
+    template <class System, class X>
+    void check(const System& /*system*/, const X& x, double smallest, double largest) const
+    {
+        detail::check_model(model(), recipe_, dimension(recipe_, x.size()),
+                            offers<System, X>(recipe_));
+        detail::check_model_step(model(), smallest, largest);
+    }
+
+    /// Whether the step is predicted to be free of events.
+    template <class Guard, class Step>
+    [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
+    {
+        std::array<double, max_features> input;
+        features(recipe_, guard.system(), step.time(0), step.x0(), step.rate0(), step.h(),
+                 input.data());
+        return !classifier_->alarm(classifier_->logit(input.data()));
+    }
+
+    template <class Guard, class Step>
+    [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
+    {
+        Finding finding = Ends{}.confirm(guard, step, watch);
+        if (finding.hit) {
+            finding.lo.value = guard.value(step.time(0), step.x0());
+            finding.late = side_of(finding.lo.value) == opposite(finding.side);
+        }
+        return finding;
+    }
+
+private:
+    std::shared_ptr<const Classifier> classifier_;
+    Recipe recipe_;
+};
+
+}  // namespace ricochet

@@ -1,0 +1,36 @@
+// An event: when a guard crossed its surface, and the states around it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace ricochet {
+
+/// What happened.
+enum class EventKind : std::uint8_t {
+    crossing,  ///< the guard changed sign
+};
+
+/// Two times between which the guard leaves its armed side: still on it at
+/// `lo`, across the surface or on it at `hi`. In seconds.
+struct Bracket {
+    double lo = 0;
+    double hi = 0;
+};
+
+/// One event. `t` is the right end of `bracket`, so that `before` is on the
+/// surface or just across it.
+template <class State>
+struct Event {
+    double t = 0;  ///< [s]
+    EventKind kind = EventKind::crossing;
+    std::size_t guard = 0;  ///< which guard of the system
+    State before{};         ///< x⁻
+    State after{};          ///< x⁺, equal to x⁻ where there is no reset
+    Bracket bracket;        ///< [s]
+    double slope = 0;       ///< rate of the guard at the event, per second; NaN if not computed
+    double error = 0;       ///< [s] estimate of the error of location
+    bool late = false;      ///< found at a step after the one that held it
+};
+
+}  // namespace ricochet

@@ -1,0 +1,60 @@
+// Guards: scalar functions whose sign change marks an event.
+//
+// A guard g(t, x) is positive inside a mode and zero on its event surface. Which
+// side it is on is remembered as the side on which it was *armed*, not as its
+// value at the start of a step: a ball that leaves the floor and is below it at
+// the end of the step has bounced, although the guard was zero at the start.
+#pragma once
+
+namespace ricochet {
+
+/// The sign change that counts as an event.
+enum class Crossing {
+    falling,  ///< positive, then zero or negative: leaving the mode
+    rising,   ///< negative, then zero or positive
+    either,
+};
+
+/// Where a guard was when it was armed: its sign, or on its surface the sign of
+/// its first nonzero derivative along the flow. A plateau has neither, and waits.
+enum class Side { below, plateau, above };
+
+/// The side that a value lies on; zero is a plateau.
+[[nodiscard]] constexpr Side side_of(double value) noexcept
+{
+    return value > 0 ? Side::above : value < 0 ? Side::below : Side::plateau;
+}
+
+[[nodiscard]] constexpr Side opposite(Side side) noexcept
+{
+    return side == Side::above ? Side::below : side == Side::below ? Side::above : Side::plateau;
+}
+
+/// Whether a guard armed on `side` and worth `g` has left that side: crossed its
+/// surface or arrived on it. NaN and plateaus have not.
+[[nodiscard]] constexpr bool has_left(Side side, double g) noexcept
+{
+    return (side == Side::above && g <= 0) || (side == Side::below && g >= 0);
+}
+
+/// Whether leaving `side` is the sign change that counts.
+[[nodiscard]] constexpr bool counts(Side side, Crossing crossing) noexcept
+{
+    switch (crossing) {
+        case Crossing::falling: return side == Side::above;
+        case Crossing::rising: return side == Side::below;
+        case Crossing::either: return side != Side::plateau;
+    }
+    return false;
+}
+
+/// Whether a guard armed on `side` and worth `g_end` at the end of a step has
+/// triggered. The end is included, so a zero on the boundary of two steps counts
+/// once; the start is represented by `side`, so a step that begins on the
+/// surface, as after a bounce, is judged like any other.
+[[nodiscard]] constexpr bool triggers(Side side, double g_end, Crossing crossing) noexcept
+{
+    return has_left(side, g_end) && counts(side, crossing);
+}
+
+}  // namespace ricochet

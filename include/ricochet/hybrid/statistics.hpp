@@ -1,0 +1,48 @@
+// What a run did, counted.
+#pragma once
+
+#include <cstdint>
+
+namespace ricochet {
+
+/// Why a step was taken to hold no event.
+enum class Evidence : std::uint8_t {
+    proved,   ///< a bound or polynomial excludes a root
+    checked,  ///< the ends and the interior extremum were looked at
+    gated,    ///< a calibrated network skipped the check, within its miss rate
+    assumed,  ///< only the ends were looked at, or a bare network said so
+};
+
+/// How many steps were taken to be free of events, and on what evidence.
+struct EvidenceCounts {
+    std::uint64_t proved = 0;
+    std::uint64_t checked = 0;
+    std::uint64_t gated = 0;
+    std::uint64_t assumed = 0;
+
+    constexpr void add(Evidence evidence) noexcept
+    {
+        switch (evidence) {
+            case Evidence::proved: ++proved; return;
+            case Evidence::checked: ++checked; return;
+            case Evidence::gated: ++gated; return;
+            case Evidence::assumed: ++assumed; return;
+        }
+    }
+};
+
+/// Counts over one run.
+struct Statistics {
+    std::uint64_t steps = 0;          ///< accepted, also those cut short by an event
+    std::uint64_t rejected = 0;       ///< steps that failed the error test
+    std::uint64_t resteps = 0;        ///< steps repeated from their start to locate an event
+    std::uint64_t flow_calls = 0;     ///< evaluations of the flow, all purposes
+    std::uint64_t guard_calls = 0;    ///< evaluations of the guard, all purposes
+    std::uint64_t network_calls = 0;  ///< inferences
+    std::uint64_t false_alarms = 0;   ///< a network predicted an event and there was none
+    std::uint64_t late_events = 0;    ///< events that a network missed and a later step found
+    std::uint64_t events = 0;
+    EvidenceCounts evidence;
+};
+
+}  // namespace ricochet

@@ -1,0 +1,334 @@
+// One step of an explicit one-step method, taken as a departure from the tangent.
+//
+// With f0 = f(t0, x0), odeint integrates
+//
+//     w' = f(t0 + s, x0 + s f0 + w) - f0,    w(0) = 0,    x(t0 + s) = x0 + s f0 + w(s)
+//
+// which is the same Runge-Kutta step, since the rows of a tableau sum to its nodes,
+// but w is of second order in the step: the tableau's coefficients, which are
+// rounded and reach 11.6 in Dormand and Prince's, multiply only what departs from
+// the tangent. The state is carried as x0 + remainder, so that the rounding of the
+// final addition is not lost but joins the next increment, and errors of rounding
+// do not grow with the number of steps.
+//
+// Two steppers are kept: one advances, and its stages make the dense output; the
+// other repeats the step to inner times, so that asking never disturbs what is
+// being asked about.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+#include "ricochet/hybrid/instant.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/methods.hpp"
+
+namespace ricochet::detail {
+
+/// A vector like `x`, of zeros.
+template <class X>
+[[nodiscard]] X zeros_like(X x)
+{
+    const auto n = static_cast<std::size_t>(x.size());
+    for (std::size_t i = 0; i < n; ++i) {
+        x[i] = 0;
+    }
+    return x;
+}
+
+/// Whether every component is finite.
+template <class X>
+[[nodiscard]] bool all_finite(const X& x) noexcept
+{
+    const auto n = static_cast<std::size_t>(x.size());
+    double sum = 0;  // 0 * x is NaN where x is not finite
+    for (std::size_t i = 0; i < n; ++i) {
+        sum += 0 * x[i];
+    }
+    return sum == 0;
+}
+
+/// The step in progress. Fulfils `Step`.
+template <class Method, class System, StateVector X>
+class ExplicitStep {
+public:
+    using Stepper = typename Method::template Stepper<X>;
+
+    static_assert(!Multistep<Stepper>,
+                  "ricochet: a multistep method keeps a memory that an event makes stale; "
+                  "use a one-step method");
+
+    /// Places the step at (t, x) and evaluates the flow there.
+    ExplicitStep(const System& system, double t, const X& x)
+        : system_(&system),
+          start_{t, 0},
+          x0_(x),
+          remainder_(zeros_like(x)),
+          zero_(remainder_),
+          rate0_(remainder_),
+          w_(remainder_),
+          w_rate1_(remainder_),
+          x1_(x),
+          rate1_(remainder_),
+          error_(remainder_),
+          at_(remainder_),
+          unused_rate_(remainder_)
+    {
+        flow(0, x0_, rate0_);
+    }
+
+    [[nodiscard]] double time(double s) const noexcept { return start_.plus(s); }
+    [[nodiscard]] const Instant& start() const noexcept { return start_; }
+    [[nodiscard]] double h() const noexcept { return h_; }
+    [[nodiscard]] const X& x0() const noexcept { return x0_; }
+    [[nodiscard]] const X& x1() const noexcept { return x1_; }
+    [[nodiscard]] const X& rate0() const noexcept { return rate0_; }
+    [[nodiscard]] const X& rate1() const noexcept { return rate1_; }
+    [[nodiscard]] static constexpr int order() noexcept { return order_of<Stepper>(); }
+
+    /// x(t0 + s) on the dense output: the method's own where it has one, else the
+    /// cubic Hermite polynomial through both ends.
+    void interpolate(double s, X& x) const
+    {
+        if constexpr (has_dense_output) {
+            advancing_.calc_state(s, x, zero_, zero_, 0.0, w_, w_rate1_, h_);
+        } else {
+            const double u = s / h_;
+            const double slope = h_ * u * u * (u - 1);
+            const double rise = u * u * (3 - 2 * u);
+            for_components([&](std::size_t i) {
+                x[i] = rise * w_[i] + slope * (rate1_[i] - rate0_[i]);
+            });
+        }
+        add_tangent(s, x);
+    }
+
+    /// x(t0 + s) by the method's own step of length s from the start.
+    void restep(double s, X& x) const
+    {
+        ++resteps_;
+        advance<false>(probing_, s, x, unused_rate_, error_);
+        add_tangent(s, x);
+    }
+
+    /// x(t0 + s) as precisely as is cheap: dense output of the method's own order,
+    /// or a step of its own.
+    void sample(double s, X& x) const
+    {
+        if constexpr (has_dense_output) {
+            interpolate(s, x);
+        } else {
+            restep(s, x);
+        }
+    }
+
+    /// x(t0 + s) by the method's own step, and the flow there.
+    void restep(double s, X& x, X& dxdt) const
+    {
+        ++resteps_;
+        advance<false>(probing_, s, x, dxdt, error_);
+        add_tangent(s, x);
+        if constexpr (is_fsal<Stepper>) {
+            for_components([&](std::size_t i) { dxdt[i] += rate0_[i]; });
+        } else {
+            flow(s, x, dxdt);
+        }
+    }
+
+    /// x' = f(t0 + s, x).
+    void flow(double s, const X& x, X& dxdt) const
+    {
+        ++flow_calls_;
+        system_->flow(time(s), x, dxdt);
+    }
+
+    /// Takes a step of length h, without a look at its error.
+    void attempt(double h)
+    {
+        h_ = h;
+        advance<false>(advancing_, h, w_, w_rate1_, error_);
+        finish_attempt();
+    }
+
+    /// Takes a step of length h and returns its largest estimated error over
+    /// atol + rtol max(|x0|, |x1|); NaN if anything is not finite.
+    [[nodiscard]] double attempt(double h, double rtol, double atol)
+    {
+        static_assert(has_error_estimate<Stepper>,
+                      "ricochet: error control needs one of odeint's error steppers");
+        h_ = h;
+        advance<true>(advancing_, h, w_, w_rate1_, error_);
+        finish_attempt();
+
+        double worst = 0;
+        for_components([&](std::size_t i) {
+            const double size = std::max(std::fabs(x0_[i]), std::fabs(x1_[i]));
+            const double ratio = std::fabs(error_[i]) / (atol + rtol * size);
+            worst = worst >= ratio ? worst : ratio;  // NaN stays
+        });
+        return end_is_finite() ? worst : std::numeric_limits<double>::quiet_NaN();
+    }
+
+    /// Whether the end of the step and the flow there are finite.
+    [[nodiscard]] bool end_is_finite() const noexcept
+    {
+        return all_finite(x1_) && all_finite(rate1_);
+    }
+
+    /// The end of the step becomes the start of the next.
+    void accept() noexcept
+    {
+        start_ = start_.after(h_);
+        for_components([&](std::size_t i) {
+            const TwoSum sum =
+                two_sum(x0_[i], h_ * rate0_[i] + (w_[i] + remainder_[i]));
+            x0_[i] = sum.value;
+            remainder_[i] = sum.remainder;
+        });
+        rate0_ = rate1_;
+    }
+
+    /// As `accept`, where the end is the time `t` by decree.
+    void accept_at(double t) noexcept
+    {
+        accept();
+        start_ = {t, 0};
+    }
+
+    /// Moves the start of the step to offset s and state x, after an event.
+    void restart(double s, const X& x)
+    {
+        start_ = start_.after(s);
+        x0_ = x;
+        remainder_ = zero_;
+        flow(0, x0_, rate0_);
+    }
+
+    [[nodiscard]] std::uint64_t flow_calls() const noexcept { return flow_calls_; }
+    [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
+
+private:
+    static constexpr bool has_dense_output = requires(const Stepper& stepper, X& x) {
+        stepper.calc_state(0.0, x, x, x, 0.0, x, x, 0.0);
+    };
+
+    static constexpr bool fits_registers =
+        std::is_trivially_copyable_v<X> && sizeof(X) <= 8 * sizeof(double);
+
+    template <class Function>
+    void for_components(Function function) const
+    {
+        const auto n = static_cast<std::size_t>(x0_.size());
+        for (std::size_t i = 0; i < n; ++i) {
+            function(i);
+        }
+    }
+
+    /// What a step starts from.
+    struct Origin {
+        const System& system;
+        const Instant& start;
+        const X& x;
+        const X& rate;
+        const X& zero;
+    };
+
+    /// The departure w after a step of length s, with its rate there and the error
+    /// estimate where the method has them. `at` is scratch. Returns the flow calls.
+    template <bool with_error>
+    static std::uint64_t depart(Stepper& stepper, const Origin& from, double s, X& at, X& w,
+                                X& rate, X& error)
+    {
+        std::uint64_t calls = 0;
+        const auto n = static_cast<std::size_t>(from.x.size());
+        const auto flow = [&](const X& departure, X& departure_rate, double offset) {
+            for (std::size_t i = 0; i < n; ++i) {
+                at[i] = from.x[i] + (offset * from.rate[i] + departure[i]);
+            }
+            ++calls;
+            from.system.flow(from.start.plus(offset), at, departure_rate);
+            for (std::size_t i = 0; i < n; ++i) {
+                departure_rate[i] -= from.rate[i];
+            }
+        };
+        if constexpr (is_fsal<Stepper> && with_error) {
+            stepper.do_step(flow, from.zero, from.zero, 0.0, w, rate, s, error);
+        } else if constexpr (is_fsal<Stepper>) {
+            stepper.do_step(flow, from.zero, from.zero, 0.0, w, rate, s);
+        } else if constexpr (with_error) {
+            stepper.do_step(flow, from.zero, from.zero, 0.0, w, s, error);
+        } else if constexpr (requires { stepper.do_step(flow, w, w, 0.0, w, s); }) {
+            stepper.do_step(flow, from.zero, from.zero, 0.0, w, s);
+        } else if constexpr (requires { stepper.do_step(flow, w, 0.0, w, s); }) {
+            stepper.do_step(flow, from.zero, 0.0, w, s);
+        } else {
+            w = from.zero;
+            stepper.do_step(flow, w, 0.0, s);
+        }
+        return calls;
+    }
+
+    /// `depart` from the start of this step.
+    template <bool with_error>
+    [[gnu::flatten]] void advance(Stepper& stepper, double s, X& w, X& rate, X& error) const
+    {
+        if constexpr (fits_registers) {
+            // On copies that nothing else refers to, the compiler keeps a small
+            // state in registers from stage to stage.
+            Stepper own;
+            const X x = x0_;
+            const X rate0 = rate0_;
+            const X zero{};
+            X at{};
+            X w_own{};
+            X rate_own{};
+            X error_own{};
+            flow_calls_ += depart<with_error>(own, {*system_, start_, x, rate0, zero}, s, at,
+                                              w_own, rate_own, error_own);
+            w = w_own;
+            if constexpr (is_fsal<Stepper>) rate = rate_own;
+            if constexpr (with_error) error = error_own;
+            if constexpr (has_dense_output) {
+                if (&stepper == &advancing_) stepper = own;
+            }
+        } else {
+            flow_calls_ += depart<with_error>(stepper, {*system_, start_, x0_, rate0_, zero_}, s,
+                                              at_, w, rate, error);
+        }
+    }
+
+    /// From w to x at offset s.
+    void add_tangent(double s, X& w) const noexcept
+    {
+        for_components(
+            [&](std::size_t i) { w[i] = x0_[i] + (s * rate0_[i] + (w[i] + remainder_[i])); });
+    }
+
+    void finish_attempt()
+    {
+        x1_ = w_;
+        add_tangent(h_, x1_);
+        if constexpr (is_fsal<Stepper>) {
+            for_components([&](std::size_t i) { rate1_[i] = rate0_[i] + w_rate1_[i]; });
+        } else {
+            flow(h_, x1_, rate1_);
+        }
+    }
+
+    const System* system_;
+    Instant start_;
+    X x0_, remainder_, zero_, rate0_;
+    double h_ = 0;
+    X w_, w_rate1_, x1_, rate1_;
+    Stepper advancing_;
+    mutable Stepper probing_;
+    mutable X error_, at_, unused_rate_;
+    mutable std::uint64_t flow_calls_ = 0;
+    mutable std::uint64_t resteps_ = 0;
+};
+
+}  // namespace ricochet::detail

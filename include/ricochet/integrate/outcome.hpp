@@ -1,0 +1,24 @@
+// How a run ended.
+#pragma once
+
+#include <string_view>
+
+namespace ricochet {
+
+enum class Outcome {
+    reached_end,
+    stopped_by_event,
+    zeno,            ///< event times accumulate and the system has no rest rule
+    outside_mode,    ///< a reset left the state behind a unilateral guard
+    step_underflow,  ///< no step above h_min met the tolerance
+    step_limit,      ///< `Options::max_steps` steps were taken
+    non_finite,      ///< the flow, a guard or a reset returned NaN or infinity
+};
+
+/// The enumerator's name, e.g. "reached_end".
+[[nodiscard]] std::string_view name(Outcome outcome) noexcept;
+
+/// One sentence with the remedy, e.g. "step fell below h_min; loosen rtol".
+[[nodiscard]] std::string_view describe(Outcome outcome) noexcept;
+
+}  // namespace ricochet

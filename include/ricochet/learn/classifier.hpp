@@ -1,0 +1,125 @@
+// Training of a classifier that predicts whether a step meets an event surface.
+//
+// Binary cross entropy on logits, Adam, mini-batches, everything from one seed:
+// the same options and data give the same weights to the bit on one machine,
+// however many threads run. A miss is worse than a false alarm, so the decision
+// threshold is put below the logit of every event of a validation set.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/learn/adam.hpp"
+#include "ricochet/learn/assessment.hpp"
+#include "ricochet/learn/data_set.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet::learn {
+
+/// How a classifier is trained.
+struct TrainingOptions {
+    std::vector<std::size_t> hidden{16, 16};  ///< widths of the hidden layers
+    Activation activation = Activation::relu;
+    std::vector<double> offset{};  ///< per feature; empty: the mean of the training states
+    std::vector<double> scale{};   ///< per feature; empty: one over their standard deviation
+
+    std::size_t iterations = 20'000;
+    std::size_t batch = 256;   ///< states an iteration, half of them events
+    double rate = 3e-3;        ///< learning rate at the start, [1/iteration]
+    double final_rate = 1e-5;  ///< and at the end; half a cosine between them
+    Adam::Options adam{};
+
+    double hard_share = 0.5;        ///< of a batch, drawn from the hardest states
+    double hard_pool = 0.05;        ///< share of the training states that count as hardest
+    std::size_t hard_every = 1000;  ///< iterations between two searches for them
+
+    double test_share = 0.1;           ///< held out and never looked at in training
+    double validation_share = 0.1;     ///< of the rest; chooses weights and threshold
+    std::size_t evaluate_every = 500;  ///< iterations between two looks at the validation set
+    double logit_margin = 1;  ///< the threshold is at least that much below the lowest event
+    double gap_share = 0.5;   ///< and by that share of the gap down to the highest clear state
+    double cleared_at_least = 0.5;  ///< share of clear states a threshold must leave cleared
+
+    std::uint64_t seed = 1;
+    std::filesystem::path checkpoint{};   ///< written now and then and on stopping; empty: none
+    std::size_t checkpoint_every = 5000;  ///< iterations
+    bool resume = false;                  ///< continue from `checkpoint`
+};
+
+/// Where a training is; given at every look at the validation set.
+struct Progress {
+    std::size_t iteration = 0;
+    std::size_t total = 0;
+    double loss = 0;         ///< mean binary cross entropy on the validation set
+    std::size_t misses = 0;  ///< validation events with a negative logit
+    double seconds = 0;      ///< elapsed, earlier parts of a resumed training included
+};
+
+/// Draws a bar, or returns false to stop the training; the best so far is kept.
+using ProgressCallback = std::function<bool(const Progress&)>;
+
+/// How a training ended.
+enum class TrainingOutcome {
+    finished,       ///< all iterations; no event of the validation or test set is missed
+    stopped,        ///< by the callback; no event of these sets is missed by the best so far
+    misses_remain,  ///< no threshold catches every event and still clears enough states
+    diverged,       ///< the loss is not finite; the best before that is kept
+};
+
+/// One sentence with the remedy.
+[[nodiscard]] std::string_view describe(TrainingOutcome outcome) noexcept;
+
+/// What came out of a training. All figures are of the stored weights, rounded
+/// to float.
+struct Report {
+    TrainingOutcome outcome = TrainingOutcome::finished;
+    std::size_t iterations = 0;  ///< done
+    double seconds = 0;          ///< of training
+    std::size_t training_states = 0;
+    std::size_t band = 0;             ///< clear states drawn inside the margin and not trained on
+    Assessment validation;            ///< the set the threshold was chosen on
+    Assessment held_out;              ///< the test set
+    std::optional<Assessment> fresh;  ///< new balanced states, band included
+};
+
+struct Trained {
+    Model model;
+    Report report;
+
+    /// Whether no event was missed on any set of the report: the caller's ground
+    /// for storing the model or not.
+    [[nodiscard]] bool misses_none() const noexcept;
+};
+
+/// Trains a classifier on `data`.
+///
+/// The test set is held out first, then the validation set. The weights kept are
+/// those with the best score (misses, false alarms, loss) on the validation set
+/// at the threshold
+///
+///     lowest event - max(logit_margin, gap_share (lowest event - highest clear state)),
+///
+/// logits of the validation set, raised if necessary until `cleared_at_least` of the clear states
+/// are cleared: a network that always alarms has missed nothing and is no use. Events missed by
+/// then are reported as misses.
+///
+/// The model's domain is the range of the features in `data`. What the data
+/// cannot tell (system, parameters, recipe, step range) is left to the caller.
+///
+/// @throws std::invalid_argument if the data are inconsistent or lack a class, or
+///         an option is outside its range.
+/// @throws std::runtime_error if the checkpoint cannot be written or read, or
+///         belongs to other data or options.
+[[nodiscard]] Trained train(const DataSet& data, const TrainingOptions& options,
+                            const ProgressCallback& progress = {});
+
+/// The report as a JSON object.
+[[nodiscard]] std::string to_json(const Report& report);
+
+}  // namespace ricochet::learn

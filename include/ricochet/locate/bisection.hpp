@@ -1,0 +1,28 @@
+// Bisection on the step's own map: the plainest location, and the source paper's.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "ricochet/locate/location.hpp"
+
+namespace ricochet {
+
+/// Halves the bracket until it is no wider than the tolerance or its ends are
+/// neighbouring doubles. Only the side of the guard is used, so any guard will do.
+struct Bisection {
+    template <class Probe>
+    [[nodiscard]] Location locate(Probe& probe, GuardSample lo, GuardSample hi,
+                                  double tolerance) const
+    {
+        while (hi.s - lo.s > std::max(tolerance, probe.finest(hi.s))) {
+            const double middle = lo.s + (hi.s - lo.s) / 2;
+            if (middle <= lo.s || middle >= hi.s) break;
+            const GuardSample sample = probe.value(middle);
+            (probe.has_left(sample) ? hi : lo) = sample;
+        }
+        return {.lo = lo.s, .hi = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
+    }
+};
+
+}  // namespace ricochet

@@ -1,0 +1,46 @@
+// TOMS 748 from Boost.Math, for guards whose slope is not to be had.
+#pragma once
+
+#include <boost/math/tools/toms748_solve.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "ricochet/locate/location.hpp"
+
+namespace ricochet {
+
+/// Inverse cubic interpolation on the values alone (Alefeld, Potra and Shi, ACM
+/// Transactions on Mathematical Software 21, 1995).
+struct Toms748 {
+    template <class Probe>
+    [[nodiscard]] Location locate(Probe& probe, GuardSample lo, GuardSample hi,
+                                  double tolerance) const
+    {
+        const auto narrow_enough = [&](double a, double b) {
+            const double middle = a + (b - a) / 2;
+            return b - a <= std::max(tolerance, probe.finest(b)) || middle <= a || middle >= b;
+        };
+        const auto sample_at = [&](double s) {
+            const GuardSample sample = probe.value(s);
+            if (probe.has_left(sample)) {
+                if (s < hi.s) hi = sample;
+            } else if (s > lo.s) {
+                lo = sample;
+            }
+            return sample.value;
+        };
+        // A step that begins on the surface has no sign there: halve until it has.
+        while (lo.value == 0 && !narrow_enough(lo.s, hi.s)) {
+            (void)sample_at(lo.s + (hi.s - lo.s) / 2);
+        }
+        if (hi.value != 0 && !narrow_enough(lo.s, hi.s)) {
+            std::uintmax_t iterations = 200;
+            boost::math::tools::toms748_solve(sample_at, lo.s, hi.s, lo.value, hi.value,
+                                              narrow_enough, iterations);
+        }
+        return {.lo = lo.s, .hi = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
+    }
+};
+
+}  // namespace ricochet

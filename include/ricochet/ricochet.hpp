@@ -1,0 +1,20 @@
+// Everything needed to run a hybrid system. Training is in `ricochet/learn/`.
+#pragma once
+
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/features.hpp"
+#include "ricochet/detect/network.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/step.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/run.hpp"
+#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/toms748.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"

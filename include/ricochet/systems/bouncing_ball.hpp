@@ -1,0 +1,90 @@
+// The bouncing ball, the first example of every text on hybrid systems.
+#pragma once
+
+#include <array>
+
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet {
+
+/// A point mass falling onto a rigid floor at height 0.
+///
+/// State x = (height u [m], velocity v [m/s]); one mode, one transition.
+///
+///     flow    x' = (v, -gravity)
+///     guard   u, falling
+///     reset   u⁺ = 0,  v⁺ = -restitution v⁻
+///
+/// (Saunders, Steyer and Kuether, SAND2023-06682C, eqs. 1 and 2.) For 0 <
+/// restitution < 1 the impacts accumulate at `zeno_time`. Functions are generic
+/// in the state type.
+class BouncingBall {
+public:
+    using State = std::array<double, 2>;
+
+    struct Parameters {
+        double gravity = 9.81;     ///< [m/s²], positive
+        double restitution = 0.9;  ///< Newton's coefficient, in [0, 1]
+    };
+
+    /// The source paper's ball.
+    BouncingBall() : BouncingBall(Parameters{}) {}
+
+    /// @throws std::invalid_argument if a parameter is outside its range.
+    explicit BouncingBall(const Parameters& parameters);
+
+    [[nodiscard]] double gravity() const noexcept { return gravity_; }
+    [[nodiscard]] double restitution() const noexcept { return restitution_; }
+
+    /// The floor bounds the motion.
+    static constexpr bool unilateral = true;
+
+    template <class X>
+    void flow(double /*t*/, const X& x, X& dxdt) const noexcept
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -gravity_;
+    }
+
+    template <class X>
+    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    {
+        return x[0];
+    }
+
+    template <class X>
+    [[nodiscard]] double guard_rate(double /*t*/, const X& /*x*/, const X& dxdt) const noexcept
+    {
+        return dxdt[0];
+    }
+
+    /// d2g/dt2 along the flow [m/s²].
+    template <class X>
+    [[nodiscard]] double guard_curvature(double /*t*/, const X& /*x*/) const noexcept
+    {
+        return -gravity_;
+    }
+
+    template <class X>
+    void reset(double /*t*/, X& x) const noexcept
+    {
+        x[0] = 0;
+        x[1] *= -restitution_;
+    }
+
+    /// Time [s] from `height` [m] >= 0 and `velocity` [m/s] to the first impact.
+    [[nodiscard]] double first_impact(double height, double velocity = 0) const noexcept;
+
+    /// Time [s] of impact n = 0, 1, 2, ... from the same start: each flight is
+    /// `restitution` times the one before.
+    [[nodiscard]] double impact_time(int n, double height, double velocity = 0) const noexcept;
+
+    /// Limit [s] of the impact times; infinite for restitution 1.
+    [[nodiscard]] double zeno_time(double height, double velocity = 0) const noexcept;
+
+private:
+    double gravity_;
+    double restitution_;
+};
+
+}  // namespace ricochet

@@ -1,0 +1,23 @@
+// `ricochet compare`: every detector on one system, against the exact event times.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace ricochet::app {
+
+struct CompareRequest {
+    std::string system{};
+    bool json = false;
+    std::optional<std::filesystem::path> csv{};
+};
+
+/// Prints the event times of every method beside the exact ones, then what each
+/// method made of them and what it cost. The answers are checked before the clock
+/// counts.
+/// @return 0 if every method found every event, else 1.
+/// @throws BadInput or ModelError before anything is printed or written.
+int compare(const CompareRequest& request);
+
+}  // namespace ricochet::app

@@ -1,0 +1,59 @@
+#include "input.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+namespace ricochet::app {
+
+BadInput unknown(std::string_view what, std::string_view given,
+                 const std::vector<std::string_view>& known)
+{
+    return BadInput(fmt::format("unknown {} '{}'; known {} {}", what, given,
+                                known.size() == 1 ? "is" : "are", fmt::join(known, ", ")));
+}
+
+double number(std::string_view option, std::string_view text)
+{
+    std::string_view digits = text;
+    if (digits.starts_with('+')) digits.remove_prefix(1);
+    double value = 0;
+    const char* const end = digits.data() + digits.size();
+    const auto [stop, error] = std::from_chars(digits.data(), end, value);
+    const bool out_of_range = error == std::errc::result_out_of_range;
+    if (stop != end || digits.empty() || (error != std::errc() && !out_of_range)) {
+        throw BadInput(fmt::format("{} must be a number, got '{}'", option, text));
+    }
+    if (out_of_range || !std::isfinite(value)) {
+        throw BadInput(fmt::format("{} must be a finite number, got {}", option, text));
+    }
+    return value;
+}
+
+std::uint64_t whole_number(std::string_view option, std::string_view text, std::uint64_t lowest,
+                           std::uint64_t highest)
+{
+    std::uint64_t value = 0;
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (stop != end || error != std::errc() || value < lowest || value > highest) {
+        throw BadInput(fmt::format("{} must be a whole number from {} to {}, got '{}'", option,
+                                   lowest, highest, text));
+    }
+    return value;
+}
+
+Assignment assignment(std::string_view option, std::string_view text)
+{
+    const std::size_t equals = text.find('=');
+    if (equals == std::string_view::npos || equals == 0) {
+        throw BadInput(fmt::format("{} must be name=value, got '{}'", option, text));
+    }
+    const std::string name(text.substr(0, equals));
+    return {.name = name, .value = number(name, text.substr(equals + 1))};
+}
+
+}  // namespace ricochet::app

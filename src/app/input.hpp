@@ -1,0 +1,42 @@
+// What the user typed, read strictly: one sentence names what was given and what
+// was expected.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace ricochet::app {
+
+/// Input that cannot be right. Ends the command with status 2, nothing written.
+class BadInput : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+/// "unknown `what` 'given'; known are ..."
+[[nodiscard]] BadInput unknown(std::string_view what, std::string_view given,
+                               const std::vector<std::string_view>& known);
+
+/// The finite number that `text` spells.
+/// @throws BadInput naming the option.
+[[nodiscard]] double number(std::string_view option, std::string_view text);
+
+/// The whole number that `text` spells, in [lowest, highest].
+/// @throws BadInput naming the option.
+[[nodiscard]] std::uint64_t whole_number(std::string_view option, std::string_view text,
+                                         std::uint64_t lowest, std::uint64_t highest);
+
+/// "name=value" taken apart.
+struct Assignment {
+    std::string name;
+    double value = 0;
+};
+
+/// @throws BadInput unless `text` is name=value with a finite value.
+[[nodiscard]] Assignment assignment(std::string_view option, std::string_view text);
+
+}  // namespace ricochet::app

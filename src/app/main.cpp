@@ -1,0 +1,236 @@
+// The command line `ricochet`.
+//
+// Exit status: 0 fine; 1 a run or training that ended otherwise than hoped (its
+// result is printed all the same) or a file that could not be written in the end;
+// 2 bad input: one sentence on standard error, nothing printed, nothing written.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "compare.hpp"
+#include "files.hpp"
+#include "input.hpp"
+#include "report.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "simulate.hpp"
+#include "systems.hpp"
+#include "train.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+/// An option with a finite number.
+void add_number(CLI::App& command, const std::string& option, std::optional<double>& out,
+                const std::string& value, const std::string& help)
+{
+    command
+        .add_option_function<std::string>(
+            option, [&out, option](const std::string& text) { out = number(option, text); }, help)
+        ->type_name(value);
+}
+
+/// An option with a whole number in [lowest, highest].
+template <class Number>
+void add_whole_number(CLI::App& command, const std::string& option, std::optional<Number>& out,
+                      std::uint64_t lowest, std::uint64_t highest, const std::string& help)
+{
+    command
+        .add_option_function<std::string>(
+            option,
+            [&out, option, lowest, highest](const std::string& text) {
+                out = whole_number(option, text, lowest, highest);
+            },
+            help)
+        ->type_name("N");
+}
+
+template <class Text>
+CLI::Option* add_text(CLI::App& command, const std::string& option, std::optional<Text>& out,
+                      const std::string& value, const std::string& help)
+{
+    return command
+        .add_option_function<std::string>(
+            option, [&out](const std::string& text) { out = text; }, help)
+        ->type_name(value);
+}
+
+void add_system(CLI::App& command, std::string& out)
+{
+    command.add_option("SYSTEM", out, "its name; `ricochet systems` lists them")
+        ->required()
+        ->type_name("");
+}
+
+void add_systems(CLI::App& app, int& status)
+{
+    CLI::App& command = *app.add_subcommand("systems", "List the systems and their parameters");
+    auto json = std::make_shared<bool>(false);
+    command.add_flag("--json", *json, "print JSON");
+    command.footer("Example:\n  ricochet systems");
+    command.callback([&status, json] { status = list_systems(*json); });
+}
+
+void add_simulate(CLI::App& app, int& status)
+{
+    CLI::App& command = *app.add_subcommand("simulate", "Run a system and print its events");
+    auto request = std::make_shared<SimulateRequest>();
+    RunRequest& run = request->run;
+    add_system(command, request->system);
+    command.add_option("--set", run.set, "a parameter of the system; may be repeated")
+        ->type_name("name=value ...");
+    add_number(command, "--t-start", run.t_start, "T", "time at the start [s], default 0");
+    add_number(command, "--t-end", run.t_end, "T", "time at the end [s], default: the system's");
+    add_text(command, "--detector", run.detector, "NAME", "ends, extremum (default) or network");
+    add_text(command, "--model", run.model, "FILE",
+             "network to use, by path or name; default: one that suits");
+    add_text(command, "--locator", run.locator, "NAME", "newton (default), bisection or toms748");
+    add_text(command, "--stepper", run.stepper, "NAME",
+             "rk4 (default with --step), dopri5 (default without), fehlberg78, cash-karp54 or "
+             "euler");
+    add_number(command, "--step", run.step, "H", "take fixed steps of H [s]");
+    add_number(command, "--rtol", run.rtol, "R", "relative error allowed in a step, default 1e-8");
+    add_number(command, "--atol", run.atol, "A", "absolute error allowed in a step, default 1e-10");
+    add_number(command, "--event-tolerance", run.event_tolerance, "T",
+               "width to which events are located [s], default: neighbouring doubles");
+    add_whole_number(command, "--samples", request->samples, 2, 10'000'000,
+                     "points of the trajectory in --json, --csv and --plot, default 1001");
+    command.add_flag("--json", request->json, "print JSON");
+    add_text(command, "--csv", request->csv, "FILE", "write the sampled trajectory");
+    add_text(command, "--plot", request->plot, "FILE", "draw it with gnuplot, as .svg or .png");
+    command.footer(
+        "Examples:\n"
+        "  ricochet simulate bouncing-ball --set restitution=0.8 --plot ball.svg\n"
+        "  ricochet simulate bouncing-ball --detector network --step 0.01 --json");
+    command.callback([&status, request] { status = simulate(*request); });
+}
+
+void add_train(CLI::App& app, int& status)
+{
+    CLI::App& command = *app.add_subcommand("train", "Train a network that predicts events");
+    auto request = std::make_shared<TrainRequest>();
+    TrainingRequest& training = request->training;
+    add_system(command, request->system);
+    command.add_option("--out", request->out, "the model, a .safetensors file")
+        ->required()
+        ->type_name("FILE");
+    command
+        .add_option("--kind", training.kind,
+                    "fixed-step (default; as in the paper, for one step) or any-step "
+                    "(dimensionless, for all)")
+        ->type_name("NAME");
+    command.add_option("--set", training.set, "gravity or height of a fixed-step network")
+        ->type_name("name=value ...");
+    add_number(command, "--step", training.step, "H", "step [s] of a fixed-step network");
+    add_whole_number(command, "--seed", training.seed, 0, std::numeric_limits<std::uint64_t>::max(),
+                     "of sampling and training");
+    add_whole_number(command, "--iterations", training.iterations, 1, 1'000'000'000,
+                     "of the training");
+    add_whole_number(command, "--states", training.states, 100, 100'000'000,
+                     "sampled for training and testing");
+    add_whole_number(command, "--fresh", training.fresh_events, 1, 100'000'000,
+                     "fresh events for the report");
+    command
+        .add_option("--checkpoint", training.checkpoint,
+                    "where an interrupted training is kept, default FILE.checkpoint")
+        ->type_name("FILE");
+    command.add_flag("--resume", training.resume, "go on from the checkpoint");
+    command.add_flag("--allow-misses", request->allow_misses,
+                     "write the model even if it misses events");
+    command.add_flag("--json", request->json, "print the report as JSON");
+    command.footer("Example:\n  ricochet train bouncing-ball --out ball.safetensors");
+    command.callback([&status, request] { status = train(*request); });
+}
+
+void add_compare(CLI::App& app, int& status)
+{
+    CLI::App& command =
+        *app.add_subcommand("compare", "Compare the detectors with the exact event times");
+    auto request = std::make_shared<CompareRequest>();
+    add_system(command, request->system);
+    command.add_flag("--json", request->json, "print JSON");
+    add_text(command, "--csv", request->csv, "FILE", "write the event times");
+    command.footer("Example:\n  ricochet compare bouncing-ball");
+    command.callback([&status, request] { status = compare(*request); });
+}
+
+/// A first word that is no command gets a sentence of its own.
+void check_command(const CLI::App& app, int count, char** arguments)
+{
+    std::vector<std::string> names;
+    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+    const std::vector<std::string_view> known(names.begin(), names.end());
+    if (count < 2) {
+        throw BadInput(fmt::format("a command is needed, one of {}; --help tells more",
+                                   fmt::join(known, ", ")));
+    }
+    const std::string first = arguments[1];
+    if (first.starts_with('-')) return;
+    if (std::find(names.begin(), names.end(), first) == names.end()) {
+        throw unknown("command", first, known);
+    }
+}
+
+int run(int count, char** arguments)
+{
+    CLI::App app("Simulate hybrid systems: smooth motion, events, resets", "ricochet");
+    app.set_version_flag("--version", "ricochet " RICOCHET_VERSION);
+    app.require_subcommand(1);
+    app.footer(
+        "Example:\n  ricochet simulate bouncing-ball\n\n"
+        "Exit status: 0 fine, 1 a run that ended early or a file that could not be written,\n"
+        "2 bad input.");
+    int status = 0;
+    add_systems(app, status);
+    add_simulate(app, status);
+    add_train(app, status);
+    add_compare(app, status);
+
+    check_command(app, count, arguments);
+    try {
+        app.parse(count, arguments);
+    } catch (const CLI::Success& success) {  // --help, --version
+        return app.exit(success);
+    } catch (const CLI::ParseError& error) {
+        throw BadInput(error.what());
+    }
+    return status;
+}
+
+int fail(int status, std::string_view sentence)
+{
+    fmt::print(stderr, "ricochet: {}\n", sentence);
+    return status;
+}
+
+}  // namespace
+
+}  // namespace ricochet::app
+
+int main(int count, char** arguments)
+{
+    using namespace ricochet::app;
+    try {
+        return run(count, arguments);
+    } catch (const BadInput& error) {
+        return fail(2, error.what());
+    } catch (const ricochet::ModelError& error) {
+        return fail(2, error.what());
+    } catch (const std::invalid_argument& error) {
+        return fail(2, error.what());
+    } catch (const std::exception& error) {
+        return fail(1, error.what());
+    }
+}

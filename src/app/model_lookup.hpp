@@ -1,0 +1,34 @@
+// Where models are, and which one suits a run.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ricochet/nn/model.hpp"
+#include "settings.hpp"
+
+namespace ricochet::app {
+
+struct FoundModel {
+    std::filesystem::path file;
+    Model model;
+};
+
+/// Directories with models: beside the program, as ../share/ricochet/models (so in
+/// a build and in an installed tree), then under the prefix of the installation.
+[[nodiscard]] std::vector<std::filesystem::path> model_directories();
+
+/// The model that the user named: a path, or a name in one of the directories, with
+/// or without its extension.
+/// @throws BadInput or ModelError if it is not there, is no model, or does not suit
+///         the system, its parameters or the stepping.
+[[nodiscard]] FoundModel named_model(const SystemEntry& system, const RunSettings& settings,
+                                     const std::string& given);
+
+/// The first of the system's own models that suits its parameters, start and
+/// stepping.
+/// @throws BadInput saying why each does not.
+[[nodiscard]] FoundModel suitable_model(const SystemEntry& system, const RunSettings& settings);
+
+}  // namespace ricochet::app

@@ -1,0 +1,215 @@
+#include "plot.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <system_error>
+
+#include "files.hpp"
+#include "input.hpp"
+#include "report.hpp"
+
+extern char** environ;
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+using PlainRun = Run<std::vector<double>>;
+
+/// A text in gnuplot's single quotes, where nothing but the quote is special.
+std::string single_quoted(std::string_view text)
+{
+    std::string out = "'";
+    for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
+    return out + '\'';
+}
+
+/// t, x; the flights between events are separated by blank lines.
+std::string flights(const SystemEntry& system, const PlainRun& run)
+{
+    std::string out;
+    for (const Row& row : rows(system, run)) {
+        if (row.event.starts_with("after")) out += '\n';
+        out += fmt::format("{} {}\n", row.t, fmt::join(row.x, " "));
+    }
+    return out;
+}
+
+/// t, x before and t, x after of each event, separated by blank lines.
+std::string jumps(const PlainRun& run)
+{
+    std::string out;
+    for (const auto& event : run.events) {
+        out += fmt::format("{0} {1}\n{0} {2}\n\n", event.t, fmt::join(event.before, " "),
+                           fmt::join(event.after, " "));
+    }
+    return out;
+}
+
+/// t, x after of each event.
+std::string marks(const PlainRun& run)
+{
+    std::string out;
+    for (const auto& event : run.events) {
+        out += fmt::format("{} {}\n", event.t, fmt::join(event.after, " "));
+    }
+    return out;
+}
+
+/// Whether component i jumps by more than a rounding at some event.
+bool jumps_in(const PlainRun& run, std::size_t i)
+{
+    double size = 0;
+    double jump = 0;
+    for (const auto& event : run.events) {
+        size = std::max({size, std::fabs(event.before[i]), std::fabs(event.after[i])});
+        jump = std::max(jump, std::fabs(event.after[i] - event.before[i]));
+    }
+    for (const auto& x : run.trajectory.x) size = std::max(size, std::fabs(x[i]));
+    return jump > 1e-6 * size;
+}
+
+std::string script(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,
+                   bool svg)
+{
+    const std::size_t panels = system.state.size();
+    const std::size_t height = 100 + 320 * panels;
+    const std::string_view event = system.guards.empty() ? "event" : system.guards.front().event;
+
+    std::string out = "set encoding utf8\n";
+    out +=
+        svg ? fmt::format(
+                  "set terminal svg noenhanced size 1200,{} font 'sans-serif,15' "
+                  "background rgb 'white'\n",
+                  height)
+            : fmt::format("set terminal pngcairo noenhanced size 1200,{} font 'Sans,13'\n", height);
+    out += fmt::format(
+        "set output 'plot'\n"
+        "set multiplot layout {},1 title {}.\"\\n\"\n"
+        "set grid linecolor rgb '#d8d8d8' linetype 1\n"
+        "set border 3 linecolor rgb '#404040'\n"
+        "set tics nomirror out\n"
+        "set lmargin 11\n"
+        "set rmargin 3\n"
+        "set tmargin 2.5\n"
+        "set key outside top right horizontal Left reverse samplen 2.5\n"
+        "set offsets graph 0, graph 0, graph 0.06, graph 0.06\n",
+        panels, single_quoted(title(system, settings)));
+    if (run.t > settings.options.t_start) {
+        out += fmt::format("set xrange [{}:{}]\n", settings.options.t_start, run.t);
+    }
+    for (std::size_t i = 0; i < panels; ++i) {
+        const Component& component = system.state[i];
+        const std::size_t column = i + 2;
+        if (i + 1 == panels) out += "set xlabel 'time t [s]'\n";
+        out += fmt::format("set ylabel {}\n",
+                           single_quoted(fmt::format("{} {} [{}]", component.meaning,
+                                                     component.name, component.unit)));
+        std::vector<std::string> curves{
+            fmt::format("'flights' using 1:{} with lines linewidth 2 linecolor rgb '#1f5fa8' "
+                        "title {}",
+                        column, single_quoted(component.name))};
+        if (!run.events.empty()) {
+            if (jumps_in(run, i)) {
+                curves.push_back(
+                    fmt::format("'jumps' using 1:{} with lines linewidth 1.2 dashtype 2 "
+                                "linecolor rgb '#d1495b' notitle",
+                                column));
+                curves.push_back(fmt::format(
+                    "'jumps' using 1:{} with points pointtype 7 pointsize 0.7 linecolor rgb "
+                    "'#d1495b' title {}",
+                    column, single_quoted(fmt::format("{}: before and after", event))));
+            } else {
+                curves.push_back(
+                    fmt::format("'marks' using 1:{} with points pointtype 7 pointsize "
+                                "0.9 linecolor rgb '#d1495b' title {}",
+                                column, single_quoted(event)));
+            }
+        }
+        out += fmt::format("plot {}\n", fmt::join(curves, ", \\\n     "));
+    }
+    return out + "unset multiplot\nunset output\n";
+}
+
+std::string content(const fs::path& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Runs gnuplot on `script` in `directory`; what it says goes to the file `messages`.
+void run_gnuplot(const fs::path& directory)
+{
+    const std::string program = "gnuplot";
+    const std::string messages = (directory / "messages").string();
+    // The script's own names are relative; the script changes to where they are.
+    std::string no_settings = "--default-settings";
+    std::string file = (directory / "script").string();
+    std::array<char*, 4> arguments{const_cast<char*>(program.c_str()), no_settings.data(),
+                                   file.data(), nullptr};
+
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, 1, messages.c_str(), O_WRONLY | O_CREAT, 0600);
+    posix_spawn_file_actions_adddup2(&actions, 1, 2);
+    pid_t child = 0;
+    const int error =
+        posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) {
+        throw WriteError(error == ENOENT
+                             ? std::string("the plot needs gnuplot, which was not found; "
+                                           "get it with: apt-get install gnuplot-nox")
+                             : "gnuplot cannot be run: " + std::generic_category().message(error));
+    }
+    int status = 0;
+    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+        std::string said = content(messages);
+        std::replace(said.begin(), said.end(), '\n', ' ');
+        throw WriteError(fmt::format("gnuplot failed: {}", said));
+    }
+}
+
+}  // namespace
+
+void check_plot(const fs::path& file)
+{
+    if (file.extension() != ".svg" && file.extension() != ".png") {
+        throw BadInput(
+            fmt::format("--plot must be a file ending in .svg or .png, got '{}'", file.string()));
+    }
+    check_writable("--plot", file);
+}
+
+void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,
+          const fs::path& file)
+{
+    const TemporaryDirectory directory;
+    const fs::path& path = directory.path();
+    write_file(path / "flights", flights(system, run));
+    write_file(path / "jumps", jumps(run));
+    write_file(path / "marks", marks(run));
+    write_file(path / "script", fmt::format("cd {}\n", single_quoted(path.string())) +
+                                    script(system, settings, run, file.extension() == ".svg"));
+    run_gnuplot(path);
+    const std::string drawing = content(path / "plot");
+    if (drawing.empty()) throw WriteError("gnuplot drew nothing");
+    write_file(file, drawing);
+}
+
+}  // namespace ricochet::app

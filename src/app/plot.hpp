@@ -1,0 +1,22 @@
+// Plots of a run, drawn by gnuplot.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "registry.hpp"
+
+namespace ricochet::app {
+
+/// @throws BadInput unless `file` ends in .svg or .png and can be written.
+void check_plot(const std::filesystem::path& file);
+
+/// Draws every component of the state against time, broken at the events, which
+/// are marked. gnuplot runs as a child process, without a shell, in a temporary
+/// directory; nothing the user typed becomes part of its script.
+///
+/// @throws WriteError if there is no gnuplot (saying how to get it), or it fails.
+void plot(const SystemEntry& system, const RunSettings& settings,
+          const Run<std::vector<double>>& run, const std::filesystem::path& file);
+
+}  // namespace ricochet::app

@@ -1,0 +1,40 @@
+#include "registry.hpp"
+
+#include <fmt/format.h>
+
+#include "input.hpp"
+#include "systems/entries.hpp"
+
+namespace ricochet::app {
+
+bool Range::contains(double value) const noexcept
+{
+    return (lower_included ? value >= lower : value > lower) &&
+           (upper_included ? value <= upper : value < upper);
+}
+
+std::string to_string(const Range& range)
+{
+    return fmt::format("{}{}, {}{}", range.lower_included ? '[' : '(', range.lower, range.upper,
+                       range.upper_included ? ']' : ')');
+}
+
+const std::vector<SystemEntry>& systems()
+{
+    static const std::vector<SystemEntry> all{
+        bouncing_ball_entry(),
+    };
+    return all;
+}
+
+const SystemEntry& find_system(std::string_view name)
+{
+    std::vector<std::string_view> known;
+    for (const SystemEntry& system : systems()) {
+        if (system.name == name) return system;
+        known.push_back(system.name);
+    }
+    throw unknown("system", name, known);
+}
+
+}  // namespace ricochet::app

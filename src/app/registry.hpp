@@ -1,0 +1,124 @@
+// The systems that the command line knows, as values.
+//
+// A system is added by one file in systems/ that defines its entry, and one line in
+// registry.cpp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/integrate/run.hpp"
+#include "ricochet/learn/classifier.hpp"
+#include "settings.hpp"
+
+namespace ricochet::app {
+
+/// The values that a parameter may have.
+struct Range {
+    double lower = -std::numeric_limits<double>::infinity();
+    double upper = std::numeric_limits<double>::infinity();
+    bool lower_included = false;
+    bool upper_included = false;
+
+    [[nodiscard]] bool contains(double value) const noexcept;
+};
+
+/// "[0, 1]", "(0, inf)"
+[[nodiscard]] std::string to_string(const Range& range);
+
+struct Parameter {
+    std::string_view name;
+    double initial;         ///< what it is when nobody sets it
+    std::string_view unit;  ///< "1" where it has none
+    Range range;
+    std::string_view meaning;
+};
+
+struct Component {
+    std::string_view name;
+    std::string_view unit;
+    std::string_view meaning;
+};
+
+/// A guard, and what happens on its surface.
+struct GuardLabel {
+    std::string_view name;   ///< "floor"
+    std::string_view event;  ///< "impact"
+};
+
+/// A run whatever the system's state type, and how long it took.
+struct TimedRun {
+    Run<std::vector<double>> run;
+    double seconds = 0;  ///< of wall time, per run
+};
+
+/// What a training is asked for. What is absent has the library's default.
+struct TrainingRequest {
+    std::string kind;                ///< one of the system's
+    std::vector<std::string> set{};  ///< name=value
+    std::optional<double> step{};    ///< [s]
+    std::optional<std::size_t> states{}, fresh_events{}, iterations{};
+    std::optional<std::uint64_t> seed{};
+    std::filesystem::path checkpoint{};
+    bool resume = false;
+};
+
+/// A kind of classifier that can be trained for a system.
+struct TrainingKind {
+    std::string_view name;
+    std::string_view other_name;
+    std::string_view meaning;
+};
+
+/// The networks of a system; the first kind is the default.
+struct Training {
+    std::vector<TrainingKind> kinds;
+    learn::Trained (*train)(const TrainingRequest& request,
+                            const learn::ProgressCallback& progress);
+};
+
+/// Event times that somebody printed, for the default parameters.
+struct Published {
+    std::string_view name;
+    std::string_view source;
+    std::vector<double> times;  ///< [s]
+};
+
+struct SystemEntry {
+    std::string_view name;
+    std::string_view description;  ///< one sentence
+    std::vector<Parameter> parameters;
+    std::vector<Component> state;
+    std::vector<GuardLabel> guards;
+    double t_end;  ///< [s] default
+
+    /// The start that these parameters give.
+    std::vector<double> (*start)(const std::vector<double>& parameters);
+
+    /// Runs it `repeats` times over; the runs are alike and the last is returned.
+    TimedRun (*run)(const RunSettings& settings, int repeats);
+
+    /// Models that come with the library, the more special before the more general.
+    std::vector<std::string_view> models{};
+
+    /// Exact event times [s] up to a time, for comparison; none known: null.
+    std::vector<double> (*exact_events)(const std::vector<double>& parameters,
+                                        double t_end) = nullptr;
+    std::vector<Published> published{};
+    double comparison_step = 0;  ///< [s] of the fixed steps in a comparison
+
+    std::optional<Training> training{};
+};
+
+[[nodiscard]] const std::vector<SystemEntry>& systems();
+
+/// @throws BadInput naming the systems there are.
+[[nodiscard]] const SystemEntry& find_system(std::string_view name);
+
+}  // namespace ricochet::app

@@ -1,0 +1,213 @@
+#include "report.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cstdio>
+
+#include "files.hpp"
+#include "json_text.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+using PlainRun = Run<std::vector<double>>;
+
+std::string_view name(EventKind kind)
+{
+    switch (kind) {
+        case EventKind::crossing: break;
+    }
+    return "crossing";
+}
+
+Json json(const SystemEntry& system, const Event<std::vector<double>>& event)
+{
+    return {{"t", event.t},
+            {"guards", Json::array({system.guards.at(event.guard).name})},
+            {"kind", name(event.kind)},
+            {"state_before", event.before},
+            {"state_after", event.after},
+            {"bracket", Json::array({event.bracket.lo, event.bracket.hi})},
+            {"slope", event.slope},
+            {"error", event.error},
+            {"late", event.late}};
+}
+
+Json json(const Statistics& s)
+{
+    return {{"steps", s.steps},
+            {"rejected", s.rejected},
+            {"resteps", s.resteps},
+            {"flow_calls", s.flow_calls},
+            {"guard_calls", s.guard_calls},
+            {"network_calls", s.network_calls},
+            {"false_alarms", s.false_alarms},
+            {"late_events", s.late_events},
+            {"evidence",
+             {{"proved", s.evidence.proved},
+              {"checked", s.evidence.checked},
+              {"gated", s.evidence.gated},
+              {"assumed", s.evidence.assumed}}}};
+}
+
+std::string with_unit(double value, std::string_view unit)
+{
+    return unit == "1" ? fmt::format("{}", value) : fmt::format("{} {}", value, unit);
+}
+
+/// "u [m]"
+std::string label(const Component& component)
+{
+    return fmt::format("{} [{}]", component.name, component.unit);
+}
+
+std::string events_table(const SystemEntry& system, const PlainRun& run)
+{
+    constexpr int wide = 24;
+    const bool any_late = run.statistics.late_events > 0;
+    std::string out = fmt::format("{:>4}  {:<8}{:>{}}", "", "guard", "t [s]", wide - 2);
+    for (const char* side : {"before", "after"}) {
+        for (const Component& component : system.state) {
+            out += fmt::format("{:>{}}", fmt::format("{} {}", label(component), side), wide);
+        }
+    }
+    out += '\n';
+    for (std::size_t i = 0; i < run.events.size(); ++i) {
+        const auto& event = run.events[i];
+        out += fmt::format("{:>4}  {:<8}{:>{}}", i + 1, system.guards.at(event.guard).name, event.t,
+                           wide - 2);
+        for (const auto* x : {&event.before, &event.after}) {
+            for (const double value : *x) out += fmt::format("{:>{}}", value, wide);
+        }
+        out += any_late && event.late ? "  late\n" : "\n";
+    }
+    return out;
+}
+
+}  // namespace
+
+std::vector<Row> rows(const SystemEntry& system, const PlainRun& run)
+{
+    std::vector<Row> out;
+    std::size_t sample = 0;
+    const auto samples_before = [&](double t) {
+        for (; sample < run.trajectory.t.size() && run.trajectory.t[sample] < t; ++sample) {
+            out.push_back({.t = run.trajectory.t[sample], .x = run.trajectory.x[sample]});
+        }
+    };
+    for (const auto& event : run.events) {
+        samples_before(event.t);
+        const std::string_view guard = system.guards.at(event.guard).name;
+        out.push_back({event.t, event.before, fmt::format("before {}", guard)});
+        out.push_back({event.t, event.after, fmt::format("after {}", guard)});
+    }
+    samples_before(std::numeric_limits<double>::infinity());
+    if (out.empty() || out.back().t < run.t) out.push_back({.t = run.t, .x = run.x});
+    return out;
+}
+
+std::string title(const SystemEntry& system, const RunSettings& settings)
+{
+    std::vector<std::string> parts;
+    for (std::size_t i = 0; i < system.parameters.size(); ++i) {
+        parts.push_back(fmt::format("{} {}", system.parameters[i].name,
+                                    with_unit(settings.parameters[i], system.parameters[i].unit)));
+    }
+    return fmt::format("{}: {}", system.name, fmt::join(parts, ", "));
+}
+
+std::string to_json(const SystemEntry& system, const RunSettings& settings, const TimedRun& timed,
+                    bool with_trajectory)
+{
+    const PlainRun& run = timed.run;
+    Json parameters = Json::object();
+    for (std::size_t i = 0; i < system.parameters.size(); ++i) {
+        parameters[std::string(system.parameters[i].name)] = settings.parameters[i];
+    }
+    Json events = Json::array();
+    for (const auto& event : run.events) events.push_back(json(system, event));
+
+    Json out{{"system", system.name},
+             {"parameters", parameters},
+             {"detector", name(settings.detector)},
+             {"locator", name(settings.locator)},
+             {"stepper", name(settings.stepper)}};
+    if (settings.fixed_step) {
+        out["step"] = settings.options.step;
+    } else {
+        out["rtol"] = settings.options.rtol;
+        out["atol"] = settings.options.atol;
+    }
+    if (settings.network) out["model"] = settings.model.string();
+    out["outcome"] = ricochet::name(run.outcome);
+    out["t"] = run.t;
+    out["state"] = run.x;
+    out["events"] = std::move(events);
+    out["statistics"] = json(run.statistics);
+    if (with_trajectory) out["trajectory"] = {{"t", run.trajectory.t}, {"state", run.trajectory.x}};
+    out["seconds"] = timed.seconds;
+    return json_text(out);
+}
+
+std::string to_text(const SystemEntry& system, const RunSettings& settings, const TimedRun& timed)
+{
+    const PlainRun& run = timed.run;
+    const Statistics& s = run.statistics;
+    std::string out = title(system, settings) + '\n';
+    out += fmt::format(
+        "{}; events: {}, {}{}\n\n", describe_stepping(settings), name(settings.detector),
+        name(settings.locator),
+        settings.network ? fmt::format(", model {}", settings.model.filename().string()) : "");
+    if (!run.events.empty()) out += events_table(system, run) + '\n';
+
+    std::vector<std::string> state;
+    for (std::size_t i = 0; i < system.state.size(); ++i) {
+        state.push_back(fmt::format("{} = {}", system.state[i].name,
+                                    with_unit(run.x[i], system.state[i].unit)));
+    }
+    out += fmt::format("{} at t = {} s, {}\n", ricochet::name(run.outcome), run.t,
+                       fmt::join(state, ", "));
+    if (run.outcome != Outcome::reached_end) {
+        out += fmt::format("  {}\n", describe(run.outcome));
+    }
+    out += fmt::format("{} events, {} steps ({} rejected), {} flow calls, {} guard calls", s.events,
+                       s.steps, s.rejected, s.flow_calls, s.guard_calls);
+    if (settings.network) {
+        out += fmt::format(", {} network calls ({} false alarms, {} late events)", s.network_calls,
+                           s.false_alarms, s.late_events);
+    }
+    out += fmt::format("\nsteps without an event: {} proved, {} checked, {} gated, {} assumed\n",
+                       s.evidence.proved, s.evidence.checked, s.evidence.gated, s.evidence.assumed);
+    return out + fmt::format("{}\n", duration(timed.seconds));
+}
+
+std::string to_csv(const SystemEntry& system, const PlainRun& run)
+{
+    std::string out = "t [s]";
+    for (const Component& component : system.state) out += ',' + label(component);
+    out += ",event\n";
+    for (const Row& row : rows(system, run)) {
+        out += fmt::format("{},{},{}\n", row.t, fmt::join(row.x, ","), row.event);
+    }
+    return out;
+}
+
+std::string duration(double seconds)
+{
+    if (seconds < 1e-6) return fmt::format("{:.3g} ns", seconds * 1e9);
+    if (seconds < 1e-3) return fmt::format("{:.3g} us", seconds * 1e6);
+    if (seconds < 1) return fmt::format("{:.3g} ms", seconds * 1e3);
+    return fmt::format("{:.3g} s", seconds);
+}
+
+void print(std::string_view text)
+{
+    const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+    if (std::fflush(stdout) != 0 || !written) {
+        throw WriteError("cannot write to standard output");
+    }
+}
+
+}  // namespace ricochet::app

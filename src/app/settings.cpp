@@ -1,0 +1,192 @@
+#include "settings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "input.hpp"
+#include "model_lookup.hpp"
+#include "registry.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+template <class Kind, std::size_t n>
+using Names = std::array<std::pair<std::string_view, Kind>, n>;
+
+constexpr Names<DetectorKind, 3> detectors{{{"ends", DetectorKind::ends},
+                                            {"extremum", DetectorKind::extremum},
+                                            {"network", DetectorKind::network}}};
+constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
+                                          {"bisection", LocatorKind::bisection},
+                                          {"toms748", LocatorKind::toms748}}};
+constexpr Names<StepperKind, 5> steppers{{{"rk4", StepperKind::rk4},
+                                          {"dopri5", StepperKind::dopri5},
+                                          {"fehlberg78", StepperKind::fehlberg78},
+                                          {"cash-karp54", StepperKind::cash_karp54},
+                                          {"euler", StepperKind::euler}}};
+
+template <class Kind, std::size_t n>
+std::string_view name_in(const Names<Kind, n>& names, Kind kind)
+{
+    return std::find_if(names.begin(), names.end(), [&](auto& e) { return e.second == kind; })
+        ->first;
+}
+
+template <class Kind, std::size_t n>
+Kind named(std::string_view what, const Names<Kind, n>& names, std::string_view given)
+{
+    std::vector<std::string_view> known;
+    for (const auto& [name, kind] : names) {
+        if (name == given) return kind;
+        known.push_back(name);
+    }
+    throw unknown(what, given, known);
+}
+
+void require_positive(std::string_view option, double value)
+{
+    if (!(value > 0)) {
+        throw BadInput(fmt::format("{} must be positive, got {}", option, value));
+    }
+}
+
+void require_not_negative(std::string_view option, double value)
+{
+    if (!(value >= 0)) {
+        throw BadInput(fmt::format("{} must be zero or positive, got {}", option, value));
+    }
+}
+
+void choose_stepping(const RunRequest& request, RunSettings& settings)
+{
+    settings.fixed_step = request.step.has_value();
+    settings.stepper = settings.fixed_step ? StepperKind::rk4 : StepperKind::dopri5;
+    if (request.stepper) settings.stepper = named("stepper", steppers, *request.stepper);
+
+    Options& options = settings.options;
+    if (settings.fixed_step) {
+        if (request.rtol || request.atol) {
+            throw BadInput(
+                "--step takes fixed steps and --rtol and --atol control the error; "
+                "expected one or the other, got both");
+        }
+        require_positive("--step", *request.step);
+        options.step = *request.step;
+        return;
+    }
+    if (settings.stepper == StepperKind::rk4 || settings.stepper == StepperKind::euler) {
+        throw BadInput(
+            fmt::format("stepper {} has no error estimate and needs --step; "
+                        "steppers with error control are dopri5, fehlberg78, "
+                        "cash-karp54",
+                        name(settings.stepper)));
+    }
+    options.rtol = request.rtol.value_or(options.rtol);
+    options.atol = request.atol.value_or(options.atol);
+    require_not_negative("--rtol", options.rtol);
+    require_not_negative("--atol", options.atol);
+    if (options.rtol == 0 && options.atol == 0) {
+        throw BadInput("--rtol or --atol must be positive, got zero for both");
+    }
+}
+
+void choose_detector(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
+{
+    if (request.detector) {
+        settings.detector = named("detector", detectors, *request.detector);
+    } else if (request.model) {
+        settings.detector = DetectorKind::network;
+    }
+    if (settings.detector != DetectorKind::network) {
+        if (request.model) {
+            throw BadInput(fmt::format("--model is for the detector network, got --detector {}",
+                                       name(settings.detector)));
+        }
+        return;
+    }
+    FoundModel found = request.model ? named_model(system, settings, *request.model)
+                                     : suitable_model(system, settings);
+    if (!settings.fixed_step) {
+        settings.options.h_min = found.model.step_min;
+        settings.options.h_max = found.model.step_max;
+    }
+    settings.model = std::move(found.file);
+    settings.network.emplace(std::move(found.model));
+}
+
+}  // namespace
+
+std::string_view name(DetectorKind kind) noexcept
+{
+    return name_in(detectors, kind);
+}
+std::string_view name(LocatorKind kind) noexcept
+{
+    return name_in(locators, kind);
+}
+std::string_view name(StepperKind kind) noexcept
+{
+    return name_in(steppers, kind);
+}
+
+std::vector<double> parameter_values(const SystemEntry& system, const std::vector<std::string>& set)
+{
+    std::vector<double> values;
+    std::vector<std::string_view> known;
+    for (const Parameter& parameter : system.parameters) {
+        values.push_back(parameter.initial);
+        known.push_back(parameter.name);
+    }
+    for (const std::string& text : set) {
+        const Assignment given = assignment("--set", text);
+        const auto found = std::find(known.begin(), known.end(), given.name);
+        if (found == known.end()) {
+            throw unknown(fmt::format("parameter of {}", system.name), given.name, known);
+        }
+        const auto i = static_cast<std::size_t>(found - known.begin());
+        const Parameter& parameter = system.parameters[i];
+        if (!parameter.range.contains(given.value)) {
+            throw BadInput(fmt::format(
+                "{} of {} must lie in {}{}, got {}", parameter.name, system.name,
+                to_string(parameter.range),
+                parameter.unit == "1" ? "" : fmt::format(" {}", parameter.unit), given.value));
+        }
+        values[i] = given.value;
+    }
+    return values;
+}
+
+RunSettings resolve(const SystemEntry& system, const RunRequest& request)
+{
+    RunSettings settings;
+    settings.parameters = parameter_values(system, request.set);
+
+    Options& options = settings.options;
+    options.t_start = request.t_start.value_or(0);
+    options.t_end = request.t_end.value_or(system.t_end);
+    if (options.t_end < options.t_start) {
+        throw BadInput(fmt::format("--t-end must not lie before the start at {} s, got {}",
+                                   options.t_start, options.t_end));
+    }
+    options.event_tolerance = request.event_tolerance.value_or(0);
+    require_not_negative("--event-tolerance", options.event_tolerance);
+
+    choose_stepping(request, settings);
+    if (request.locator) settings.locator = named("locator", locators, *request.locator);
+    choose_detector(system, request, settings);
+    return settings;
+}
+
+std::string describe_stepping(const RunSettings& settings)
+{
+    const Options& options = settings.options;
+    return settings.fixed_step ? fmt::format("{}, step {} s", name(settings.stepper), options.step)
+                               : fmt::format("{}, rtol {}, atol {}", name(settings.stepper),
+                                             options.rtol, options.atol);
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,62 @@
+// How a run is to be done: the choices that the command line offers, by name.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/detect/network.hpp"
+#include "ricochet/integrate/options.hpp"
+
+namespace ricochet::app {
+
+struct SystemEntry;
+
+enum class DetectorKind { ends, extremum, network };
+enum class LocatorKind { newton, bisection, toms748 };
+enum class StepperKind { rk4, dopri5, fehlberg78, cash_karp54, euler };
+
+[[nodiscard]] std::string_view name(DetectorKind kind) noexcept;
+[[nodiscard]] std::string_view name(LocatorKind kind) noexcept;
+[[nodiscard]] std::string_view name(StepperKind kind) noexcept;
+
+/// Everything a system needs to be run.
+struct RunSettings {
+    std::vector<double> parameters;  ///< in the order of the system's
+    Options options;
+    StepperKind stepper = StepperKind::dopri5;
+    bool fixed_step = false;  ///< else error control
+    DetectorKind detector = DetectorKind::extremum;
+    LocatorKind locator = LocatorKind::newton;
+    std::optional<Network> network{};  ///< of the detector `network`
+    std::filesystem::path model{};     ///< its file
+};
+
+/// A run as it was asked for. What is absent has a default.
+struct RunRequest {
+    std::vector<std::string> set{};  ///< name=value
+    std::optional<double> t_start{}, t_end{};
+    std::optional<std::string> detector{}, locator{}, stepper{}, model{};
+    std::optional<double> step{}, rtol{}, atol{}, event_tolerance{};
+};
+
+/// The values of a system's parameters, in its order, after "name=value"s.
+/// @throws BadInput for a name it does not have or a value out of range.
+[[nodiscard]] std::vector<double> parameter_values(const SystemEntry& system,
+                                                   const std::vector<std::string>& set);
+
+/// Fills in the defaults, and loads the model that the detector needs.
+///
+/// With `step` the stepper takes fixed steps, rk4 unless it is named; without, it
+/// is error-controlled, dopri5 unless it is named. A model without a detector asks
+/// for the detector `network`.
+///
+/// @throws BadInput or ModelError, in words of the command line.
+[[nodiscard]] RunSettings resolve(const SystemEntry& system, const RunRequest& request);
+
+/// "dopri5, rtol 1e-08, atol 1e-10" or "rk4, step 0.01 s".
+[[nodiscard]] std::string describe_stepping(const RunSettings& settings);
+
+}  // namespace ricochet::app

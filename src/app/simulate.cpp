@@ -1,0 +1,52 @@
+#include "simulate.hpp"
+
+#include <algorithm>
+
+#include "files.hpp"
+#include "plot.hpp"
+#include "registry.hpp"
+#include "report.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+constexpr std::size_t default_samples = 1001;
+
+/// `n` >= 2 times from start to end, both included.
+std::vector<double> evenly(double start, double end, std::size_t n)
+{
+    std::vector<double> times(n);
+    for (std::size_t i = 0; i + 1 < n; ++i) {
+        const double share = static_cast<double>(i) / static_cast<double>(n - 1);
+        times[i] = std::min(start + share * (end - start), end);
+    }
+    times.back() = end;
+    return times;
+}
+
+}  // namespace
+
+int simulate(const SimulateRequest& request)
+{
+    const SystemEntry& system = find_system(request.system);
+    RunSettings settings = resolve(system, request.run);
+    if (request.csv) check_writable("--csv", *request.csv);
+    if (request.plot) check_plot(*request.plot);
+    if (request.samples || request.csv || request.plot) {
+        settings.options.sample_times = evenly(settings.options.t_start, settings.options.t_end,
+                                               request.samples.value_or(default_samples));
+    }
+
+    const TimedRun timed = system.run(settings, 1);
+
+    print(request.json ? to_json(system, settings, timed, request.samples.has_value())
+                       : to_text(system, settings, timed));
+    if (request.csv) write_file(*request.csv, to_csv(system, timed.run));
+    if (request.plot) plot(system, settings, timed.run, *request.plot);
+
+    const Outcome outcome = timed.run.outcome;
+    return outcome == Outcome::reached_end || outcome == Outcome::stopped_by_event ? 0 : 1;
+}
+
+}  // namespace ricochet::app

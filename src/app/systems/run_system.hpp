@@ -1,0 +1,121 @@
+// From settings to the templates: every stepper and detector for one system.
+//
+// Each combination is compiled, since steps and detection are the inner loop; the
+// locator, needed once an event, is chosen at run time. Included once per system.
+#pragma once
+
+#include <chrono>
+#include <utility>
+#include <vector>
+
+#include "../registry.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate/methods.hpp"
+#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/toms748.hpp"
+
+namespace ricochet::app {
+
+/// One of the locators, by name.
+struct ChosenLocator {
+    LocatorKind kind;
+
+    template <class Probe>
+    [[nodiscard]] Location locate(Probe& probe, const GuardSample& lo, const GuardSample& hi,
+                                  double tolerance) const
+    {
+        switch (kind) {
+            case LocatorKind::newton: break;
+            case LocatorKind::bisection: return Bisection{}.locate(probe, lo, hi, tolerance);
+            case LocatorKind::toms748: return Toms748{}.locate(probe, lo, hi, tolerance);
+        }
+        return Newton{}.locate(probe, lo, hi, tolerance);
+    }
+};
+
+/// Calls `use` with the stepping of the settings.
+template <class Use>
+TimedRun with_stepping(const RunSettings& settings, Use&& use)
+{
+    if (settings.fixed_step) {
+        switch (settings.stepper) {
+            case StepperKind::rk4: break;
+            case StepperKind::dopri5: return use(FixedStep<Dopri5>{});
+            case StepperKind::fehlberg78: return use(FixedStep<Fehlberg78>{});
+            case StepperKind::cash_karp54: return use(FixedStep<CashKarp54>{});
+            case StepperKind::euler: return use(FixedStep<Euler>{});
+        }
+        return use(FixedStep<Rk4>{});
+    }
+    switch (settings.stepper) {
+        case StepperKind::fehlberg78: return use(ErrorControlled<Fehlberg78>{});
+        case StepperKind::cash_karp54: return use(ErrorControlled<CashKarp54>{});
+        default: return use(ErrorControlled<Dopri5>{});
+    }
+}
+
+/// Calls `use` with the detector of the settings.
+template <class Use>
+TimedRun with_detector(const RunSettings& settings, Use&& use)
+{
+    switch (settings.detector) {
+        case DetectorKind::ends: return use(Ends{});
+        case DetectorKind::network: return use(settings.network.value());
+        case DetectorKind::extremum: break;
+    }
+    return use(Extremum{});
+}
+
+/// The same run with states of one type for all systems.
+template <class X>
+[[nodiscard]] Run<std::vector<double>> with_plain_states(const Run<X>& run)
+{
+    const auto plain = [](const X& x) {
+        std::vector<double> out;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(x.size()); ++i) out.push_back(x[i]);
+        return out;
+    };
+    Run<std::vector<double>> out{.outcome = run.outcome,
+                                 .t = run.t,
+                                 .x = plain(run.x),
+                                 .events = {},
+                                 .trajectory = {.t = run.trajectory.t, .x = {}},
+                                 .statistics = run.statistics};
+    for (const Event<X>& event : run.events) {
+        out.events.push_back({.t = event.t,
+                              .kind = event.kind,
+                              .guard = event.guard,
+                              .before = plain(event.before),
+                              .after = plain(event.after),
+                              .bracket = event.bracket,
+                              .slope = event.slope,
+                              .error = event.error,
+                              .late = event.late});
+    }
+    for (const X& x : run.trajectory.x) out.trajectory.x.push_back(plain(x));
+    return out;
+}
+
+/// Runs `system` from x0 `repeats` times and returns the last run.
+template <class System, class X>
+[[nodiscard]] TimedRun run_system(const System& system, const X& x0, const RunSettings& settings,
+                                  int repeats)
+{
+    return with_stepping(settings, [&](auto stepping) {
+        return with_detector(settings, [&](const auto& detector) {
+            const ChosenLocator locator{settings.locator};
+            Run<X> run;
+            const auto start = std::chrono::steady_clock::now();
+            for (int i = 0; i < repeats; ++i) {
+                run = integrate(system, x0, settings.options, stepping, detector, locator);
+            }
+            const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+            return TimedRun{.run = with_plain_states(run), .seconds = spent.count() / repeats};
+        });
+    });
+}
+
+}  // namespace ricochet::app

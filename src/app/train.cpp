@@ -1,0 +1,217 @@
+#include "train.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "files.hpp"
+#include "input.hpp"
+#include "json_text.hpp"
+#include "report.hpp"
+#include "ricochet/nn/safetensors.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+/// While it lives, the first interrupt sets a flag; a second one ends the program.
+class InterruptWatch {
+public:
+    InterruptWatch()
+    {
+        interrupted = 0;
+        struct sigaction action = {};
+        action.sa_handler = [](int) { interrupted = 1; };
+        action.sa_flags = SA_RESETHAND | SA_RESTART;
+        sigaction(SIGINT, &action, &before_int_);
+        sigaction(SIGTERM, &action, &before_term_);
+    }
+    ~InterruptWatch()
+    {
+        sigaction(SIGINT, &before_int_, nullptr);
+        sigaction(SIGTERM, &before_term_, nullptr);
+    }
+    InterruptWatch(const InterruptWatch&) = delete;
+    InterruptWatch& operator=(const InterruptWatch&) = delete;
+
+private:
+    struct sigaction before_int_ = {};
+    struct sigaction before_term_ = {};
+};
+
+/// A bar that is redrawn on a terminal; elsewhere a line every tenth of the way.
+class ProgressBar {
+public:
+    void show(const learn::Progress& progress)
+    {
+        const double now = progress.seconds;
+        if (!started_) {
+            first_iteration_ = progress.iteration;
+            first_seconds_ = now;
+            started_ = true;
+        }
+        const auto done = static_cast<double>(progress.iteration - first_iteration_);
+        const double rate = now > first_seconds_ ? done / (now - first_seconds_) : 0;
+        const std::string left =
+            rate > 0 ? fmt::format("{:.0f} s left",
+                                   static_cast<double>(progress.total - progress.iteration) / rate)
+                     : std::string("starting");
+        const std::size_t percent =
+            progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
+        const std::string figures =
+            fmt::format("{:>3} %  {} of {}  {:.0f} iterations/s  {}  loss {:.2e}", percent,
+                        progress.iteration, progress.total, rate, left, progress.loss);
+        if (terminal_) {
+            constexpr std::size_t width = 24;
+            const std::size_t full = width * percent / 100;
+            fmt::print(stderr, "\r[{}{}] {}\x1b[K", std::string(full, '#'),
+                       std::string(width - full, '.'), figures);
+            std::fflush(stderr);
+        } else if (percent / 10 != tenth_) {
+            fmt::print(stderr, "training: {}\n", figures);
+        }
+        tenth_ = percent / 10;
+    }
+
+    /// The line is free again for something else.
+    void finish() const
+    {
+        if (terminal_ && started_) fmt::print(stderr, "\n");
+    }
+
+private:
+    bool terminal_ = isatty(STDERR_FILENO) == 1;
+    bool started_ = false;
+    std::size_t first_iteration_ = 0;
+    double first_seconds_ = 0;
+    std::size_t tenth_ = 100;
+};
+
+std::string text(std::string_view set, const learn::Assessment& a)
+{
+    const learn::Confusion& c = a.confusion;
+    return fmt::format("{:<12}{:>10}{:>10}{:>14}{:>10}{:>14.2e}{:>14.2e}{:>14.4f}\n", set,
+                       c.detected, c.missed, c.false_alarms, c.cleared, a.miss_bound,
+                       a.false_alarm_rate, a.cleared_share);
+}
+
+std::string text(const learn::Report& report, const learn::Progress& last)
+{
+    std::string out = fmt::format(
+        "{} iterations in {} on {} states; {} clear states too near the boundary were left out\n",
+        report.iterations, duration(report.seconds), report.training_states, report.band);
+    out +=
+        fmt::format("{:<12}{:>10}{:>10}{:>14}{:>10}{:>14}{:>14}{:>14}\n", "", "detected", "missed",
+                    "false alarms", "cleared", "miss bound", "false alarm", "cleared share");
+    out += text("validation", report.validation) + text("held out", report.held_out);
+    if (report.fresh) out += text("fresh", *report.fresh);
+    out += fmt::format(
+        "miss bound: 95 % upper bound of the share of events missed; cleared share: of the clear "
+        "states with a margin above {}\n",
+        report.validation.margin);
+    if (report.outcome == learn::TrainingOutcome::stopped) {
+        out += fmt::format("interrupted after {} of {} iterations\n", last.iteration, last.total);
+    }
+    return out + fmt::format("{}\n", describe(report.outcome));
+}
+
+std::string_view kind_named(const SystemEntry& system, const Training& training,
+                            std::string_view given)
+{
+    if (given.empty()) return training.kinds.front().name;
+    std::vector<std::string_view> known;
+    for (const TrainingKind& kind : training.kinds) {
+        if (given == kind.name || given == kind.other_name) return kind.name;
+        known.push_back(kind.name);
+    }
+    throw unknown(fmt::format("kind of network for {}", system.name), given, known);
+}
+
+/// @throws BadInput if the checkpoint to resume is not there or of another training.
+learn::Trained run_training(const Training& training, const TrainingRequest& request,
+                            const learn::ProgressCallback& progress)
+{
+    bool started = false;
+    try {
+        return training.train(request, [&](const learn::Progress& now) {
+            started = true;
+            return progress(now);
+        });
+    } catch (const std::runtime_error& error) {
+        if (request.resume && !started) throw BadInput(error.what());
+        throw;
+    }
+}
+
+std::string json(const learn::Report& report, const fs::path& out, bool written)
+{
+    auto object = Json::parse(learn::to_json(report));
+    object["model"] = written ? Json(out.string()) : Json();
+    return json_text(object);
+}
+
+}  // namespace
+
+int train(const TrainRequest& request)
+{
+    const SystemEntry& system = find_system(request.system);
+    if (!system.training) {
+        throw BadInput(fmt::format("there is no training for the system {}", system.name));
+    }
+    TrainingRequest training = request.training;
+    training.kind = kind_named(system, *system.training, training.kind);
+    check_writable("--out", request.out);
+    const bool own_checkpoint = training.checkpoint.empty();
+    if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
+    check_writable("--checkpoint", training.checkpoint);
+
+    ProgressBar bar;
+    learn::Progress last;
+    const InterruptWatch watch;
+    const learn::Trained trained =
+        run_training(*system.training, training, [&](const learn::Progress& progress) {
+            last = progress;
+            bar.show(progress);
+            return interrupted == 0;
+        });
+    bar.finish();
+
+    const learn::Report& report = trained.report;
+    const bool stopped = interrupted != 0 && last.iteration < last.total;
+    const bool sound = trained.misses_none() && report.outcome != learn::TrainingOutcome::diverged;
+    const bool write = sound || request.allow_misses;
+    if (write) save_model(trained.model, request.out);
+    if (own_checkpoint && !stopped) {
+        std::error_code ignored;
+        fs::remove(training.checkpoint, ignored);
+    }
+
+    print(request.json ? json(report, request.out, write) : text(report, last));
+    if (write) {
+        fmt::print(stderr, "ricochet: {} is in '{}'\n", stopped ? "the best so far" : "the model",
+                   request.out.string());
+    } else {
+        fmt::print(stderr,
+                   "ricochet: events are missed and nothing was written; "
+                   "--allow-misses writes the model all the same\n");
+    }
+    if (stopped) {
+        fmt::print(stderr,
+                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+                   training.checkpoint.string());
+    }
+    return write && !stopped ? 0 : 1;
+}
+
+}  // namespace ricochet::app

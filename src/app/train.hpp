@@ -1,0 +1,27 @@
+// `ricochet train`: a network for one system.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "registry.hpp"
+
+namespace ricochet::app {
+
+struct TrainRequest {
+    std::string system{};
+    TrainingRequest training{};  ///< an empty kind is the system's first
+    std::filesystem::path out{};
+    bool allow_misses = false;
+    bool json = false;
+};
+
+/// Trains, shows progress on standard error, prints the report and writes the
+/// model. Ctrl-C stops the training and keeps the best so far; a checkpoint beside
+/// the model, or where the request says, lets it be resumed.
+///
+/// @return 0 if the training ran to its end and the model was written, else 1.
+/// @throws BadInput, ModelError, std::invalid_argument or std::runtime_error.
+int train(const TrainRequest& request);
+
+}  // namespace ricochet::app

@@ -1,0 +1,6 @@
+// The kernels as the whole library is compiled.
+#define RICOCHET_KERNEL_NAMESPACE library_baseline
+#include "kernels.hpp"
+
+constexpr ricochet::detail::KernelTable ricochet::detail::kernels_baseline =
+    ricochet::detail::library_baseline::table;

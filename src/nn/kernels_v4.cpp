@@ -1,0 +1,11 @@
+// The kernels for AVX-512: compile with -march=x86-64-v4.
+// Without these instructions, as on other processors, it has none.
+#define RICOCHET_KERNEL_NAMESPACE library_v4
+#include "kernels.hpp"
+
+#if defined(__AVX512VL__)
+constexpr ricochet::detail::KernelTable ricochet::detail::kernels_v4 =
+    ricochet::detail::library_v4::table;
+#else
+constexpr ricochet::detail::KernelTable ricochet::detail::kernels_v4;
+#endif

@@ -1,0 +1,143 @@
+#include "ricochet/integrate/explicit_step.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <boost/numeric/odeint/algebra/array_algebra.hpp>
+#include <cmath>
+
+#include "ricochet/hybrid/step.hpp"
+#include "walled_oscillator.hpp"
+
+namespace ricochet {
+namespace {
+
+using X = std::array<double, 2>;
+using test::WalledOscillator;
+
+template <class Method>
+using StepOf = detail::ExplicitStep<Method, WalledOscillator, X>;
+
+static_assert(Step<StepOf<Rk4>, X>);
+static_assert(Step<StepOf<Dopri5>, X>);
+static_assert(Step<StepOf<Fehlberg78>, X>);
+
+template <class Method>
+class ExplicitStepTest : public testing::Test {};
+
+using Methods = testing::Types<Euler, Rk4, CashKarp54, Dopri5, Fehlberg78>;
+TYPED_TEST_SUITE(ExplicitStepTest, Methods);
+
+TYPED_TEST(ExplicitStepTest, RestepToTheEndIsTheStep)
+{
+    const WalledOscillator oscillator;
+    StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
+    step.attempt(0.1);
+    X x;
+    X rate;
+    step.restep(0.1, x, rate);
+    EXPECT_EQ(x, step.x1());
+    EXPECT_EQ(rate, step.rate1());
+}
+
+TYPED_TEST(ExplicitStepTest, AskingDoesNotDisturbTheStep)
+{
+    const WalledOscillator oscillator;
+    StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
+    step.attempt(0.1);
+    X before;
+    X between;
+    X after;
+    step.interpolate(0.05, before);
+    step.restep(0.03, between);
+    step.interpolate(0.05, after);
+    EXPECT_EQ(before, after);
+}
+
+TYPED_TEST(ExplicitStepTest, DenseOutputMeetsBothEnds)
+{
+    const WalledOscillator oscillator;
+    StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
+    step.attempt(0.1);
+    X x;
+    step.interpolate(0, x);
+    EXPECT_EQ(x, step.x0());
+    step.interpolate(0.1, x);
+    // the weights of the polynomial at 1 are those of the step, to rounding
+    EXPECT_NEAR(x[0], step.x1()[0], 1e-15);
+    EXPECT_NEAR(x[1], step.x1()[1], 1e-15);
+}
+
+TEST(ExplicitStep, ItIsOdeintsStep)
+{
+    // The same step by odeint on the state itself; the two differ by rounding.
+    const WalledOscillator oscillator;
+    StepOf<Dopri5> ours(oscillator, 0, {1.0, 0.5});
+    ours.attempt(0.3);
+    namespace odeint = boost::numeric::odeint;
+    odeint::runge_kutta_dopri5<X, double, X, double, odeint::array_algebra> theirs;
+    X x = {1.0, 0.5};
+    theirs.do_step([&](const X& at, X& dxdt, double t) { oscillator.flow(t, at, dxdt); }, x, 0.0,
+                   0.3);
+    EXPECT_NEAR(ours.x1()[0], x[0], 4e-16);
+    EXPECT_NEAR(ours.x1()[1], x[1], 4e-16);
+}
+
+TEST(ExplicitStep, DenseOutputOfDopri5IsOfFourthOrder)
+{
+    const auto error = [](double h) {
+        const WalledOscillator oscillator;
+        StepOf<Dopri5> step(oscillator, 0, {1.0, 0.0});
+        step.attempt(h);
+        X x;
+        step.interpolate(0.4 * h, x);
+        return std::abs(x[0] - std::cos(0.4 * h));
+    };
+    // locally h^5; a step of 0.4 leaves 1e-7, far above rounding
+    EXPECT_GT(std::log2(error(0.4) / error(0.2)), 4.8);
+}
+
+TEST(ExplicitStep, RoundingDoesNotGrowWithTheNumberOfSteps)
+{
+    // A million steps of free motion x' = v: exact but for rounding, which by plain
+    // addition reaches 1e-11 here.
+    struct Drift {
+        void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], 0}; }
+    };
+    const Drift drift;
+    detail::ExplicitStep<Rk4, Drift, X> step(drift, 0, {0.0, 0.1});
+    for (int i = 0; i < 1'000'000; ++i) {
+        step.attempt(0.1);
+        step.accept();
+    }
+    EXPECT_NEAR(step.x0()[0], 1e4, 2e-12);  // one ulp
+    EXPECT_NEAR(step.time(0), 1e5, 1.5e-11);  // one ulp
+}
+
+/// The explicit midpoint rule, as little as odeint's Stepper concept asks for.
+struct Midpoint {
+    using stepper_category = boost::numeric::odeint::stepper_tag;
+    static constexpr unsigned short order() { return 2; }
+    template <class System>
+    void do_step(System system, X& x, double t, double dt)
+    {
+        X k;
+        system(x, k, t);
+        X middle = {x[0] + dt / 2 * k[0], x[1] + dt / 2 * k[1]};
+        system(middle, k, t + dt / 2);
+        x = {x[0] + dt * k[0], x[1] + dt * k[1]};
+    }
+};
+
+TEST(ExplicitStep, AUsersOwnStepperNeedsOnlyTheStepInPlace)
+{
+    const WalledOscillator oscillator;
+    StepOf<ThisStepper<Midpoint>> step(oscillator, 0, {1.0, 0.0});
+    step.attempt(0.01);
+    EXPECT_EQ(step.order(), 2);
+    EXPECT_NEAR(step.x1()[0], 1 - 0.01 * 0.01 / 2, 1e-16);
+    EXPECT_NEAR(step.x1()[1], -0.01, 1e-18);
+}
+
+}  // namespace
+}  // namespace ricochet

@@ -1,0 +1,35 @@
+// The trainings behind the stored models, whole: less than a minute of one core.
+#include <gtest/gtest.h>
+
+#include "ricochet/learn/bouncing_ball.hpp"
+
+namespace ricochet::learn {
+namespace {
+
+TEST(BallTrainingInFull, FixedStepIsRightOnItsWholeTestSetAndMissesNoFreshEvent)
+{
+    const Trained trained =
+        train_bouncing_ball(BallModel::fixed_step, ball_training(BallModel::fixed_step));
+    EXPECT_EQ(trained.report.outcome, TrainingOutcome::finished);
+    EXPECT_EQ(trained.report.held_out.confusion.missed, 0U);
+    EXPECT_EQ(trained.report.held_out.confusion.false_alarms, 0U);
+    EXPECT_EQ(trained.report.fresh->confusion.missed, 0U);
+    EXPECT_LE(trained.report.fresh->miss_bound, 1e-4);
+}
+
+TEST(BallTrainingInFull, AnyStepMissesNoFreshEventFromAnySeedAndTakesLessThanAMinute)
+{
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+        BallTraining training = ball_training(BallModel::any_step);
+        training.seed = seed;
+        const Trained trained = train_bouncing_ball(BallModel::any_step, training);
+        EXPECT_EQ(trained.report.outcome, TrainingOutcome::finished) << seed;
+        EXPECT_EQ(trained.report.fresh->confusion.missed, 0U) << seed;
+        EXPECT_LE(trained.report.fresh->miss_bound, 1e-4) << seed;
+        EXPECT_GE(trained.report.fresh->cleared_share, 0.95) << seed;
+        EXPECT_LE(trained.report.seconds, 60) << seed;
+    }
+}
+
+}  // namespace
+}  // namespace ricochet::learn

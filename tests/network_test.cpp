@@ -1,0 +1,134 @@
+#include "ricochet/detect/network.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
+
+namespace ricochet {
+namespace {
+
+Model paper_model() { return load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"); }
+
+/// A network without hidden layers: weight . (u, v) + bias >= 0 announces an event.
+Model linear_model(double weight_u, double weight_v, double bias)
+{
+    Model model;
+    model.system = "bouncing-ball";
+    model.recipe = "state";
+    model.offset = {0, 0};
+    model.scale = {1, 1};
+    model.step_min = model.step_max = 0.01;
+    model.layers = {{.inputs = 2, .outputs = 1, .weight = {weight_u, weight_v}, .bias = {bias}}};
+    return model;
+}
+
+Run<std::array<double, 2>> run_with(const Network& network, double step = 0.01)
+{
+    return integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .step = step}, FixedStep<Rk4>{},
+                     network);
+}
+
+TEST(Network, FindsThePapersThirteenImpactsAtItsOwnStep)
+{
+    const BouncingBall ball;
+    const auto run = run_with(Network(paper_model()));
+    ASSERT_EQ(run.events.size(), 13u);
+    for (int i = 0; i < 13; ++i) {
+        // The bound that the exact detectors meet too.
+        EXPECT_NEAR(run.events[static_cast<std::size_t>(i)].t, ball.impact_time(i, 10), 2e-14);
+    }
+    EXPECT_EQ(run.statistics.late_events, 0u);
+    EXPECT_GT(run.statistics.evidence.assumed, 1800u);
+}
+
+TEST(Network, IsAskedOncePerStepAndSavesTheGuard)
+{
+    const auto run = run_with(Network(paper_model()));
+    EXPECT_EQ(run.statistics.network_calls, run.statistics.steps);
+    EXPECT_LT(run.statistics.guard_calls, run.statistics.steps / 5);
+}
+
+TEST(Network, AFalseAlarmIsCountedAndChangesNothing)
+{
+    const auto exact =
+        integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .step = 0.01}, FixedStep<Rk4>{},
+                  Ends{});
+    const auto run = run_with(Network(linear_model(0, 0, 1)));  // always "event"
+    ASSERT_EQ(run.events.size(), exact.events.size());
+    for (std::size_t i = 0; i < run.events.size(); ++i) {
+        EXPECT_EQ(run.events[i].t, exact.events[i].t);
+    }
+    EXPECT_EQ(run.statistics.false_alarms, run.statistics.steps - 13);
+}
+
+TEST(Network, AMissedEventIsFoundLateAndMarked)
+{
+    // Announces an event only once the ball is already below the floor.
+    const auto run = run_with(Network(linear_model(-1, 0, 0)));
+    ASSERT_GT(run.events.size(), 0u);
+    EXPECT_EQ(run.statistics.late_events, run.events.size());
+    const auto& first = run.events[0];
+    EXPECT_TRUE(first.late);
+    EXPECT_LT(first.before[0], 0);
+    // 1.42784 s lies in the step that ends at 1.43 s.
+    EXPECT_NEAR(first.t, 1.43, 1e-12);
+}
+
+TEST(Network, ANetworkThatNeverSpeaksLetsTheBallFall)
+{
+    const auto run = run_with(Network(linear_model(0, 0, -1)));
+    EXPECT_EQ(run.events.size(), 0u);
+    EXPECT_LT(run.x[0], -1000);
+    EXPECT_EQ(run.statistics.guard_calls, 1u);  // when it was armed
+}
+
+TEST(Network, NaNWeightsAnnounceAnEventAtEveryStep)
+{
+    const auto run = run_with(Network(linear_model(std::nan(""), 0, 0)));
+    EXPECT_EQ(run.events.size(), 13u);
+    EXPECT_EQ(run.statistics.evidence.assumed, run.statistics.false_alarms);
+}
+
+std::string refusal(const Model& model, double step = 0.01)
+{
+    try {
+        (void)run_with(Network(model), step);
+        return "accepted";
+    } catch (const std::invalid_argument& reason) {
+        return reason.what();
+    }
+}
+
+TEST(Network, AnotherStepThanItWasTrainedForIsRefused)
+{
+    EXPECT_EQ(refusal(linear_model(0, 0, 1), 0.02),
+              "Network: the model for bouncing-ball is trained for steps in [0.01, 0.01] s, "
+              "got [0.02, 0.02]");
+}
+
+TEST(Network, AnUnknownRecipeIsRefused)
+{
+    Model model = linear_model(0, 0, 1);
+    model.recipe = "entrails";
+    EXPECT_NE(refusal(model).find("entrails"), std::string::npos);
+}
+
+TEST(Network, FeaturesThatDoNotFitTheStateAreRefused)
+{
+    Model model = linear_model(0, 0, 1);
+    model.offset = model.scale = {1, 1, 1};
+    model.layers[0].inputs = 3;
+    model.layers[0].weight = {1, 1, 1};
+    EXPECT_EQ(refusal(model),
+              "Network: the model for bouncing-ball takes 3 features, but 'state' of this state "
+              "are 2");
+}
+
+}  // namespace
+}  // namespace ricochet

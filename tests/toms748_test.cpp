@@ -1,0 +1,11 @@
+#include "ricochet/locate/toms748.hpp"
+
+#include "locators.hpp"
+
+namespace ricochet::test {
+namespace {
+
+INSTANTIATE_TYPED_TEST_SUITE_P(Toms748, LocatorSuite, Toms748);
+
+}  // namespace
+}  // namespace ricochet::test
