@@ -34,8 +34,8 @@ Eigen::VectorXd dynamic(double a, double b)
 
 const Network& network()
 {
-    static const Network instance(load_model(std::filesystem::path(RICOCHET_MODELS) /
-                                             "bouncing-ball-step-0.01.safetensors"));
+    static const Network instance(
+        load_model(std::filesystem::path(RICOCHET_MODELS) / "bouncing-ball-step-0.01.safetensors"));
     return instance;
 }
 
@@ -106,9 +106,7 @@ void controlled(benchmark::State& state, const System& system, const Array& x0, 
 
 void register_all()
 {
-    const auto add = [](const char* name, auto body) {
-        benchmark::RegisterBenchmark(name, body);
-    };
+    const auto add = [](const char* name, auto body) { benchmark::RegisterBenchmark(name, body); };
     using S = benchmark::State;
     const Array launch{0, 15};
     const Array drop{10, 0};

@@ -77,9 +77,8 @@ void register_method(const std::string& method)
     for (const double tolerance : {0.0, 1e-10}) {
         const std::string setting = tolerance == 0 ? "/tol=0" : "/tol=1e-10";
         const auto with = [=](const std::string& name, const auto& locator) {
-            add("locate_event" + ball_name + name + setting, [=](S& s) {
-                one_event<Method>(s, tolerance, locator);
-            });
+            add("locate_event" + ball_name + name + setting,
+                [=](S& s) { one_event<Method>(s, tolerance, locator); });
         };
         with("newton", Newton{});
         with("toms748", Toms748{});

@@ -26,8 +26,8 @@ namespace {
 
 Network network_at_its_step()
 {
-    return Network(load_model(std::filesystem::path(RICOCHET_MODELS) /
-                              "bouncing-ball-step-0.01.safetensors"));
+    return Network(
+        load_model(std::filesystem::path(RICOCHET_MODELS) / "bouncing-ball-step-0.01.safetensors"));
 }
 
 // --- accuracy ---
@@ -86,9 +86,10 @@ Measured time_of_impacts()
         cases.push_back(c);
     }
     const auto unrecorded = [=] {
-        return integrate(problem.system, problem.x0,
-                         {.t_end = problem.t_end, .rtol = rtol, .atol = rtol, .record_events = false},
-                         ErrorControlled<Dopri5>{}, Extremum{});
+        return integrate(
+            problem.system, problem.x0,
+            {.t_end = problem.t_end, .rtol = rtol, .atol = rtol, .record_events = false},
+            ErrorControlled<Dopri5>{}, Extremum{});
     };
 
     // The answers are checked before the clock counts.
@@ -106,9 +107,10 @@ Measured time_of_impacts()
         return fmt::format("{:7.3f} us raw [{:.3f} - {:.3f}], {:7.3f} us scaled", time.median * 1e6,
                            time.p10 * 1e6, time.p90 * 1e6, scaled(time.median, yard) * 1e6);
     };
-    details.push_back(fmt::format(
-        "yardstick {:.3f} ns [{:.3f} - {:.3f}], {} ns on the reference machine; medians [p10 - p90]",
-        yard.median * 1e9, yard.p10 * 1e9, yard.p90 * 1e9, yardstick_reference * 1e9));
+    details.push_back(
+        fmt::format("yardstick {:.3f} ns [{:.3f} - {:.3f}], {} ns on the reference machine; "
+                    "medians [p10 - p90]",
+                    yard.median * 1e9, yard.p10 * 1e9, yard.p90 * 1e9, yardstick_reference * 1e9));
     double by_hand = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const Setting& s = rows[i].setting;
@@ -118,8 +120,8 @@ Measured time_of_impacts()
                                       rows[i].score.complete() ? "" : ", WRONG SET OF EVENTS"));
         if (s.method == "odeint-by-hand") by_hand = std::min(by_hand, time.median);
     }
-    details.push_back(
-        fmt::format("{:<15}{:<13}{}, events counted, not kept", "dopri5", "extremum", line(timings[1])));
+    details.push_back(fmt::format("{:<15}{:<13}{}, events counted, not kept", "dopri5", "extremum",
+                                  line(timings[1])));
 
     const Timing& ours = timings[2];
     const double time = scaled(ours.median, yard);
@@ -159,7 +161,8 @@ Measured no_allocation()
     count_allocations("dopri5 ends", ErrorControlled<Dopri5>{}, Ends{}, total, text);
     count_allocations("dopri5 extremum", ErrorControlled<Dopri5>{}, Extremum{}, total, text);
     count_allocations("fehlberg78 ends", ErrorControlled<Fehlberg78>{}, Ends{}, total, text);
-    count_allocations("fehlberg78 extremum", ErrorControlled<Fehlberg78>{}, Extremum{}, total, text);
+    count_allocations("fehlberg78 extremum", ErrorControlled<Fehlberg78>{}, Extremum{}, total,
+                      text);
 
     // The counter counts: an allocation between two readings shows.
     const std::uint64_t before = allocations();
@@ -253,7 +256,10 @@ std::vector<Check> checks_of_part_1()
          .id = "b1-rk4",
          .sentence = "B1, rk4 at steps 1e-4, 1e-3, 0.01, 0.037, 0.1, 0.3, 1; ends and extremum",
          .target = "all 13 impacts, error <= 2e-14 s",
-         .run = [] { return largest_error(b1_cases({"rk4"}, {"ends", "extremum"}), 2e-14); }},
+         .run =
+             [] {
+                 return largest_error(b1_cases({"rk4"}, {"ends", "extremum"}), 2e-14);
+             }},
         {.part = 1,
          .id = "b1-controlled",
          .sentence = "B1, dopri5 and fehlberg78 at rtol 1e-6 to 1e-13; ends and extremum",
@@ -287,7 +293,8 @@ std::vector<Check> checks_of_part_1()
          .run = observe_orders},
         {.part = 1,
          .id = "state-types",
-         .sentence = "std::array, std::vector, Eigen::Vector2d, Eigen::VectorXd give the same events",
+         .sentence =
+             "std::array, std::vector, Eigen::Vector2d, Eigen::VectorXd give the same events",
          .target = "the same bits",
          .run = compare_state_types},
         {.part = 1,

@@ -54,8 +54,8 @@ void compare(const P& problem, std::string_view name, Options options, const Ste
     const auto check = [&](std::string_view type, const std::vector<double>& row) {
         ++result.runs;
         if (row != reference) {
-            result.differences.push_back(fmt::format("{} {}: {} differs from std::array",
-                                                     problem.name, name, type));
+            result.differences.push_back(
+                fmt::format("{} {}: {} differs from std::array", problem.name, name, type));
         }
     };
     result.events += problem.events.size();
@@ -82,12 +82,12 @@ Measured compare_state_types()
     compare_steppers(b1(), Ends{}, result);
     compare_steppers(b1(), Extremum{}, result);
     compare_steppers(spiral(), Extremum{}, result);
-    return {.pass = result.differences.empty(),
-            .text = fmt::format("{} of {} runs equal std::array's bit for bit; {} events, rk4, "
-                                "dopri5, fehlberg78, ball and spiral",
-                                result.runs - result.differences.size(), result.runs,
-                                result.events),
-            .details = result.differences};
+    return {
+        .pass = result.differences.empty(),
+        .text = fmt::format("{} of {} runs equal std::array's bit for bit; {} events, rk4, "
+                            "dopri5, fehlberg78, ball and spiral",
+                            result.runs - result.differences.size(), result.runs, result.events),
+        .details = result.differences};
 }
 
 }  // namespace ricochet::bench

@@ -58,12 +58,12 @@ using BallProblem = Problem<BouncingBall, std::array<double, 2>>;
 /// Restitution 0.9, from 1 m, four impacts. Closed form as for `b1`, 16 digits.
 [[nodiscard]] inline BallProblem b3()
 {
-    return {.name = "b3",
-            .system = BouncingBall({.gravity = 9.81, .restitution = 0.9}),
-            .x0 = {1, 0},
-            .t_end = 3,
-            .events = {0.4515236409857308, 1.264266194760045, 1.995734493156927,
-                       2.654055961714119}};
+    return {
+        .name = "b3",
+        .system = BouncingBall({.gravity = 9.81, .restitution = 0.9}),
+        .x0 = {1, 0},
+        .t_end = 3,
+        .events = {0.4515236409857308, 1.264266194760045, 1.995734493156927, 2.654055961714119}};
 }
 
 /// A spiral that winds outwards to a limit cycle, and is thrown back inside: smooth,
@@ -78,9 +78,9 @@ using BallProblem = Problem<BouncingBall, std::array<double, 2>>;
 struct Spiral {
     using State = std::array<double, 2>;
 
-    static constexpr double turn = 3;       ///< [1/s] angular velocity
-    static constexpr double rim = 0.9;      ///< radius at which it is thrown back
-    static constexpr double shrink = 0.5;   ///< by this factor
+    static constexpr double turn = 3;      ///< [1/s] angular velocity
+    static constexpr double rim = 0.9;     ///< radius at which it is thrown back
+    static constexpr double shrink = 0.5;  ///< by this factor
 
     template <class X>
     void flow(double /*t*/, const X& x, X& dxdt) const noexcept

@@ -45,10 +45,10 @@ struct Timing {
 };
 
 struct TimingOptions {
-    double sample = 2e-4;       ///< [s] shortest sample
-    double budget = 4e-2;       ///< [s] to spend on each work
-    std::size_t fewest = 11;    ///< samples
-    std::size_t most = 201;     ///< samples
+    double sample = 2e-4;     ///< [s] shortest sample
+    double budget = 4e-2;     ///< [s] to spend on each work
+    std::size_t fewest = 11;  ///< samples
+    std::size_t most = 201;   ///< samples
 };
 
 /// Times all works in turns.

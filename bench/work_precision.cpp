@@ -155,15 +155,14 @@ std::string table(std::span<const Row> rows, const Timing& yardstick)
         "yardstick {:.3g} ns (reference {:.3g} ns); times are medians [p10 - p90]\n\n"
         "{:<8}{:<15}{:<13}{:<12}{:>7}{:>7}{:>9}{:>10}{:>9}{:>9}{:>9}{:>9}{:>11}{:>11}  {}\n",
         yardstick.median * 1e9, yardstick_reference * 1e9, "problem", "method", "detector",
-        "setting", "events", "missed", "spurious", "error [s]", "steps", "flow", "guard",
-        "network", "time [us]", "scaled", "spread [us]");
+        "setting", "events", "missed", "spurious", "error [s]", "steps", "flow", "guard", "network",
+        "time [us]", "scaled", "spread [us]");
     for (const Row& row : rows) {
-        text += fmt::format(
-            "{:<8}{:<15}{:<13}{:<12}{:>7}{:>7}{:>9}{:>10.1e}{:>9}{:>9}{:>9}{:>9}", row.problem,
-            row.setting.method, row.setting.detector, knob(row.setting), row.events,
-            row.score.missed, row.score.spurious, row.score.error, count(row.answer.steps),
-            count(row.answer.flow_calls), count(row.answer.guard_calls),
-            count(row.answer.network_calls));
+        text += fmt::format("{:<8}{:<15}{:<13}{:<12}{:>7}{:>7}{:>9}{:>10.1e}{:>9}{:>9}{:>9}{:>9}",
+                            row.problem, row.setting.method, row.setting.detector,
+                            knob(row.setting), row.events, row.score.missed, row.score.spurious,
+                            row.score.error, count(row.answer.steps), count(row.answer.flow_calls),
+                            count(row.answer.guard_calls), count(row.answer.network_calls));
         if (row.time) {
             text += fmt::format("{:>11.3f}{:>11.3f}  [{:.3f} - {:.3f}]\n", row.time->median * 1e6,
                                 scaled(row.time->median, yardstick) * 1e6, row.time->p10 * 1e6,

@@ -41,7 +41,7 @@ struct Setting {
 /// What one run says of itself; a rival leaves out what it does not count.
 struct Answer {
     std::vector<double> times{};  ///< [s] of events, ascending
-    bool finished = true;       ///< the run reached its end
+    bool finished = true;         ///< the run reached its end
     std::optional<std::uint64_t> steps{};
     std::optional<std::uint64_t> flow_calls{};
     std::optional<std::uint64_t> guard_calls{};

@@ -34,9 +34,8 @@ int run(int argc, char** argv)
 #ifdef RICOCHET_BENCH_CVODE
     bench::add_cvode(cases);
 #endif
-    const auto wanted = cases.select([&](const bench::Case& c) {
-        return c.name().find(filter) != std::string::npos;
-    });
+    const auto wanted = cases.select(
+        [&](const bench::Case& c) { return c.name().find(filter) != std::string::npos; });
     if (list) {
         for (const bench::Case& c : wanted) fmt::print("{}\n", c.name());
         return 0;

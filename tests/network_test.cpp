@@ -82,7 +82,9 @@ TEST(Network, AMissedEventIsFoundLateAndMarked)
 
 TEST(Network, ANetworkThatNeverSpeaksLetsTheBallFall)
 {
-    const auto run = run_with(Network(linear_model(0, 0, -1)));
+    Model silent = linear_model(0, 0, -1);
+    silent.step_min = 0;  // the last step is shorter
+    const auto run = run_with(Network(silent));
     EXPECT_EQ(run.events.size(), 0u);
     EXPECT_LT(run.x[0], -1000);
     EXPECT_EQ(run.statistics.guard_calls, 1u);  // when it was armed
@@ -93,6 +95,62 @@ TEST(Network, NaNWeightsAnnounceAnEventAtEveryStep)
     const auto run = run_with(Network(linear_model(std::nan(""), 0, 0)));
     EXPECT_EQ(run.events.size(), 13u);
     EXPECT_EQ(run.statistics.evidence.assumed, run.statistics.false_alarms);
+}
+
+// --- one model for every ball and every step ---
+
+Model any_step_model() { return load_model(RICOCHET_MODELS "/bouncing-ball.safetensors"); }
+
+struct KnownRun {
+    double restitution, height, t_end;
+    std::size_t impacts;
+};
+
+// B1 is the source paper's run; B2 and B3 fall from 1 m.
+constexpr KnownRun known_runs[] = {{0.9, 10, 20.5, 13}, {0.7, 1, 2.25, 6}, {0.9, 1, 3, 4}};
+
+template <class Stepping>
+void expect_all_impacts(const KnownRun& known, const Options& options, const Network& network)
+{
+    const BouncingBall ball({.gravity = 9.81, .restitution = known.restitution});
+    const auto run = integrate(ball, {known.height, 0.0}, options, Stepping{}, network);
+    ASSERT_EQ(run.events.size(), known.impacts) << options.step;
+    for (std::size_t i = 0; i < run.events.size(); ++i) {
+        EXPECT_NEAR(run.events[i].t, ball.impact_time(static_cast<int>(i), known.height), 5e-14);
+    }
+    EXPECT_EQ(run.statistics.missed_events, 0u) << options.step;
+}
+
+TEST(Network, OneModelServesEveryBallAtEveryFixedStep)
+{
+    const Network network(any_step_model());
+    for (const KnownRun& known : known_runs) {
+        for (const double h : {1e-4, 3e-4, 1e-3, 3.7e-3, 0.01, 0.05, 0.1, 0.37, 1.0}) {
+            expect_all_impacts<FixedStep<Rk4>>(known, {.t_end = known.t_end, .step = h}, network);
+        }
+    }
+}
+
+TEST(Network, OneModelServesEveryBallUnderErrorControl)
+{
+    const Network network(any_step_model());
+    for (const KnownRun& known : known_runs) {
+        for (const double rtol : {1e-5, 1e-8, 1e-11}) {
+            const Options options{.t_end = known.t_end, .rtol = rtol, .atol = rtol / 100};
+            expect_all_impacts<ErrorControlled<Dopri5>>(known, options, network);
+            expect_all_impacts<ErrorControlled<Fehlberg78>>(known, options, network);
+        }
+    }
+}
+
+TEST(Network, AStepOutsideItsRangeIsNeverCleared)
+{
+    // Trained for 0.01 s only: the last step, 0.004 s, is looked at.
+    const Network network(linear_model(0, 0, -1));  // never "event"
+    const auto run = integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 0.104, .step = 0.01},
+                               FixedStep<Rk4>{}, network);
+    EXPECT_EQ(run.statistics.checks_put_off, 10u);
+    EXPECT_EQ(run.statistics.false_alarms, 1u);
 }
 
 std::string refusal(const Model& model, double step = 0.01)

@@ -55,7 +55,10 @@ public:
     {
         switch (below(4)) {
             case 0: return below(10);
-            case 1: return (std::uint64_t{1} << below(64)) + below(3) - 1;
+            case 1: {
+                const std::uint64_t power = std::uint64_t{1} << below(64);
+                return power + below(3) - 1;
+            }
             case 2: return std::uint64_t{0} - below(10);
             default: return bits_() >> below(64);
         }
@@ -70,7 +73,7 @@ public:
             case 3: return -static_cast<std::int64_t>(size() >> 1);
             case 4: return std::ldexp(1.5, static_cast<int>(below(2000)) - 1000);
             case 5: return text();
-            case 6: return std::string(below(40), static_cast<char>('!' + below(90)));
+            case 6: return std::string(below(40), '%');
             case 7: {
                 json array = json::array();
                 for (std::uint64_t i = below(5); i > 0; --i) array.push_back(value(depth - 1));
@@ -124,7 +127,7 @@ public:
             case 0: entry = value(3); break;
             case 1: header.erase(any_of(names)); break;
             case 2: header[one_in(2) ? text() : any_of(names)] = json(entry); break;
-            case 3: std::swap(header[any_of(names)], header[any_of(names)]); break;
+            case 3: std::swap(entry, header[any_of(names)]); break;
             case 4: change_data(data); break;
             case 5: data.resize(below(2 * data.size() + 2)); break;
             default: change_entry(entry); break;
@@ -161,7 +164,7 @@ private:
             case 0: entry.erase(any_of(keys)); break;
             case 1: entry[text()] = value(2); break;
             case 2: part = value(2); break;
-            case 3: std::swap(entry[any_of(keys)], entry[any_of(keys)]); break;
+            case 3: std::swap(part, entry[any_of(keys)]); break;
             default:
                 if (part.is_array() && !part.empty()) {
                     any_of(part) = one_in(4) ? value(1) : json(size());
@@ -206,10 +209,11 @@ private:
 
     void break_text(std::string& text)
     {
+        const std::size_t at = below(text.size());
         switch (below(5)) {
-            case 0: text[below(text.size())] = static_cast<char>(below(256)); break;
-            case 1: text.erase(below(text.size()), below(20)); break;
-            case 2: text.insert(below(text.size()), std::string(below(3000), '[')); break;
+            case 0: text[at] = static_cast<char>(below(256)); break;
+            case 1: text.erase(at, below(20)); break;
+            case 2: text.insert(at, std::string(below(3000), '[')); break;
             case 3:
                 text.insert(1, text.substr(1, text.size() - 2) + ",");
                 break;  // every key twice
@@ -321,7 +325,8 @@ int run(std::uint64_t count, std::uint64_t seed)
         try {
             for (std::uint64_t i = fuzzer.below(3); i < 3; ++i)
                 fuzzer.change(parts.header, parts.data);
-            attempt(fuzzer.join(parts.header, parts.data), fuzzer.one_in(2), counts);
+            const Bytes bytes = fuzzer.join(parts.header, parts.data);
+            attempt(bytes, fuzzer.one_in(2), counts);
         } catch (const std::exception& error) {
             std::printf("file %llu with seed %llu: unexpected: %s\n",
                         static_cast<unsigned long long>(done),

@@ -5,6 +5,7 @@
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/features.hpp"
 #include "ricochet/detect/network.hpp"
+#include "ricochet/detect/verified.hpp"
 #include "ricochet/hybrid/event.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/step.hpp"

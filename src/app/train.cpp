@@ -33,7 +33,7 @@ public:
         interrupted = 0;
         struct sigaction action = {};
         action.sa_handler = [](int) { interrupted = 1; };
-        action.sa_flags = SA_RESETHAND | SA_RESTART;
+        action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
         sigaction(SIGINT, &action, &before_int_);
         sigaction(SIGTERM, &action, &before_term_);
     }

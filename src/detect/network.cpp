@@ -25,7 +25,7 @@ void check_model(const Model& model, Recipe recipe, std::size_t features, bool o
 
 void check_model_step(const Model& model, double smallest, double largest)
 {
-    if (smallest < model.step_min || largest > model.step_max) {
+    if (largest < model.step_min || smallest > model.step_max) {
         throw std::invalid_argument(
             fmt::format("Network: the model for {} is trained for steps in [{}, {}] s, got [{}, {}]",
                         model.system, model.step_min, model.step_max, smallest, largest));

@@ -36,6 +36,7 @@ void check_model_step(const Model& model, double smallest, double largest);
 class Network {
 public:
     static constexpr bool uses_rates = false;
+    static constexpr bool checks_every_step = false;
     static constexpr std::size_t max_features = 16;
 
     /// @throws std::invalid_argument if the model names an unknown recipe or has
@@ -45,7 +46,7 @@ public:
     [[nodiscard]] const Model& model() const noexcept { return classifier_->model(); }
 
     /// Whether this network can be asked about `system` in steps between `smallest`
-    /// and `largest` [s].
+    /// and `largest` [s], at least in some of them.
     ///
     /// @throws std::invalid_argument naming the model's system, features or steps
     /// and what they would have to be.
@@ -57,10 +58,12 @@ public:
         detail::check_model_step(model(), smallest, largest);
     }
 
-    /// Whether the step is predicted to be free of events.
+    /// Whether the step is predicted to be free of events. Never of a step shorter
+    /// or longer than the network was trained for.
     template <class Guard, class Step>
     [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
     {
+        if (!(step.h() >= model().step_min && step.h() <= model().step_max)) return false;
         std::array<double, max_features> input;
         features(recipe_, guard.system(), step.time(0), step.x0(), step.rate0(), step.h(),
                  input.data());

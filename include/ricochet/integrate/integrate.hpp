@@ -255,9 +255,12 @@ private:
     [[nodiscard]] bool handle_event()
     {
         const auto guard = this->guard();
+        bool cleared = false;
         if constexpr (predicts) {
             ++run_.statistics.network_calls;
-            if (detector_.clears(guard, step_)) {
+            cleared = detector_.clears(guard, step_);
+            if (cleared && !Detector::checks_every_step) {
+                ++run_.statistics.checks_put_off;
                 run_.statistics.evidence.add(Evidence::assumed);
                 watch_.start = {};
                 return false;
@@ -269,12 +272,13 @@ private:
             return true;
         }
         if (!finding.hit) {
-            if (predicts) ++run_.statistics.false_alarms;
+            if (predicts && !cleared) ++run_.statistics.false_alarms;
             run_.statistics.evidence.add(finding.evidence);
             pass_on();
             return false;
         }
         ++run_.statistics.steps;
+        if (cleared || finding.late) ++run_.statistics.missed_events;
         if (finding.late) {
             ++run_.statistics.late_events;
             const double t = step_.time(0);
@@ -329,7 +333,10 @@ private:
         ++run_.statistics.events;
         const bool finite = all_finite(event.after);
         if (finite) step_.restart(s, event.after);
-        if (options_.record_events) run_.events.push_back(std::move(event));
+        if (options_.record_events) {
+            if (run_.events.empty()) run_.events.reserve(16);  // most runs grow no further
+            run_.events.push_back(std::move(event));
+        }
         if (!finite) return end(Outcome::non_finite);
         if (options_.stop_at_event) return end(Outcome::stopped_by_event);
         if (Resetting<System, X> &&

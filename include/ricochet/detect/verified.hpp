@@ -1,0 +1,55 @@
+// The verified gate: a network may change what a run costs, never what it finds.
+//
+// The network proposes which exact checks to put off, and every stretch is closed
+// by an exact check that covers all of it. What covers a stretch longer than one
+// step is a bound on the guard's rate; a guard that declares none gives nothing to
+// cover with, and every step keeps its exact check. The network is then asked in
+// vain, and the statistics say so: no checks put off, and how often it would have
+// been right. With any weights whatever the events are those of the exact detector,
+// bit for bit.
+#pragma once
+
+#include <utility>
+
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/network.hpp"
+
+namespace ricochet {
+
+template <class Exact = Extremum>
+class Verified {
+public:
+    static constexpr bool uses_rates = Exact::uses_rates;
+    static constexpr bool checks_every_step = true;
+
+    explicit Verified(Network network, const Exact& exact = {})
+        : network_(std::move(network)), exact_(exact)
+    {
+    }
+
+    /// As `Network::check`.
+    template <class System, class X>
+    void check(const System& system, const X& x, double smallest, double largest) const
+    {
+        network_.check(system, x, smallest, largest);
+    }
+
+    /// What the network predicts of the step, for the statistics.
+    template <class Guard, class Step>
+    [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
+    {
+        return network_.clears(guard, step);
+    }
+
+    template <class Guard, class Step>
+    [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
+    {
+        return exact_.confirm(guard, step, watch);
+    }
+
+private:
+    Network network_;
+    Exact exact_;
+};
+
+}  // namespace ricochet
