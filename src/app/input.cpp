@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <system_error>
@@ -14,6 +15,15 @@ BadInput unknown(std::string_view what, std::string_view given,
 {
     return BadInput(fmt::format("unknown {} '{}'; known {} {}", what, given,
                                 known.size() == 1 ? "is" : "are", fmt::join(known, ", ")));
+}
+
+std::string printable(std::string_view text)
+{
+    std::string out(text);
+    std::replace_if(
+        out.begin(), out.end(),
+        [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == '\x7f'; }, '?');
+    return out;
 }
 
 double number(std::string_view option, std::string_view text)

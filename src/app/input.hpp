@@ -21,6 +21,9 @@ public:
 [[nodiscard]] BadInput unknown(std::string_view what, std::string_view given,
                                const std::vector<std::string_view>& known);
 
+/// Bytes that a terminal would act on, as a foreign file may hold, become '?'.
+[[nodiscard]] std::string printable(std::string_view text);
+
 /// The finite number that `text` spells.
 /// @throws BadInput naming the option.
 [[nodiscard]] double number(std::string_view option, std::string_view text);

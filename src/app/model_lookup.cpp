@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <optional>
+#include <algorithm>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
 #include "input.hpp"
-#include "registry.hpp"
+#include "ricochet/detect/features.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
 namespace ricochet::app {
@@ -17,31 +18,38 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The file, or what was looked for.
-struct Search {
-    std::optional<fs::path> found;
-    std::vector<std::string> looked;
-};
-
-Search search(const std::string& name)
+/// The first of the files that is there.
+/// @throws BadInput
+fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates)
 {
-    std::vector<fs::path> candidates{name};
-    if (!name.empty() && !fs::path(name).has_parent_path()) {
-        for (const fs::path& directory : model_directories()) {
-            candidates.push_back(directory / name);
-            candidates.push_back(directory / (name + ".safetensors"));
-        }
-    }
-    Search result;
+    std::vector<std::string> looked;
     std::error_code ignored;
     for (const fs::path& file : candidates) {
-        if (fs::exists(file, ignored)) {
-            result.found = file;
-            return result;
-        }
-        result.looked.push_back(file.string());
+        if (fs::exists(file, ignored)) return file;
+        looked.push_back(file.string());
     }
-    return result;
+    throw BadInput(
+        fmt::format("model '{}' not found; looked for {}", name, fmt::join(looked, ", ")));
+}
+
+/// Why what `model` computes is not an event of `system`; empty if it may be.
+std::string objection_to_shape(const SystemEntry& system, const Model& model)
+{
+    Recipe recipe{};
+    try {
+        recipe = recipe_named(model.recipe);
+    } catch (const std::invalid_argument& error) {
+        return fmt::format("has an {}", error.what());
+    }
+    const std::size_t expected = dimension(recipe, system.state.size());
+    const std::size_t features = model.layers.front().inputs;
+    if (features != expected) {
+        return fmt::format("takes {} features, but the recipe '{}' makes {} of a state of {}",
+                           features, model.recipe, expected, system.name);
+    }
+    const std::size_t outputs = model.layers.back().outputs;
+    if (outputs != 1) return fmt::format("has {} outputs, expected 1", outputs);
+    return {};
 }
 
 /// Why `model` cannot be used for this run; empty if it can.
@@ -50,12 +58,18 @@ std::string objection(const SystemEntry& system, const RunSettings& settings, co
     if (model.system != system.name) {
         return fmt::format("is for the system '{}', expected '{}'", model.system, system.name);
     }
+    if (std::string why = objection_to_shape(system, model); !why.empty()) return why;
     for (const auto& [name, trained] : model.parameters) {
-        for (std::size_t i = 0; i < system.parameters.size(); ++i) {
-            if (system.parameters[i].name == name && settings.parameters[i] != trained) {
-                return fmt::format("is trained for {} = {}, got {}", name, trained,
-                                   settings.parameters[i]);
-            }
+        const auto found = std::find_if(system.parameters.begin(), system.parameters.end(),
+                                        [&](const Parameter& p) { return p.name == name; });
+        if (found == system.parameters.end()) {
+            return fmt::format("depends on the parameter '{}', which {} does not have", name,
+                               system.name);
+        }
+        const auto i = static_cast<std::size_t>(found - system.parameters.begin());
+        if (settings.parameters[i] != trained) {
+            return fmt::format("is trained for {} = {}, got {}", name, trained,
+                               settings.parameters[i]);
         }
     }
     const double step = settings.options.step;
@@ -97,19 +111,34 @@ std::vector<fs::path> model_directories()
     return directories;
 }
 
+fs::path find_model(const std::string& given)
+{
+    std::vector<fs::path> candidates{given};
+    if (!given.empty() && !fs::path(given).has_parent_path()) {
+        for (const fs::path& directory : model_directories()) {
+            candidates.push_back(directory / given);
+            candidates.push_back(directory / (given + ".safetensors"));
+        }
+    }
+    return first_of(given, candidates);
+}
+
+fs::path find_model(const OwnModel& own)
+{
+    std::vector<fs::path> candidates;
+    for (const fs::path& directory : model_directories()) candidates.push_back(directory / own.file);
+    return first_of(own.file, candidates);
+}
+
 FoundModel named_model(const SystemEntry& system, const RunSettings& settings,
                        const std::string& given)
 {
-    const Search result = search(given);
-    if (!result.found) {
-        throw BadInput(fmt::format("model '{}' not found; looked for {}", given,
-                                   fmt::join(result.looked, ", ")));
+    const fs::path file = find_model(given);
+    FoundModel found{.file = file, .model = load_model(file)};
+    if (const std::string why = objection(system, settings, found.model); !why.empty()) {
+        throw BadInput(fmt::format("model '{}' {}", file.string(), why));
     }
-    FoundModel model{.file = *result.found, .model = load_model(*result.found)};
-    if (const std::string why = objection(system, settings, model.model); !why.empty()) {
-        throw BadInput(fmt::format("model '{}' {}", model.file.string(), why));
-    }
-    return model;
+    return found;
 }
 
 FoundModel suitable_model(const SystemEntry& system, const RunSettings& settings)
@@ -119,18 +148,13 @@ FoundModel suitable_model(const SystemEntry& system, const RunSettings& settings
             fmt::format("no model for {} comes with ricochet; expected --model FILE", system.name));
     }
     std::vector<std::string> reasons;
-    for (const std::string_view name : system.models) {
-        const Search result = search(std::string(name));
-        if (!result.found) {
-            reasons.push_back(fmt::format("'{}' was not found; looked for {}", name,
-                                          fmt::join(result.looked, ", ")));
-            continue;
-        }
-        FoundModel found{.file = *result.found, .model = load_model(*result.found)};
+    for (const OwnModel& own : system.models) {
+        const fs::path file = find_model(own);
+        FoundModel found{.file = file, .model = load_model(file)};
         const std::string why = objection(system, settings, found.model);
         if (why.empty() && holds_start(system, settings, found.model)) return found;
         reasons.push_back(
-            fmt::format("'{}' {}", name, why.empty() ? "is not trained for this start" : why));
+            fmt::format("'{}' {}", own.file, why.empty() ? "is not trained for this start" : why));
     }
     throw BadInput(fmt::format("no model for {} suits: {}", system.name, fmt::join(reasons, "; ")));
 }

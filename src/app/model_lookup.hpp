@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "registry.hpp"
 #include "ricochet/nn/model.hpp"
 #include "settings.hpp"
 
@@ -19,8 +20,16 @@ struct FoundModel {
 /// a build and in an installed tree), then under the prefix of the installation.
 [[nodiscard]] std::vector<std::filesystem::path> model_directories();
 
-/// The model that the user named: a path, or a name in one of the directories, with
+/// The file that the user named: a path, or a name in one of the directories, with
 /// or without its extension.
+/// @throws BadInput saying where it was looked for.
+[[nodiscard]] std::filesystem::path find_model(const std::string& given);
+
+/// The file of a model that comes with the library, in one of the directories.
+/// @throws BadInput saying where it was looked for.
+[[nodiscard]] std::filesystem::path find_model(const OwnModel& own);
+
+/// The model that the user named, see `find_model`.
 /// @throws BadInput or ModelError if it is not there, is no model, or does not suit
 ///         the system, its parameters or the stepping.
 [[nodiscard]] FoundModel named_model(const SystemEntry& system, const RunSettings& settings,

@@ -90,6 +90,13 @@ struct Published {
     std::vector<double> times;  ///< [s]
 };
 
+/// A model that comes with the library.
+struct OwnModel {
+    std::string_view file;  ///< in one of the model directories
+    std::string_view kind;  ///< "fixed-step"
+    bool any_step;          ///< else it is for one step only
+};
+
 struct SystemEntry {
     std::string_view name;
     std::string_view description;  ///< one sentence
@@ -104,8 +111,12 @@ struct SystemEntry {
     /// Runs it `repeats` times over; the runs are alike and the last is returned.
     TimedRun (*run)(const RunSettings& settings, int repeats);
 
-    /// Models that come with the library, the more special before the more general.
-    std::vector<std::string_view> models{};
+    /// The more special before the more general.
+    std::vector<OwnModel> models{};
+
+    /// Where the guard is a parabola in time: the boundary of a step that meets it, in
+    /// words. The detector `line` evaluates it. Empty elsewhere.
+    std::string_view line{};
 
     /// Exact event times [s] up to a time, for comparison; none known: null.
     std::vector<double> (*exact_events)(const std::vector<double>& parameters,

@@ -44,7 +44,9 @@ Json json(const Statistics& s)
             {"guard_calls", s.guard_calls},
             {"network_calls", s.network_calls},
             {"false_alarms", s.false_alarms},
+            {"missed_events", s.missed_events},
             {"late_events", s.late_events},
+            {"checks_put_off", s.checks_put_off},
             {"evidence",
              {{"proved", s.evidence.proved},
               {"checked", s.evidence.checked},
@@ -174,9 +176,10 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     }
     out += fmt::format("{} events, {} steps ({} rejected), {} flow calls, {} guard calls", s.events,
                        s.steps, s.rejected, s.flow_calls, s.guard_calls);
-    if (settings.network) {
-        out += fmt::format(", {} network calls ({} false alarms, {} late events)", s.network_calls,
-                           s.false_alarms, s.late_events);
+    if (s.network_calls > 0) {
+        out += fmt::format(
+            ",\n{} network calls: {} checks put off, {} false alarms, {} missed events ({} late)",
+            s.network_calls, s.checks_put_off, s.false_alarms, s.missed_events, s.late_events);
     }
     out += fmt::format("\nsteps without an event: {} proved, {} checked, {} gated, {} assumed\n",
                        s.evidence.proved, s.evidence.checked, s.evidence.gated, s.evidence.assumed);

@@ -17,9 +17,11 @@ namespace {
 template <class Kind, std::size_t n>
 using Names = std::array<std::pair<std::string_view, Kind>, n>;
 
-constexpr Names<DetectorKind, 3> detectors{{{"ends", DetectorKind::ends},
+constexpr Names<DetectorKind, 5> detectors{{{"ends", DetectorKind::ends},
                                             {"extremum", DetectorKind::extremum},
-                                            {"network", DetectorKind::network}}};
+                                            {"network", DetectorKind::network},
+                                            {"verified", DetectorKind::verified},
+                                            {"line", DetectorKind::line}}};
 constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
                                           {"bisection", LocatorKind::bisection},
                                           {"toms748", LocatorKind::toms748}}};
@@ -101,16 +103,24 @@ void choose_detector(const SystemEntry& system, const RunRequest& request, RunSe
     } else if (request.model) {
         settings.detector = DetectorKind::network;
     }
-    if (settings.detector != DetectorKind::network) {
+    if (settings.detector == DetectorKind::line && system.line.empty()) {
+        throw BadInput(
+            fmt::format("the detector line is for guards that are parabolas in time, which those "
+                        "of {} are not",
+                        system.name));
+    }
+    const bool bare = settings.detector == DetectorKind::network;
+    if (!bare && settings.detector != DetectorKind::verified) {
         if (request.model) {
-            throw BadInput(fmt::format("--model is for the detector network, got --detector {}",
-                                       name(settings.detector)));
+            throw BadInput(
+                fmt::format("--model is for the detectors network and verified, got --detector {}",
+                            name(settings.detector)));
         }
         return;
     }
     FoundModel found = request.model ? named_model(system, settings, *request.model)
                                      : suitable_model(system, settings);
-    if (!settings.fixed_step) {
+    if (bare && !settings.fixed_step) {  // `verified` takes the steps of its exact detector
         settings.options.h_min = found.model.step_min;
         settings.options.h_max = found.model.step_max;
     }
@@ -174,6 +184,7 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     }
     options.event_tolerance = request.event_tolerance.value_or(0);
     require_not_negative("--event-tolerance", options.event_tolerance);
+    options.max_steps = request.max_steps.value_or(options.max_steps);
 
     choose_stepping(request, settings);
     if (request.locator) settings.locator = named("locator", locators, *request.locator);

@@ -1,6 +1,7 @@
 // How a run is to be done: the choices that the command line offers, by name.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -14,7 +15,7 @@ namespace ricochet::app {
 
 struct SystemEntry;
 
-enum class DetectorKind { ends, extremum, network };
+enum class DetectorKind { ends, extremum, network, verified, line };
 enum class LocatorKind { newton, bisection, toms748 };
 enum class StepperKind { rk4, dopri5, fehlberg78, cash_karp54, euler };
 
@@ -30,7 +31,7 @@ struct RunSettings {
     bool fixed_step = false;  ///< else error control
     DetectorKind detector = DetectorKind::extremum;
     LocatorKind locator = LocatorKind::newton;
-    std::optional<Network> network{};  ///< of the detector `network`
+    std::optional<Network> network{};  ///< of the detectors `network` and `verified`
     std::filesystem::path model{};     ///< its file
 };
 
@@ -40,6 +41,7 @@ struct RunRequest {
     std::optional<double> t_start{}, t_end{};
     std::optional<std::string> detector{}, locator{}, stepper{}, model{};
     std::optional<double> step{}, rtol{}, atol{}, event_tolerance{};
+    std::optional<std::uint64_t> max_steps{};
 };
 
 /// The values of a system's parameters, in its order, after "name=value"s.

@@ -2,10 +2,10 @@
 // and the rate is there whether or not the system has one in closed form.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 
+#include "ricochet/hybrid/components.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
@@ -47,22 +47,16 @@ public:
             return system_->guard_rate(t, x, dxdt);
         } else {
             const double delta = 1e-5 * scale;
-            const double ahead = value(t + delta, moved(x, dxdt, delta));
-            const double behind = value(t - delta, moved(x, dxdt, -delta));
+            X moved = x;
+            detail::move(moved, x, delta, dxdt);
+            const double ahead = value(t + delta, moved);
+            detail::move(moved, x, -delta, dxdt);
+            const double behind = value(t - delta, moved);
             return (ahead - behind) / (2 * delta);
         }
     }
 
 private:
-    [[nodiscard]] static X moved(X x, const X& dxdt, double delta)
-    {
-        const auto n = static_cast<std::size_t>(x.size());
-        for (std::size_t i = 0; i < n; ++i) {
-            x[i] += delta * dxdt[i];
-        }
-        return x;
-    }
-
     const System* system_;
     std::uint64_t* calls_;
 };

@@ -18,11 +18,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
 
+#include "ricochet/hybrid/components.hpp"
 #include "ricochet/hybrid/instant.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/methods.hpp"
@@ -33,23 +33,8 @@ namespace ricochet::detail {
 template <class X>
 [[nodiscard]] X zeros_like(X x)
 {
-    const auto n = static_cast<std::size_t>(x.size());
-    for (std::size_t i = 0; i < n; ++i) {
-        x[i] = 0;
-    }
+    for_each_component(x, [&](auto i) { x[i] = 0; });
     return x;
-}
-
-/// Whether every component is finite.
-template <class X>
-[[nodiscard]] bool all_finite(const X& x) noexcept
-{
-    const auto n = static_cast<std::size_t>(x.size());
-    double sum = 0;  // 0 * x is NaN where x is not finite
-    for (std::size_t i = 0; i < n; ++i) {
-        sum += 0 * x[i];
-    }
-    return sum == 0;
 }
 
 /// The step in progress. Fulfils `Step`.
@@ -100,7 +85,7 @@ public:
             const double u = s / h_;
             const double slope = h_ * u * u * (u - 1);
             const double rise = u * u * (3 - 2 * u);
-            for_components([&](std::size_t i) {
+            for_components([&](auto i) {
                 x[i] = rise * w_[i] + slope * (rate1_[i] - rate0_[i]);
             });
         }
@@ -133,7 +118,7 @@ public:
         advance<false>(probing_, s, x, dxdt, error_);
         add_tangent(s, x);
         if constexpr (is_fsal<Stepper>) {
-            for_components([&](std::size_t i) { dxdt[i] += rate0_[i]; });
+            for_components([&](auto i) { dxdt[i] += rate0_[i]; });
         } else {
             flow(s, x, dxdt);
         }
@@ -165,7 +150,7 @@ public:
         finish_attempt();
 
         double worst = 0;
-        for_components([&](std::size_t i) {
+        for_components([&](auto i) {
             const double size = std::max(std::fabs(x0_[i]), std::fabs(x1_[i]));
             const double ratio = std::fabs(error_[i]) / (atol + rtol * size);
             worst = worst >= ratio ? worst : ratio;  // NaN stays
@@ -183,13 +168,13 @@ public:
     void accept() noexcept
     {
         start_ = start_.after(h_);
-        for_components([&](std::size_t i) {
+        for_components([&](auto i) {
             const TwoSum sum =
                 two_sum(x0_[i], h_ * rate0_[i] + (w_[i] + remainder_[i]));
             x0_[i] = sum.value;
             remainder_[i] = sum.remainder;
         });
-        rate0_ = rate1_;
+        assign(rate0_, rate1_);
     }
 
     /// As `accept`, where the end is the time `t` by decree.
@@ -203,8 +188,8 @@ public:
     void restart(double s, const X& x)
     {
         start_ = start_.after(s);
-        x0_ = x;
-        remainder_ = zero_;
+        assign(x0_, x);
+        assign(remainder_, zero_);
         flow(0, x0_, rate0_);
     }
 
@@ -216,16 +201,12 @@ private:
         stepper.calc_state(0.0, x, x, x, 0.0, x, x, 0.0);
     };
 
-    static constexpr bool fits_registers =
-        std::is_trivially_copyable_v<X> && sizeof(X) <= 8 * sizeof(double);
+    static constexpr bool fits_registers = is_small<X> && std::is_trivially_copyable_v<X>;
 
     template <class Function>
-    void for_components(Function function) const
+    [[gnu::always_inline]] void for_components(const Function& function) const
     {
-        const auto n = static_cast<std::size_t>(x0_.size());
-        for (std::size_t i = 0; i < n; ++i) {
-            function(i);
-        }
+        for_each_component(x0_, function);
     }
 
     /// What a step starts from.
@@ -244,16 +225,13 @@ private:
                                 X& rate, X& error)
     {
         std::uint64_t calls = 0;
-        const auto n = static_cast<std::size_t>(from.x.size());
         const auto flow = [&](const X& departure, X& departure_rate, double offset) {
-            for (std::size_t i = 0; i < n; ++i) {
+            for_each_component(from.x, [&](auto i) {
                 at[i] = from.x[i] + (offset * from.rate[i] + departure[i]);
-            }
+            });
             ++calls;
             from.system.flow(from.start.plus(offset), at, departure_rate);
-            for (std::size_t i = 0; i < n; ++i) {
-                departure_rate[i] -= from.rate[i];
-            }
+            for_each_component(from.x, [&](auto i) { departure_rate[i] -= from.rate[i]; });
         };
         if constexpr (is_fsal<Stepper> && with_error) {
             stepper.do_step(flow, from.zero, from.zero, 0.0, w, rate, s, error);
@@ -280,8 +258,10 @@ private:
             // On copies that nothing else refers to, the compiler keeps a small
             // state in registers from stage to stage.
             Stepper own;
-            const X x = x0_;
-            const X rate0 = rate0_;
+            X x;
+            X rate0;
+            assign(x, x0_);
+            assign(rate0, rate0_);
             const X zero{};
             X at{};
             X w_own{};
@@ -289,9 +269,9 @@ private:
             X error_own{};
             flow_calls_ += depart<with_error>(own, {*system_, start_, x, rate0, zero}, s, at,
                                               w_own, rate_own, error_own);
-            w = w_own;
-            if constexpr (is_fsal<Stepper>) rate = rate_own;
-            if constexpr (with_error) error = error_own;
+            assign(w, w_own);
+            if constexpr (is_fsal<Stepper>) assign(rate, rate_own);
+            if constexpr (with_error) assign(error, error_own);
             if constexpr (has_dense_output) {
                 if (&stepper == &advancing_) stepper = own;
             }
@@ -305,15 +285,15 @@ private:
     void add_tangent(double s, X& w) const noexcept
     {
         for_components(
-            [&](std::size_t i) { w[i] = x0_[i] + (s * rate0_[i] + (w[i] + remainder_[i])); });
+            [&](auto i) { w[i] = x0_[i] + (s * rate0_[i] + (w[i] + remainder_[i])); });
     }
 
     void finish_attempt()
     {
-        x1_ = w_;
+        assign(x1_, w_);
         add_tangent(h_, x1_);
         if constexpr (is_fsal<Stepper>) {
-            for_components([&](std::size_t i) { rate1_[i] = rate0_[i] + w_rate1_[i]; });
+            for_components([&](auto i) { rate1_[i] = rate0_[i] + w_rate1_[i]; });
         } else {
             flow(h_, x1_, rate1_);
         }

@@ -119,10 +119,9 @@ private:
     static const Options& checked(const Options& options, const X& x0)
     {
         validate(options, !error_controlled);
-        const auto n = static_cast<std::size_t>(x0.size());
-        for (std::size_t i = 0; i < n; ++i) {
-            if (!std::isfinite(x0[i])) throw_start_not_finite(i, x0[i]);
-        }
+        for_each_component(x0, [&](auto i) {
+            if (!std::isfinite(x0[i])) throw_start_not_finite(static_cast<std::size_t>(i), x0[i]);
+        });
         return options;
     }
 
@@ -214,28 +213,25 @@ private:
         constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
         const X& x = step_.x0();
         const X& dxdt = step_.rate0();
-        const auto n = static_cast<std::size_t>(x.size());
-        const auto scale = [&](std::size_t i) {
+        const auto scale = [&](auto i) {
             return options_.atol + options_.rtol * std::fabs(x[i]);
         };
         double size = 0;
         double speed = 0;
-        for (std::size_t i = 0; i < n; ++i) {
+        for_each_component(x, [&](auto i) {
             size = std::max(size, std::fabs(x[i]) / scale(i));
             speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
-        }
+        });
         const double span = options_.t_end - options_.t_start;
         const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : 1e-6 * span;
         X moved = x;
         X rate = dxdt;
-        for (std::size_t i = 0; i < n; ++i) {
-            moved[i] += euler * dxdt[i];
-        }
+        move(moved, x, euler, dxdt);
         step_.flow(euler, moved, rate);
         double bend = 0;
-        for (std::size_t i = 0; i < n; ++i) {
+        for_each_component(x, [&](auto i) {
             bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i));
-        }
+        });
         const double fastest = std::max(speed, bend / euler);
         const double h = fastest <= 1e-15 ? std::max(1e-6 * span, euler * 1e-3)
                                           : std::pow(0.01 / fastest, 1.0 / order);
@@ -300,7 +296,7 @@ private:
         watch_.start.s = 0;
     }
 
-    void locate_and_fire(const GuardView<System, X>& guard, const Finding& finding)
+    [[gnu::noinline]] void locate_and_fire(const GuardView<System, X>& guard, const Finding& finding)
     {
         StepProbe probe(guard, step_, finding.side);
         probe.agree_on(finding.hi);
@@ -374,10 +370,7 @@ private:
         const X& dxdt = step_.rate0();
         X x = step_.x0();
         X later = dxdt;
-        const auto n = static_cast<std::size_t>(x.size());
-        for (std::size_t i = 0; i < n; ++i) {
-            x[i] += delta * dxdt[i];
-        }
+        move(x, step_.x0(), delta, dxdt);
         step_.flow(delta, x, later);
         return side_of(guard().rate(step_.time(delta), x, later, h_next_));
     }
@@ -393,10 +386,7 @@ private:
             const double t = step_.time(0);
             system_.reset(t, x);
             bool unchanged = true;
-            const auto n = static_cast<std::size_t>(x.size());
-            for (std::size_t i = 0; i < n; ++i) {
-                unchanged = unchanged && x[i] == before[i];
-            }
+            for_each_component(x, [&](auto i) { unchanged = unchanged && x[i] == before[i]; });
             if (unchanged || ++cascade_ > most_cascades) return end(Outcome::zeno);
             fire({.t = t, .before = before, .after = before, .bracket = {t, t}}, 0, 0);
             cascade_ = 0;

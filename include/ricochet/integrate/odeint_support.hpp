@@ -10,7 +10,10 @@
 #include <boost/numeric/odeint/util/resize.hpp>
 #include <boost/numeric/odeint/util/same_size.hpp>
 #include <cstddef>
+#include <tuple>
 #include <utility>
+
+#include "ricochet/hybrid/components.hpp"
 
 namespace Eigen {
 template <typename Scalar, int Rows, int Cols, int Options, int MaxRows, int MaxCols>
@@ -79,10 +82,9 @@ private:
     static void apply(X& x, Tuple rest, std::index_sequence<I...>)
     {
         auto& operation = std::get<sizeof...(I)>(rest);
-        const auto n = static_cast<std::size_t>(x.size());
-        for (std::size_t i = 0; i < n; ++i) {
+        detail::for_each_component(x, [&](auto i) __attribute__((always_inline)) {
             operation(x[i], std::get<I>(rest)[i]...);
-        }
+        });
     }
 };
 

@@ -9,14 +9,14 @@ namespace ricochet {
 /// The step-size rule of error control: with the error scaled so that 1 is just
 /// acceptable, and proportional to h^order, the next step is
 ///
-///     h_new = h min(5, max(1/5, 0.9 error^(-1/order)))
+///     h_new = h min(10, max(1/5, 0.9 error^(-1/order)))
 ///
 /// (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I,
 /// eq. II.4.13). A value, so that other rules can take its place.
 struct ErrorRule {
     double safety = 0.9;
     double smallest = 0.2;
-    double largest = 5;
+    double largest = 10;
 
     [[nodiscard]] static constexpr bool accepts(double error) noexcept { return error <= 1; }
 

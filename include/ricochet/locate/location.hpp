@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 
 #include "ricochet/detect/finding.hpp"
+#include "ricochet/hybrid/components.hpp"
 
 namespace ricochet {
 
@@ -37,7 +37,7 @@ public:
 
     StepProbe(const Guard& guard, const Step& step, Side side)
         : guard_(&guard), step_(&step), side_(side), x_(step.x0()), dxdt_(step.x0()),
-          beyond_(step.x1()), beyond_at_(step.h())
+          ahead_(step.x0()), beyond_(step.x1()), beyond_at_(step.h())
     {
     }
 
@@ -76,15 +76,11 @@ public:
     /// `value_and_rate` took.
     [[nodiscard]] GuardSample along_the_flow(const GuardSample& sample, double s)
     {
-        const double d = s - sample.s;
-        const auto n = static_cast<std::size_t>(x_.size());
-        State x = x_;
-        for (std::size_t i = 0; i < n; ++i) {
-            x[i] += d * dxdt_[i];
-        }
-        const GuardSample at{.s = s, .value = guard_->value(step_->time(s), x), .rate = sample.rate};
+        detail::move(ahead_, x_, s - sample.s, dxdt_);
+        const GuardSample at{
+            .s = s, .value = guard_->value(step_->time(s), ahead_), .rate = sample.rate};
         if (has_left(at)) {
-            beyond_ = x;
+            detail::assign(beyond_, ahead_);
             beyond_at_ = s;
         }
         return at;
@@ -121,7 +117,7 @@ public:
     {
         if (s != beyond_at_) {
             (void)value(s);
-            beyond_ = x_;
+            detail::assign(beyond_, x_);
         }
         return beyond_;
     }
@@ -136,7 +132,7 @@ private:
     [[nodiscard]] GuardSample keep(const GuardSample& sample)
     {
         if (has_left(sample)) {
-            beyond_ = x_;
+            detail::assign(beyond_, x_);
             beyond_at_ = sample.s;
         }
         return sample;
@@ -145,7 +141,7 @@ private:
     const Guard* guard_;
     const Step* step_;
     Side side_;
-    State x_, dxdt_, beyond_;
+    State x_, dxdt_, ahead_, beyond_;
     double beyond_at_;
     bool on_dense_output_ = false;
 };

@@ -5,17 +5,21 @@
 #pragma once
 
 #include <chrono>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "../registry.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/features.hpp"
+#include "ricochet/detect/verified.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/newton.hpp"
 #include "ricochet/locate/toms748.hpp"
+#include "line.hpp"
 
 namespace ricochet::app {
 
@@ -58,12 +62,20 @@ TimedRun with_stepping(const RunSettings& settings, Use&& use)
 }
 
 /// Calls `use` with the detector of the settings.
-template <class Use>
+/// @throws std::logic_error for `line` where the system has no closed curvature.
+template <class System, class X, class Use>
 TimedRun with_detector(const RunSettings& settings, Use&& use)
 {
     switch (settings.detector) {
         case DetectorKind::ends: return use(Ends{});
         case DetectorKind::network: return use(settings.network.value());
+        case DetectorKind::verified: return use(Verified<Extremum>(settings.network.value()));
+        case DetectorKind::line:
+            if constexpr (CurvedGuard<System, X>) {
+                return use(Line{});
+            } else {
+                throw std::logic_error("a system with a line has a guard curvature");
+            }
         case DetectorKind::extremum: break;
     }
     return use(Extremum{});
@@ -105,7 +117,7 @@ template <class System, class X>
                                   int repeats)
 {
     return with_stepping(settings, [&](auto stepping) {
-        return with_detector(settings, [&](const auto& detector) {
+        return with_detector<System, X>(settings, [&](const auto& detector) {
             const ChosenLocator locator{settings.locator};
             Run<X> run;
             const auto start = std::chrono::steady_clock::now();
