@@ -1,5 +1,10 @@
 // What detection adds to a step: time per step, and the error of the events that
 // the same run finds on the ball of the source paper.
+//
+//     step/<system>/<method>/<state type, of rk4>/<detector>
+//
+// Networks are named by their hidden layers: 1x16 is the any-step model of the ball,
+// 5x16 the one for steps of 0.01 s. `line` is the rival that knows the boundary.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Core>
@@ -8,10 +13,11 @@
 #include <limits>
 #include <vector>
 
+#include "line_detector.hpp"
 #include "problems.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/verified.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/safetensors.hpp"
@@ -32,11 +38,9 @@ Eigen::VectorXd dynamic(double a, double b)
     return x;
 }
 
-const Network& network()
+Network stored(const char* file)
 {
-    static const Network instance(
-        load_model(std::filesystem::path(RICOCHET_MODELS) / "bouncing-ball-step-0.01.safetensors"));
-    return instance;
+    return Network(load_model(std::filesystem::path(RICOCHET_MODELS) / file));
 }
 
 /// Times a run without events, and reports the cost of one step and its counts.
@@ -118,10 +122,19 @@ void register_all()
         state.counters["time/step"] = benchmark::Counter(
             batch, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
     });
+    const Network any_step = stored("bouncing-ball.safetensors");
+    const Network fixed_step = stored("bouncing-ball-step-0.01.safetensors");
+    const Verified<Extremum> gate_1x16(any_step);
+    const Verified<Extremum> gate_5x16(fixed_step);
+
     add("step/ball/rk4/array/none", [=](S& s) { ball_rk4_unguarded(s, launch); });
     add("step/ball/rk4/array/ends", [=](S& s) { ball_rk4(s, launch, drop, Ends{}); });
     add("step/ball/rk4/array/extremum", [=](S& s) { ball_rk4(s, launch, drop, Extremum{}); });
-    add("step/ball/rk4/array/network", [=](S& s) { ball_rk4(s, launch, drop, network()); });
+    add("step/ball/rk4/array/line", [=](S& s) { ball_rk4(s, launch, drop, bench::Line{}); });
+    add("step/ball/rk4/array/network_1x16", [=](S& s) { ball_rk4(s, launch, drop, any_step); });
+    add("step/ball/rk4/array/network_5x16", [=](S& s) { ball_rk4(s, launch, drop, fixed_step); });
+    add("step/ball/rk4/array/verified_1x16", [=](S& s) { ball_rk4(s, launch, drop, gate_1x16); });
+    add("step/ball/rk4/array/verified_5x16", [=](S& s) { ball_rk4(s, launch, drop, gate_5x16); });
 
     const Eigen::VectorXd vector_launch = dynamic(0, 15);
     const Eigen::VectorXd vector_drop = dynamic(10, 0);
@@ -130,8 +143,8 @@ void register_all()
         [=](S& s) { ball_rk4(s, vector_launch, vector_drop, Ends{}); });
     add("step/ball/rk4/vectorxd/extremum",
         [=](S& s) { ball_rk4(s, vector_launch, vector_drop, Extremum{}); });
-    add("step/ball/rk4/vectorxd/network",
-        [=](S& s) { ball_rk4(s, vector_launch, vector_drop, network()); });
+    add("step/ball/rk4/vectorxd/network_5x16",
+        [=](S& s) { ball_rk4(s, vector_launch, vector_drop, fixed_step); });
 
     const Array high{1e6, 0};
     const BouncingBall ball;
@@ -139,6 +152,9 @@ void register_all()
     add("step/ball/dopri5/none", [=](S& s) { controlled(s, free_fall, high, 0.1, Ends{}); });
     add("step/ball/dopri5/ends", [=](S& s) { controlled(s, ball, high, 0.1, Ends{}); });
     add("step/ball/dopri5/extremum", [=](S& s) { controlled(s, ball, high, 0.1, Extremum{}); });
+    add("step/ball/dopri5/line", [=](S& s) { controlled(s, ball, high, 0.1, bench::Line{}); });
+    add("step/ball/dopri5/network_1x16", [=](S& s) { controlled(s, ball, high, 0.1, any_step); });
+    add("step/ball/dopri5/verified_1x16", [=](S& s) { controlled(s, ball, high, 0.1, gate_1x16); });
 
     const Array swing{1, 0};
     constexpr double any = std::numeric_limits<double>::infinity();

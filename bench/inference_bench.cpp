@@ -17,16 +17,15 @@
 // repetitions under other load the minimum is the least disturbed:
 //
 //     inference_bench --benchmark_repetitions=25 --benchmark_enable_random_interleaving=true
+#include "networks.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/static_mlp.hpp"
 
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,25 +37,6 @@ using namespace ricochet;
 double smallest(const std::vector<double>& values)
 {
     return *std::min_element(values.begin(), values.end());
-}
-
-/// Uniform weights of variance 1 / inputs.
-Model network(const std::vector<std::size_t>& widths, Activation activation)
-{
-    std::mt19937_64 bits(1);
-    const auto uniform = [&] { return static_cast<double>(bits() >> 11) * 0x1p-52 - 1; };
-    Model model;
-    model.activation = activation;
-    for (std::size_t k = 0; k + 1 < widths.size(); ++k) {
-        DenseLayer layer{widths[k], widths[k + 1], {}, {}};
-        const double scale = std::sqrt(3 / static_cast<double>(layer.inputs));
-        for (std::size_t i = 0; i < layer.inputs * layer.outputs; ++i) {
-            layer.weight.push_back(scale * uniform());
-        }
-        for (std::size_t j = 0; j < layer.outputs; ++j) layer.bias.push_back(uniform());
-        model.layers.push_back(layer);
-    }
-    return model;
 }
 
 InstructionSet chosen_set()
@@ -96,7 +76,7 @@ void register_shape(const std::string& hidden)
 {
     const std::string prefix = "infer/" + hidden + (sizeof(T) == 4 ? "/float" : "/double") +
                                (activation == Activation::relu ? "/relu/" : "/tanh/");
-    const Model model = network({4, Widths..., 1}, activation);
+    const Model model = bench::random_network({4, Widths..., 1}, activation);
     const Mlp<T> reference(model, {InstructionSet::baseline, false});
     const BasicStaticMlp<activation, T, 4, Widths..., 1> fixed(model);
     const auto add = [&](const std::string& kernel, const auto& evaluated) {
@@ -113,41 +93,18 @@ template <class T, Activation activation>
 void register_shapes()
 {
     register_shape<T, activation, 8>("1x8");
+    register_shape<T, activation, 16>("1x16");
     register_shape<T, activation, 16, 16>("2x16");
     register_shape<T, activation, 16, 16, 16, 16, 16>("5x16");
     register_shape<T, activation, 64, 64>("2x64");
 }
 
 #if defined(__FMA__)
-typedef float Lanes __attribute__((vector_size(32)));
-
 void fma_peak(benchmark::State& state)
 {
-    // The assembler is told the operation, so that 12 registers are 12 registers.
-    Lanes a0{}, a1{}, a2{}, a3{}, a4{}, a5{}, a6{}, a7{}, a8{}, a9{}, a10{}, a11{};
-    const Lanes b = 0.5F - Lanes{};
-    constexpr int rounds = 100;
-    for (auto _ : state) {
-        for (int i = 0; i < rounds; ++i) {
-            asm volatile(
-                "vfmadd231ps %12, %12, %0\n\t"
-                "vfmadd231ps %12, %12, %1\n\t"
-                "vfmadd231ps %12, %12, %2\n\t"
-                "vfmadd231ps %12, %12, %3\n\t"
-                "vfmadd231ps %12, %12, %4\n\t"
-                "vfmadd231ps %12, %12, %5\n\t"
-                "vfmadd231ps %12, %12, %6\n\t"
-                "vfmadd231ps %12, %12, %7\n\t"
-                "vfmadd231ps %12, %12, %8\n\t"
-                "vfmadd231ps %12, %12, %9\n\t"
-                "vfmadd231ps %12, %12, %10\n\t"
-                "vfmadd231ps %12, %12, %11"
-                : "+x"(a0), "+x"(a1), "+x"(a2), "+x"(a3), "+x"(a4), "+x"(a5), "+x"(a6), "+x"(a7),
-                  "+x"(a8), "+x"(a9), "+x"(a10), "+x"(a11)
-                : "x"(b));
-        }
-    }
-    const double operations = 12 * 8 * 2 * rounds;
+    constexpr std::size_t rounds = 100;
+    for (auto _ : state) bench::multiply_add_rounds(rounds);
+    const double operations = bench::operations_per_round * rounds;
     state.counters["GFLOP/s"] =
         benchmark::Counter(operations * 1e-9, benchmark::Counter::kIsIterationInvariantRate);
 }

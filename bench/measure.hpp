@@ -26,10 +26,25 @@ struct Check {
 /// The bouncing ball, end to end.
 [[nodiscard]] std::vector<Check> checks_of_part_1();
 
+/// The network: kernels, models, training, gate.
+[[nodiscard]] std::vector<Check> checks_of_part_2();
+
 /// Whether every state type gives the same events, bit for bit.
 [[nodiscard]] Measured compare_state_types();
 
 /// The observed order of convergence of every stepper, through events.
 [[nodiscard]] Measured observe_orders();
+
+/// The cost of one evaluation, against hand-written kernels.
+[[nodiscard]] Measured time_inference();
+
+/// Whether every kernel returns the same bytes.
+[[nodiscard]] Measured compare_instruction_sets();
+
+/// Whether the verified gate returns the bits of its exact detector.
+[[nodiscard]] Measured compare_verified();
+
+/// The cost of one step with each detector.
+[[nodiscard]] Measured compare_detectors();
 
 }  // namespace ricochet::bench

@@ -10,8 +10,10 @@
 #include "files.hpp"
 #include "input.hpp"
 #include "json_text.hpp"
+#include "model_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
+#include "timing.hpp"
 
 namespace ricochet::app {
 
@@ -47,22 +49,8 @@ Accuracy judge(const std::vector<double>& exact, std::span<const double> times)
     return out;
 }
 
-/// Seconds per run, over many batches of runs.
-struct Timing {
-    double median = 0;
-    double lower = 0;  ///< quartile
-    double upper = 0;  ///< quartile
-};
-
-Timing summarise(std::vector<double> seconds)
-{
-    std::sort(seconds.begin(), seconds.end());
-    const std::size_t n = seconds.size();
-    return {.median = seconds[n / 2], .lower = seconds[n / 4], .upper = seconds[3 * n / 4]};
-}
-
 struct Method {
-    std::string name;      ///< of the detector
+    std::string label;     ///< of the detector: "network any-step"
     std::string stepping;  ///< in words
     RunSettings settings;
     bool in_table;  ///< whether its times have a column
@@ -71,29 +59,51 @@ struct Method {
     Timing timing{};
 };
 
+/// Every detector in fixed steps and under error control.
+class MethodList {
+public:
+    explicit MethodList(const SystemEntry& system) : system_(system) {}
+
+    void add(DetectorKind detector, bool fixed_step, bool in_table, const OwnModel* model = nullptr)
+    {
+        RunRequest request{.detector = std::string(name(detector))};
+        if (fixed_step) request.step = system_.comparison_step;
+        if (model != nullptr) request.model = find_model(*model).string();
+        RunSettings settings = resolve(system_, request);
+        const std::string_view stepper = name(settings.stepper);
+        std::string label(name(detector));
+        if (model != nullptr) label += fmt::format(" {}", model->kind);
+        methods_.push_back({.label = std::move(label),
+                            .stepping = fixed_step
+                                            ? fmt::format("{} h={}", stepper, settings.options.step)
+                                            : std::string(stepper),
+                            .settings = std::move(settings),
+                            .in_table = in_table});
+    }
+
+    [[nodiscard]] std::vector<Method> take() { return std::move(methods_); }
+
+private:
+    const SystemEntry& system_;
+    std::vector<Method> methods_;
+};
+
+/// The paper's columns are in the table of times, and beside them what is ours. The
+/// methods that are left out of it differ in the last digits at most.
 std::vector<Method> methods(const SystemEntry& system)
 {
-    struct Choice {
-        const char* detector;
-        bool fixed;
-        bool in_table;
-    };
-    std::vector<Method> out;
-    for (const Choice choice : {Choice{"network", true, true}, Choice{"ends", true, true},
-                                Choice{"extremum", true, true}, Choice{"network", false, false},
-                                Choice{"ends", false, false}, Choice{"extremum", false, true}}) {
-        RunRequest request{.detector = choice.detector};
-        if (choice.fixed) request.step = system.comparison_step;
-        RunSettings settings = resolve(system, request);
-        out.push_back(
-            {.name = choice.detector,
-             .stepping = fmt::format(
-                 "{}{}", name(settings.stepper),
-                 choice.fixed ? fmt::format(" h={}", settings.options.step) : std::string()),
-             .settings = std::move(settings),
-             .in_table = choice.in_table});
+    MethodList list(system);
+    for (const bool fixed : {true, false}) {
+        for (const OwnModel& model : system.models) {
+            if (!fixed && !model.any_step) continue;
+            list.add(DetectorKind::network, fixed, fixed != model.any_step, &model);
+        }
+        if (!system.line.empty()) list.add(DetectorKind::line, fixed, false);
+        if (!system.models.empty()) list.add(DetectorKind::verified, fixed, !fixed);
+        list.add(DetectorKind::ends, fixed, fixed);
+        list.add(DetectorKind::extremum, fixed, fixed);
     }
-    return out;
+    return list.take();
 }
 
 /// Runs each method once, with its events.
@@ -132,40 +142,82 @@ void measure(const SystemEntry& system, std::vector<Method>& methods)
     }
 }
 
-const Method& find(const std::vector<Method>& methods, std::string_view name, bool fixed_step)
+/// The method with that detector, by default any of its models; null if there is none.
+const Method* find(const std::vector<Method>& methods, DetectorKind detector, bool fixed_step)
 {
-    return *std::find_if(methods.begin(), methods.end(), [&](const Method& method) {
-        return method.name == name && method.settings.fixed_step == fixed_step;
+    const auto found = std::find_if(methods.begin(), methods.end(), [&](const Method& method) {
+        return method.settings.detector == detector && method.settings.fixed_step == fixed_step;
     });
+    return found == methods.end() ? nullptr : &*found;
 }
 
-/// What the measured times say about the network on this system.
-std::string verdict(const std::vector<Method>& methods)
+/// [s]
+double per_step(const Method& method)
 {
-    const Method& network = find(methods, "network", true);
-    const Method& ends = find(methods, "ends", true);
-    const double difference = network.timing.median - ends.timing.median;
-    const auto saved = static_cast<double>(ends.statistics.guard_calls) -
-                       static_cast<double>(network.statistics.guard_calls);
-    return fmt::format(
-        "With {} a run takes {} with the network and {} with ends: on this scene the network "
-        "costs {} than the {} guard calls it saves, by {} a run ({} a step).",
-        network.stepping, duration(network.timing.median), duration(ends.timing.median),
-        difference > 0 ? "more" : "less", saved, duration(std::fabs(difference)),
-        duration(std::fabs(difference) / static_cast<double>(network.statistics.steps)));
+    return method.timing.median / static_cast<double>(method.statistics.steps);
+}
+
+/// What a step of `method` takes beyond one of `base`: "+12.3 ns".
+std::string extra(const Method& method, const Method& base)
+{
+    return fmt::format("{:+.1f} ns", (per_step(method) - per_step(base)) * 1e9);
+}
+
+/// What the measured times say, under one stepping, of asking before a step.
+void add_verdict(const std::vector<Method>& methods, bool fixed_step,
+                 std::vector<std::string>& sentences)
+{
+    const Method& ends = *find(methods, DetectorKind::ends, fixed_step);
+    const Method& extremum = *find(methods, DetectorKind::extremum, fixed_step);
+    std::vector<std::string> asked;
+    const Method* network = nullptr;  // the cheapest
+    for (const Method& method : methods) {
+        const DetectorKind detector = method.settings.detector;
+        if (method.settings.fixed_step != fixed_step) continue;
+        if (detector != DetectorKind::network && detector != DetectorKind::line) continue;
+        asked.push_back(fmt::format("{} {}", method.label, extra(method, ends)));
+        const bool cheaper = network == nullptr || per_step(method) < per_step(*network);
+        if (detector == DetectorKind::network && cheaper) network = &method;
+    }
+    if (!asked.empty()) {
+        sentences.push_back(fmt::format("{}: a step takes {} with ends; asking first: {}.",
+                                        ends.stepping, duration(per_step(ends)),
+                                        fmt::join(asked, ", ")));
+    }
+    if (network != nullptr) {
+        sentences.push_back(
+            fmt::format("{}: on this scene the network costs {} than the checks it saves.",
+                        ends.stepping, per_step(*network) > per_step(ends) ? "more" : "less"));
+    }
+    if (const Method* verified = find(methods, DetectorKind::verified, fixed_step)) {
+        const bool same = verified->accuracy.found == extremum.accuracy.found;
+        sentences.push_back(fmt::format(
+            "{}: verified put off {} checks and takes {} a step beyond extremum ({}), with {} "
+            "events.",
+            verified->stepping, verified->statistics.checks_put_off, extra(*verified, extremum),
+            duration(per_step(extremum)), same ? "the same" : "other"));
+    }
+}
+
+std::vector<std::string> verdict(const std::vector<Method>& methods)
+{
+    std::vector<std::string> sentences;
+    add_verdict(methods, true, sentences);
+    add_verdict(methods, false, sentences);
+    return sentences;
 }
 
 std::string times_table(const std::vector<double>& exact, const std::vector<Method>& methods)
 {
-    constexpr int wide = 21;
-    std::string names = fmt::format("{:>3}{:>{}}", "", "closed form", wide);
+    constexpr int wide = 19;
+    std::string labels = fmt::format("{:>3}{:>{}}", "", "closed form", wide);
     std::string steppings = fmt::format("{:>3}{:>{}}", "", "t [s]", wide);
     for (const Method& method : methods) {
         if (!method.in_table) continue;
-        names += fmt::format("{:>{}}", method.name, wide);
+        labels += fmt::format("{:>{}}", method.label, wide);
         steppings += fmt::format("{:>{}}", method.stepping, wide);
     }
-    std::string out = names + '\n' + steppings + '\n';
+    std::string out = labels + '\n' + steppings + '\n';
     for (std::size_t i = 0; i < exact.size(); ++i) {
         out += fmt::format("{:>3}{:>{}.15f}", i + 1, exact[i], wide);
         for (const Method& method : methods) {
@@ -182,25 +234,26 @@ std::string times_table(const std::vector<double>& exact, const std::vector<Meth
 std::string cost_table(const SystemEntry& system, const std::vector<double>& exact,
                        const std::vector<Method>& methods)
 {
-    std::string out = fmt::format("{:<32}{:>11}{:>8}{:>10}{:>6}{:>7}{:>7}{:>7}{:>9}{:>12}  {}\n",
-                                  "", "largest", "missed", "spurious", "late", "steps", "flow",
-                                  "guard", "network", "time", "middle half");
-    out +=
-        fmt::format("{:<32}{:>11}{:>8}{:>10}{:>6}{:>7}{:>7}{:>7}{:>9}{:>12}  {}\n", "", "error [s]",
-                    "", "", "", "", "calls", "calls", "calls", "per run", "of the times");
+    const auto row = [](const auto&... cells) {
+        return fmt::format("{:<31}{:>9}{:>7}{:>9}{:>5}{:>6}{:>7}{:>7}{:>8}{:>8}{:>9}{:>8}\n",
+                           cells...);
+    };
+    std::string out =
+        row("", "largest", "missed", "spurious", "late", "steps", "flow", "guard", "asked",
+            "checks", "time", "spread") +
+        row("", "error [s]", "", "", "", "", "calls", "calls", "", "put off", "per run", "");
     for (const Method& method : methods) {
         const Statistics& s = method.statistics;
-        out += fmt::format("{:<32}{:>11.1e}{:>8}{:>10}{:>6}{:>7}{:>7}{:>7}{:>9}{:>12}  {} to {}\n",
-                           fmt::format("{}, {}", method.name, method.stepping),
-                           method.accuracy.largest_error, method.accuracy.missed,
-                           method.accuracy.spurious, s.late_events, s.steps, s.flow_calls,
-                           s.guard_calls, s.network_calls, duration(method.timing.median),
-                           duration(method.timing.lower), duration(method.timing.upper));
+        const Accuracy& a = method.accuracy;
+        out += row(fmt::format("{}, {}", method.label, method.stepping),
+                   fmt::format("{:.1e}", a.largest_error), a.missed, a.spurious, s.late_events,
+                   s.steps, s.flow_calls, s.guard_calls, s.network_calls, s.checks_put_off,
+                   duration(method.timing.median), spread(method.timing));
     }
     for (const Published& published : system.published) {
-        const Accuracy accuracy = judge(exact, published.times);
-        out += fmt::format("{:<32}{:>11.1e}{:>8}{:>10}\n", published.name, accuracy.largest_error,
-                           accuracy.missed, accuracy.spurious);
+        const Accuracy a = judge(exact, published.times);
+        out += fmt::format("{:<31}{:>9.1e}{:>7}{:>9}\n", published.name, a.largest_error, a.missed,
+                           a.spurious);
     }
     return out;
 }
@@ -212,13 +265,26 @@ std::string to_text(const SystemEntry& system, const std::vector<double>& exact,
     std::string out =
         fmt::format("{}, to t = {} s\n\n", title(system, settings), settings.options.t_end);
     out += times_table(exact, methods) + '\n' + cost_table(system, exact, methods) + '\n';
-    const Options& controlled = find(methods, "extremum", false).settings.options;
+    const Options& controlled = find(methods, DetectorKind::extremum, false)->settings.options;
     out += fmt::format("Where no step h is given the error is controlled, rtol {}, atol {}.\n",
                        controlled.rtol, controlled.atol);
+    if (!system.line.empty()) {
+        out += fmt::format("line: the boundary itself, {}, is asked in the place of a network.\n",
+                           system.line);
+    }
     if (!system.published.empty()) {
         out += fmt::format("paper: {}.\n", system.published.front().source);
     }
-    return out + verdict(methods) + '\n';
+    for (const Method& method : methods) {
+        const std::optional<Network>& network = method.settings.network;
+        if (network && network->model().recipe == name(Recipe::ballistic)) {
+            out += fmt::format(
+                "{}: its features read the guard once a step, which guard calls leave out.\n",
+                method.label);
+            break;
+        }
+    }
+    return out + fmt::format("{}\n", fmt::join(verdict(methods), "\n"));
 }
 
 Json json(const std::vector<double>& exact, const Accuracy& accuracy)
@@ -238,7 +304,8 @@ std::string to_json(const SystemEntry& system, const std::vector<double>& exact,
     Json rows = Json::array();
     for (const Method& method : methods) {
         const RunSettings& settings = method.settings;
-        Json row{{"detector", method.name},
+        Json row{{"label", method.label},
+                 {"detector", name(settings.detector)},
                  {"stepper", name(settings.stepper)},
                  {"step", settings.fixed_step ? Json(settings.options.step) : Json()},
                  {"rtol", settings.fixed_step ? Json() : Json(settings.options.rtol)},
@@ -246,12 +313,14 @@ std::string to_json(const SystemEntry& system, const std::vector<double>& exact,
                  {"model", settings.network ? Json(settings.model.string()) : Json()}};
         row.update(json(exact, method.accuracy));
         const Statistics& s = method.statistics;
+        row["missed_events"] = s.missed_events;
         row["late"] = s.late_events;
         row["false_alarms"] = s.false_alarms;
         row["steps"] = s.steps;
         row["flow_calls"] = s.flow_calls;
         row["guard_calls"] = s.guard_calls;
         row["network_calls"] = s.network_calls;
+        row["checks_put_off"] = s.checks_put_off;
         row["seconds"] = {{"median", method.timing.median},
                           {"lower_quartile", method.timing.lower},
                           {"upper_quartile", method.timing.upper}};
@@ -276,7 +345,7 @@ std::string to_csv(const SystemEntry& system, const std::vector<double>& exact,
 {
     std::string out = "event,closed form [s]";
     for (const Method& method : methods) {
-        out += fmt::format(",{} {} [s]", method.name, method.stepping);
+        out += fmt::format(",{} {} [s]", method.label, method.stepping);
     }
     for (const Published& column : system.published) out += fmt::format(",{} [s]", column.name);
     out += '\n';

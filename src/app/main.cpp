@@ -22,6 +22,7 @@
 #include "compare.hpp"
 #include "files.hpp"
 #include "input.hpp"
+#include "inspect.hpp"
 #include "report.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "simulate.hpp"
@@ -93,7 +94,8 @@ void add_simulate(CLI::App& app, int& status)
         ->type_name("name=value ...");
     add_number(command, "--t-start", run.t_start, "T", "time at the start [s], default 0");
     add_number(command, "--t-end", run.t_end, "T", "time at the end [s], default: the system's");
-    add_text(command, "--detector", run.detector, "NAME", "ends, extremum (default) or network");
+    add_text(command, "--detector", run.detector, "NAME",
+             "ends, extremum (default), network, verified or line");
     add_text(command, "--model", run.model, "FILE",
              "network to use, by path or name; default: one that suits");
     add_text(command, "--locator", run.locator, "NAME", "newton (default), bisection or toms748");
@@ -105,6 +107,9 @@ void add_simulate(CLI::App& app, int& status)
     add_number(command, "--atol", run.atol, "A", "absolute error allowed in a step, default 1e-10");
     add_number(command, "--event-tolerance", run.event_tolerance, "T",
                "width to which events are located [s], default: neighbouring doubles");
+    add_whole_number(command, "--max-steps", run.max_steps, 1,
+                     std::numeric_limits<std::uint64_t>::max(),
+                     "end the run after N steps, as step_limit");
     add_whole_number(command, "--samples", request->samples, 2, 10'000'000,
                      "points of the trajectory in --json, --csv and --plot, default 1001");
     command.add_flag("--json", request->json, "print JSON");
@@ -154,6 +159,18 @@ void add_train(CLI::App& app, int& status)
     command.callback([&status, request] { status = train(*request); });
 }
 
+void add_inspect(CLI::App& app, int& status)
+{
+    CLI::App& command = *app.add_subcommand("inspect", "Print what a model file is");
+    auto request = std::make_shared<InspectRequest>();
+    command.add_option("MODEL", request->model, "by path, or the name of one that comes along")
+        ->required()
+        ->type_name("");
+    command.add_flag("--json", request->json, "print JSON");
+    command.footer("Example:\n  ricochet inspect bouncing-ball");
+    command.callback([&status, request] { status = inspect(*request); });
+}
+
 void add_compare(CLI::App& app, int& status)
 {
     CLI::App& command =
@@ -196,6 +213,7 @@ int run(int count, char** arguments)
     add_systems(app, status);
     add_simulate(app, status);
     add_train(app, status);
+    add_inspect(app, status);
     add_compare(app, status);
 
     check_command(app, count, arguments);
@@ -211,7 +229,7 @@ int run(int count, char** arguments)
 
 int fail(int status, std::string_view sentence)
 {
-    fmt::print(stderr, "ricochet: {}\n", sentence);
+    fmt::print(stderr, "ricochet: {}\n", printable(sentence));
     return status;
 }
 

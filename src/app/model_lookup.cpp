@@ -60,8 +60,9 @@ std::string objection(const SystemEntry& system, const RunSettings& settings, co
     }
     if (std::string why = objection_to_shape(system, model); !why.empty()) return why;
     for (const auto& [name, trained] : model.parameters) {
-        const auto found = std::find_if(system.parameters.begin(), system.parameters.end(),
-                                        [&](const Parameter& p) { return p.name == name; });
+        const auto found =
+            std::find_if(system.parameters.begin(), system.parameters.end(),
+                         [&wanted = name](const Parameter& p) { return p.name == wanted; });
         if (found == system.parameters.end()) {
             return fmt::format("depends on the parameter '{}', which {} does not have", name,
                                system.name);
@@ -126,7 +127,8 @@ fs::path find_model(const std::string& given)
 fs::path find_model(const OwnModel& own)
 {
     std::vector<fs::path> candidates;
-    for (const fs::path& directory : model_directories()) candidates.push_back(directory / own.file);
+    for (const fs::path& directory : model_directories())
+        candidates.push_back(directory / own.file);
     return first_of(own.file, candidates);
 }
 
@@ -149,7 +151,13 @@ FoundModel suitable_model(const SystemEntry& system, const RunSettings& settings
     }
     std::vector<std::string> reasons;
     for (const OwnModel& own : system.models) {
-        const fs::path file = find_model(own);
+        fs::path file;
+        try {
+            file = find_model(own);
+        } catch (const BadInput& not_found) {
+            reasons.emplace_back(not_found.what());
+            continue;
+        }
         FoundModel found{.file = file, .model = load_model(file)};
         const std::string why = objection(system, settings, found.model);
         if (why.empty() && holds_start(system, settings, found.model)) return found;

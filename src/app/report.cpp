@@ -7,6 +7,7 @@
 
 #include "files.hpp"
 #include "json_text.hpp"
+#include "timing.hpp"
 
 namespace ricochet::app {
 
@@ -178,7 +179,7 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
                        s.steps, s.rejected, s.flow_calls, s.guard_calls);
     if (s.network_calls > 0) {
         out += fmt::format(
-            ",\n{} network calls: {} checks put off, {} false alarms, {} missed events ({} late)",
+            ",\n{} predictions: {} checks put off, {} false alarms, {} missed events ({} late)",
             s.network_calls, s.checks_put_off, s.false_alarms, s.missed_events, s.late_events);
     }
     out += fmt::format("\nsteps without an event: {} proved, {} checked, {} gated, {} assumed\n",
@@ -195,14 +196,6 @@ std::string to_csv(const SystemEntry& system, const PlainRun& run)
         out += fmt::format("{},{},{}\n", row.t, fmt::join(row.x, ","), row.event);
     }
     return out;
-}
-
-std::string duration(double seconds)
-{
-    if (seconds < 1e-6) return fmt::format("{:.3g} ns", seconds * 1e9);
-    if (seconds < 1e-3) return fmt::format("{:.3g} us", seconds * 1e6);
-    if (seconds < 1) return fmt::format("{:.3g} ms", seconds * 1e3);
-    return fmt::format("{:.3g} s", seconds);
 }
 
 void print(std::string_view text)

@@ -35,9 +35,6 @@ struct Row {
 /// Header "t [s],u [m],...,event", then `rows`.
 [[nodiscard]] std::string to_csv(const SystemEntry& system, const Run<std::vector<double>>& run);
 
-/// A time that people can read: "1.25 us", "3.4 ms".
-[[nodiscard]] std::string duration(double seconds);
-
 /// Prints to standard output.
 /// @throws WriteError if it cannot.
 void print(std::string_view text);

@@ -1,12 +1,14 @@
 #include "train.hpp"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -16,6 +18,7 @@
 #include "json_text.hpp"
 #include "report.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "timing.hpp"
 
 namespace ricochet::app {
 
@@ -70,13 +73,17 @@ public:
         const std::size_t percent =
             progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
         const std::string figures =
-            fmt::format("{:>3} %  {} of {}  {:.0f} iterations/s  {}  loss {:.2e}", percent,
-                        progress.iteration, progress.total, rate, left, progress.loss);
+            fmt::format("{:>3} %  {} of {}  {}  loss {:.2e}  {:.0f} iterations/s", percent,
+                        progress.iteration, progress.total, left, progress.loss, rate);
         if (terminal_) {
-            constexpr std::size_t width = 24;
+            const bool last = progress.iteration == progress.total;
+            if (drawn_ && now - *drawn_ < redraw_every && !last) return;
+            drawn_ = now;
+            constexpr std::size_t width = 20;
             const std::size_t full = width * percent / 100;
-            fmt::print(stderr, "\r[{}{}] {}\x1b[K", std::string(full, '#'),
-                       std::string(width - full, '.'), figures);
+            const std::string line = fmt::format("[{}{}] {}", std::string(full, '#'),
+                                                 std::string(width - full, '.'), figures);
+            fmt::print(stderr, "\r{}\x1b[K", line.substr(0, columns() - 1));
             std::fflush(stderr);
         } else if (percent / 10 != tenth_) {
             fmt::print(stderr, "training: {}\n", figures);
@@ -91,7 +98,18 @@ public:
     }
 
 private:
+    static constexpr double redraw_every = 0.05;  // [s]
+
+    /// Of the terminal: a line any longer would wrap and be left behind.
+    static std::size_t columns()
+    {
+        winsize size{};
+        const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
+        return known ? size.ws_col : 80;
+    }
+
     bool terminal_ = isatty(STDERR_FILENO) == 1;
+    std::optional<double> drawn_{};  ///< [s] when
     bool started_ = false;
     std::size_t first_iteration_ = 0;
     double first_seconds_ = 0;
@@ -101,9 +119,9 @@ private:
 std::string text(std::string_view set, const learn::Assessment& a)
 {
     const learn::Confusion& c = a.confusion;
-    return fmt::format("{:<12}{:>10}{:>10}{:>14}{:>10}{:>14.2e}{:>14.2e}{:>14.4f}\n", set,
-                       c.detected, c.missed, c.false_alarms, c.cleared, a.miss_bound,
-                       a.false_alarm_rate, a.cleared_share);
+    return fmt::format("{:<11}{:>9}{:>7}{:>13}{:>8}{:>11.1e}{:>11.1e}{:>8.4f}\n", set, c.detected,
+                       c.missed, c.false_alarms, c.cleared, a.miss_bound, a.false_alarm_rate,
+                       a.cleared_share);
 }
 
 std::string text(const learn::Report& report, const learn::Progress& last)
@@ -111,14 +129,13 @@ std::string text(const learn::Report& report, const learn::Progress& last)
     std::string out = fmt::format(
         "{} iterations in {} on {} states; {} clear states too near the boundary were left out\n",
         report.iterations, duration(report.seconds), report.training_states, report.band);
-    out +=
-        fmt::format("{:<12}{:>10}{:>10}{:>14}{:>10}{:>14}{:>14}{:>14}\n", "", "detected", "missed",
-                    "false alarms", "cleared", "miss bound", "false alarm", "cleared share");
+    out += fmt::format("{:<11}{:>9}{:>7}{:>13}{:>8}{:>11}{:>11}{:>8}\n", "", "detected", "missed",
+                       "false alarms", "cleared", "miss bound", "alarm rate", "share");
     out += text("validation", report.validation) + text("held out", report.held_out);
     if (report.fresh) out += text("fresh", *report.fresh);
     out += fmt::format(
-        "miss bound: 95 % upper bound of the share of events missed; cleared share: of the clear "
-        "states with a margin above {}\n",
+        "miss bound: 95 % upper bound of the share of events missed; alarm rate: of the clear "
+        "states;\nshare: cleared, of the clear states with a margin above {}\n",
         report.validation.margin);
     if (report.outcome == learn::TrainingOutcome::stopped) {
         out += fmt::format("interrupted after {} of {} iterations\n", last.iteration, last.total);
@@ -161,6 +178,16 @@ std::string json(const learn::Report& report, const fs::path& out, bool written)
     return json_text(object);
 }
 
+/// One sentence with the remedy.
+std::string why_not_written(const learn::Report& report)
+{
+    return report.outcome == learn::TrainingOutcome::diverged
+               ? fmt::format("{}, and nothing was written", describe(report.outcome))
+               : std::string(
+                     "events are missed and nothing was written; --allow-misses writes the model "
+                     "all the same");
+}
+
 }  // namespace
 
 int train(const TrainRequest& request)
@@ -192,7 +219,7 @@ int train(const TrainRequest& request)
     const bool sound = trained.misses_none() && report.outcome != learn::TrainingOutcome::diverged;
     const bool write = sound || request.allow_misses;
     if (write) save_model(trained.model, request.out);
-    if (own_checkpoint && !stopped) {
+    if (own_checkpoint && write && !stopped) {
         std::error_code ignored;
         fs::remove(training.checkpoint, ignored);
     }
@@ -202,9 +229,15 @@ int train(const TrainRequest& request)
         fmt::print(stderr, "ricochet: {} is in '{}'\n", stopped ? "the best so far" : "the model",
                    request.out.string());
     } else {
+        fmt::print(stderr, "ricochet: {}\n", why_not_written(report));
+    }
+    std::error_code error;
+    const bool kept = fs::exists(training.checkpoint, error);
+    if (!write && !stopped && kept) {
         fmt::print(stderr,
-                   "ricochet: events are missed and nothing was written; "
-                   "--allow-misses writes the model all the same\n");
+                   "ricochet: the best is kept in '{}'; the same command with --resume "
+                   "--allow-misses writes it\n",
+                   training.checkpoint.string());
     }
     if (stopped) {
         fmt::print(stderr,

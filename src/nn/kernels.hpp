@@ -48,6 +48,7 @@ Kernel<T> choose(const Network<T>& net, bool common_shapes) noexcept
 {
     if (common_shapes) {
         if (has_widths<T, 8, 1>(net)) return run_common<T, Activation, 8, 1>;
+        if (has_widths<T, 16, 1>(net)) return run_common<T, Activation, 16, 1>;
         if (has_widths<T, 16, 16, 1>(net)) return run_common<T, Activation, 16, 16, 1>;
         if (has_widths<T, 16, 16, 16, 16, 16, 1>(net)) {
             return run_common<T, Activation, 16, 16, 16, 16, 16, 1>;

@@ -20,10 +20,8 @@ struct Line {
 
     /// Nothing has been trained, and nothing can be unsuitable.
     template <class System, class X>
-        requires CurvedGuard<System, X>
-    void check(const System&, const X&, double /*smallest*/, double /*largest*/) const noexcept
-    {
-    }
+    requires CurvedGuard<System, X>
+    void check(const System&, const X&, double /*smallest*/, double /*largest*/) const noexcept {}
 
     template <class Guard, class Step>
     [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept

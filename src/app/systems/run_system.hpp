@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "../registry.hpp"
+#include "line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/features.hpp"
@@ -19,7 +20,6 @@
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/newton.hpp"
 #include "ricochet/locate/toms748.hpp"
-#include "line.hpp"
 
 namespace ricochet::app {
 

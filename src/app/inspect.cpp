@@ -1,0 +1,241 @@
+#include "inspect.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "input.hpp"
+#include "json_text.hpp"
+#include "model_lookup.hpp"
+#include "registry.hpp"
+#include "report.hpp"
+#include "ricochet/nn/classifier.hpp"
+#include "ricochet/nn/mlp.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "timing.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A model and what was found out about it.
+struct Inspection {
+    fs::path file;
+    std::uintmax_t bytes = 0;
+    Model model;
+    std::vector<double> outputs{};  ///< of the self-test, repeated now
+    Timing inference{};             ///< from raw features to logit
+};
+
+const SystemEntry* system_of(const Model& model)
+{
+    const auto& all = systems();
+    const auto found = std::find_if(all.begin(), all.end(),
+                                    [&](const SystemEntry& s) { return s.name == model.system; });
+    return found == all.end() ? nullptr : &*found;
+}
+
+/// What the features are called, in the order of the inputs; "feature 0" where the
+/// recipe is not known here.
+std::vector<std::string> feature_names(const Model& model)
+{
+    std::vector<std::string> names;
+    if (model.recipe == name(Recipe::ballistic)) {
+        names = {"slog(g / (|g''| h²))", "slog(g' / (|g''| h))"};
+    } else if (const SystemEntry* system = system_of(model);
+               system != nullptr && model.recipe == name(Recipe::state)) {
+        for (const Component& x : system->state) {
+            names.push_back(fmt::format("{} [{}]", x.name, x.unit));
+        }
+    }
+    if (names.size() == model.offset.size()) return names;
+    names.clear();
+    for (std::size_t i = 0; i < model.offset.size(); ++i) {
+        names.push_back(fmt::format("feature {}", i));
+    }
+    return names;
+}
+
+bool recipe_known(const Model& model)
+{
+    return model.recipe == name(Recipe::state) || model.recipe == name(Recipe::ballistic);
+}
+
+/// Weights and biases.
+std::size_t number_of_weights(const Model& model)
+{
+    std::size_t sum = 0;
+    for (const DenseLayer& layer : model.layers) sum += layer.weight.size() + layer.bias.size();
+    return sum;
+}
+
+/// "2 - 16 - 1"
+std::string shape(const Model& model)
+{
+    std::string out = fmt::format("{}", model.layers.front().inputs);
+    for (const DenseLayer& layer : model.layers) out += fmt::format(" - {}", layer.outputs);
+    return out;
+}
+
+std::string_view activation(const Model& model)
+{
+    return model.activation == Activation::relu ? "relu" : "tanh";
+}
+
+std::string_view precision(const Model& model)
+{
+    return model.precision == Precision::f32 ? "f32" : "f64";
+}
+
+/// Times batches of inferences on the input of the self-test; no branch of the
+/// arithmetic depends on the input.
+Timing time_inference(const Classifier& classifier)
+{
+    using Clock = std::chrono::steady_clock;
+    constexpr int batches = 201;
+    constexpr double batch_seconds = 5e-5;
+    std::vector<double> out(classifier.outputs());
+    const double* const features = classifier.model().self_test.input.data();
+    const auto seconds_each = [&](int repeats) {
+        const auto start = Clock::now();
+        for (int i = 0; i < repeats; ++i) classifier.logits(features, out.data());
+        return std::chrono::duration<double>(Clock::now() - start).count() / repeats;
+    };
+    seconds_each(1000);  // wakes the processor up
+    const int repeats = 1 + static_cast<int>(batch_seconds / seconds_each(100));
+    std::vector<double> seconds;
+    for (int batch = 0; batch < batches; ++batch) seconds.push_back(seconds_each(repeats));
+    return summarise(std::move(seconds));
+}
+
+Inspection look_at(const fs::path& file)
+{
+    Inspection found{.file = file, .model = load_model(file)};
+    found.bytes = fs::file_size(file);
+    const Classifier classifier(found.model);
+    found.outputs.resize(classifier.outputs());
+    classifier.logits(found.model.self_test.input.data(), found.outputs.data());
+    found.inference = time_inference(classifier);
+    return found;
+}
+
+std::string numbers(const std::vector<double>& values)
+{
+    return fmt::format("({})", fmt::join(values, ", "));
+}
+
+std::string to_text(const Inspection& found)
+{
+    const Model& model = found.model;
+    std::string out;
+    const auto line = [&](std::string_view name, const std::string& value) {
+        out += fmt::format("{:<13}{}\n", name, value);
+    };
+    const std::string unknown_here = " (not known here)";
+    line("file", fmt::format("{}, {} bytes", printable(found.file.string()), found.bytes));
+    line("kind", printable(model.kind));
+
+    std::vector<std::string> parameters;
+    for (const auto& [name, value] : model.parameters) {
+        parameters.push_back(fmt::format("{} = {}", printable(name), value));
+    }
+    line("system",
+         fmt::format("{}{}, {}", printable(model.system),
+                     system_of(model) == nullptr ? unknown_here : "",
+                     parameters.empty() ? "whatever its parameters"
+                                        : fmt::format("{}", fmt::join(parameters, ", "))));
+    line("steps", model.step_min == model.step_max
+                      ? fmt::format("{} s only", model.step_min)
+                      : fmt::format("{} to {} s", model.step_min, model.step_max));
+    line("recipe",
+         fmt::format("{}{}", printable(model.recipe), recipe_known(model) ? "" : unknown_here));
+    const std::vector<std::string> names = feature_names(model);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        line(i == 0 ? "features" : "",
+             fmt::format("{}, minus {}, times {}; in [{}, {}]", names[i], model.offset[i],
+                         model.scale[i], model.domain[i].lower, model.domain[i].upper));
+    }
+    line("network", fmt::format("{}, {}, {}, {} weights and biases", shape(model),
+                                activation(model), precision(model), number_of_weights(model)));
+    for (std::size_t k = 0; k < model.layers.size(); ++k) {
+        const DenseLayer& layer = model.layers[k];
+        line(k == 0 ? "layers" : "", fmt::format("{}: weight {} x {}, bias {}", k, layer.outputs,
+                                                 layer.inputs, layer.outputs));
+    }
+    line("decision", fmt::format("event where the logit is at least {}", model.threshold));
+    line("seed", fmt::format("{}", model.seed));
+    line("self-test",
+         fmt::format("reproduced: {} gives {}, recorded {}", numbers(model.self_test.input),
+                     numbers(found.outputs), numbers(model.self_test.output)));
+    line("certificate", model.certificate.empty() ? "none" : printable(model.certificate));
+    line("cost",
+         fmt::format("{} an inference (spread {}), {} kernels", duration(found.inference.median),
+                     spread(found.inference), name(best_instruction_set())));
+    return out;
+}
+
+std::string to_json(const Inspection& found)
+{
+    const Model& model = found.model;
+    Json parameters = Json::object();
+    for (const auto& [name, value] : model.parameters) parameters[name] = value;
+    const std::vector<std::string> names = feature_names(model);
+    Json features = Json::array();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        features.push_back(
+            {{"name", names[i]},
+             {"offset", model.offset[i]},
+             {"scale", model.scale[i]},
+             {"domain", Json::array({model.domain[i].lower, model.domain[i].upper})}});
+    }
+    Json layers = Json::array();
+    for (const DenseLayer& layer : model.layers) {
+        layers.push_back({{"inputs", layer.inputs}, {"outputs", layer.outputs}});
+    }
+    const Timing& cost = found.inference;
+    return json_text({{"file", found.file.string()},
+                      {"bytes", found.bytes},
+                      {"kind", model.kind},
+                      {"system", model.system},
+                      {"parameters", parameters},
+                      {"step_range", Json::array({model.step_min, model.step_max})},
+                      {"recipe", model.recipe},
+                      {"features", features},
+                      {"layers", layers},
+                      {"activation", activation(model)},
+                      {"precision", precision(model)},
+                      {"weights", number_of_weights(model)},
+                      {"threshold", model.threshold},
+                      {"seed", model.seed},
+                      {"self_test",
+                       {{"reproduced", true},  // or it would not have been loaded
+                        {"input", model.self_test.input},
+                        {"recorded", model.self_test.output},
+                        {"output", found.outputs}}},
+                      {"certificate", model.certificate.empty() ? Json() : Json(model.certificate)},
+                      {"cost",
+                       {{"nanoseconds",
+                         {{"median", cost.median * 1e9},
+                          {"lower_quartile", cost.lower * 1e9},
+                          {"upper_quartile", cost.upper * 1e9}}},
+                        {"instruction_set", name(best_instruction_set())}}}});
+}
+
+}  // namespace
+
+int inspect(const InspectRequest& request)
+{
+    const Inspection found = look_at(find_model(request.model));
+    print(request.json ? to_json(found) : to_text(found));
+    return 0;
+}
+
+}  // namespace ricochet::app

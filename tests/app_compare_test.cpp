@@ -1,0 +1,72 @@
+// `ricochet compare`.
+#include "app.hpp"
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+
+namespace ricochet {
+namespace {
+
+TEST_F(App, CompareFindsAllImpactsByEveryDetector)
+{
+    const nlohmann::json table = json({"compare", "bouncing-ball", "--json"});
+    ASSERT_EQ(table["closed_form"].size(), 13U);
+    Words labels;
+    for (const nlohmann::json& method : table["methods"]) {
+        labels.push_back(method["label"].get<std::string>() + ' ' +
+                         method["stepper"].get<std::string>());
+    }
+    EXPECT_EQ(labels, (Words{"network fixed-step rk4", "network any-step rk4", "line rk4",
+                             "verified rk4", "ends rk4", "extremum rk4", "network any-step dopri5",
+                             "line dopri5", "verified dopri5", "ends dopri5", "extremum dopri5"}));
+    for (const nlohmann::json& method : table["methods"]) {
+        SCOPED_TRACE(method["label"].get<std::string>() +
+                     (method["step"].is_null() ? "" : " fixed"));
+        EXPECT_EQ(method["missed"], 0);
+        EXPECT_EQ(method["spurious"], 0);
+        EXPECT_EQ(method["times"].size(), 13U);
+        EXPECT_LE(method["largest_error"].get<double>(), 2e-14);
+        EXPECT_GT(method["seconds"]["median"].get<double>(), 0);
+    }
+    for (const nlohmann::json& method : table["methods"]) {
+        const bool asks_in_vain = method["detector"] == "verified";
+        const bool bare = method["detector"] == "network" || method["detector"] == "line";
+        EXPECT_EQ(method["checks_put_off"] > 0, bare);
+        EXPECT_EQ(method["network_calls"] > 0, bare || asks_in_vain);
+        if (!asks_in_vain) continue;
+        const auto extremum = std::find_if(
+            table["methods"].begin(), table["methods"].end(), [&](const nlohmann::json& other) {
+                return other["detector"] == "extremum" && other["stepper"] == method["stepper"];
+            });
+        ASSERT_NE(extremum, table["methods"].end());
+        EXPECT_EQ(method["times"], (*extremum)["times"]);
+    }
+    // The figures of the source paper, against the closed form.
+    EXPECT_NEAR(table["published"][0]["largest_error"].get<double>(), 2.2e-11, 0.1e-11);
+    EXPECT_NEAR(table["published"][1]["largest_error"].get<double>(), 1.2e-12, 0.1e-12);
+}
+
+TEST_F(App, CompareSaysWhatTheNetworkCostsAndWritesTheTimes)
+{
+    const Result result = run({"compare", "bouncing-ball", "--csv", "table.csv"});
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_NE(result.out.find("the network costs"), std::string::npos);
+    EXPECT_NE(result.out.find("verified put off 0 checks"), std::string::npos);
+    EXPECT_NE(result.out.find("with the same events"), std::string::npos);
+    EXPECT_NE(result.out.find("u/(g h²) + v/(g h) <= 1/2"), std::string::npos);
+    // The title, then the two tables.
+    std::istringstream lines(result.out);
+    std::string line;
+    std::getline(lines, line);
+    for (int i = 0; i < 2 + 15 + 1 + 2 + 13 && std::getline(lines, line); ++i) {
+        EXPECT_LE(line.size(), 120U) << line;
+    }
+    EXPECT_NE(result.out.find("19.870248050848"), std::string::npos);
+    const std::string csv = content(work() / "table.csv");
+    EXPECT_TRUE(csv.starts_with("event,closed form [s],"));
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 14);
+}
+
+}  // namespace
+}  // namespace ricochet

@@ -1,0 +1,104 @@
+// `ricochet train`.
+#include "app.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <thread>
+
+namespace ricochet {
+namespace {
+
+const Words small_training{"train",    "bouncing-ball", "--out",   "ball.safetensors",
+                           "--states", "20000",         "--fresh", "2000"};
+
+Words train(const Words& more)
+{
+    Words words = small_training;
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+}
+
+TEST_F(App, TrainedModelIsWrittenAndFindsThe13Impacts)
+{
+    const nlohmann::json report = json(train({"--iterations", "2000", "--json"}));
+    EXPECT_EQ(report["fresh"]["missed"], 0);
+    EXPECT_EQ(report["model"], "ball.safetensors");
+    EXPECT_EQ(files(), Words{"ball.safetensors"});
+    const nlohmann::json run =
+        json(simulate({"--json", "--step", "0.01", "--model", "ball.safetensors"}));
+    EXPECT_LE(largest_error(run), 2e-14);
+    EXPECT_GT(run["statistics"]["network_calls"].get<int>(), 2000);
+}
+
+TEST_F(App, ModelThatMissesEventsIsOnlyWrittenWhenAllowed)
+{
+    // After one iteration the network knows nothing.
+    const Result refused = run(train({"--iterations", "1"}));
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_NE(refused.err.find("events are missed"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("--allow-misses"), std::string::npos) << refused.err;
+    EXPECT_EQ(files(), Words{"ball.safetensors.checkpoint"});
+
+    // The best is in the checkpoint, and is what the whole training would have written.
+    EXPECT_EQ(run(train({"--iterations", "1", "--allow-misses", "--resume"})).status, 0);
+    EXPECT_EQ(files(), Words{"ball.safetensors"});
+    const std::string kept = content(work() / "ball.safetensors");
+    EXPECT_EQ(run(train({"--iterations", "1", "--allow-misses"})).status, 0);
+    EXPECT_EQ(files(), Words{"ball.safetensors"});
+    EXPECT_EQ(content(work() / "ball.safetensors"), kept);
+}
+
+TEST_F(App, TrainingThatMissesLeavesAnEarlierModelAsItWas)
+{
+    write("ball.safetensors", "earlier");
+    EXPECT_EQ(run(train({"--iterations", "1"})).status, 1);
+    EXPECT_EQ(content(work() / "ball.safetensors"), "earlier");
+}
+
+TEST_F(App, InterruptedTrainingKeepsTheBestAndResumesToTheSameBits)
+{
+    const Words words = train({"--kind", "any-step", "--iterations", "60000"});
+    const pid_t child = start(words);
+    // The first line of progress says that the training itself has begun.
+    const fs::path err = work().parent_path() / "err";
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (content(err).find("10 %") == std::string::npos &&
+           std::chrono::steady_clock::now() < deadline) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    kill(child, SIGINT);
+    const Result interrupted = wait_for(child);
+    EXPECT_EQ(interrupted.status, 1);
+    EXPECT_NE(interrupted.err.find("interrupted"), std::string::npos) << interrupted.err;
+    EXPECT_NE(interrupted.err.find("--resume"), std::string::npos);
+    const Words kept = files();
+    EXPECT_NE(std::find(kept.begin(), kept.end(), "ball.safetensors.checkpoint"), kept.end());
+
+    Words resumed = words;
+    resumed.emplace_back("--resume");
+    const Result rest = run(resumed);
+    EXPECT_EQ(rest.status, 0) << rest.err;
+    EXPECT_EQ(rest.err.find(" 0 of 60000"), std::string::npos) << rest.err;
+    EXPECT_EQ(files(), Words{"ball.safetensors"});
+
+    const std::string resumed_bytes = content(work() / "ball.safetensors");
+    EXPECT_EQ(run(words).status, 0);  // from the start, uninterrupted
+    EXPECT_EQ(content(work() / "ball.safetensors"), resumed_bytes);
+}
+
+TEST_F(App, CheckpointOfAnotherTrainingIsRefused)
+{
+    ASSERT_EQ(run(train({"--iterations", "1"})).status, 1);
+    expect_refused(train({"--iterations", "2", "--resume"}),
+                   {"ball.safetensors.checkpoint", "other data or options"});
+}
+
+TEST_F(App, ResumingWithoutACheckpointIsRefused)
+{
+    expect_refused(train({"--resume"}), {"ball.safetensors.checkpoint"});
+    expect_refused(train({"--kind", "any-step", "--step", "1"}), {"--step", "fixed-step"});
+}
+
+}  // namespace
+}  // namespace ricochet
