@@ -21,7 +21,8 @@ using ricochet::bench::Measured;
 std::vector<Check> all_checks()
 {
     std::vector<Check> checks;
-    for (const auto& part : {ricochet::bench::checks_of_part_1(), ricochet::bench::checks_of_part_2()}) {
+    for (const auto& part :
+         {ricochet::bench::checks_of_part_1(), ricochet::bench::checks_of_part_2()}) {
         checks.insert(checks.end(), part.begin(), part.end());
     }
     return checks;

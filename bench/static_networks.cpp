@@ -20,7 +20,7 @@ void StaticNetwork<activation, T, Hidden...>::chain(const Mlp& mlp, T* x, std::s
     for (std::size_t i = 0; i < n; ++i) {
         mlp.forward(x, &y);
         next_inputs(y, x);
-        asm volatile("" : : "r"(x) : "memory");
+        asm volatile("" : : "r"(x) : "memory");  // the inputs pass through memory
     }
 }
 

@@ -10,7 +10,8 @@
 
 namespace ricochet::bench {
 
-/// Hidden layers of the measured shapes; all have 4 inputs and 1 output.
+/// A shape that is measured: 4 inputs, the hidden layers, 1 output. Instances are
+/// those at the end of static_networks.cpp.
 template <Activation activation, class T, std::size_t... Hidden>
 struct StaticNetwork {
     using Mlp = BasicStaticMlp<activation, T, 4, Hidden..., 1>;
@@ -30,11 +31,11 @@ template <class T>
     for (int i = 0; i < 4; ++i) x[i] = y * T(1e-3) * T(i + 1);
 }
 
-/// `networks.hpp`: `multiply_add_rounds`, which only some machines have. Does nothing
-/// where this build has no such instruction.
+/// `multiply_add_rounds` of networks.hpp; nothing where the compiler has no such
+/// instruction.
 void run_multiply_adds(std::size_t rounds);
 
-/// Whether the two are compiled for x86-64-v3, and not for the baseline.
+/// Whether all this is compiled for x86-64-v3, and not for the baseline.
 [[nodiscard]] bool static_networks_are_v3() noexcept;
 
 }  // namespace ricochet::bench

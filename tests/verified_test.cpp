@@ -49,6 +49,7 @@ BallRun run(const Detector& detector)
                      detector);
 }
 
+/// `a` verified, `b` by the exact detector.
 void expect_same(const BallRun& a, const BallRun& b)
 {
     ASSERT_EQ(a.events.size(), b.events.size());
@@ -61,7 +62,8 @@ void expect_same(const BallRun& a, const BallRun& b)
     ASSERT_EQ(a.t, b.t);
     ASSERT_EQ(a.x, b.x);
     ASSERT_EQ(a.statistics.steps, b.statistics.steps);
-    ASSERT_EQ(a.statistics.guard_calls, b.statistics.guard_calls);
+    // The features of the network read the guard once a step.
+    ASSERT_EQ(a.statistics.guard_calls, b.statistics.guard_calls + a.statistics.network_calls);
 }
 
 template <class Stepping>

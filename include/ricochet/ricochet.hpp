@@ -1,6 +1,7 @@
 // Everything needed to run a hybrid system. Training is in `ricochet/learn/`.
 #pragma once
 
+#include "ricochet/detect/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/features.hpp"

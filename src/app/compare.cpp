@@ -275,15 +275,6 @@ std::string to_text(const SystemEntry& system, const std::vector<double>& exact,
     if (!system.published.empty()) {
         out += fmt::format("paper: {}.\n", system.published.front().source);
     }
-    for (const Method& method : methods) {
-        const std::optional<Network>& network = method.settings.network;
-        if (network && network->model().recipe == name(Recipe::ballistic)) {
-            out += fmt::format(
-                "{}: its features read the guard once a step, which guard calls leave out.\n",
-                method.label);
-            break;
-        }
-    }
     return out + fmt::format("{}\n", fmt::join(verdict(methods), "\n"));
 }
 

@@ -109,7 +109,7 @@ void add_simulate(CLI::App& app, int& status)
                "width to which events are located [s], default: neighbouring doubles");
     add_whole_number(command, "--max-steps", run.max_steps, 1,
                      std::numeric_limits<std::uint64_t>::max(),
-                     "end the run after N steps, as step_limit");
+                     "end the run after N steps, as step_limit; default 10 million");
     add_whole_number(command, "--samples", request->samples, 2, 10'000'000,
                      "points of the trajectory in --json, --csv and --plot, default 1001");
     command.add_flag("--json", request->json, "print JSON");

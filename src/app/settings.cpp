@@ -14,6 +14,9 @@ namespace ricochet::app {
 
 namespace {
 
+/// A minute or so: a run that asks for more says so.
+constexpr std::uint64_t default_max_steps = 10'000'000;
+
 template <class Kind, std::size_t n>
 using Names = std::array<std::pair<std::string_view, Kind>, n>;
 
@@ -184,7 +187,7 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     }
     options.event_tolerance = request.event_tolerance.value_or(0);
     require_not_negative("--event-tolerance", options.event_tolerance);
-    options.max_steps = request.max_steps.value_or(options.max_steps);
+    options.max_steps = request.max_steps.value_or(default_max_steps);
 
     choose_stepping(request, settings);
     if (request.locator) settings.locator = named("locator", locators, *request.locator);

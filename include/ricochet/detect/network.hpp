@@ -31,6 +31,19 @@ void check_model(const Model& model, Recipe recipe, std::size_t features, bool o
 /// @throws std::invalid_argument: h [s] is outside the steps the model was trained for.
 void check_model_step(const Model& model, double smallest, double largest);
 
+/// Looks at the end of a step that was not cleared. An event whose guard had left
+/// its side before the step began was missed by an earlier prediction, and is late.
+template <class Guard, class Step>
+[[nodiscard]] Finding confirm_prediction(const Guard& guard, const Step& step, Watch& watch)
+{
+    Finding finding = Ends{}.confirm(guard, step, watch);
+    if (finding.hit) {
+        finding.lo.value = guard.value(step.time(0), step.x0());
+        finding.late = side_of(finding.lo.value) == opposite(finding.side);
+    }
+    return finding;
+}
+
 }  // namespace detail
 
 class Network {
@@ -65,6 +78,7 @@ public:
     {
         if (!(step.h() >= model().step_min && step.h() <= model().step_max)) return false;
         std::array<double, max_features> input;
+        if (recipe_ == Recipe::ballistic) guard.count();
         features(recipe_, guard.system(), step.time(0), step.x0(), step.rate0(), step.h(),
                  input.data());
         return !classifier_->alarm(classifier_->logit(input.data()));
@@ -73,12 +87,7 @@ public:
     template <class Guard, class Step>
     [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
     {
-        Finding finding = Ends{}.confirm(guard, step, watch);
-        if (finding.hit) {
-            finding.lo.value = guard.value(step.time(0), step.x0());
-            finding.late = side_of(finding.lo.value) == opposite(finding.side);
-        }
-        return finding;
+        return detail::confirm_prediction(guard, step, watch);
     }
 
 private:

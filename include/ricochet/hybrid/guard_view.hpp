@@ -31,9 +31,12 @@ public:
     [[nodiscard]] const System& system() const noexcept { return *system_; }
     [[nodiscard]] Crossing crossing() const noexcept { return crossing_of(*system_); }
 
+    /// Counts an evaluation that somebody else makes.
+    void count() const noexcept { ++*calls_; }
+
     [[nodiscard]] double value(double t, const X& x) const
     {
-        ++*calls_;
+        count();
         return system_->guard(t, x);
     }
 

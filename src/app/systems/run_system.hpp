@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "../registry.hpp"
-#include "line.hpp"
+#include "ricochet/detect/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/features.hpp"
@@ -72,7 +72,7 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
         case DetectorKind::verified: return use(Verified<Extremum>(settings.network.value()));
         case DetectorKind::line:
             if constexpr (CurvedGuard<System, X>) {
-                return use(Line{});
+                return use(BallisticLine{});
             } else {
                 throw std::logic_error("a system with a line has a guard curvature");
             }

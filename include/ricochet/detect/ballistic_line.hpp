@@ -1,27 +1,29 @@
-// The exact rival of a network: where the guard is a parabola in time, whether a step
-// meets the event surface is one inequality.
+// The exact rival of a network: where the guard is a parabola in time, whether a
+// step meets the event surface is one inequality.
 #pragma once
 
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/features.hpp"
-#include "ricochet/detect/finding.hpp"
+#include "ricochet/detect/network.hpp"
 
-namespace ricochet::app {
+namespace ricochet {
 
 /// Predicts as `Network` does, with the same answers to its mistakes, from
 ///
 ///     g + g' h + g'' h^2 / 2 <= 0   iff the guard is on or below its surface after h,
 ///
 /// which for a ball in free fall is u / (g h^2) + v / (g h) <= 1/2. Exact up to
-/// rounding for a guard that starts above, with g'' constant and negative.
-struct Line {
+/// rounding for a falling guard of constant negative curvature.
+struct BallisticLine {
     static constexpr bool uses_rates = false;
     static constexpr bool checks_every_step = false;
 
-    /// Nothing has been trained, and nothing can be unsuitable.
+    /// Nothing has been trained, so nothing can be unsuitable.
     template <class System, class X>
-    requires CurvedGuard<System, X>
-    void check(const System&, const X&, double /*smallest*/, double /*largest*/) const noexcept {}
+        requires CurvedGuard<System, X>
+    void check(const System& /*system*/, const X& /*x*/, double /*smallest*/,
+               double /*largest*/) const noexcept
+    {
+    }
 
     template <class Guard, class Step>
     [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
@@ -37,13 +39,8 @@ struct Line {
     template <class Guard, class Step>
     [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
     {
-        Finding finding = Ends{}.confirm(guard, step, watch);
-        if (finding.hit) {
-            finding.lo.value = guard.value(step.time(0), step.x0());
-            finding.late = side_of(finding.lo.value) == opposite(finding.side);
-        }
-        return finding;
+        return detail::confirm_prediction(guard, step, watch);
     }
 };
 
-}  // namespace ricochet::app
+}  // namespace ricochet
