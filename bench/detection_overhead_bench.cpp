@@ -13,8 +13,8 @@
 #include <limits>
 #include <vector>
 
-#include "line_detector.hpp"
 #include "problems.hpp"
+#include "ricochet/detect/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/verified.hpp"
@@ -130,7 +130,7 @@ void register_all()
     add("step/ball/rk4/array/none", [=](S& s) { ball_rk4_unguarded(s, launch); });
     add("step/ball/rk4/array/ends", [=](S& s) { ball_rk4(s, launch, drop, Ends{}); });
     add("step/ball/rk4/array/extremum", [=](S& s) { ball_rk4(s, launch, drop, Extremum{}); });
-    add("step/ball/rk4/array/line", [=](S& s) { ball_rk4(s, launch, drop, bench::Line{}); });
+    add("step/ball/rk4/array/line", [=](S& s) { ball_rk4(s, launch, drop, BallisticLine{}); });
     add("step/ball/rk4/array/network_1x16", [=](S& s) { ball_rk4(s, launch, drop, any_step); });
     add("step/ball/rk4/array/network_5x16", [=](S& s) { ball_rk4(s, launch, drop, fixed_step); });
     add("step/ball/rk4/array/verified_1x16", [=](S& s) { ball_rk4(s, launch, drop, gate_1x16); });
@@ -152,7 +152,7 @@ void register_all()
     add("step/ball/dopri5/none", [=](S& s) { controlled(s, free_fall, high, 0.1, Ends{}); });
     add("step/ball/dopri5/ends", [=](S& s) { controlled(s, ball, high, 0.1, Ends{}); });
     add("step/ball/dopri5/extremum", [=](S& s) { controlled(s, ball, high, 0.1, Extremum{}); });
-    add("step/ball/dopri5/line", [=](S& s) { controlled(s, ball, high, 0.1, bench::Line{}); });
+    add("step/ball/dopri5/line", [=](S& s) { controlled(s, ball, high, 0.1, BallisticLine{}); });
     add("step/ball/dopri5/network_1x16", [=](S& s) { controlled(s, ball, high, 0.1, any_step); });
     add("step/ball/dopri5/verified_1x16", [=](S& s) { controlled(s, ball, high, 0.1, gate_1x16); });
 

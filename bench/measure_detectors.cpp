@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "line_detector.hpp"
 #include "measure.hpp"
 #include "problems.hpp"
+#include "ricochet/detect/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/verified.hpp"
@@ -88,7 +88,7 @@ Measured compare_detectors()
         flight("none", "", Unguarded<BouncingBall>{BouncingBall()}, Ends{}),
         row("ends", "", Ends{}),
         row("extremum", "", Extremum{}),
-        row("line", "", Line{}),
+        row("line", "", BallisticLine{}),
         row("network", "1x16", any_step),
         row("network", "5x16", fixed_step),
         row("verified", "1x16", Verified<Extremum>(any_step)),

@@ -158,8 +158,9 @@ struct Runs {
     [[nodiscard]] std::string text() const
     {
         return fmt::format(
-            "{} of {} runs with all impacts in time; largest error {:.1e} s ({}); {:.1f} % of the "
-            "steps not looked at",
+            "{} of {} runs with all impacts in time; largest error {:.1e} s ({}); checks put off "
+            "in "
+            "{:.1f} % of the steps",
             runs - wrong, runs, error, at,
             100 * static_cast<double>(cleared) / static_cast<double>(steps));
     }
