@@ -26,6 +26,7 @@ using Widths = std::vector<std::size_t>;
 const std::vector<Widths> shapes{
     {4, 8, 1},
     {1, 16, 16, 1},
+    {2, 16, 1},
     {2, 16, 16, 16, 16, 16, 1},
     {9, 64, 64, 1},
     {1, 1},
