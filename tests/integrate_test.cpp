@@ -436,6 +436,31 @@ TEST(Integrate, AStartBelowTheFloorIsRefused)
               "guard >= 0 at t = 0, got -1");
 }
 
+TEST(Integrate, AStartWithoutComponentsIsRefused)
+{
+    EXPECT_THROW((void)integrate(BouncingBall(), std::vector<double>{}, {.t_end = 1}),
+                 std::invalid_argument);
+}
+
+TEST(Integrate, AConstraintWithoutAResetIsRefused)
+{
+    struct Wall {
+        bool unilateral = true;
+        void flow(double, const X&, X& dxdt) const { dxdt = {-1, 0}; }
+        [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
+    };
+    EXPECT_NE(refusal(Wall{}, {1.0, 0.0}), "accepted");
+}
+
+TEST(Integrate, TheLargestStepHoldsFromTheFirstStepOn)
+{
+    struct Clock {
+        void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    };
+    const auto run = integrate(Clock{}, X{0.0, 0.0}, {.t_end = 3, .step = 3, .h_max = 1});
+    EXPECT_EQ(run.statistics.steps, 3u);
+}
+
 TEST(Integrate, TheStateTypeFollowsTheStart)
 {
     const Eigen::VectorXd start = Eigen::Vector2d(10.0, 0.0);

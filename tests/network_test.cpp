@@ -170,6 +170,50 @@ TEST(Network, AnotherStepThanItWasTrainedForIsRefused)
               "got [0.02, 0.02]");
 }
 
+TEST(Network, AModelForAnotherSystemIsRefused)
+{
+    Model model = linear_model(0, 0, 1);
+    model.system = "pendulum";
+    EXPECT_EQ(refusal(model), "Network: the model is for pendulum, this system is bouncing-ball");
+
+    struct Nameless {
+        using State = std::array<double, 2>;
+        void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -x[0]}; }
+        [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+    };
+    EXPECT_THROW((void)integrate(Nameless{}, {0.0, 1.0}, {.t_end = 1, .step = 0.01},
+                                 FixedStep<Rk4>{}, Network(paper_model())),
+                 std::invalid_argument);
+}
+
+TEST(Network, AModelForAnotherGravityIsRefused)
+{
+    try {
+        (void)integrate(BouncingBall({.gravity = 1.62, .restitution = 0.9}), {10.0, 0.0},
+                        {.t_end = 1, .step = 0.01}, FixedStep<Rk4>{}, Network(paper_model()));
+        FAIL() << "accepted";
+    } catch (const std::invalid_argument& reason) {
+        EXPECT_STREQ(reason.what(),
+                     "Network: the model for bouncing-ball is trained for gravity = 9.81, got 1.62");
+    }
+}
+
+TEST(Network, AModelForOneStepIsRefusedUnderErrorControl)
+{
+    EXPECT_THROW((void)integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 1},
+                                 ErrorControlled<Dopri5>{}, Network(paper_model())),
+                 std::invalid_argument);
+}
+
+TEST(Network, OutsideItsDomainNothingIsCleared)
+{
+    // The model knows heights up to some 12 m; a ball from 1000 m is looked at until
+    // it has come down that far, and by then it is too fast.
+    const auto run = integrate(BouncingBall(), {1000.0, 0.0}, {.t_end = 14, .step = 0.01},
+                               FixedStep<Rk4>{}, Network(paper_model()));
+    EXPECT_EQ(run.statistics.checks_put_off, 0u);
+}
+
 TEST(Network, AnUnknownRecipeIsRefused)
 {
     Model model = linear_model(0, 0, 1);

@@ -95,7 +95,7 @@ void add_simulate(CLI::App& app, int& status)
     add_number(command, "--t-start", run.t_start, "T", "time at the start [s], default 0");
     add_number(command, "--t-end", run.t_end, "T", "time at the end [s], default: the system's");
     add_text(command, "--detector", run.detector, "NAME",
-             "ends, extremum (default), network, verified or line");
+             "ends, extremum (default), network (default with --model), verified or line");
     add_text(command, "--model", run.model, "FILE",
              "network to use, by path or name; default: one that suits");
     add_text(command, "--locator", run.locator, "NAME", "newton (default), bisection or toms748");
@@ -111,7 +111,7 @@ void add_simulate(CLI::App& app, int& status)
                      std::numeric_limits<std::uint64_t>::max(),
                      "end the run after N steps, as step_limit; default 10 million");
     add_whole_number(command, "--samples", request->samples, 2, 10'000'000,
-                     "points of the trajectory in --json, --csv and --plot, default 1001");
+                     "points of the trajectory in --csv and --plot, default 1001, and in --json if given");
     command.add_flag("--json", request->json, "print JSON");
     add_text(command, "--csv", request->csv, "FILE", "write the sampled trajectory");
     add_text(command, "--plot", request->plot, "FILE", "draw it with gnuplot, as .svg or .png");

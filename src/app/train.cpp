@@ -182,9 +182,9 @@ std::string json(const learn::Report& report, const fs::path& out, bool written)
 std::string why_not_written(const learn::Report& report)
 {
     return report.outcome == learn::TrainingOutcome::diverged
-               ? fmt::format("{}, and nothing was written", describe(report.outcome))
+               ? fmt::format("{}, and no model was written", describe(report.outcome))
                : std::string(
-                     "events are missed and nothing was written; --allow-misses writes the model "
+                     "events are missed and no model was written; --allow-misses writes the model "
                      "all the same");
 }
 

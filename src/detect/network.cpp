@@ -8,7 +8,35 @@ namespace ricochet {
 
 namespace detail {
 
-void check_model(const Model& model, Recipe recipe, std::size_t features, bool offered)
+void check_model_system(const Model& model, std::string_view name)
+{
+    if (model.system == name) return;
+    if (name.empty()) {
+        throw std::invalid_argument(fmt::format(
+            "Network: the model is for {}, and this system declares no name to tell what it is",
+            model.system));
+    }
+    throw std::invalid_argument(
+        fmt::format("Network: the model is for {}, this system is {}", model.system, name));
+}
+
+void check_model_parameter(const Model& model, std::string_view parameter, double trained,
+                           std::optional<double> value)
+{
+    if (!value) {
+        throw std::invalid_argument(
+            fmt::format("Network: the model for {} is trained for {} = {}, and this system does "
+                        "not declare that parameter",
+                        model.system, parameter, trained));
+    }
+    if (*value != trained) {
+        throw std::invalid_argument(
+            fmt::format("Network: the model for {} is trained for {} = {}, got {}", model.system,
+                        parameter, trained, *value));
+    }
+}
+
+void check_model_features(const Model& model, Recipe recipe, std::size_t features, bool offered)
 {
     if (!offered) {
         throw std::invalid_argument(
@@ -25,7 +53,8 @@ void check_model(const Model& model, Recipe recipe, std::size_t features, bool o
 
 void check_model_step(const Model& model, double smallest, double largest)
 {
-    if (largest < model.step_min || smallest > model.step_max) {
+    const bool one_step_only = model.step_min == model.step_max && smallest != largest;
+    if (largest < model.step_min || smallest > model.step_max || one_step_only) {
         throw std::invalid_argument(
             fmt::format("Network: the model for {} is trained for steps in [{}, {}] s, got [{}, {}]",
                         model.system, model.step_min, model.step_max, smallest, largest));

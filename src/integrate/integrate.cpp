@@ -6,6 +6,17 @@
 
 namespace ricochet::detail {
 
+void throw_start_empty()
+{
+    throw std::invalid_argument("integrate: the start must have components, got none");
+}
+
+void throw_no_reset()
+{
+    throw std::invalid_argument(
+        "integrate: a unilateral guard needs a reset: nothing says how the motion goes on there");
+}
+
 void throw_start_not_finite(std::size_t component, double value)
 {
     throw std::invalid_argument(fmt::format(

@@ -15,8 +15,8 @@
 #include <array>
 #include <cstddef>
 #include <memory>
-#include <string>
-#include <utility>
+#include <optional>
+#include <string_view>
 
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/features.hpp"
@@ -26,9 +26,14 @@ namespace ricochet {
 
 namespace detail {
 
-/// @throws std::invalid_argument: the model does not predict events of this system.
-void check_model(const Model& model, Recipe recipe, std::size_t features, bool offered);
-/// @throws std::invalid_argument: h [s] is outside the steps the model was trained for.
+/// @throws std::invalid_argument: the model is for another system than `name`.
+void check_model_system(const Model& model, std::string_view name);
+/// @throws std::invalid_argument: the model was trained for another value.
+void check_model_parameter(const Model& model, std::string_view parameter, double trained,
+                           std::optional<double> value);
+/// @throws std::invalid_argument: the features are not to be had from this system.
+void check_model_features(const Model& model, Recipe recipe, std::size_t features, bool offered);
+/// @throws std::invalid_argument: no step [s] taken is one the model was trained for.
 void check_model_step(const Model& model, double smallest, double largest);
 
 /// Looks at the end of a step that was not cleared. An event whose guard had left
@@ -59,20 +64,33 @@ public:
     [[nodiscard]] const Model& model() const noexcept { return classifier_->model(); }
 
     /// Whether this network can be asked about `system` in steps between `smallest`
-    /// and `largest` [s], at least in some of them.
+    /// and `largest` [s], at least in some of them. The system must declare its
+    /// `name`, and as `parameter(name)` those that the model depends on.
     ///
-    /// @throws std::invalid_argument naming the model's system, features or steps
-    /// and what they would have to be.
+    /// @throws std::invalid_argument naming the model's system, parameters, features
+    /// or steps and what they would have to be.
     template <class System, class X>
-    void check(const System& /*system*/, const X& x, double smallest, double largest) const
+    void check(const System& system, const X& x, double smallest, double largest) const
     {
-        detail::check_model(model(), recipe_, dimension(recipe_, x.size()),
+        if constexpr (requires { std::string_view(system.name); }) {
+            detail::check_model_system(model(), system.name);
+        } else {
+            detail::check_model_system(model(), {});
+        }
+        for (const auto& [parameter, trained] : model().parameters) {
+            std::optional<double> value;
+            if constexpr (requires { value = system.parameter(std::string_view(parameter)); }) {
+                value = system.parameter(std::string_view(parameter));
+            }
+            detail::check_model_parameter(model(), parameter, trained, value);
+        }
+        detail::check_model_features(model(), recipe_, dimension(recipe_, x.size()),
                             offers<System, X>(recipe_));
         detail::check_model_step(model(), smallest, largest);
     }
 
     /// Whether the step is predicted to be free of events. Never of a step shorter
-    /// or longer than the network was trained for.
+    /// or longer than the network was trained for, nor outside its domain.
     template <class Guard, class Step>
     [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
     {
@@ -81,7 +99,8 @@ public:
         if (recipe_ == Recipe::ballistic) guard.count();
         features(recipe_, guard.system(), step.time(0), step.x0(), step.rate0(), step.h(),
                  input.data());
-        return !classifier_->alarm(classifier_->logit(input.data()));
+        return classifier_->in_domain(input.data()) &&
+               !classifier_->alarm(classifier_->logit(input.data()));
     }
 
     template <class Guard, class Step>

@@ -11,8 +11,10 @@ enum class EventKind : std::uint8_t {
     crossing,  ///< the guard changed sign
 };
 
-/// Two times between which the guard leaves its armed side: still on it at
-/// `lo`, across the surface or on it at `hi`. In seconds.
+/// Two times [s] between which the guard leaves its armed side: still on it at `lo`,
+/// across the surface or on it at `hi`. They are located as offsets from the start
+/// of a step, which resolve more than a time does: rounded to doubles the two are
+/// often equal.
 struct Bracket {
     double lo = 0;
     double hi = 0;
@@ -29,7 +31,7 @@ struct Event {
     State after{};          ///< x⁺, equal to x⁻ where there is no reset
     Bracket bracket;        ///< [s]
     double slope = 0;       ///< rate of the guard at the event, per second; NaN if not computed
-    double error = 0;       ///< [s] estimate of the error of location
+    double error = 0;       ///< [s] of location within the step, not of the solution
     bool late = false;      ///< found at a step after the one that held it
 };
 

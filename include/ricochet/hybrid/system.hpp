@@ -3,9 +3,11 @@
 //     flow(t, x, dxdt)          x' = f(t, x)                       always
 //     guard(t, x)               g, positive inside the mode        for events
 //     guard_rate(t, x, dxdt)    dg/dt along the flow               optional
+//     guard_curvature(t, x)     d2g/dt2 along the flow             for some networks
 //     reset(t, x)               x⁻ becomes x⁺, in place            optional
 //     crossing                  which sign change counts           default: falling
 //     unilateral                g >= 0 bounds the motion           default: false
+//     name, parameter(name)     what it is                         for networks
 //     State                     state type when none is given      optional
 //
 // All functions are const and free of side effects; t is in seconds. A system
@@ -52,6 +54,37 @@ template <class System, class X>
 concept Resetting = Guarded<System, X> && requires(const System& system, double t, X& x) {
     system.reset(t, x);
 };
+
+namespace detail {
+
+/// A member that is there but does not fit would be passed over in silence: a guard
+/// that is not const, a reset that takes its state by value. These say so instead.
+/// (Members that are templates have no address and are not looked at.)
+template <class System, class X>
+constexpr void check_declarations()
+{
+    if constexpr (requires { &System::guard; }) {
+        static_assert(Guarded<System, X>,
+                      "ricochet: guard must be callable as guard(double t, const State& x) on a "
+                      "const system and return a number");
+    }
+    if constexpr (requires { &System::guard_rate; }) {
+        static_assert(RatedGuard<System, X>,
+                      "ricochet: guard_rate must be callable as guard_rate(double t, const State& "
+                      "x, const State& dxdt) on a const system and return a number");
+    }
+    if constexpr (requires { &System::reset; }) {
+        static_assert(Resetting<System, X>,
+                      "ricochet: reset must be callable as reset(double t, State& x) on a const "
+                      "system, and needs a guard");
+    }
+    if constexpr (Resetting<System, X>) {
+        static_assert(!requires(const System& system, double t) { system.reset(t, X{}); },
+                      "ricochet: reset changes the state in place, so it must take it by reference");
+    }
+}
+
+}  // namespace detail
 
 /// The sign change of the guard that counts.
 template <class System>

@@ -30,10 +30,14 @@ namespace ricochet {
 
 namespace detail {
 
+/// @throws std::invalid_argument: the start has no components.
+[[noreturn]] void throw_start_empty();
 /// @throws std::invalid_argument: the start is not finite.
 [[noreturn]] void throw_start_not_finite(std::size_t component, double value);
 /// @throws std::invalid_argument: the start is behind a unilateral guard.
 [[noreturn]] void throw_start_outside_mode(double t, double guard);
+/// @throws std::invalid_argument: a unilateral guard without a reset.
+[[noreturn]] void throw_no_reset();
 /// @throws std::invalid_argument: the guard is not finite at the start.
 [[noreturn]] void throw_start_guard_not_finite(double t, double guard);
 
@@ -80,6 +84,9 @@ class Integration {
     };
     static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
 
+    static_assert(!error_controlled || has_error_estimate<typename CurrentStep::Stepper>,
+                  "ricochet: error control needs one of odeint's error steppers, such as Dopri5");
+
 public:
     Integration(const System& system, const X& x0, const Options& options,
                 const Detector& detector, const Locator& locator)
@@ -92,6 +99,7 @@ public:
         h_next_ = options_.step > 0 ? options_.step : options_.t_end - options_.t_start;
         if constexpr (error_controlled) {
             if (options_.step == 0) h_next_ = initial_step();
+            h_next_ = std::min(h_next_, options_.h_max);
         }
         if constexpr (guarded) {
             refuse_bad_start();
@@ -118,7 +126,9 @@ public:
 private:
     static const Options& checked(const Options& options, const X& x0)
     {
+        check_declarations<System, X>();
         validate(options, !error_controlled);
+        if (x0.size() == 0) throw_start_empty();
         for_each_component(x0, [&](auto i) {
             if (!std::isfinite(x0[i])) throw_start_not_finite(static_cast<std::size_t>(i), x0[i]);
         });
@@ -129,6 +139,7 @@ private:
     {
         const double g = system_.guard(options_.t_start, step_.x0());
         if (!std::isfinite(g)) throw_start_guard_not_finite(options_.t_start, g);
+        if (is_unilateral(system_) && !Resetting<System, X>) throw_no_reset();
         if (is_unilateral(system_) && g < 0) throw_start_outside_mode(options_.t_start, g);
     }
 
@@ -452,7 +463,7 @@ private:
 /// @param x0       start; its type is the state type of the run
 /// @param options  only `t_end` is required
 /// @param stepping `ErrorControlled<Method>` or `FixedStep<Method>`
-/// @param detector `Extremum`, `Ends` or a network
+/// @param detector `Extremum`, `Ends`, a `Network`, or one that is `Verified`
 /// @param locator  `Newton`, `Bisection` or `Toms748`
 /// @throws std::invalid_argument for options, start or guard that make no sense.
 ///         What happens along the way is returned as `Run::outcome`.

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <optional>
+#include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
 
@@ -35,6 +37,16 @@ public:
 
     [[nodiscard]] double gravity() const noexcept { return gravity_; }
     [[nodiscard]] double restitution() const noexcept { return restitution_; }
+
+    static constexpr std::string_view name = "bouncing-ball";
+
+    /// The parameter of that name, for models that depend on it.
+    [[nodiscard]] std::optional<double> parameter(std::string_view of) const noexcept
+    {
+        if (of == "gravity") return gravity_;
+        if (of == "restitution") return restitution_;
+        return std::nullopt;
+    }
 
     /// The floor bounds the motion.
     static constexpr bool unilateral = true;
