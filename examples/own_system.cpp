@@ -3,6 +3,7 @@
 // It declares a flow, a guard and a reset, and nothing else. The rate of the guard
 // is then taken along the flow, and the state type is whatever the run starts from.
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 

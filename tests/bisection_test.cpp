@@ -9,7 +9,8 @@ INSTANTIATE_TYPED_TEST_SUITE_P(Bisection, LocatorSuite, Bisection);
 
 TEST(Bisection, HalvesOncePerBitOfTheTolerance)
 {
-    const HostStep step(1.0, [](double s) { return 0.3 - s; }, [](double) { return -1.0; });
+    const HostStep step(
+        1.0, [](double s) { return 0.3 - s; }, [](double) { return -1.0; });
     (void)locate<Bisection>(step, Side::above, 0x1p-20);
     EXPECT_EQ(step.resteps, 20);
 }

@@ -73,8 +73,9 @@ void expect_proportional()
     const auto exact = oscillator.impacts(20);
     double previous = 1;
     for (const double rtol : {1e-5, 1e-7, 1e-9, 1e-11}) {
-        const auto run = integrate(oscillator, {1.0, 0.0}, {.t_end = 20, .rtol = rtol, .atol = rtol},
-                                   ErrorControlled<Method>{});
+        const auto run =
+            integrate(oscillator, {1.0, 0.0}, {.t_end = 20, .rtol = rtol, .atol = rtol},
+                      ErrorControlled<Method>{});
         ASSERT_EQ(run.events.size(), exact.size());
         double worst = 0;
         for (std::size_t i = 0; i < exact.size(); ++i) {
@@ -86,9 +87,18 @@ void expect_proportional()
     }
 }
 
-TEST(Convergence, ErrorFollowsToleranceWithDopri5) { expect_proportional<Dopri5>(); }
-TEST(Convergence, ErrorFollowsToleranceWithCashKarp) { expect_proportional<CashKarp54>(); }
-TEST(Convergence, ErrorFollowsToleranceWithFehlberg78) { expect_proportional<Fehlberg78>(); }
+TEST(Convergence, ErrorFollowsToleranceWithDopri5)
+{
+    expect_proportional<Dopri5>();
+}
+TEST(Convergence, ErrorFollowsToleranceWithCashKarp)
+{
+    expect_proportional<CashKarp54>();
+}
+TEST(Convergence, ErrorFollowsToleranceWithFehlberg78)
+{
+    expect_proportional<Fehlberg78>();
+}
 
 }  // namespace
 }  // namespace ricochet

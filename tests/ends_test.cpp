@@ -12,7 +12,8 @@ using test::look;
 
 HostStep line(double from, double to)
 {
-    return {1.0, [=](double s) { return from + s * (to - from); }, [=](double) { return to - from; }};
+    return {1.0, [=](double s) { return from + s * (to - from); },
+            [=](double) { return to - from; }};
 }
 
 TEST(Ends, AStepThatEndsAcrossTheSurfaceIsAHit)

@@ -23,7 +23,8 @@ static_assert(Step<StepOf<Dopri5>, X>);
 static_assert(Step<StepOf<Fehlberg78>, X>);
 
 template <class Method>
-class ExplicitStepTest : public testing::Test {};
+class ExplicitStepTest : public testing::Test {
+};
 
 using Methods = testing::Types<Euler, Rk4, CashKarp54, Dopri5, Fehlberg78>;
 TYPED_TEST_SUITE(ExplicitStepTest, Methods);
@@ -110,7 +111,7 @@ TEST(ExplicitStep, RoundingDoesNotGrowWithTheNumberOfSteps)
         step.attempt(0.1);
         step.accept();
     }
-    EXPECT_NEAR(step.x0()[0], 1e4, 2e-12);  // one ulp
+    EXPECT_NEAR(step.x0()[0], 1e4, 2e-12);    // one ulp
     EXPECT_NEAR(step.time(0), 1e5, 1.5e-11);  // one ulp
 }
 

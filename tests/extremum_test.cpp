@@ -63,7 +63,8 @@ TEST(Extremum, AnExcursionSeenFromBelowIsFoundToo)
 
 TEST(Extremum, WhereTheRateDoesNotTurnOneGuardCallSuffices)
 {
-    const HostStep fall(1.0, [](double s) { return 2 - s; }, [](double) { return -1.0; });
+    const HostStep fall(
+        1.0, [](double s) { return 2 - s; }, [](double) { return -1.0; });
     std::uint64_t calls = 0;
     EXPECT_FALSE(look(Extremum{}, fall, Side::above, Crossing::falling, &calls).hit);
     EXPECT_EQ(calls, 1u);

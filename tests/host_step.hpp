@@ -81,9 +81,8 @@ template <class Detector>
     std::uint64_t calls = 0;
     const HostSystem system{crossing};
     const GuardView<HostSystem, HostState> guard(system, calls);
-    Watch watch{.side = side,
-                .start = {.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]},
-                .end = {}};
+    Watch watch{
+        .side = side, .start = {.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]}, .end = {}};
     const Finding finding = detector.confirm(guard, step, watch);
     if (guard_calls) *guard_calls = calls;
     return finding;

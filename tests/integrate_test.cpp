@@ -25,8 +25,8 @@ double impact_error(const Run<X>& run, const BouncingBall& ball, double height)
 {
     double worst = 0;
     for (std::size_t i = 0; i < run.events.size(); ++i) {
-        worst = std::max(worst, std::abs(run.events[i].t -
-                                         ball.impact_time(static_cast<int>(i), height)));
+        worst = std::max(worst,
+                         std::abs(run.events[i].t - ball.impact_time(static_cast<int>(i), height)));
     }
     return worst;
 }
@@ -142,7 +142,8 @@ TEST(Integrate, ATerminalEventEndsTheRunAfterItsReset)
 
 TEST(Integrate, WithRecordingOffEventsAreCountedOnly)
 {
-    const auto run = integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .record_events = false});
+    const auto run =
+        integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .record_events = false});
     EXPECT_TRUE(run.events.empty());
     EXPECT_EQ(run.statistics.events, 13u);
 }
@@ -224,7 +225,8 @@ TEST(Integrate, TheEndIsHitExactlyByStepsThatDoNotDivideIt)
     EXPECT_EQ(run.t, 1.0);
     EXPECT_EQ(run.x[0], 1.0);
     EXPECT_EQ(run.statistics.steps, 4u);
-    const auto tenths = integrate(Clock{}, X{0.0, 0.0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{});
+    const auto tenths =
+        integrate(Clock{}, X{0.0, 0.0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{});
     EXPECT_EQ(tenths.statistics.steps, 10u) << "no step for a remainder of rounding";
 }
 
@@ -335,7 +337,8 @@ struct Failing {
 
 TEST(Integrate, AFlowThatFailsMidwayKeepsWhatWasComputed)
 {
-    const auto controlled = integrate(Failing{}, {10.0, 0.0}, {.t_end = 2, .sample_times = {0, 0.5}});
+    const auto controlled =
+        integrate(Failing{}, {10.0, 0.0}, {.t_end = 2, .sample_times = {0, 0.5}});
     EXPECT_EQ(controlled.outcome, Outcome::non_finite);
     EXPECT_NEAR(controlled.t, 1, 1e-6);  // the step shrinks towards the failure
     EXPECT_LT(controlled.t, 1);
@@ -357,8 +360,8 @@ TEST(Integrate, AGuardThatFailsEndsTheRun)
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
         [[nodiscard]] double guard(double t, const X&) const { return t < 0.5 ? 1.0 : nan; }
     };
-    const auto run = integrate(Blind{}, {0.0, 0.0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{},
-                               Ends{});
+    const auto run =
+        integrate(Blind{}, {0.0, 0.0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{}, Ends{});
     EXPECT_EQ(run.outcome, Outcome::non_finite);
     EXPECT_LT(run.t, 0.5);
 }
@@ -403,7 +406,8 @@ TEST(Integrate, AStiffToleranceThatCannotBeMetUnderflows)
     struct Jump {  // a discontinuity that no step resolves
         void flow(double t, const X&, X& dxdt) const { dxdt = {t < 0.5 ? 0.0 : 1e6, 0}; }
     };
-    const auto run = integrate(Jump{}, X{0.0, 0.0}, {.t_end = 1, .rtol = 1e-12, .atol = 1e-30, .h_min = 1e-9});
+    const auto run =
+        integrate(Jump{}, X{0.0, 0.0}, {.t_end = 1, .rtol = 1e-12, .atol = 1e-30, .h_min = 1e-9});
     EXPECT_EQ(run.outcome, Outcome::step_underflow);
     EXPECT_LE(run.t, 0.5 + 1e-6);
 }

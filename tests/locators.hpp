@@ -26,7 +26,8 @@ template <class Locator>
 }
 
 template <class Locator>
-class LocatorSuite : public testing::Test {};
+class LocatorSuite : public testing::Test {
+};
 
 TYPED_TEST_SUITE_P(LocatorSuite);
 
@@ -34,8 +35,8 @@ TYPED_TEST_P(LocatorSuite, ClosesToNeighbouringOffsets)
 {
     // cos crosses zero at pi/2. Time 100 + s resolves 1.4e-14 s, of which a
     // bracket is at most a 256th; the offset itself resolves 2.2e-16.
-    const HostStep step(3.0, [](double s) { return std::cos(s); },
-                        [](double s) { return -std::sin(s); });
+    const HostStep step(
+        3.0, [](double s) { return std::cos(s); }, [](double s) { return -std::sin(s); });
     const Location where = locate<TypeParam>(step, Side::above);
     EXPECT_LE(where.hi - where.lo, 4 * std::numeric_limits<double>::epsilon());
     EXPECT_NEAR(where.hi, std::acos(0.0), 3 * std::numeric_limits<double>::epsilon());
@@ -53,8 +54,8 @@ TYPED_TEST_P(LocatorSuite, TheBracketHoldsTheCrossing)
 
 TYPED_TEST_P(LocatorSuite, StopsAtTheTolerance)
 {
-    const HostStep step(5.0, [](double s) { return std::exp(-s) - 0.3; },
-                        [](double s) { return -std::exp(-s); });
+    const HostStep step(
+        5.0, [](double s) { return std::exp(-s) - 0.3; }, [](double s) { return -std::exp(-s); });
     const Location where = locate<TypeParam>(step, Side::above, 1e-6);
     EXPECT_LE(where.hi - where.lo, 1e-6);
     EXPECT_NEAR(where.hi, -std::log(0.3), 1e-6);
@@ -62,24 +63,24 @@ TYPED_TEST_P(LocatorSuite, StopsAtTheTolerance)
 
 TYPED_TEST_P(LocatorSuite, ARisingCrossingIsLocatedAsWell)
 {
-    const HostStep step(3.0, [](double s) { return -std::cos(s); },
-                        [](double s) { return std::sin(s); });
+    const HostStep step(
+        3.0, [](double s) { return -std::cos(s); }, [](double s) { return std::sin(s); });
     EXPECT_NEAR(locate<TypeParam>(step, Side::below).hi, std::acos(0.0), 1e-15);
 }
 
 TYPED_TEST_P(LocatorSuite, AStartOnTheSurfaceIsNotTheEvent)
 {
     // A flight from the floor back to it: s (1 - s), on the surface at 0 and 1.
-    const HostStep step(3.0, [](double s) { return s * (1 - s); },
-                        [](double s) { return 1 - 2 * s; });
+    const HostStep step(
+        3.0, [](double s) { return s * (1 - s); }, [](double s) { return 1 - 2 * s; });
     EXPECT_NEAR(locate<TypeParam>(step, Side::above).hi, 1, 4e-16);
 }
 
 TYPED_TEST_P(LocatorSuite, AVeryShortFlightInALongStepIsFound)
 {
     const double flight = 1e-9;
-    const HostStep step(10.0, [=](double s) { return s * (flight - s); },
-                        [=](double s) { return flight - 2 * s; });
+    const HostStep step(
+        10.0, [=](double s) { return s * (flight - s); }, [=](double s) { return flight - 2 * s; });
     // The time of day, 100 s, resolves 1.4e-14 s; a 256th of it is asked for.
     EXPECT_NEAR(locate<TypeParam>(step, Side::above).hi, flight, 1e-16);
 }
@@ -88,15 +89,16 @@ TYPED_TEST_P(LocatorSuite, AFlatCrossingIsLocatedToTheRoundingOfTheGuard)
 {
     // A triple root: the guard is zero to rounding for |s - 1| < 1e-108, so the
     // crossing is defined, only slow for Newton's method.
-    const HostStep step(2.5, [](double s) { return -std::pow(s - 1, 3); },
-                        [](double s) { return -3 * std::pow(s - 1, 2); });
+    const HostStep step(
+        2.5, [](double s) { return -std::pow(s - 1, 3); },
+        [](double s) { return -3 * std::pow(s - 1, 2); });
     EXPECT_NEAR(locate<TypeParam>(step, Side::above).hi, 1, 1e-15);
 }
 
 TYPED_TEST_P(LocatorSuite, AJumpIsLocatedAlthoughItHasNoSlope)
 {
-    const HostStep step(1.0, [](double s) { return s < 0.7 ? 1.0 : -1.0; },
-                        [](double) { return 0.0; });
+    const HostStep step(
+        1.0, [](double s) { return s < 0.7 ? 1.0 : -1.0; }, [](double) { return 0.0; });
     const Location where = locate<TypeParam>(step, Side::above);
     EXPECT_LE(where.lo, 0.7);
     EXPECT_GE(where.hi, 0.7);
@@ -105,8 +107,8 @@ TYPED_TEST_P(LocatorSuite, AJumpIsLocatedAlthoughItHasNoSlope)
 
 TYPED_TEST_P(LocatorSuite, TheNumberOfStepsTakenIsBounded)
 {
-    const HostStep step(1.0, [](double s) { return s < 0.7 ? 1.0 : -1e-300; },
-                        [](double) { return -1.0; });
+    const HostStep step(
+        1.0, [](double s) { return s < 0.7 ? 1.0 : -1e-300; }, [](double) { return -1.0; });
     (void)locate<TypeParam>(step, Side::above);
     EXPECT_LE(step.resteps, 250);
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -13,7 +14,10 @@
 namespace ricochet {
 namespace {
 
-Model paper_model() { return load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"); }
+Model paper_model()
+{
+    return load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors");
+}
 
 /// A network without hidden layers: weight . (u, v) + bias >= 0 announces an event.
 Model linear_model(double weight_u, double weight_v, double bias)
@@ -56,9 +60,8 @@ TEST(Network, IsAskedOncePerStepAndSavesTheGuard)
 
 TEST(Network, AFalseAlarmIsCountedAndChangesNothing)
 {
-    const auto exact =
-        integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .step = 0.01}, FixedStep<Rk4>{},
-                  Ends{});
+    const auto exact = integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .step = 0.01},
+                                 FixedStep<Rk4>{}, Ends{});
     const auto run = run_with(Network(linear_model(0, 0, 1)));  // always "event"
     ASSERT_EQ(run.events.size(), exact.events.size());
     for (std::size_t i = 0; i < run.events.size(); ++i) {
@@ -99,7 +102,10 @@ TEST(Network, NaNWeightsAnnounceAnEventAtEveryStep)
 
 // --- one model for every ball and every step ---
 
-Model any_step_model() { return load_model(RICOCHET_MODELS "/bouncing-ball.safetensors"); }
+Model any_step_model()
+{
+    return load_model(RICOCHET_MODELS "/bouncing-ball.safetensors");
+}
 
 struct KnownRun {
     double restitution, height, t_end;
@@ -193,8 +199,9 @@ TEST(Network, AModelForAnotherGravityIsRefused)
                         {.t_end = 1, .step = 0.01}, FixedStep<Rk4>{}, Network(paper_model()));
         FAIL() << "accepted";
     } catch (const std::invalid_argument& reason) {
-        EXPECT_STREQ(reason.what(),
-                     "Network: the model for bouncing-ball is trained for gravity = 9.81, got 1.62");
+        EXPECT_STREQ(
+            reason.what(),
+            "Network: the model for bouncing-ball is trained for gravity = 9.81, got 1.62");
     }
 }
 

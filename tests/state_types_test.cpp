@@ -31,7 +31,8 @@ X state(double a, double b)
 }
 
 template <class X>
-class StateTypes : public testing::Test {};
+class StateTypes : public testing::Test {
+};
 
 using Types = testing::Types<std::vector<double>, Eigen::Vector2d, Eigen::VectorXd,
                              Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>>;

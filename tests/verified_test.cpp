@@ -78,9 +78,8 @@ TEST(Verified, AThousandRandomNetworksChangeNoBit)
     std::mt19937_64 random(20230605);
     for (int i = 0; i < 1000; ++i) {
         const double size = std::pow(10.0, static_cast<double>(random() % 7) - 3);
-        const Model model = model_of([&] {
-            return size * (static_cast<double>(random() >> 11U) * 0x1p-52 - 1);
-        });
+        const Model model =
+            model_of([&] { return size * (static_cast<double>(random() >> 11U) * 0x1p-52 - 1); });
         expect_unmoved_by<FixedStep<Rk4>>(model);
         expect_unmoved_by<ErrorControlled<Dopri5>>(model);
     }
@@ -88,9 +87,9 @@ TEST(Verified, AThousandRandomNetworksChangeNoBit)
 
 TEST(Verified, WeightsThatAreNotNumbersChangeNoBit)
 {
-    for (const double weight : {std::numeric_limits<double>::quiet_NaN(),
-                                std::numeric_limits<double>::infinity(),
-                                -std::numeric_limits<double>::infinity()}) {
+    for (const double weight :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+          -std::numeric_limits<double>::infinity()}) {
         const Model model = model_of([=] { return weight; });
         expect_unmoved_by<FixedStep<Rk4>>(model);
         expect_unmoved_by<ErrorControlled<Dopri5>>(model);

@@ -110,8 +110,9 @@ void add_simulate(CLI::App& app, int& status)
     add_whole_number(command, "--max-steps", run.max_steps, 1,
                      std::numeric_limits<std::uint64_t>::max(),
                      "end the run after N steps, as step_limit; default 10 million");
-    add_whole_number(command, "--samples", request->samples, 2, 10'000'000,
-                     "points of the trajectory in --csv and --plot, default 1001, and in --json if given");
+    add_whole_number(
+        command, "--samples", request->samples, 2, 10'000'000,
+        "points of the trajectory in --csv and --plot, default 1001, and in --json if given");
     command.add_flag("--json", request->json, "print JSON");
     add_text(command, "--csv", request->csv, "FILE", "write the sampled trajectory");
     add_text(command, "--plot", request->plot, "FILE", "draw it with gnuplot, as .svg or .png");

@@ -175,9 +175,9 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     if (run.outcome != Outcome::reached_end) {
         out += fmt::format("  {}\n", describe(run.outcome));
     }
-    out += fmt::format("{} event{}, {} steps ({} rejected), {} flow calls, {} guard calls", s.events,
-                       s.events == 1 ? "" : "s",
-                       s.steps, s.rejected, s.flow_calls, s.guard_calls);
+    out +=
+        fmt::format("{} event{}, {} steps ({} rejected), {} flow calls, {} guard calls", s.events,
+                    s.events == 1 ? "" : "s", s.steps, s.rejected, s.flow_calls, s.guard_calls);
     if (s.network_calls > 0) {
         out += fmt::format(
             ",\n{} predictions: {} checks put off, {} false alarms, {} missed events ({} late)",

@@ -45,9 +45,9 @@ void check_model_features(const Model& model, Recipe recipe, std::size_t feature
                         name(recipe), model.system));
     }
     if (model.offset.size() != features) {
-        throw std::invalid_argument(
-            fmt::format("Network: the model for {} takes {} features, but '{}' of this state are {}",
-                        model.system, model.offset.size(), name(recipe), features));
+        throw std::invalid_argument(fmt::format(
+            "Network: the model for {} takes {} features, but '{}' of this state are {}",
+            model.system, model.offset.size(), name(recipe), features));
     }
 }
 
@@ -55,9 +55,9 @@ void check_model_step(const Model& model, double smallest, double largest)
 {
     const bool one_step_only = model.step_min == model.step_max && smallest != largest;
     if (largest < model.step_min || smallest > model.step_max || one_step_only) {
-        throw std::invalid_argument(
-            fmt::format("Network: the model for {} is trained for steps in [{}, {}] s, got [{}, {}]",
-                        model.system, model.step_min, model.step_max, smallest, largest));
+        throw std::invalid_argument(fmt::format(
+            "Network: the model for {} is trained for steps in [{}, {}] s, got [{}, {}]",
+            model.system, model.step_min, model.step_max, smallest, largest));
     }
 }
 

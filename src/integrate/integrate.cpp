@@ -33,8 +33,8 @@ void throw_start_outside_mode(double t, double guard)
 
 void throw_start_guard_not_finite(double t, double guard)
 {
-    throw std::invalid_argument(
-        fmt::format("integrate: the guard must be finite at the start, got {} at t = {}", guard, t));
+    throw std::invalid_argument(fmt::format(
+        "integrate: the guard must be finite at the start, got {} at t = {}", guard, t));
 }
 
 }  // namespace ricochet::detail

@@ -48,9 +48,9 @@ void validate(const Options& options, bool step_required)
     double previous = o.t_start;
     for (const double t : o.sample_times) {
         if (!(t >= previous && t <= o.t_end)) {
-            throw std::invalid_argument(fmt::format(
-                "integrate: sample_times must ascend within [{}, {}], got {} after {}", o.t_start,
-                o.t_end, t, previous));
+            throw std::invalid_argument(
+                fmt::format("integrate: sample_times must ascend within [{}, {}], got {} after {}",
+                            o.t_start, o.t_end, t, previous));
         }
         previous = t;
     }

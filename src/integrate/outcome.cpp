@@ -22,7 +22,8 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::reached_end: return "the end time was reached";
         case Outcome::stopped_by_event: return "an event ended the run, as asked";
         case Outcome::zeno:
-            return "the system comes to rest on its guard, at once or after infinitely many events, "
+            return "the system comes to rest on its guard, at once or after infinitely many "
+                   "events, "
                    "and does not say how it rests; end the run earlier";
         case Outcome::outside_mode:
             return "a reset left the state behind a guard that bounds the motion; "
@@ -30,7 +31,8 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::step_underflow:
             return "the step fell below h_min without meeting the tolerance; "
                    "loosen rtol and atol, or lower h_min";
-        case Outcome::step_limit: return "as many steps were taken as the run may take; allow more or end earlier";
+        case Outcome::step_limit:
+            return "as many steps were taken as the run may take; allow more or end earlier";
         case Outcome::non_finite:
             return "the flow, the guard or the reset returned NaN or infinity; "
                    "the last finite state is kept";

@@ -18,8 +18,8 @@ bool bounces_thirteen_times(const State& start)
     const auto newton = ricochet::integrate(ball, start, options, Stepping{});
     const auto bisection = ricochet::integrate(ball, start, options, Stepping{}, ricochet::Ends{},
                                                ricochet::Bisection{});
-    const auto toms748 = ricochet::integrate(ball, start, options, Stepping{},
-                                             ricochet::Extremum{}, ricochet::Toms748{});
+    const auto toms748 = ricochet::integrate(ball, start, options, Stepping{}, ricochet::Extremum{},
+                                             ricochet::Toms748{});
     return newton.events.size() == 13 && bisection.events.size() == 13 &&
            toms748.events.size() == 13;
 }

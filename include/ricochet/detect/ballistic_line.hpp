@@ -19,7 +19,7 @@ struct BallisticLine {
 
     /// Nothing has been trained, so nothing can be unsuitable.
     template <class System, class X>
-        requires CurvedGuard<System, X>
+    requires CurvedGuard<System, X>
     void check(const System& /*system*/, const X& /*x*/, double /*smallest*/,
                double /*largest*/) const noexcept
     {

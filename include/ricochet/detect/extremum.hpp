@@ -60,8 +60,8 @@ private:
     {
         typename Guard::State x = step.x0();
         typename Guard::State dxdt = x;
-        GuardSample best = std::fabs(watch.end.value) < std::fabs(watch.start.value) ? watch.end
-                                                                                     : watch.start;
+        GuardSample best =
+            std::fabs(watch.end.value) < std::fabs(watch.start.value) ? watch.end : watch.start;
         bool left = false;
         const auto rate_at = [&](double s) {
             step.interpolate(s, x);

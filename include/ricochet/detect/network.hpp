@@ -85,7 +85,7 @@ public:
             detail::check_model_parameter(model(), parameter, trained, value);
         }
         detail::check_model_features(model(), recipe_, dimension(recipe_, x.size()),
-                            offers<System, X>(recipe_));
+                                     offers<System, X>(recipe_));
         detail::check_model_step(model(), smallest, largest);
     }
 

@@ -33,16 +33,16 @@ struct EvidenceCounts {
 
 /// Counts over one run.
 struct Statistics {
-    std::uint64_t steps = 0;          ///< accepted, also those cut short by an event
-    std::uint64_t rejected = 0;       ///< steps that failed the error test
-    std::uint64_t resteps = 0;        ///< steps repeated from their start to locate an event
-    std::uint64_t flow_calls = 0;     ///< evaluations of the flow, all purposes
-    std::uint64_t guard_calls = 0;    ///< evaluations of the guard, all purposes
-    std::uint64_t network_calls = 0;  ///< inferences
-    std::uint64_t false_alarms = 0;   ///< a network predicted an event and there was none
-    std::uint64_t missed_events = 0;  ///< events in a step that a network had cleared
-    std::uint64_t late_events = 0;    ///< missed events that only a later step found
-    std::uint64_t checks_put_off = 0; ///< steps whose exact check a network saved
+    std::uint64_t steps = 0;           ///< accepted, also those cut short by an event
+    std::uint64_t rejected = 0;        ///< steps that failed the error test
+    std::uint64_t resteps = 0;         ///< steps repeated from their start to locate an event
+    std::uint64_t flow_calls = 0;      ///< evaluations of the flow, all purposes
+    std::uint64_t guard_calls = 0;     ///< evaluations of the guard, all purposes
+    std::uint64_t network_calls = 0;   ///< inferences
+    std::uint64_t false_alarms = 0;    ///< a network predicted an event and there was none
+    std::uint64_t missed_events = 0;   ///< events in a step that a network had cleared
+    std::uint64_t late_events = 0;     ///< missed events that only a later step found
+    std::uint64_t checks_put_off = 0;  ///< steps whose exact check a network saved
     std::uint64_t events = 0;
     EvidenceCounts evidence;
 };

@@ -85,9 +85,7 @@ public:
             const double u = s / h_;
             const double slope = h_ * u * u * (u - 1);
             const double rise = u * u * (3 - 2 * u);
-            for_components([&](auto i) {
-                x[i] = rise * w_[i] + slope * (rate1_[i] - rate0_[i]);
-            });
+            for_components([&](auto i) { x[i] = rise * w_[i] + slope * (rate1_[i] - rate0_[i]); });
         }
         add_tangent(s, x);
     }
@@ -169,8 +167,7 @@ public:
     {
         start_ = start_.after(h_);
         for_components([&](auto i) {
-            const TwoSum sum =
-                two_sum(x0_[i], h_ * rate0_[i] + (w_[i] + remainder_[i]));
+            const TwoSum sum = two_sum(x0_[i], h_ * rate0_[i] + (w_[i] + remainder_[i]));
             x0_[i] = sum.value;
             remainder_[i] = sum.remainder;
         });
@@ -197,7 +194,8 @@ public:
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
 
 private:
-    static constexpr bool has_dense_output = requires(const Stepper& stepper, X& x) {
+    static constexpr bool has_dense_output = requires(const Stepper& stepper, X& x)
+    {
         stepper.calc_state(0.0, x, x, x, 0.0, x, x, 0.0);
     };
 
@@ -267,8 +265,8 @@ private:
             X w_own{};
             X rate_own{};
             X error_own{};
-            flow_calls_ += depart<with_error>(own, {*system_, start_, x, rate0, zero}, s, at,
-                                              w_own, rate_own, error_own);
+            flow_calls_ += depart<with_error>(own, {*system_, start_, x, rate0, zero}, s, at, w_own,
+                                              rate_own, error_own);
             assign(w, w_own);
             if constexpr (is_fsal<Stepper>) assign(rate, rate_own);
             if constexpr (with_error) assign(error, error_own);
@@ -284,8 +282,7 @@ private:
     /// From w to x at offset s.
     void add_tangent(double s, X& w) const noexcept
     {
-        for_components(
-            [&](auto i) { w[i] = x0_[i] + (s * rate0_[i] + (w[i] + remainder_[i])); });
+        for_components([&](auto i) { w[i] = x0_[i] + (s * rate0_[i] + (w[i] + remainder_[i])); });
     }
 
     void finish_attempt()

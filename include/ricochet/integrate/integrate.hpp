@@ -10,7 +10,6 @@
 // fixed size, unless events are recorded.
 #pragma once
 
-#include <array>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -53,8 +52,8 @@ public:
         const bool shrinks = seen_ >= 2 && interval < interval_;
         shrinking_ = shrinks ? shrinking_ + 1 : 0;
         const double q = shrinks ? interval / interval_ : 1;
-        const double rest = q < 1 ? interval * q / (1 - q)
-                                  : std::numeric_limits<double>::infinity();
+        const double rest =
+            q < 1 ? interval * q / (1 - q) : std::numeric_limits<double>::infinity();
         last_ = t;
         interval_ = interval;
         ++seen_;
@@ -79,7 +78,8 @@ class Integration {
 
     static constexpr bool guarded = Guarded<System, X>;
     static constexpr bool predicts = requires(const Detector& detector, const CurrentStep& step,
-                                              const GuardView<System, X>& guard) {
+                                              const GuardView<System, X>& guard)
+    {
         detector.clears(guard, step);
     };
     static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
@@ -88,8 +88,8 @@ class Integration {
                   "ricochet: error control needs one of odeint's error steppers, such as Dopri5");
 
 public:
-    Integration(const System& system, const X& x0, const Options& options,
-                const Detector& detector, const Locator& locator)
+    Integration(const System& system, const X& x0, const Options& options, const Detector& detector,
+                const Locator& locator)
         : system_(system),
           options_(checked(options, x0)),
           detector_(detector),
@@ -194,8 +194,8 @@ private:
         for (;;) {
             const double error = step_.attempt(h, options_.rtol, options_.atol);
             if (rule_.accepts(error)) {
-                h_next_ = std::min(h * std::min(largest, rule_.factor(error, order)),
-                                    options_.h_max);
+                h_next_ =
+                    std::min(h * std::min(largest, rule_.factor(error, order)), options_.h_max);
                 return true;
             }
             ++run_.statistics.rejected;
@@ -212,8 +212,7 @@ private:
 
     [[nodiscard]] double smallest_step() const noexcept
     {
-        const double ulp =
-            std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
         return std::max(options_.h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
     }
 
@@ -224,9 +223,7 @@ private:
         constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
         const X& x = step_.x0();
         const X& dxdt = step_.rate0();
-        const auto scale = [&](auto i) {
-            return options_.atol + options_.rtol * std::fabs(x[i]);
-        };
+        const auto scale = [&](auto i) { return options_.atol + options_.rtol * std::fabs(x[i]); };
         double size = 0;
         double speed = 0;
         for_each_component(x, [&](auto i) {
@@ -240,9 +237,8 @@ private:
         move(moved, x, euler, dxdt);
         step_.flow(euler, moved, rate);
         double bend = 0;
-        for_each_component(x, [&](auto i) {
-            bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i));
-        });
+        for_each_component(
+            x, [&](auto i) { bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i)); });
         const double fastest = std::max(speed, bend / euler);
         const double h = fastest <= 1e-15 ? std::max(1e-6 * span, euler * 1e-3)
                                           : std::pow(0.01 / fastest, 1.0 / order);
@@ -289,7 +285,11 @@ private:
         if (finding.late) {
             ++run_.statistics.late_events;
             const double t = step_.time(0);
-            fire({.t = t, .before = step_.x0(), .after = step_.x0(), .bracket = {t, t}, .late = true},
+            fire({.t = t,
+                  .before = step_.x0(),
+                  .after = step_.x0(),
+                  .bracket = {t, t},
+                  .late = true},
                  0, std::fabs(finding.lo.value));
         } else {
             locate_and_fire(guard, finding);
@@ -307,7 +307,8 @@ private:
         watch_.start.s = 0;
     }
 
-    [[gnu::noinline]] void locate_and_fire(const GuardView<System, X>& guard, const Finding& finding)
+    [[gnu::noinline]] void locate_and_fire(const GuardView<System, X>& guard,
+                                           const Finding& finding)
     {
         StepProbe probe(guard, step_, finding.side);
         probe.agree_on(finding.hi);
@@ -469,7 +470,7 @@ private:
 ///         What happens along the way is returned as `Run::outcome`.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
-    requires Flowing<System, X> && StateVector<X>
+requires Flowing<System, X> && StateVector<X>
 [[nodiscard]] Run<X> integrate(const System& system, const X& x0, const Options& options,
                                const Stepping& /*stepping*/ = {}, const Detector& detector = {},
                                const Locator& locator = {})

@@ -74,7 +74,10 @@ inline constexpr bool has_error_estimate =
     has_category<Stepper, odeint::error_stepper_tag>;
 
 template <class Stepper>
-concept Multistep = requires { Stepper::steps; };
+concept Multistep = requires
+{
+    Stepper::steps;
+};
 
 template <class Stepper>
 [[nodiscard]] constexpr int order_of() noexcept

@@ -23,7 +23,8 @@ class Matrix;
 namespace boost::numeric::odeint {
 
 template <int Rows, int Options, int MaxRows>
-struct is_resizeable<Eigen::Matrix<double, Rows, 1, Options, MaxRows, 1>> : boost::true_type {};
+struct is_resizeable<Eigen::Matrix<double, Rows, 1, Options, MaxRows, 1>> : boost::true_type {
+};
 
 template <int Rows, int Options, int MaxRows>
 struct resize_impl<Eigen::Matrix<double, Rows, 1, Options, MaxRows, 1>,
@@ -82,9 +83,9 @@ private:
     static void apply(X& x, Tuple rest, std::index_sequence<I...>)
     {
         auto& operation = std::get<sizeof...(I)>(rest);
-        detail::for_each_component(x, [&](auto i) __attribute__((always_inline)) {
-            operation(x[i], std::get<I>(rest)[i]...);
-        });
+        detail::for_each_component(
+            x, [&](auto i)
+                   __attribute__((always_inline)) { operation(x[i], std::get<I>(rest)[i]...); });
     }
 };
 

@@ -12,8 +12,8 @@ namespace ricochet {
 
 /// Where the guard left its side, as offsets [s] from the start of the step.
 struct Location {
-    double lo = 0;     ///< still on the armed side
-    double hi = 0;     ///< across the surface or on it
+    double lo = 0;                                            ///< still on the armed side
+    double hi = 0;                                            ///< across the surface or on it
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< rate of the guard at `hi`
     double error = 0;  ///< [s] width of the bracket, or more where rounding in g is coarser
 };
@@ -36,8 +36,14 @@ public:
     using State = typename Guard::State;
 
     StepProbe(const Guard& guard, const Step& step, Side side)
-        : guard_(&guard), step_(&step), side_(side), x_(step.x0()), dxdt_(step.x0()),
-          ahead_(step.x0()), beyond_(step.x1()), beyond_at_(step.h())
+        : guard_(&guard),
+          step_(&step),
+          side_(side),
+          x_(step.x0()),
+          dxdt_(step.x0()),
+          ahead_(step.x0()),
+          beyond_(step.x1()),
+          beyond_at_(step.h())
     {
     }
 

@@ -96,9 +96,8 @@ private:
         probe.complete(lo);
         probe.complete(hi);
         const double width = hi.s - lo.s;
-        const double u =
-            detail::hermite_root(lo.value, lo.rate * width, hi.value, hi.rate * width,
-                                 probe.side() == Side::above ? 1 : -1);
+        const double u = detail::hermite_root(lo.value, lo.rate * width, hi.value, hi.rate * width,
+                                              probe.side() == Side::above ? 1 : -1);
         return lo.s + u * width;
     }
 

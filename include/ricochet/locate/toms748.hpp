@@ -1,8 +1,8 @@
 // TOMS 748 from Boost.Math, for guards whose slope is not to be had.
 #pragma once
 
-#include <boost/math/tools/toms748_solve.hpp>
 #include <algorithm>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <cstdint>
 
