@@ -393,6 +393,60 @@ TEST(Integrate, AResetBehindTheSurfaceIsReported)
     EXPECT_EQ(run.outcome, Outcome::outside_mode);
 }
 
+TEST(Integrate, APoleIsOneEventNotAThousand)
+{
+    struct Pole {
+        Crossing crossing = Crossing::either;
+        void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+        [[nodiscard]] double guard(double t, const X&) const { return std::tan(t); }
+    };
+    const auto run =
+        integrate(Pole{}, X{0.0, 0.0}, {.t_start = 1, .t_end = 2, .step = 0.1, .max_steps = 1000},
+                  FixedStep<Rk4>{});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_NEAR(run.events[0].t, std::acos(0.0), 1e-15);
+}
+
+TEST(Integrate, EventsThatDoNotAdvanceTimeEndTheRun)
+{
+    struct Plateau {
+        Crossing crossing = Crossing::either;
+        void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+        [[nodiscard]] double guard(double t, const X&) const
+        {
+            return std::max(0.0, std::abs(t - 5) - 1);
+        }
+    };
+    for (const double step : {0.01, 0.1}) {
+        const auto run = integrate(Plateau{}, X{0.0, 0.0},
+                                   {.t_end = 10, .step = step, .max_steps = 100'000},
+                                   FixedStep<Rk4>{}, Extremum{}, Bisection{});
+        EXPECT_NE(run.outcome, Outcome::step_limit);
+    }
+}
+
+TEST(Integrate, AVanishingComponentNeedsNoAbsoluteTolerance)
+{
+    struct Clock {
+        void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    };
+    const auto run = integrate(Clock{}, X{1.0, 0.0}, {.t_end = 1, .rtol = 1e-8, .atol = 0});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+}
+
+TEST(Integrate, Toms748FollowsAResetThatLeavesTheResidueOfLocation)
+{
+    struct Flip {
+        void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+        [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
+        void reset(double, X& x) const { x[1] *= -0.9; }
+    };
+    const auto run = integrate(Flip{}, X{10.0, 0.0}, {.t_end = 20.5}, ErrorControlled<Dopri5>{},
+                               Extremum{}, Toms748{});
+    EXPECT_EQ(run.events.size(), 13u);
+}
+
 TEST(Integrate, AStepLimitEndsTheRun)
 {
     const auto run = integrate(BouncingBall(), {10.0, 0.0},

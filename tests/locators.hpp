@@ -105,6 +105,27 @@ TYPED_TEST_P(LocatorSuite, AJumpIsLocatedAlthoughItHasNoSlope)
     EXPECT_LE(where.hi - where.lo, 2e-15);
 }
 
+TYPED_TEST_P(LocatorSuite, ASaturatedGuardIsLocatedAllTheSame)
+{
+    // Flat at both ends, where its slope says nothing: erf is 1 to the last bit there.
+    const HostStep step(
+        10.0, [](double s) { return std::erf(10 * (5.03 - s)); },
+        [](double s) { return -11.283791670955126 * std::exp(-std::pow(10 * (5.03 - s), 2)); });
+    const Location where = locate<TypeParam>(step, Side::above);
+    EXPECT_NEAR(where.hi, 5.03, 4e-15);
+    EXPECT_LE(where.hi - where.lo, 4e-15);
+}
+
+TYPED_TEST_P(LocatorSuite, APlateauAtZeroIsEnteredAtItsEdge)
+{
+    const HostStep step(
+        5.0, [](double s) { return std::max(0.0, 4 - s); },
+        [](double s) { return s < 4 ? -1.0 : 0.0; });
+    const Location where = locate<TypeParam>(step, Side::above);
+    EXPECT_NEAR(where.hi, 4, 2e-15);
+    EXPECT_LE(where.hi - where.lo, 2e-15);
+}
+
 TYPED_TEST_P(LocatorSuite, TheNumberOfStepsTakenIsBounded)
 {
     const HostStep step(
@@ -117,6 +138,7 @@ REGISTER_TYPED_TEST_SUITE_P(LocatorSuite, ClosesToNeighbouringOffsets, TheBracke
                             StopsAtTheTolerance, ARisingCrossingIsLocatedAsWell,
                             AStartOnTheSurfaceIsNotTheEvent, AVeryShortFlightInALongStepIsFound,
                             AFlatCrossingIsLocatedToTheRoundingOfTheGuard,
-                            AJumpIsLocatedAlthoughItHasNoSlope, TheNumberOfStepsTakenIsBounded);
+                            AJumpIsLocatedAlthoughItHasNoSlope, ASaturatedGuardIsLocatedAllTheSame,
+                            APlateauAtZeroIsEnteredAtItsEdge, TheNumberOfStepsTakenIsBounded);
 
 }  // namespace ricochet::test

@@ -31,7 +31,7 @@ struct Extremum {
         if (left && counts(watch.side, guard.crossing())) {
             return Finding::leaving(watch.side, watch.start, watch.end);
         }
-        if (left || !turns(watch)) {
+        if (left || !turns(watch) || !std::isfinite(watch.start.rate * watch.end.rate)) {
             return Finding::clear(Evidence::checked);
         }
         const GuardSample extremum = find_extremum(guard, step, watch);

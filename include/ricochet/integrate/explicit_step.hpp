@@ -150,7 +150,8 @@ public:
         double worst = 0;
         for_components([&](auto i) {
             const double size = std::max(std::fabs(x0_[i]), std::fabs(x1_[i]));
-            const double ratio = std::fabs(error_[i]) / (atol + rtol * size);
+            const double error = std::fabs(error_[i]);
+            const double ratio = error == 0 ? 0 : error / (atol + rtol * size);
             worst = worst >= ratio ? worst : ratio;  // NaN stays
         });
         return end_is_finite() ? worst : std::numeric_limits<double>::quiet_NaN();

@@ -41,34 +41,45 @@ namespace detail {
 [[noreturn]] void throw_start_guard_not_finite(double t, double guard);
 
 /// Recognises accumulating events: three intervals in a row that shrink, and a
-/// geometric remainder d q / (1 - q) that is no longer worth resolving.
+/// geometric remainder d q / (1 - q) that is no longer worth resolving. And events
+/// that do not advance time at all.
 class ShrinkingIntervals {
 public:
-    /// @param t         [s] of the event just seen
-    /// @param tolerance [s] resolution of event times
-    [[nodiscard]] bool accumulate(const Instant& t, double tolerance) noexcept
+    /// Takes note of an event at `t`; true after a hundred in a row that time cannot
+    /// tell apart.
+    [[nodiscard]] bool stalls(const Instant& t) noexcept
     {
-        const double interval = -t.until(last_.value) - last_.remainder;
-        const bool shrinks = seen_ >= 2 && interval < interval_;
-        shrinking_ = shrinks ? shrinking_ + 1 : 0;
-        const double q = shrinks ? interval / interval_ : 1;
-        const double rest =
-            q < 1 ? interval * q / (1 - q) : std::numeric_limits<double>::infinity();
+        const double interval = (t.value - last_.value) + (t.remainder - last_.remainder);
+        shrinking_ = seen_ >= 2 && interval < interval_ ? shrinking_ + 1 : 0;
+        ratio_ = shrinking_ > 0 ? interval / interval_ : 1;
         last_ = t;
         interval_ = interval;
         ++seen_;
-        const double resolution = 16 * std::numeric_limits<double>::epsilon() * std::fabs(t.value);
-        return shrinking_ >= 3 && rest < std::max(tolerance, resolution);
+        stalled_ = interval < resolution() / 4 ? stalled_ + 1 : 0;
+        return stalled_ > 100;
+    }
+
+    /// Whether what is left after the event just noted is below `tolerance` [s] or
+    /// the resolution of its time.
+    [[nodiscard]] bool accumulate(double tolerance) const noexcept
+    {
+        const double rest = interval_ * ratio_ / (1 - ratio_);
+        return shrinking_ >= 3 && rest < std::max(tolerance, resolution());
     }
 
 private:
+    [[nodiscard]] double resolution() const noexcept
+    {
+        return 16 * std::numeric_limits<double>::epsilon() * std::fabs(last_.value);
+    }
+
     Instant last_;
     double interval_ = 0;
+    double ratio_ = 1;
     std::size_t seen_ = 0;
     std::size_t shrinking_ = 0;
+    std::size_t stalled_ = 0;
 };
-
-struct Nothing {};
 
 /// One run in progress.
 template <class System, class X, class Stepping, class Detector, class Locator>
@@ -347,8 +358,9 @@ private:
         }
         if (!finite) return end(Outcome::non_finite);
         if (options_.stop_at_event) return end(Outcome::stopped_by_event);
-        if (Resetting<System, X> &&
-            intervals_.accumulate(step_.start(), event_tolerance(step_.time(0)))) {
+        const double tolerance = event_tolerance(step_.time(0));
+        if (intervals_.stalls(step_.start()) ||
+            (Resetting<System, X> && intervals_.accumulate(tolerance))) {
             return end(Outcome::zeno);
         }
         arm(band);
@@ -369,7 +381,10 @@ private:
         if (Detector::uses_rates || on_surface) {
             watch_.start.rate = guard.rate(t, x, step_.rate0(), h_next_);
         }
-        watch_.side = on_surface ? heading(watch_.start.rate) : side_of(g);
+        // Without a reset the state is where the guard left it, exactly on the surface
+        // or across it.
+        const bool decided = !Resetting<System, X> && g != 0;
+        watch_.side = on_surface && !decided ? heading(watch_.start.rate) : side_of(g);
         if (is_unilateral(system_) && watch_.side != Side::above) meet_constraint(on_surface);
     }
 

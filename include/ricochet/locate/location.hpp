@@ -18,13 +18,11 @@ struct Location {
     double error = 0;  ///< [s] width of the bracket, or more where rounding in g is coarser
 };
 
-/// The narrowest bracket worth having at offset `s` of a step that ends at time
-/// `t`: two neighbouring doubles, or 1/256 of the spacing of doubles at `t`, since
-/// a time is carried with its remainder but reported as one double.
-[[nodiscard]] inline double finest_bracket(double t, double s) noexcept
+/// The narrowest bracket worth having at offset s of a step of length h: neighbouring
+/// doubles, or a millionth of their spacing at the end of the step.
+[[nodiscard]] inline double finest_bracket(double s, double h) noexcept
 {
-    constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    return std::max(epsilon * std::fabs(t) / 256, epsilon * std::fabs(s));
+    return std::numeric_limits<double>::epsilon() * std::max(std::fabs(s), 0x1p-20 * std::fabs(h));
 }
 
 /// The guard along the step's own map: every sample repeats the step from its
@@ -131,7 +129,7 @@ public:
     /// Narrowest useful bracket near offset s.
     [[nodiscard]] double finest(double s) const noexcept
     {
-        return finest_bracket(step_->time(s), s);
+        return finest_bracket(s, step_->h());
     }
 
 private:

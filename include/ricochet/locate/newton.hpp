@@ -53,7 +53,7 @@ struct Newton {
                                   double tolerance) const
     {
         double s = first_guess(probe, lo, hi);
-        const double curvature = std::fabs((hi.rate - lo.rate) / (hi.s - lo.s));
+        double curvature = bend(lo, hi);
         double past = 0;
         for (int slow = 0;;) {
             const double width = hi.s - lo.s;
@@ -64,14 +64,15 @@ struct Newton {
 
             const GuardSample sample = probe.value_and_rate(s);
             const bool beyond = probe.has_left(sample);
+            curvature = std::max({curvature, bend(lo, sample), bend(sample, hi)});
             (beyond ? hi : lo) = sample;
             const double correction = -sample.value / sample.rate;
             const double distance = std::fabs(correction);
             // What a straight line neglects over that distance, as a shift in time.
-            if (distance * distance * curvature <= std::fabs(sample.rate) * finest / 2) {
-                close_in(probe, sample, correction, tolerance, lo, hi);
-                break;
-            }
+            const bool straight =
+                distance <= width &&
+                distance * distance * curvature <= std::fabs(sample.rate) * finest / 2;
+            if (straight && close_in(probe, sample, correction, tolerance, lo, hi)) break;
             // Converged from one side: reach for the other.
             past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
             s += correction + (beyond ? -past : past);
@@ -90,6 +91,12 @@ struct Newton {
     }
 
 private:
+    /// Change of the rate from one sample to another, per second.
+    [[nodiscard]] static double bend(const GuardSample& a, const GuardSample& b) noexcept
+    {
+        return std::fabs((b.rate - a.rate) / (b.s - a.s));
+    }
+
     template <class Probe>
     [[nodiscard]] static double first_guess(const Probe& probe, GuardSample& lo, GuardSample& hi)
     {
@@ -102,9 +109,10 @@ private:
     }
 
     /// Brackets the root predicted from `sample` as narrowly as rounding in the
-    /// guard allows: from the predicted root outwards until the side changes.
+    /// guard allows: from the predicted root outwards until the side changes. False
+    /// if it does not change within the bracket: the prediction was wrong.
     template <class Probe>
-    static void close_in(Probe& probe, const GuardSample& sample, double correction,
+    [[nodiscard]] static bool close_in(Probe& probe, const GuardSample& sample, double correction,
                          double tolerance, GuardSample& lo, GuardSample& hi)
     {
         double s = sample.s + correction;
@@ -123,11 +131,12 @@ private:
             const GuardSample at = probe.along_the_flow(sample, s);
             const int toward = probe.has_left(at) ? -1 : 1;
             (toward < 0 ? hi : lo) = at;
-            if (toward == -direction) return;
+            if (toward == -direction) return true;
             direction = toward;
             s += toward * margin;
             margin *= 2;
         }
+        return false;
     }
 };
 

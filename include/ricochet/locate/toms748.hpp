@@ -30,15 +30,18 @@ struct Toms748 {
             }
             return sample.value;
         };
-        // A step that begins on the surface has no sign there: halve until it has.
-        while (lo.value == 0 && !narrow_enough(lo.s, hi.s)) {
-            (void)sample_at(lo.s + (hi.s - lo.s) / 2);
-        }
-        if (hi.value != 0 && !narrow_enough(lo.s, hi.s)) {
+        const auto halve = [&] { (void)sample_at(lo.s + (hi.s - lo.s) / 2); };
+        // A step that begins on the surface, or a rounding behind it, has no sign there.
+        while (probe.has_left(lo) && !narrow_enough(lo.s, hi.s)) halve();
+        if (lo.value * hi.value < 0 && std::isfinite(lo.value * hi.value) &&
+            !narrow_enough(lo.s, hi.s)) {
             std::uintmax_t iterations = 200;
             boost::math::tools::toms748_solve(sample_at, lo.s, hi.s, lo.value, hi.value,
                                               narrow_enough, iterations);
         }
+        // An exact zero ends the search from one side: close the other.
+        if (!narrow_enough(lo.s, hi.s)) (void)sample_at(hi.s - probe.finest(hi.s));
+        while (!narrow_enough(lo.s, hi.s)) halve();
         return {.lo = lo.s, .hi = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
     }
 };
