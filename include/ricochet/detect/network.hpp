@@ -79,7 +79,7 @@ public:
         }
         for (const auto& [parameter, trained] : model().parameters) {
             std::optional<double> value;
-            if constexpr (requires { value = system.parameter(std::string_view(parameter)); }) {
+            if constexpr (requires { system.parameter(std::string_view()); }) {
                 value = system.parameter(std::string_view(parameter));
             }
             detail::check_model_parameter(model(), parameter, trained, value);
