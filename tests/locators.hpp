@@ -33,8 +33,7 @@ TYPED_TEST_SUITE_P(LocatorSuite);
 
 TYPED_TEST_P(LocatorSuite, ClosesToNeighbouringOffsets)
 {
-    // cos crosses zero at pi/2. Time 100 + s resolves 1.4e-14 s, of which a
-    // bracket is at most a 256th; the offset itself resolves 2.2e-16.
+    // cos crosses zero at pi/2, whose neighbours are 2.2e-16 apart.
     const HostStep step(
         3.0, [](double s) { return std::cos(s); }, [](double s) { return -std::sin(s); });
     const Location where = locate<TypeParam>(step, Side::above);
@@ -81,7 +80,8 @@ TYPED_TEST_P(LocatorSuite, AVeryShortFlightInALongStepIsFound)
     const double flight = 1e-9;
     const HostStep step(
         10.0, [=](double s) { return s * (flight - s); }, [=](double s) { return flight - 2 * s; });
-    // The time of day, 100 s, resolves 1.4e-14 s; a 256th of it is asked for.
+    // Located on the offset, to a millionth of the spacing at the end of the step,
+    // 1.8e-15 s: far finer than the time, 100 s, resolves.
     EXPECT_NEAR(locate<TypeParam>(step, Side::above).hi, flight, 1e-16);
 }
 
