@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "ricochet/detect/finding.hpp"
+#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/guard_view.hpp"
 #include "ricochet/hybrid/step.hpp"
 
@@ -83,7 +83,7 @@ template <class Detector>
     const GuardView<HostSystem, HostState> guard(system, calls);
     Watch watch{
         .side = side, .start = {.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]}, .end = {}};
-    const Finding finding = detector.confirm(guard, step, watch);
+    const Finding finding = look_at(detector, guard, step, watch);
     if (guard_calls) *guard_calls = calls;
     return finding;
 }

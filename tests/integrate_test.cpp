@@ -363,6 +363,7 @@ TEST(Integrate, AGuardThatFailsEndsTheRun)
     const auto run =
         integrate(Blind{}, {0.0, 0.0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{}, Ends{});
     EXPECT_EQ(run.outcome, Outcome::non_finite);
+    EXPECT_EQ(run.guard, 0u);
     EXPECT_LT(run.t, 0.5);
 }
 
@@ -419,9 +420,9 @@ TEST(Integrate, EventsThatDoNotAdvanceTimeEndTheRun)
         }
     };
     for (const double step : {0.01, 0.1}) {
-        const auto run = integrate(Plateau{}, X{0.0, 0.0},
-                                   {.t_end = 10, .step = step, .max_steps = 100'000},
-                                   FixedStep<Rk4>{}, Extremum{}, Bisection{});
+        const auto run =
+            integrate(Plateau{}, X{0.0, 0.0}, {.t_end = 10, .step = step, .max_steps = 100'000},
+                      FixedStep<Rk4>{}, Extremum{}, Bisection{});
         EXPECT_NE(run.outcome, Outcome::step_limit);
     }
 }
@@ -490,7 +491,7 @@ TEST(Integrate, AStartThatIsNotFiniteIsRefused)
 TEST(Integrate, AStartBelowTheFloorIsRefused)
 {
     EXPECT_EQ(refusal(BouncingBall(), {-1.0, 0.0}),
-              "integrate: the start lies behind a guard that bounds the motion: expected "
+              "integrate: the start lies behind guard 0, which bounds the motion: expected "
               "guard >= 0 at t = 0, got -1");
 }
 

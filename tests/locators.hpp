@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "host_step.hpp"
-#include "ricochet/locate/location.hpp"
+#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet::test {
 
@@ -19,7 +19,9 @@ template <class Locator>
     std::uint64_t calls = 0;
     const HostSystem system;
     const GuardView<HostSystem, HostState> guard(system, calls);
-    StepProbe probe(guard, step, side);
+    ProbeSpace<HostState> space(step.x0());
+    StepProbe probe(guard, step, space);
+    probe.watch(side);
     const GuardSample lo{.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]};
     const GuardSample hi{.s = step.h(), .value = step.x1()[1], .rate = step.rate1()[1]};
     return Locator{}.locate(probe, lo, hi, tolerance);

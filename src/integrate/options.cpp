@@ -24,9 +24,9 @@ void validate(const Options& options, bool step_required)
     const Options& o = options;
     require(std::isfinite(o.t_start), "t_start", o.t_start, "a finite time");
     require(std::isfinite(o.t_end), "t_end", o.t_end, "a finite time");
-    if (o.t_end < o.t_start) {
+    if (!std::isfinite(o.t_end - o.t_start)) {
         throw std::invalid_argument(fmt::format(
-            "integrate: t_end must not lie before t_start = {}, got {}", o.t_start, o.t_end));
+            "integrate: t_end - t_start must be finite, got {} - {}", o.t_end, o.t_start));
     }
     if (step_required) {
         require(std::isfinite(o.step) && o.step > 0, "step", o.step,
@@ -44,12 +44,15 @@ void validate(const Options& options, bool step_required)
             o.event_tolerance, "zero or positive");
     require(std::isfinite(o.event_rtol) && o.event_rtol >= 0, "event_rtol", o.event_rtol,
             "zero or positive");
+    require(std::isfinite(o.event_window) && o.event_window >= 0, "event_window", o.event_window,
+            "zero or positive");
 
+    const bool backward = o.t_end < o.t_start;
     double previous = o.t_start;
     for (const double t : o.sample_times) {
-        if (!(t >= previous && t <= o.t_end)) {
+        if (!(backward ? t <= previous && t >= o.t_end : t >= previous && t <= o.t_end)) {
             throw std::invalid_argument(
-                fmt::format("integrate: sample_times must ascend within [{}, {}], got {} after {}",
+                fmt::format("integrate: sample_times must go from {} towards {}, got {} after {}",
                             o.t_start, o.t_end, t, previous));
         }
         previous = t;

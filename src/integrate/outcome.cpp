@@ -9,9 +9,13 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::stopped_by_event: return "stopped_by_event";
         case Outcome::zeno: return "zeno";
         case Outcome::outside_mode: return "outside_mode";
+        case Outcome::endless_cascade: return "endless_cascade";
+        case Outcome::conflicting_resets: return "conflicting_resets";
+        case Outcome::unknown_mode: return "unknown_mode";
         case Outcome::step_underflow: return "step_underflow";
         case Outcome::step_limit: return "step_limit";
         case Outcome::non_finite: return "non_finite";
+        case Outcome::cancelled: return "cancelled";
     }
     return "unknown";
 }
@@ -28,6 +32,13 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::outside_mode:
             return "a reset left the state behind a guard that bounds the motion; "
                    "let the reset put it on the surface or in front of it";
+        case Outcome::endless_cascade:
+            return "resets triggered each other a hundred times at one instant; let each leave "
+                   "the surfaces of the others, or give the system a sliding mode";
+        case Outcome::conflicting_resets:
+            return "two guards fired together and their resets gave one component, or the mode, "
+                   "two values; declare reset(fired, t, x) to say what happens then";
+        case Outcome::unknown_mode: return "a reset returned a mode that is not below mode_count";
         case Outcome::step_underflow:
             return "the step fell below h_min without meeting the tolerance; "
                    "loosen rtol and atol, or lower h_min";
@@ -36,6 +47,7 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::non_finite:
             return "the flow, the guard or the reset returned NaN or infinity; "
                    "the last finite state is kept";
+        case Outcome::cancelled: return "the run was cancelled; it can be continued";
     }
     return "unknown outcome";
 }

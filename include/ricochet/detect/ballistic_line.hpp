@@ -15,6 +15,7 @@ namespace ricochet {
 /// rounding for a falling guard of constant negative curvature.
 struct BallisticLine {
     static constexpr bool uses_rates = false;
+    static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
     static constexpr bool checks_every_step = false;
 
     /// Nothing has been trained, so nothing can be unsuitable.
@@ -36,10 +37,16 @@ struct BallisticLine {
         return value + h * (rate + 0.5 * h * curvature) > 0;
     }
 
-    template <class Guard, class Step>
-    [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
+    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
+                                                 double rate1, double h) noexcept
     {
-        return detail::confirm_prediction(guard, step, watch);
+        return Ends::suspects(sign, g0, rate0, g1, rate1, h);
+    }
+
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        return detail::examine_prediction(probe, watch);
     }
 };
 

@@ -10,12 +10,22 @@ namespace ricochet {
 
 struct Ends {
     static constexpr bool uses_rates = false;
+    static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
 
-    template <class Guard, class Step>
-    [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
+    /// Whether a step deserves a look, in the guard times `sign`, positive on its
+    /// armed side.
+    [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
+                                                 double g1, double /*rate1*/, double /*h*/) noexcept
     {
-        watch.end = {.s = step.h(), .value = guard.value(step.time(step.h()), step.x1())};
-        if (triggers(watch.side, watch.end.value, guard.crossing())) {
+        return !(sign * g1 > 0);
+    }
+
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        const bool left = has_left(watch.side, watch.end.value);
+        watch.side_after = left ? opposite(watch.side) : watch.side;
+        if (left && counts(watch.side, probe.guard().crossing())) {
             return Finding::leaving(watch.side, watch.start, watch.end);
         }
         return Finding::clear(Evidence::assumed);

@@ -1,89 +1,186 @@
 // The honest classical rival: the guard and its rate at both ends of the step.
 //
-// Where the guard heads for its surface at the start of the step and away from it
-// at the end, it has an extremum between; one root-find of the rate on the dense
-// output finds it and shows whether the guard has crossed there and come back.
-// Smooth guards are caught unless their rate turns more than once within a step.
+// The four numbers make a cubic. Where the guard heads for its surface at the start
+// and away from it at the end, or the cubic's control points reach across, there may
+// be an extremum on the other side: it is found on the step itself, by Newton's method
+// on the rate, and only as exactly as it takes to know on which side it lies. Smooth
+// guards are caught unless they turn more often within a step than a cubic can.
 #pragma once
 
-#include <boost/math/tools/toms748_solve.hpp>
+#include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <utility>
 
 #include "ricochet/detect/finding.hpp"
 
 namespace ricochet {
 
+namespace detail {
+
+/// The guard times the sign of its armed side on a stretch, as a cubic over u in
+/// [0, 1] through the values and rates at both ends.
+struct GuardCubic {
+    double v0, r0, v1, r1;  ///< values and rates per unit of u
+
+    GuardCubic(double sign, const GuardSample& a, const GuardSample& b) noexcept
+        : v0(sign * a.value),
+          r0(sign * a.rate * (b.s - a.s)),
+          v1(sign * b.value),
+          r1(sign * b.rate * (b.s - a.s))
+    {
+    }
+
+    /// Where the cubic has its minimum (or maximum), if inside (0, 1); else 0.5.
+    [[nodiscard]] double critical(bool minimum) const noexcept
+    {
+        // p'(u) = r0 + 2 b u + 3 c u^2
+        const double b = 3 * (v1 - v0) - 2 * r0 - r1;
+        const double c = 3 * (2 * (v0 - v1) + r0 + r1);
+        const double root = std::sqrt(std::max(b * b - c * r0, 0.0));
+        // At a minimum p'' = 2 (b + c u) > 0, so b + c u = root.
+        const double signed_root = minimum ? root : -root;
+        const double sum = b + signed_root;
+        double u = minimum == (b >= 0) ? -r0 / sum : (signed_root - b) / c;
+        if (!(u > 0 && u < 1)) u = 0.5;
+        return u;
+    }
+};
+
+}  // namespace detail
+
 struct Extremum {
     static constexpr bool uses_rates = true;
+    static constexpr Evidence evidence = Evidence::checked;  ///< of a step not suspected
 
-    template <class Guard, class Step>
-    [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
+    /// Whether a step deserves a look, in the guard times `sign`, positive on its
+    /// armed side: it has left, or the control points of its cubic reach across, or it
+    /// turns back from the surface. A guard that turns five times further away than it
+    /// bends would have to bend five times more than its ends show.
+    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
+                                                 double rate1, double h) noexcept
     {
-        const double h = step.h();
-        const double t1 = step.time(h);
-        watch.end = {.s = h,
-                     .value = guard.value(t1, step.x1()),
-                     .rate = guard.rate(t1, step.x1(), step.rate1(), h)};
+        const double v1 = sign * g1;
+        const double slope0 = sign * rate0 * h / 3;
+        const double slope1 = sign * rate1 * h / 3;
+        const double b1 = sign * g0 + slope0;
+        const double b2 = v1 - slope1;
+        const double lowest = std::min(std::min(b1, b2), v1);
+        const double highest = std::max(std::max(b1, b2), v1);
+        const bool turns = slope0 <= 0 && slope1 > 0;
+        return !(v1 > 0) || !(lowest > 0) || (turns && !(5 * lowest > 4 * highest));
+    }
 
-        const bool left = has_left(watch.side, watch.end.value);
-        if (left && counts(watch.side, guard.crossing())) {
-            return Finding::leaving(watch.side, watch.start, watch.end);
-        }
-        if (left || !turns(watch) || !std::isfinite(watch.start.rate * watch.end.rate)) {
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        const Side side = watch.side;
+        const double sign = side == Side::above ? 1 : -1;
+        watch.side_after = side;
+        if (side == Side::plateau) return Finding::clear(Evidence::checked);
+
+        const detail::GuardCubic cubic(sign, watch.start, watch.end);
+        const bool left = has_left(side, watch.end.value) && !touches_at_end(cubic, watch.touch);
+        const bool known = std::isfinite(cubic.r0) && std::isfinite(cubic.r1);
+        if (left) {
+            watch.side_after = opposite(side);
+            if (known && cubic.v0 + cubic.r0 / 3 < 0 && cubic.v1 - cubic.r1 / 3 > 0) {
+                return first_of_three(probe, watch, cubic);
+            }
+            if (counts(side, probe.guard().crossing())) {
+                return Finding::leaving(side, watch.start, watch.end);
+            }
             return Finding::clear(Evidence::checked);
         }
-        const GuardSample extremum = find_extremum(guard, step, watch);
-        if (!has_left(watch.side, extremum.value)) {
-            return Finding::clear(Evidence::checked);
-        }
-        if (counts(watch.side, guard.crossing())) {
-            return Finding::leaving(watch.side, watch.start, extremum);
-        }
-        return Finding::leaving(opposite(watch.side), extremum, watch.end);
+        if (!known) return Finding::clear(Evidence::checked);
+        return look_for_pair(probe, watch, cubic);
     }
 
 private:
-    /// Heading for the surface at the start, away from it at the end.
-    [[nodiscard]] static bool turns(const Watch& watch) noexcept
+    /// The end is on the surface, and the guard is about to turn back there: whether it
+    /// crosses or touches will be seen in the next step.
+    [[nodiscard]] static bool touches_at_end(const detail::GuardCubic& cubic, double touch) noexcept
     {
-        return (watch.side == Side::above && watch.start.rate < 0 && watch.end.rate > 0) ||
-               (watch.side == Side::below && watch.start.rate > 0 && watch.end.rate < 0);
+        if (!(std::fabs(cubic.v1) <= touch)) return false;
+        const double curvature = 6 * (cubic.v0 - cubic.v1) + 2 * cubic.r0 + 4 * cubic.r1;
+        return curvature > 0 && cubic.v1 - cubic.r1 * cubic.r1 / (2 * curvature) >= -touch;
     }
 
-    /// The extremum of the guard between the ends, or the first point met on the
-    /// way there at which the guard has left its side.
-    template <class Guard, class Step>
-    [[nodiscard]] static GuardSample find_extremum(const Guard& guard, const Step& step,
-                                                   const Watch& watch)
+    /// The guard has left its side at the end, but its cubic says that it may have left
+    /// before, come back and left again.
+    template <class Probe>
+    [[nodiscard]] static Finding first_of_three(Probe& probe, const Watch& watch,
+                                                const detail::GuardCubic& cubic)
     {
-        typename Guard::State x = step.x0();
-        typename Guard::State dxdt = x;
-        GuardSample best =
-            std::fabs(watch.end.value) < std::fabs(watch.start.value) ? watch.end : watch.start;
-        bool left = false;
-        const auto rate_at = [&](double s) {
-            step.interpolate(s, x);
-            step.flow(s, x, dxdt);
-            const GuardSample sample{.s = s,
-                                     .value = guard.value(step.time(s), x),
-                                     .rate = guard.rate(step.time(s), x, dxdt, step.h())};
-            if (!left && (has_left(watch.side, sample.value) ||
-                          std::fabs(sample.value) < std::fabs(best.value))) {
-                best = sample;
-                left = has_left(watch.side, sample.value);
+        const Side side = watch.side;
+        const bool leaving_counts = counts(side, probe.guard().crossing());
+        const double width = watch.end.s - watch.start.s;
+        const double s1 = watch.start.s + width * cubic.critical(true);
+        const double s2 = watch.start.s + width * cubic.critical(false);
+        const GuardSample lowest = probe.value_and_rate(s1);
+        const GuardSample highest = probe.value_and_rate(s2);
+        const bool pair = s1 < s2 && has_left(side, lowest.value) && !has_left(side, highest.value);
+        if (leaving_counts) {
+            return Finding::leaving(side, watch.start, pair ? lowest : watch.end);
+        }
+        if (pair) return Finding::leaving(opposite(side), lowest, highest);
+        return Finding::clear(Evidence::checked);
+    }
+
+    /// Both ends are on the armed side: is the extremum between them, too?
+    template <class Probe>
+    [[nodiscard]] static Finding look_for_pair(Probe& probe, const Watch& watch,
+                                               const detail::GuardCubic& cubic)
+    {
+        GuardSample lo = watch.start;
+        GuardSample hi = watch.end;
+        if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {
+            // No turn between the ends; a dip in a slope, if anything.
+            if (cubic.v0 + cubic.r0 / 3 > 0 && cubic.v1 - cubic.r1 / 3 > 0) {
+                return Finding::clear(Evidence::checked);
             }
-            return sample.rate;
-        };
-        // The guard is flat at its extremum: an offset wrong by 1e-9 h moves its
-        // value by 1e-18 h^2 |g''| / 2, far below rounding.
-        const double resolution = 1e-9 * step.h();
-        std::uintmax_t iterations = 60;
-        boost::math::tools::toms748_solve(
-            rate_at, watch.start.s, watch.end.s, watch.start.rate, watch.end.rate,
-            [&](double a, double b) { return left || b - a <= resolution; }, iterations);
-        return best;
+            const double width = hi.s - lo.s;
+            const GuardSample dip = probe.value_and_rate(lo.s + width * cubic.critical(true));
+            if (!has_left(watch.side, dip.value)) return Finding::clear(Evidence::checked);
+            return pair(probe, watch, dip);
+        }
+        const double sign = watch.side == Side::above ? 1 : -1;
+        const double resolution = 1e-9 * (hi.s - lo.s);
+        GuardSample lowest = hi;
+        for (int i = 0; i < 60 && hi.s - lo.s > resolution; ++i) {
+            const detail::GuardCubic shape(sign, lo, hi);
+            const double width = hi.s - lo.s;
+            const double u = i % 8 == 7 ? 0.5 : shape.critical(true);
+            const GuardSample sample = probe.value_and_rate(lo.s + u * width);
+            const double value = sign * sample.value;
+            const double rate = sign * sample.rate;
+            if (value <= -watch.touch && value <= 0) return pair(probe, watch, sample);
+            if (!std::isfinite(value) || !std::isfinite(rate)) break;
+            lowest = sample;
+            // What is still to come: a parabola falls by rate^2 / (2 curvature).
+            const double bend = std::min(rate - sign * lo.rate, sign * hi.rate - rate) / width;
+            const double fall = bend > 0 ? rate * rate / (2 * bend) : std::fabs(rate) * width;
+            if (value > watch.touch + 4 * fall) return Finding::clear(Evidence::checked);
+            if (fall <= watch.touch / 64) break;
+            (rate <= 0 ? lo : hi) = sample;
+        }
+        if (std::fabs(lowest.value) > watch.touch) {
+            return has_left(watch.side, lowest.value) ? pair(probe, watch, lowest)
+                                                      : Finding::clear(Evidence::checked);
+        }
+        if (!counts(watch.side, probe.guard().crossing())) {
+            return Finding::clear(Evidence::checked);
+        }
+        return Finding::touching(watch.side, lowest);
+    }
+
+    /// The guard leaves its side before `beyond` and is back at the end.
+    template <class Probe>
+    [[nodiscard]] static Finding pair(const Probe& probe, const Watch& watch,
+                                      const GuardSample& beyond)
+    {
+        if (counts(watch.side, probe.guard().crossing())) {
+            return Finding::leaving(watch.side, watch.start, beyond);
+        }
+        return Finding::leaving(opposite(watch.side), beyond, watch.end);
     }
 };
 

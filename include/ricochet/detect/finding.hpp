@@ -7,18 +7,21 @@
 
 namespace ricochet {
 
-/// The guard over one step: the side on which it is armed, and its values at
-/// both ends. A detector fills in `end`, which is the start of the next step.
+/// The guard over a step or the rest of one: the side on which it is armed, and its
+/// samples at both ends. A detector fills in `side_after`.
 struct Watch {
     Side side = Side::plateau;
     GuardSample start;
     GuardSample end;
+    double touch = 0;                 ///< |g| at an extremum that counts as being on the surface
+    Side side_after = Side::plateau;  ///< at the end, if the stretch is clear
 };
 
-/// Either "clear", with its evidence, or a stretch of the step in which the guard
-/// leaves `side`: still on it at `lo`, across or on the surface at `hi`.
+/// Either "clear", with its evidence; or a stretch in which the guard leaves `side`:
+/// still on it at `lo`, across or on the surface at `hi`; or a touch at `hi`.
 struct Finding {
     bool hit = false;
+    bool touch = false;
     Evidence evidence = Evidence::assumed;
     Side side = Side::plateau;
     GuardSample lo;
@@ -35,7 +38,22 @@ struct Finding {
     [[nodiscard]] static constexpr Finding leaving(Side side, const GuardSample& lo,
                                                    const GuardSample& hi) noexcept
     {
-        return {.hit = true, .side = side, .lo = lo, .hi = hi};
+        Finding finding;
+        finding.hit = true;
+        finding.side = side;
+        finding.lo = lo;
+        finding.hi = hi;
+        return finding;
+    }
+
+    [[nodiscard]] static constexpr Finding touching(Side side, const GuardSample& at) noexcept
+    {
+        Finding finding;
+        finding.touch = true;
+        finding.side = side;
+        finding.lo = at;
+        finding.hi = at;
+        return finding;
     }
 };
 

@@ -38,12 +38,13 @@ void check_model_step(const Model& model, double smallest, double largest);
 
 /// Looks at the end of a step that was not cleared. An event whose guard had left
 /// its side before the step began was missed by an earlier prediction, and is late.
-template <class Guard, class Step>
-[[nodiscard]] Finding confirm_prediction(const Guard& guard, const Step& step, Watch& watch)
+template <class Probe>
+[[nodiscard]] Finding examine_prediction(Probe& probe, Watch& watch)
 {
-    Finding finding = Ends{}.confirm(guard, step, watch);
-    if (finding.hit) {
-        finding.lo.value = guard.value(step.time(0), step.x0());
+    Finding finding = Ends{}.examine(probe, watch);
+    if (finding.hit && watch.start.s == 0) {
+        const auto& step = probe.step();
+        finding.lo.value = probe.guard().value(step.time(0), step.x0());
         finding.late = side_of(finding.lo.value) == opposite(finding.side);
     }
     return finding;
@@ -54,6 +55,7 @@ template <class Guard, class Step>
 class Network {
 public:
     static constexpr bool uses_rates = false;
+    static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
     static constexpr bool checks_every_step = false;
     static constexpr std::size_t max_features = 16;
 
@@ -103,10 +105,16 @@ public:
                !classifier_->alarm(classifier_->logit(input.data()));
     }
 
-    template <class Guard, class Step>
-    [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
+    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
+                                                 double rate1, double h) noexcept
     {
-        return detail::confirm_prediction(guard, step, watch);
+        return Ends::suspects(sign, g0, rate0, g1, rate1, h);
+    }
+
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        return detail::examine_prediction(probe, watch);
     }
 
 private:

@@ -20,6 +20,7 @@ template <class Exact = Extremum>
 class Verified {
 public:
     static constexpr bool uses_rates = Exact::uses_rates;
+    static constexpr Evidence evidence = Exact::evidence;
     static constexpr bool checks_every_step = true;
 
     explicit Verified(Network network, const Exact& exact = {})
@@ -41,10 +42,16 @@ public:
         return network_.clears(guard, step);
     }
 
-    template <class Guard, class Step>
-    [[nodiscard]] Finding confirm(const Guard& guard, const Step& step, Watch& watch) const
+    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
+                                                 double rate1, double h) noexcept
     {
-        return exact_.confirm(guard, step, watch);
+        return Exact::suspects(sign, g0, rate0, g1, rate1, h);
+    }
+
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        return exact_.examine(probe, watch);
     }
 
 private:

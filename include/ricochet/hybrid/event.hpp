@@ -4,12 +4,20 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ricochet/hybrid/guard.hpp"
+
 namespace ricochet {
 
 /// What happened.
 enum class EventKind : std::uint8_t {
-    crossing,  ///< the guard changed sign
+    crossing,      ///< the guard changed sign
+    touch,         ///< the guard reached its surface and turned back
+    time,          ///< a time event
+    accumulation,  ///< the limit of infinitely many events
 };
+
+/// `Event::guard` of an event that no guard made.
+inline constexpr std::size_t no_guard = static_cast<std::size_t>(-1);
 
 /// Two times [s] between which the guard leaves its armed side: still on it at `lo`,
 /// across the surface or on it at `hi`. They are located as offsets from the start
@@ -20,19 +28,22 @@ struct Bracket {
     double hi = 0;
 };
 
-/// One event. `t` is the right end of `bracket`, so that `before` is on the
-/// surface or just across it.
+/// One event. `t` lies in `bracket`, at the root of the guard as exactly as it is
+/// known, and `before` is the state there: on its surface up to rounding, on either
+/// side.
 template <class State>
 struct Event {
     double t = 0;  ///< [s]
     EventKind kind = EventKind::crossing;
-    std::size_t guard = 0;  ///< which guard of the system
-    State before{};         ///< x⁻
-    State after{};          ///< x⁺, equal to x⁻ where there is no reset
-    Bracket bracket;        ///< [s]
-    double slope = 0;       ///< rate of the guard at the event, per second; NaN if not computed
-    double error = 0;       ///< [s] of location within the step, not of the solution
-    bool late = false;      ///< found at a step after the one that held it
+    std::size_t guard = 0;  ///< which guard of the system, or `no_guard`
+    Mode mode_before = 0;
+    Mode mode_after = 0;
+    State before{};     ///< x⁻
+    State after{};      ///< x⁺, equal to x⁻ where there is no reset
+    Bracket bracket;    ///< [s]
+    double slope = 0;   ///< rate of the guard at the event, per second; NaN if not computed
+    double error = 0;   ///< [s] of location within the step, not of the solution
+    bool late = false;  ///< found at a step after the one that held it
 };
 
 }  // namespace ricochet

@@ -6,7 +6,15 @@
 // the end of the step has bounced, although the guard was zero at the start.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
 namespace ricochet {
+
+/// The discrete state of a hybrid system, counted from 0. Systems name their modes
+/// with an unscoped enumeration.
+using Mode = std::uint32_t;
 
 /// The sign change that counts as an event.
 enum class Crossing {
@@ -18,6 +26,19 @@ enum class Crossing {
 /// Where a guard was when it was armed: its sign, or on its surface the sign of
 /// its first nonzero derivative along the flow. A plateau has neither, and waits.
 enum class Side { below, plateau, above };
+
+/// What a system says of one of its guards.
+struct GuardInfo {
+    std::string_view name{};
+    Crossing crossing = Crossing::falling;
+    bool resets = true;            ///< false: a notification, where the system has a reset
+    std::uint32_t stop_after = 0;  ///< the run ends with this many events; 0: never
+    bool unilateral = false;       ///< g >= 0 bounds the motion
+    bool boolean = false;          ///< only the sign means anything: no rates, bisection
+    int degree = 0;                ///< a polynomial of this degree in (t, x) together; 0: not known
+    double touch = 0;              ///< |g| at a zero of the rate that counts as a touch; at least
+                                   ///< 64 units in the last place of the guard's size
+};
 
 /// The side that a value lies on; zero is a plateau.
 [[nodiscard]] constexpr Side side_of(double value) noexcept

@@ -1,9 +1,13 @@
-// A system's guard as detectors and locators use it: evaluations are counted,
+// One guard of a system as detectors and locators use it: evaluations are counted,
 // and the rate is there whether or not the system has one in closed form.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "ricochet/hybrid/components.hpp"
 #include "ricochet/hybrid/system.hpp"
@@ -14,54 +18,171 @@ namespace ricochet {
 struct GuardSample {
     double s = 0;      ///< [s] offset from the start of the step
     double value = 0;  ///< g
-    double rate = std::numeric_limits<double>::quiet_NaN();  ///< dg/dt along the flow
+    double rate = std::numeric_limits<double>::quiet_NaN();  ///< dg/ds along the flow
 };
 
+namespace detail {
+
+/// x + factor * direction, a component at a time.
+template <class X, class D>
+class MovedView {
+public:
+    MovedView(const X& x, double factor, const D& direction) noexcept
+        : x_(&x), direction_(&direction), factor_(factor)
+    {
+    }
+    template <class Index>
+    [[nodiscard]] double operator[](Index i) const noexcept
+    {
+        return (*x_)[i] + factor_ * (*direction_)[i];
+    }
+    [[nodiscard]] auto size() const noexcept { return x_->size(); }
+
+private:
+    const X* x_;
+    const D* direction_;
+    double factor_;
+};
+
+/// -x, a component at a time.
+template <class X>
+class NegatedView {
+public:
+    explicit NegatedView(const X& x) noexcept : x_(&x) {}
+    template <class Index>
+    [[nodiscard]] double operator[](Index i) const noexcept
+    {
+        return -(*x_)[i];
+    }
+    [[nodiscard]] auto size() const noexcept { return x_->size(); }
+
+private:
+    const X* x_;
+};
+
+template <class X>
+[[nodiscard]] X negated(X x)
+{
+    for_each_component(x, [&](auto i) { x[i] = -x[i]; });
+    return x;
+}
+
+}  // namespace detail
+
+/// One guard in one mode. Rates are with respect to the offset inside a step, so in
+/// a run backward in time they are the negative of dg/dt.
 template <class System, class X>
 class GuardView {
 public:
     using State = X;
 
-    /// Keeps references to both; `calls` is incremented at every evaluation.
+    /// Guard of a system that has one. Keeps references to both; `calls` is
+    /// incremented at every evaluation.
     GuardView(const System& system, std::uint64_t& calls) noexcept
-        : system_(&system), calls_(&calls)
+        : GuardView(system, calls, 0, 0, guard_info_of<X>(system, 0).crossing, false)
     {
     }
 
+    GuardView(const System& system, std::uint64_t& calls, std::size_t which, Mode mode,
+              Crossing crossing, bool backward) noexcept
+        : system_(&system),
+          calls_(&calls),
+          which_(which),
+          mode_(mode),
+          crossing_(crossing),
+          backward_(backward)
+    {
+    }
+
+    /// Whether the guard can be had from a view of the state.
+    template <class V>
+    static constexpr bool sees = detail::GuardAlone<System, V>;
+
+    /// Whether its rate can be had from views of the state and of its rate.
+    template <class V, class D>
+    static constexpr bool sees_rate =
+        detail::RateAlone<System, V, D>&& detail::RateAlone<System, V, detail::NegatedView<D>>;
+
     [[nodiscard]] const System& system() const noexcept { return *system_; }
-    [[nodiscard]] Crossing crossing() const noexcept { return crossing_of(*system_); }
+    [[nodiscard]] std::size_t which() const noexcept { return which_; }
+    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] Crossing crossing() const noexcept { return crossing_; }
 
     /// Counts an evaluation that somebody else makes.
     void count() const noexcept { ++*calls_; }
 
-    [[nodiscard]] double value(double t, const X& x) const
+    /// g(t, x); x is a state, or a view of one where the guard `sees` it.
+    template <class V>
+    [[nodiscard]] double value(double t, const V& x) const
     {
         count();
-        return system_->guard(t, x);
+        if constexpr (sees<V>) {
+            return detail::call_guard(*system_, which_, mode_, t, x);
+        } else {
+            return one_of_all(t, x);
+        }
     }
 
-    /// dg/dt at (t, x) with x' = dxdt: `guard_rate` of the system, else the central
+    /// The rate at (t, x) with x' = dxdt: `guard_rate` of the system, else the central
     /// difference along the flow over 1e-5 of the time `scale` [s] to either side:
     /// its truncation error is 1e-10 scale^2 / 6 times the third derivative, and it
     /// magnifies rounding in g by 1e5 / scale.
-    [[nodiscard]] double rate(double t, const X& x, const X& dxdt, double scale) const
+    template <class V, class D>
+    [[nodiscard]] double rate(double t, const V& x, const D& dxdt, double scale) const
     {
-        if constexpr (RatedGuard<System, X>) {
-            return system_->guard_rate(t, x, dxdt);
+        if constexpr (detail::RateAlone<System, V, D>) {
+            if (!backward_) return detail::call_rate(*system_, which_, mode_, t, x, dxdt);
+            if constexpr (sees_rate<V, D>) {
+                const detail::NegatedView<D> forward(dxdt);
+                return -detail::call_rate(*system_, which_, mode_, t, x, forward);
+            } else {
+                return -detail::call_rate(*system_, which_, mode_, t, x, detail::negated(dxdt));
+            }
         } else {
             const double delta = 1e-5 * scale;
-            X moved = x;
-            detail::move(moved, x, delta, dxdt);
-            const double ahead = value(t + delta, moved);
-            detail::move(moved, x, -delta, dxdt);
-            const double behind = value(t - delta, moved);
-            return (ahead - behind) / (2 * delta);
+            return (moved(t, x, dxdt, delta) - moved(t, x, dxdt, -delta)) / (2 * delta);
         }
     }
 
 private:
+    /// The guard a time `s` later along a straight line.
+    template <class V, class D>
+    [[nodiscard]] double moved(double t, const V& x, const D& dxdt, double s) const
+    {
+        const double later = backward_ ? t - s : t + s;
+        using Moved = detail::MovedView<V, D>;
+        if constexpr (sees<Moved>) {
+            return value(later, Moved(x, s, dxdt));
+        } else {
+            V there = x;
+            detail::move(there, x, s, dxdt);
+            return value(later, there);
+        }
+    }
+
+    /// From a system whose guards come only all together.
+    template <class V>
+    [[nodiscard]] double one_of_all(double t, const V& x) const
+    {
+        constexpr std::size_t fixed = fixed_guard_count<System, X>();
+        if constexpr (fixed == counted_at_run_time) {
+            thread_local std::vector<double> all;
+            all.resize(guard_count_of<X>(*system_));
+            detail::call_guards(*system_, mode_, t, x, std::span<double>(all));
+            return all[which_];
+        } else {
+            std::array<double, fixed> all;
+            detail::call_guards(*system_, mode_, t, x, std::span<double>(all));
+            return all[which_];
+        }
+    }
+
     const System* system_;
     std::uint64_t* calls_;
+    std::size_t which_;
+    Mode mode_;
+    Crossing crossing_;
+    bool backward_;
 };
 
 }  // namespace ricochet

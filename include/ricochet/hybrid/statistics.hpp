@@ -44,6 +44,8 @@ struct Statistics {
     std::uint64_t late_events = 0;     ///< missed events that only a later step found
     std::uint64_t checks_put_off = 0;  ///< steps whose exact check a network saved
     std::uint64_t events = 0;
+    std::uint64_t suppressed = 0;  ///< repeats of an event inside its own window
+    std::uint64_t disabled = 0;    ///< crossings that `enabled` said were no events
     EvidenceCounts evidence;
 };
 

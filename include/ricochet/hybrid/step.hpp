@@ -2,11 +2,14 @@
 //
 // Times inside a step are offsets s in [0, h] from its start, because an offset
 // resolves what a time of day cannot: at t = 20 s neighbouring doubles are 4e-15 s
-// apart, at s = 0.01 s they are 2e-18 s apart. A host's own integrator can offer
+// apart, at s = 0.01 s they are 2e-18 s apart. In a run backward in time offsets are
+// positive too, and rates are with respect to them. A host's own integrator can offer
 // its steps in this form and use the detectors and locators without our loop.
 #pragma once
 
 #include <concepts>
+
+#include "ricochet/hybrid/dense_polynomial.hpp"
 
 namespace ricochet {
 
@@ -24,7 +27,13 @@ concept Step = requires(const S& step, double s, X& x, X& dxdt, const X& at) {
     step.interpolate(s, x);
     step.restep(s, x);
     step.restep(s, x, dxdt);  // and the flow at the end of it
-    step.flow(s, at, dxdt);   // x' at offset s and state `at`
+    step.flow(s, at, dxdt);   // dx/ds at offset s and state `at`
+};
+
+/// A step whose dense output is a polynomial that can be had a component at a time.
+template <class S, class X>
+concept DenseStep = Step<S, X> && requires(const S& step) {
+    { step.dense() } -> std::convertible_to<DenseParts<X>>;
 };
 
 }  // namespace ricochet

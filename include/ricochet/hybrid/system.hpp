@@ -5,18 +5,48 @@
 //     guard_rate(t, x, dxdt)    dg/dt along the flow               optional
 //     guard_curvature(t, x)     d2g/dt2 along the flow             for some networks
 //     reset(t, x)               x⁻ becomes x⁺, in place            optional
+//     rest(t, x)                where infinitely many events end   optional
 //     crossing                  which sign change counts           default: falling
 //     unilateral                g >= 0 bounds the motion           default: false
 //     name, parameter(name)     what it is                         for networks
 //     State                     state type when none is given      optional
 //
-// All functions are const and free of side effects; t is in seconds. A system
-// without a guard is integrated as a plain ordinary differential equation: none
-// of the machinery of events is compiled in.
+// A system with many guards declares `guard_count`, a constant or a member, and each
+// function of a guard takes first which one is meant:
+//
+//     guard(which, t, x)        or guards(t, x, g), all of them at once into a
+//                               std::span<double>, or both
+//     guard_rate(which, t, x, dxdt)    or guard_rates(t, x, dxdt, rates)
+//     reset(which, t, x)        or reset(fired, t, x) for all that fired together
+//     rest(which, t, x)
+//     guard_info(which)         GuardInfo: name, crossing, whether it resets, ...
+//     enabled(which, t, x)      whether a crossing here and now is an event
+//
+// A system with modes takes the mode in any of these functions, before t, and its
+// reset and rest return the next mode:
+//
+//     flow(mode, t, x, dxdt), guard(which, mode, t, x), Mode reset(which, mode, t, x), ...
+//     enabled(which, mode)      whether the guard is looked at in that mode
+//     mode_count, mode_name(mode)
+//
+// A reset may also change the dimension of a state that is sized at run time.
+// Events at known times:
+//
+//     next_time_event(t)        the first after t, or infinity
+//     previous_time_event(t)    the last before t, for runs backward in time
+//     time_reset(t, x)          or Mode time_reset(mode, t, x); optional
+//
+// All functions are const and free of side effects; t is in seconds. Guards written
+// for any x that has `x[i]` are located without the rest of the state. A system
+// without a guard is integrated as a plain ordinary differential equation: none of
+// the machinery of events is compiled in.
 #pragma once
 
 #include <concepts>
 #include <cstddef>
+#include <span>
+#include <string_view>
+#include <type_traits>
 
 #include "ricochet/hybrid/guard.hpp"
 
@@ -31,83 +61,507 @@ concept StateVector = std::copyable<X> && requires(X& x, const X& y, std::size_t
     { y.size() } -> std::convertible_to<std::size_t>;
 };
 
-/// x' = f(t, x): `flow` writes every component of `dxdt`.
-template <class System, class X>
-concept Flowing = requires(const System& system, double t, const X& x, X& dxdt) {
-    system.flow(t, x, dxdt);
-};
+/// The guards that fired together, ascending.
+class FiredGuards {
+public:
+    explicit FiredGuards(std::span<const std::size_t> guards, bool time_event = false) noexcept
+        : guards_(guards), time_event_(time_event)
+    {
+    }
 
-/// One guard, a scalar function of time and state.
-template <class System, class X>
-concept Guarded = Flowing<System, X> && requires(const System& system, double t, const X& x) {
-    { system.guard(t, x) } -> std::convertible_to<double>;
-};
+    [[nodiscard]] auto begin() const noexcept { return guards_.begin(); }
+    [[nodiscard]] auto end() const noexcept { return guards_.end(); }
+    [[nodiscard]] std::size_t size() const noexcept { return guards_.size(); }
+    [[nodiscard]] std::size_t operator[](std::size_t i) const noexcept { return guards_[i]; }
+    [[nodiscard]] bool contains(std::size_t which) const noexcept
+    {
+        for (const std::size_t guard : guards_) {
+            if (guard == which) return true;
+        }
+        return false;
+    }
+    /// Whether a time event belongs to the set.
+    [[nodiscard]] bool time_event() const noexcept { return time_event_; }
 
-/// The guard's rate dg/dt + (dg/dx) x' is known in closed form.
-template <class System, class X>
-concept RatedGuard = Guarded<System, X> && requires(const System& system, double t, const X& x) {
-    { system.guard_rate(t, x, x) } -> std::convertible_to<double>;
-};
-
-/// Something happens at an event: `reset` replaces x⁻ by x⁺.
-template <class System, class X>
-concept Resetting = Guarded<System, X> && requires(const System& system, double t, X& x) {
-    system.reset(t, x);
+private:
+    std::span<const std::size_t> guards_;
+    bool time_event_;
 };
 
 namespace detail {
 
+// --- how many guards ---
+
+template <class System>
+concept CountsGuardsFixed = requires {
+    requires std::is_same_v<decltype(&System::guard_count), const std::size_t*>;
+};
+
+template <class System>
+concept CountsGuardsByMember = !CountsGuardsFixed<System> && requires(const System& system) {
+    { system.guard_count } -> std::convertible_to<std::size_t>;
+};
+
+template <class System>
+concept CountsGuardsByCall = !CountsGuardsFixed<System> && requires(const System& system) {
+    { system.guard_count() } -> std::convertible_to<std::size_t>;
+};
+
+template <class System>
+concept CountsGuards = CountsGuardsFixed<System> || CountsGuardsByMember<System> || CountsGuardsByCall<System>;
+
+// --- flow ---
+
+template <class System, class X>
+concept ModedFlow = requires(const System& system, Mode mode, double t, const X& x, X& dxdt) {
+    system.flow(mode, t, x, dxdt);
+};
+
+template <class System, class X>
+concept PlainFlow = requires(const System& system, double t, const X& x, X& dxdt) {
+    system.flow(t, x, dxdt);
+};
+
+// --- one of many guards, and a single guard; x may be any view of a state ---
+
+template <class System, class X>
+concept ModedGuardOf = CountsGuards<System> && requires(const System& system, std::size_t which, Mode mode, double t, const X& x) {
+    { system.guard(which, mode, t, x) } -> std::convertible_to<double>;
+};
+
+template <class System, class X>
+concept PlainGuardOf = CountsGuards<System> && requires(const System& system, std::size_t which, double t, const X& x) {
+    { system.guard(which, t, x) } -> std::convertible_to<double>;
+};
+
+template <class System, class X>
+concept ModedGuards = CountsGuards<System> && requires(const System& system, Mode mode, double t, const X& x, std::span<double> g) {
+    system.guards(mode, t, x, g);
+};
+
+template <class System, class X>
+concept PlainGuards = CountsGuards<System> && requires(const System& system, double t, const X& x, std::span<double> g) {
+    system.guards(t, x, g);
+};
+
+template <class System, class X>
+concept ModedSingleGuard = !CountsGuards<System> && requires(const System& system, Mode mode, double t, const X& x) {
+    { system.guard(mode, t, x) } -> std::convertible_to<double>;
+};
+
+template <class System, class X>
+concept PlainSingleGuard = !CountsGuards<System> && requires(const System& system, double t, const X& x) {
+    { system.guard(t, x) } -> std::convertible_to<double>;
+};
+
+/// One guard can be had without the others.
+template <class System, class X>
+concept GuardAlone = ModedGuardOf<System, X> || PlainGuardOf<System, X> || ModedSingleGuard<System, X> || PlainSingleGuard<System, X>;
+
+/// All guards come from one call.
+template <class System, class X>
+concept GuardsTogether = ModedGuards<System, X> || PlainGuards<System, X>;
+
+// --- rates ---
+
+template <class System, class X, class D>
+concept ModedRateOf = CountsGuards<System> && requires(const System& system, std::size_t which, Mode mode, double t, const X& x, const D& dxdt) {
+    { system.guard_rate(which, mode, t, x, dxdt) } -> std::convertible_to<double>;
+};
+
+template <class System, class X, class D>
+concept PlainRateOf = CountsGuards<System> && requires(const System& system, std::size_t which, double t, const X& x, const D& dxdt) {
+    { system.guard_rate(which, t, x, dxdt) } -> std::convertible_to<double>;
+};
+
+template <class System, class X, class D>
+concept ModedSingleRate = !CountsGuards<System> && requires(const System& system, Mode mode, double t, const X& x, const D& dxdt) {
+    { system.guard_rate(mode, t, x, dxdt) } -> std::convertible_to<double>;
+};
+
+template <class System, class X, class D>
+concept PlainSingleRate = !CountsGuards<System> && requires(const System& system, double t, const X& x, const D& dxdt) {
+    { system.guard_rate(t, x, dxdt) } -> std::convertible_to<double>;
+};
+
+template <class System, class X, class D = X>
+concept RateAlone = ModedRateOf<System, X, D> || PlainRateOf<System, X, D> || ModedSingleRate<System, X, D> || PlainSingleRate<System, X, D>;
+
+template <class System, class X>
+concept ModedRates = CountsGuards<System> && requires(const System& system, Mode mode, double t, const X& x, std::span<double> rates) {
+    system.guard_rates(mode, t, x, x, rates);
+};
+
+template <class System, class X>
+concept PlainRates = CountsGuards<System> && requires(const System& system, double t, const X& x, std::span<double> rates) {
+    system.guard_rates(t, x, x, rates);
+};
+
+template <class System, class X>
+concept RatesTogether = ModedRates<System, X> || PlainRates<System, X>;
+
+// --- resets ---
+
+template <class System, class X>
+concept ModedSetReset = requires(const System& system, const FiredGuards& fired, Mode mode, double t, X& x) {
+    { system.reset(fired, mode, t, x) } -> std::convertible_to<Mode>;
+};
+
+template <class System, class X>
+concept PlainSetReset = CountsGuards<System> && requires(const System& system, const FiredGuards& fired, double t, X& x) {
+    system.reset(fired, t, x);
+};
+
+template <class System, class X>
+concept ModedResetOf = CountsGuards<System> && requires(const System& system, std::size_t which, Mode mode, double t, X& x) {
+    { system.reset(which, mode, t, x) } -> std::convertible_to<Mode>;
+};
+
+template <class System, class X>
+concept PlainResetOf = CountsGuards<System> && requires(const System& system, std::size_t which, double t, X& x) {
+    system.reset(which, t, x);
+};
+
+template <class System, class X>
+concept ModedSingleReset = !CountsGuards<System> && requires(const System& system, Mode mode, double t, X& x) {
+    { system.reset(mode, t, x) } -> std::convertible_to<Mode>;
+};
+
+template <class System, class X>
+concept PlainSingleReset = !CountsGuards<System> && requires(const System& system, double t, X& x) {
+    system.reset(t, x);
+};
+
+template <class System, class X>
+concept ResetsAlone = ModedResetOf<System, X> || PlainResetOf<System, X> || ModedSingleReset<System, X> || PlainSingleReset<System, X>;
+
+template <class System, class X>
+concept ResetsTogether = ModedSetReset<System, X> || PlainSetReset<System, X>;
+
+// --- rest ---
+
+template <class System, class X>
+concept ModedRestOf = CountsGuards<System> && requires(const System& system, std::size_t which, Mode mode, double t, X& x) {
+    { system.rest(which, mode, t, x) } -> std::convertible_to<Mode>;
+};
+
+template <class System, class X>
+concept PlainRestOf = CountsGuards<System> && requires(const System& system, std::size_t which, double t, X& x) {
+    system.rest(which, t, x);
+};
+
+template <class System, class X>
+concept ModedSingleRest = !CountsGuards<System> && requires(const System& system, Mode mode, double t, X& x) {
+    { system.rest(mode, t, x) } -> std::convertible_to<Mode>;
+};
+
+template <class System, class X>
+concept PlainSingleRest = !CountsGuards<System> && requires(const System& system, double t, X& x) {
+    system.rest(t, x);
+};
+
+}  // namespace detail
+
+/// x' = f(t, x): `flow` writes every component of `dxdt`.
+template <class System, class X>
+concept Flowing = detail::ModedFlow<System, X> || detail::PlainFlow<System, X>;
+
+/// At least one guard, a scalar function of time and state.
+template <class System, class X>
+concept Guarded = Flowing<System, X> && (detail::GuardAlone<System, X> || detail::GuardsTogether<System, X>);
+
+/// The guard's rate dg/dt + (dg/dx) x' is known in closed form.
+template <class System, class X>
+concept RatedGuard = Guarded<System, X> && (detail::RateAlone<System, X> || detail::RatesTogether<System, X>);
+
+/// Something happens at an event: `reset` replaces x⁻ by x⁺.
+template <class System, class X>
+concept Resetting = Guarded<System, X> && (detail::ResetsAlone<System, X> || detail::ResetsTogether<System, X>);
+
+/// `rest` says what becomes of the motion where its events accumulate.
+template <class System, class X>
+concept Resting = Guarded<System, X> && (detail::ModedRestOf<System, X> || detail::PlainRestOf<System, X> || detail::ModedSingleRest<System, X> || detail::PlainSingleRest<System, X>);
+
+/// Something happens at known times.
+template <class System>
+concept Timed = requires(const System& system, double t) {
+    { system.next_time_event(t) } -> std::convertible_to<double>;
+};
+
+/// Has modes: some function of it takes one.
+template <class System, class X>
+concept Moded = detail::ModedFlow<System, X> || requires(const System& system) { system.mode_count; } || requires(const System& system) { system.mode_count(); };
+
+/// `guard_count` that is not a constant.
+inline constexpr std::size_t counted_at_run_time = static_cast<std::size_t>(-1);
+
+/// Number of guards where the type fixes it, else `counted_at_run_time`.
+template <class System, class X>
+[[nodiscard]] constexpr std::size_t fixed_guard_count() noexcept
+{
+    if constexpr (detail::CountsGuardsFixed<System>) {
+        return System::guard_count;
+    } else if constexpr (detail::CountsGuards<System>) {
+        return counted_at_run_time;
+    } else {
+        return Guarded<System, X> ? 1 : 0;
+    }
+}
+
+/// Number of guards.
+template <class X, class System>
+[[nodiscard]] constexpr std::size_t guard_count_of(const System& system)
+{
+    if constexpr (detail::CountsGuardsByMember<System>) {
+        return static_cast<std::size_t>(system.guard_count);
+    } else if constexpr (detail::CountsGuardsByCall<System>) {
+        return static_cast<std::size_t>(system.guard_count());
+    } else {
+        return fixed_guard_count<System, X>();
+    }
+}
+
+/// What the system says of a guard.
+template <class X, class System>
+[[nodiscard]] constexpr GuardInfo guard_info_of(const System& system, std::size_t which)
+{
+    GuardInfo info;
+    if constexpr (requires { { system.guard_info(which) } -> std::convertible_to<GuardInfo>; }) {
+        info = system.guard_info(which);
+    } else {
+        if constexpr (requires { { system.crossing } -> std::convertible_to<Crossing>; }) {
+            info.crossing = system.crossing;
+        }
+        if constexpr (requires { { system.unilateral } -> std::convertible_to<bool>; }) {
+            info.unilateral = system.unilateral;
+        }
+        if constexpr (requires(double t, const X& x) { { system.guard(t, x) } -> std::same_as<bool>; }) {
+            info.boolean = true;
+        }
+    }
+    return info;
+}
+
+/// The number of modes where the system declares it, else 0.
+template <class System>
+[[nodiscard]] constexpr std::size_t mode_count_of(const System& system)
+{
+    if constexpr (requires { { system.mode_count() } -> std::convertible_to<std::size_t>; }) {
+        return static_cast<std::size_t>(system.mode_count());
+    } else if constexpr (requires { { system.mode_count } -> std::convertible_to<std::size_t>; }) {
+        return static_cast<std::size_t>(system.mode_count);
+    } else {
+        return 0;
+    }
+}
+
+namespace detail {
+
+// --- calling whichever form a system has ---
+
+template <class System, class X>
+[[gnu::always_inline]] inline void call_flow(const System& system, [[maybe_unused]] Mode mode, double t, const X& x, X& dxdt)
+{
+    if constexpr (ModedFlow<System, X>) {
+        system.flow(mode, t, x, dxdt);
+    } else {
+        system.flow(t, x, dxdt);
+    }
+}
+
+[[nodiscard]] constexpr double as_guard_value(bool inside) noexcept { return inside ? 1 : -1; }
+[[nodiscard]] constexpr double as_guard_value(double g) noexcept { return g; }
+
+/// One guard. X may be a view.
+template <class System, class X>
+[[gnu::always_inline]] [[nodiscard]] inline double call_guard(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x)
+{
+    if constexpr (ModedGuardOf<System, X>) {
+        return as_guard_value(system.guard(which, mode, t, x));
+    } else if constexpr (PlainGuardOf<System, X>) {
+        return as_guard_value(system.guard(which, t, x));
+    } else if constexpr (ModedSingleGuard<System, X>) {
+        return as_guard_value(system.guard(mode, t, x));
+    } else {
+        return as_guard_value(system.guard(t, x));
+    }
+}
+
+/// All guards into `g`.
+template <class System, class X>
+[[gnu::always_inline]] inline void call_guards(const System& system, [[maybe_unused]] Mode mode, double t, const X& x, std::span<double> g)
+{
+    if constexpr (ModedGuards<System, X>) {
+        system.guards(mode, t, x, g);
+    } else if constexpr (PlainGuards<System, X>) {
+        system.guards(t, x, g);
+    } else {
+        for (std::size_t which = 0; which < g.size(); ++which) {
+            g[which] = call_guard(system, which, mode, t, x);
+        }
+    }
+}
+
+template <class System, class X, class D>
+[[gnu::always_inline]] [[nodiscard]] inline double call_rate(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x, const D& dxdt)
+{
+    if constexpr (ModedRateOf<System, X, D>) {
+        return system.guard_rate(which, mode, t, x, dxdt);
+    } else if constexpr (PlainRateOf<System, X, D>) {
+        return system.guard_rate(which, t, x, dxdt);
+    } else if constexpr (ModedSingleRate<System, X, D>) {
+        return system.guard_rate(mode, t, x, dxdt);
+    } else {
+        return system.guard_rate(t, x, dxdt);
+    }
+}
+
+template <class System, class X>
+inline void call_rates(const System& system, [[maybe_unused]] Mode mode, double t, const X& x, const X& dxdt, std::span<double> rates)
+{
+    if constexpr (ModedRates<System, X>) {
+        system.guard_rates(mode, t, x, dxdt, rates);
+    } else {
+        system.guard_rates(t, x, dxdt, rates);
+    }
+}
+
+/// The reset of one guard; returns the mode after it.
+template <class System, class X>
+[[nodiscard]] Mode call_reset(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, X& x)
+{
+    if constexpr (ModedResetOf<System, X>) {
+        return system.reset(which, mode, t, x);
+    } else if constexpr (PlainResetOf<System, X>) {
+        system.reset(which, t, x);
+        return mode;
+    } else if constexpr (ModedSingleReset<System, X>) {
+        return system.reset(mode, t, x);
+    } else {
+        system.reset(t, x);
+        return mode;
+    }
+}
+
+/// The reset of all that fired; returns the mode after it.
+template <class System, class X>
+[[nodiscard]] Mode call_reset_set(const System& system, const FiredGuards& fired, [[maybe_unused]] Mode mode, double t, X& x)
+{
+    if constexpr (ModedSetReset<System, X>) {
+        return system.reset(fired, mode, t, x);
+    } else {
+        system.reset(fired, t, x);
+        return mode;
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] Mode call_rest(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, X& x)
+{
+    if constexpr (ModedRestOf<System, X>) {
+        return system.rest(which, mode, t, x);
+    } else if constexpr (PlainRestOf<System, X>) {
+        system.rest(which, t, x);
+        return mode;
+    } else if constexpr (ModedSingleRest<System, X>) {
+        return system.rest(mode, t, x);
+    } else {
+        system.rest(t, x);
+        return mode;
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] Mode call_time_reset(const System& system, Mode mode, double t, X& x)
+{
+    if constexpr (requires { { system.time_reset(mode, t, x) } -> std::convertible_to<Mode>; }) {
+        return system.time_reset(mode, t, x);
+    } else if constexpr (requires { system.time_reset(t, x); }) {
+        system.time_reset(t, x);
+        return mode;
+    } else {
+        return mode;
+    }
+}
+
+/// Whether a guard is looked at in a mode.
+template <class System>
+[[nodiscard]] constexpr bool call_enabled_in(const System& system, [[maybe_unused]] std::size_t which, Mode mode)
+{
+    if constexpr (CountsGuards<System> && requires { { system.enabled(which, mode) } -> std::convertible_to<bool>; }) {
+        return system.enabled(which, mode);
+    } else if constexpr (!CountsGuards<System> && requires { { system.enabled(mode) } -> std::convertible_to<bool>; }) {
+        return system.enabled(mode);
+    } else {
+        return true;
+    }
+}
+
+/// Whether a crossing at (t, x) is an event.
+template <class System, class X>
+[[nodiscard]] bool call_enabled_at(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x)
+{
+    if constexpr (requires { { system.enabled(which, mode, t, x) } -> std::convertible_to<bool>; }) {
+        return system.enabled(which, mode, t, x);
+    } else if constexpr (CountsGuards<System> && requires { { system.enabled(which, t, x) } -> std::convertible_to<bool>; }) {
+        return system.enabled(which, t, x);
+    } else if constexpr (!CountsGuards<System> && requires { { system.enabled(mode, t, x) } -> std::convertible_to<bool>; }) {
+        return system.enabled(mode, t, x);
+    } else if constexpr (!CountsGuards<System> && requires { { system.enabled(t, x) } -> std::convertible_to<bool>; }) {
+        return system.enabled(t, x);
+    } else {
+        return true;
+    }
+}
+
 /// A member that is there but does not fit would be passed over in silence: a guard
 /// that is not const, a reset that takes its state by value. These say so instead.
-/// (Members that are templates have no address and are not looked at.)
+/// (Members that are templates or overloaded have no address and are not looked at.)
 template <class System, class X>
 constexpr void check_declarations()
 {
     if constexpr (requires { &System::guard; }) {
-        static_assert(Guarded<System, X>,
-                      "ricochet: guard must be callable as guard(double t, const State& x) on a "
-                      "const system and return a number");
+        static_assert(GuardAlone<System, X>,
+                      "ricochet: guard must be callable as guard([which,] [mode,] double t, const "
+                      "State& x) on a const system and return a number; `which` comes with guard_count");
+    }
+    if constexpr (requires { &System::guards; }) {
+        static_assert(GuardsTogether<System, X>,
+                      "ricochet: guards must be callable as guards([mode,] double t, const State& x, "
+                      "std::span<double> g) on a const system, and needs guard_count");
     }
     if constexpr (requires { &System::guard_rate; }) {
-        static_assert(RatedGuard<System, X>,
-                      "ricochet: guard_rate must be callable as guard_rate(double t, const State& "
-                      "x, const State& dxdt) on a const system and return a number");
+        static_assert(RateAlone<System, X>,
+                      "ricochet: guard_rate must be callable as guard_rate([which,] [mode,] double t, "
+                      "const State& x, const State& dxdt) on a const system and return a number");
     }
     if constexpr (requires { &System::reset; }) {
         static_assert(Resetting<System, X>,
-                      "ricochet: reset must be callable as reset(double t, State& x) on a const "
-                      "system, and needs a guard");
+                      "ricochet: reset must be callable as reset([which,] double t, State& x), or as "
+                      "reset([which,] Mode, double t, State& x) returning a Mode, on a const system, "
+                      "and needs a guard");
     }
-    if constexpr (Resetting<System, X>) {
+    if constexpr (requires { &System::rest; }) {
+        static_assert(Resting<System, X>,
+                      "ricochet: rest must be callable as rest([which,] double t, State& x), or as "
+                      "rest([which,] Mode, double t, State& x) returning a Mode, on a const system");
+    }
+    if constexpr (requires { &System::next_time_event; }) {
+        static_assert(Timed<System>, "ricochet: next_time_event must be callable as next_time_event(double t) on a const system");
+    }
+    if constexpr (CountsGuards<System>) {
+        static_assert(Guarded<System, X>, "ricochet: guard_count is declared, but neither guard(which, t, x) nor guards(t, x, g) fits");
+    }
+    if constexpr (PlainSingleReset<System, X>) {
         static_assert(!requires(const System& system, double t) { system.reset(t, X{}); },
+                      "ricochet: reset changes the state in place, so it must take it by reference");
+    }
+    if constexpr (PlainResetOf<System, X>) {
+        static_assert(!requires(const System& system, std::size_t which, double t) { system.reset(which, t, X{}); },
                       "ricochet: reset changes the state in place, so it must take it by reference");
     }
 }
 
 }  // namespace detail
-
-/// The sign change of the guard that counts.
-template <class System>
-[[nodiscard]] constexpr Crossing crossing_of(const System& system) noexcept
-{
-    if constexpr (requires { { system.crossing } -> std::convertible_to<Crossing>; }) {
-        return system.crossing;
-    } else {
-        return Crossing::falling;
-    }
-}
-
-/// Whether the guard is a constraint that no trajectory may violate, as a rigid
-/// floor is: a run may not start below it, and motion that is on the surface and
-/// heads below meets its event at once.
-template <class System>
-[[nodiscard]] constexpr bool is_unilateral(const System& system) noexcept
-{
-    if constexpr (requires { { system.unilateral } -> std::convertible_to<bool>; }) {
-        return system.unilateral;
-    } else {
-        return false;
-    }
-}
 
 }  // namespace ricochet

@@ -17,12 +17,14 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
 
 #include "ricochet/hybrid/components.hpp"
+#include "ricochet/hybrid/dense_polynomial.hpp"
 #include "ricochet/hybrid/instant.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/methods.hpp"
@@ -37,7 +39,17 @@ template <class X>
     return x;
 }
 
-/// The step in progress. Fulfils `Step`.
+/// Where a step starts, to the last bit.
+template <class X>
+struct StepStart {
+    Instant t;
+    Mode mode = 0;
+    X x{};
+    X remainder{};  ///< what rounding left out of x
+    X rate{};       ///< dx/ds there
+};
+
+/// The step in progress. Fulfils `DenseStep`.
 template <class Method, class System, StateVector X>
 class ExplicitStep {
 public:
@@ -47,10 +59,13 @@ public:
                   "ricochet: a multistep method keeps a memory that an event makes stale; "
                   "use a one-step method");
 
-    /// Places the step at (t, x) and evaluates the flow there.
-    ExplicitStep(const System& system, double t, const X& x)
+    /// Places the step at (t, x) in `mode` and evaluates the flow there. `backward`:
+    /// time runs backward, and offsets and rates with it.
+    ExplicitStep(const System& system, double t, const X& x, Mode mode = 0, bool backward = false)
         : system_(&system),
           start_{t, 0},
+          mode_(mode),
+          backward_(backward),
           x0_(x),
           remainder_(zeros_like(x)),
           zero_(remainder_),
@@ -63,11 +78,22 @@ public:
           at_(remainder_),
           unused_rate_(remainder_)
     {
+        inner_w_.fill(zero_);
+        inner_rate_.fill(zero_);
         flow(0, x0_, rate0_);
     }
 
-    [[nodiscard]] double time(double s) const noexcept { return start_.plus(s); }
+    [[nodiscard]] double time(double s) const noexcept { return start_.plus(in_time(s)); }
     [[nodiscard]] const Instant& start() const noexcept { return start_; }
+    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] bool backward() const noexcept { return backward_; }
+
+    /// Seconds from the start to time t, positive if it lies ahead.
+    [[nodiscard]] double until(double t) const noexcept
+    {
+        const double ahead = start_.until(t);
+        return backward_ ? -ahead : ahead;
+    }
     [[nodiscard]] double h() const noexcept { return h_; }
     [[nodiscard]] const X& x0() const noexcept { return x0_; }
     [[nodiscard]] const X& x1() const noexcept { return x1_; }
@@ -76,18 +102,32 @@ public:
     [[nodiscard]] static constexpr int order() noexcept { return order_of<Stepper>(); }
 
     /// x(t0 + s) on the dense output: the method's own where it has one, else the
-    /// cubic Hermite polynomial through both ends.
+    /// polynomial of `dense`.
     void interpolate(double s, X& x) const
     {
         if constexpr (has_dense_output) {
             advancing_.calc_state(s, x, zero_, zero_, 0.0, w_, w_rate1_, h_);
+            add_tangent(s, x);
         } else {
-            const double u = s / h_;
-            const double slope = h_ * u * u * (u - 1);
-            const double rise = u * u * (3 - 2 * u);
-            for_components([&](auto i) { x[i] = rise * w_[i] + slope * (rate1_[i] - rate0_[i]); });
+            const DenseView<X, false> view(dense(), s);
+            for_components([&](auto i) { x[i] = view[i]; });
         }
-        add_tangent(s, x);
+    }
+
+    /// The step as a polynomial of the order that the method reaches over many steps.
+    /// Its inner nodes are computed when it is first asked for.
+    [[nodiscard]] DenseParts<X> dense() const
+    {
+        if (!dense_ready_) prepare_dense();
+        DenseParts<X> parts{
+            .nodes = dense_nodes, .h = h_, .x0 = &x0_, .remainder = &remainder_, .rate0 = &rate0_};
+        for (std::size_t k = 0; k < inner_nodes; ++k) {
+            parts.w[k] = &inner_w_[k];
+            if constexpr (!has_dense_output) parts.slope[k] = &inner_rate_[k];
+        }
+        parts.w[inner_nodes] = &w_;
+        parts.slope[inner_nodes] = &w_slope1_;
+        return parts;
     }
 
     /// x(t0 + s) by the method's own step of length s from the start.
@@ -126,7 +166,8 @@ public:
     void flow(double s, const X& x, X& dxdt) const
     {
         ++flow_calls_;
-        system_->flow(time(s), x, dxdt);
+        call_flow(*system_, mode_, time(s), x, dxdt);
+        if (backward_) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
     }
 
     /// Takes a step of length h, without a look at its error.
@@ -166,7 +207,7 @@ public:
     /// The end of the step becomes the start of the next.
     void accept() noexcept
     {
-        start_ = start_.after(h_);
+        start_ = start_.after(in_time(h_));
         for_components([&](auto i) {
             const TwoSum sum = two_sum(x0_[i], h_ * rate0_[i] + (w_[i] + remainder_[i]));
             x0_[i] = sum.value;
@@ -182,14 +223,32 @@ public:
         start_ = {t, 0};
     }
 
-    /// Moves the start of the step to offset s and state x, after an event.
-    void restart(double s, const X& x)
+    /// Moves the start of the step to offset s + `remainder`, state x and a mode, after
+    /// an event. The state may have another dimension.
+    void restart(double s, double remainder, const X& x, Mode mode)
     {
-        start_ = start_.after(s);
-        assign(x0_, x);
-        assign(remainder_, zero_);
+        start_ = start_.after(in_time(s));
+        if (remainder != 0) start_ = start_.after(in_time(remainder));
+        begin(x, mode);
         flow(0, x0_, rate0_);
     }
+
+    /// Moves the start of the step to where another one started.
+    void restart(const StepStart<X>& at)
+    {
+        start_ = at.t;
+        begin(at.x, at.mode);
+        assign(remainder_, at.remainder);
+        assign(rate0_, at.rate);
+    }
+
+    /// Only time goes on, to t.
+    void hold(double t) noexcept { start_ = {t, 0}; }
+
+    /// Evaluates the flow at the start anew.
+    void refresh() { flow(0, x0_, rate0_); }
+
+    [[nodiscard]] StepStart<X> place() const { return {start_, mode_, x0_, remainder_, rate0_}; }
 
     [[nodiscard]] std::uint64_t flow_calls() const noexcept { return flow_calls_; }
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
@@ -200,6 +259,14 @@ private:
         stepper.calc_state(0.0, x, x, x, 0.0, x, x, 0.0);
     };
 
+    static constexpr DenseNodes dense_nodes = has_dense_output           ? DenseNodes::middle_end
+                                              : order_of<Stepper>() <= 4 ? DenseNodes::end
+                                              : order_of<Stepper>() <= 6 ? DenseNodes::half_end
+                                                                         : DenseNodes::thirds_end;
+    static constexpr std::size_t inner_nodes = dense_nodes == DenseNodes::end          ? 0
+                                               : dense_nodes == DenseNodes::thirds_end ? 2
+                                                                                       : 1;
+
     static constexpr bool fits_registers = is_small<X> && std::is_trivially_copyable_v<X>;
 
     template <class Function>
@@ -208,10 +275,57 @@ private:
         for_each_component(x0_, function);
     }
 
+    [[nodiscard]] double in_time(double s) const noexcept { return backward_ ? -s : s; }
+
+    void begin(const X& x, Mode mode)
+    {
+        mode_ = mode;
+        if (x.size() != x0_.size()) {
+            const bool backward = backward_;
+            const Instant start = start_;
+            const std::uint64_t calls = flow_calls_;
+            const std::uint64_t resteps = resteps_;
+            *this = ExplicitStep(*system_, start.value, x, mode, backward);
+            start_ = start;
+            flow_calls_ = calls;
+            resteps_ = resteps;
+        }
+        assign(x0_, x);
+        assign(remainder_, zero_);
+        dense_ready_ = false;
+    }
+
+    void prepare_dense() const
+    {
+        for_components([&](auto i) { w_slope1_[i] = rate1_[i] - rate0_[i]; });
+        if constexpr (has_dense_output) {
+            advancing_.calc_state(h_ / 2, inner_w_[0], zero_, zero_, 0.0, w_, w_rate1_, h_);
+        } else {
+            for (std::size_t k = 0; k < inner_nodes; ++k) {
+                prepare_node(h_ * static_cast<double>(k + 1) / static_cast<double>(inner_nodes + 1),
+                             k);
+            }
+        }
+        dense_ready_ = true;
+    }
+
+    /// A node inside, from a step of its own.
+    void prepare_node(double s, std::size_t k) const
+    {
+        advance<false>(probing_, s, inner_w_[k], unused_rate_, error_);
+        assign(at_, inner_w_[k]);
+        add_tangent(s, at_);
+        X& slope = inner_rate_[k];
+        flow(s, at_, slope);
+        for_components([&](auto i) { slope[i] -= rate0_[i]; });
+    }
+
     /// What a step starts from.
     struct Origin {
         const System& system;
         const Instant& start;
+        Mode mode;
+        bool backward;
         const X& x;
         const X& rate;
         const X& zero;
@@ -229,8 +343,14 @@ private:
                 at[i] = from.x[i] + (offset * from.rate[i] + departure[i]);
             });
             ++calls;
-            from.system.flow(from.start.plus(offset), at, departure_rate);
-            for_each_component(from.x, [&](auto i) { departure_rate[i] -= from.rate[i]; });
+            if (from.backward) {
+                call_flow(from.system, from.mode, from.start.plus(-offset), at, departure_rate);
+                for_each_component(
+                    from.x, [&](auto i) { departure_rate[i] = -departure_rate[i] - from.rate[i]; });
+            } else {
+                call_flow(from.system, from.mode, from.start.plus(offset), at, departure_rate);
+                for_each_component(from.x, [&](auto i) { departure_rate[i] -= from.rate[i]; });
+            }
         };
         if constexpr (is_fsal<Stepper> && with_error) {
             stepper.do_step(flow, from.zero, from.zero, 0.0, w, rate, s, error);
@@ -266,8 +386,9 @@ private:
             X w_own{};
             X rate_own{};
             X error_own{};
-            flow_calls_ += depart<with_error>(own, {*system_, start_, x, rate0, zero}, s, at, w_own,
-                                              rate_own, error_own);
+            flow_calls_ +=
+                depart<with_error>(own, {*system_, start_, mode_, backward_, x, rate0, zero}, s, at,
+                                   w_own, rate_own, error_own);
             assign(w, w_own);
             if constexpr (is_fsal<Stepper>) assign(rate, rate_own);
             if constexpr (with_error) assign(error, error_own);
@@ -275,8 +396,9 @@ private:
                 if (&stepper == &advancing_) stepper = own;
             }
         } else {
-            flow_calls_ += depart<with_error>(stepper, {*system_, start_, x0_, rate0_, zero_}, s,
-                                              at_, w, rate, error);
+            flow_calls_ += depart<with_error>(
+                stepper, {*system_, start_, mode_, backward_, x0_, rate0_, zero_}, s, at_, w, rate,
+                error);
         }
     }
 
@@ -288,6 +410,7 @@ private:
 
     void finish_attempt()
     {
+        dense_ready_ = false;
         assign(x1_, w_);
         add_tangent(h_, x1_);
         if constexpr (is_fsal<Stepper>) {
@@ -299,12 +422,17 @@ private:
 
     const System* system_;
     Instant start_;
+    Mode mode_;
+    bool backward_;
     X x0_, remainder_, zero_, rate0_;
     double h_ = 0;
     X w_, w_rate1_, x1_, rate1_;
     Stepper advancing_;
     mutable Stepper probing_;
     mutable X error_, at_, unused_rate_;
+    mutable X w_slope1_ = zero_;
+    mutable std::array<X, inner_nodes> inner_w_, inner_rate_;
+    mutable bool dense_ready_ = false;
     mutable std::uint64_t flow_calls_ = 0;
     mutable std::uint64_t resteps_ = 0;
 };

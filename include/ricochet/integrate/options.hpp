@@ -1,16 +1,20 @@
 // What a caller can ask of a run.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <limits>
 #include <vector>
+
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet {
 
 /// Options of `integrate`. Times in seconds. Only `t_end` has no default.
 struct Options {
     double t_start = 0;
-    double t_end = std::numeric_limits<double>::quiet_NaN();
+    double t_end = std::numeric_limits<double>::quiet_NaN();  ///< before t_start: backward in time
+    Mode mode = 0;                                            ///< at the start
 
     /// The step of a fixed-step run, where it is required; with error control the
     /// first step tried, estimated from the flow if zero.
@@ -29,14 +33,24 @@ struct Options {
     double event_tolerance = 0;
     double event_rtol = 0;
 
+    /// Events no further apart than max(event_window, event tolerance, 4 units in the
+    /// last place of t) happen together: one set, applied once.
+    double event_window = 0;
+
     bool stop_at_event = false;
     bool record_events = true;  ///< off: events are counted, not kept
+    bool event_states = true;   ///< off: events without reset are kept without their states
+    bool record_steps = false;  ///< keep every step, for `Run::solution`
 
-    /// Times at which the trajectory is wanted, ascending, within the run. A time
-    /// that coincides with an event gets the state after it.
+    /// Times at which the trajectory is wanted, in the order in which the run meets
+    /// them. A time that coincides with an event gets the state after it.
     std::vector<double> sample_times{};
 
     std::uint64_t max_steps = std::numeric_limits<std::uint64_t>::max();
+
+    /// Set from another thread or a signal handler, it ends the run after the step in
+    /// progress; nothing is lost.
+    const std::atomic<bool>* cancelled = nullptr;
 };
 
 /// @throws std::invalid_argument naming the option, what was given and what was

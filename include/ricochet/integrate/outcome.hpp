@@ -8,11 +8,15 @@ namespace ricochet {
 enum class Outcome {
     reached_end,
     stopped_by_event,
-    zeno,            ///< event times accumulate and the system has no rest rule
-    outside_mode,    ///< a reset left the state behind a unilateral guard
-    step_underflow,  ///< no step above h_min met the tolerance
-    step_limit,      ///< `Options::max_steps` steps were taken
-    non_finite,      ///< the flow, a guard or a reset returned NaN or infinity
+    zeno,                ///< event times accumulate and the system has no rest rule
+    outside_mode,        ///< a reset left the state behind a unilateral guard
+    endless_cascade,     ///< resets kept triggering each other at one instant
+    conflicting_resets,  ///< two resets of one set wrote one component differently
+    unknown_mode,        ///< a reset returned a mode that the system does not have
+    step_underflow,      ///< no step above h_min met the tolerance
+    step_limit,          ///< `Options::max_steps` steps were taken
+    non_finite,          ///< the flow, a guard or a reset returned NaN or infinity
+    cancelled,           ///< `Options::cancelled` was set
 };
 
 /// The enumerator's name, e.g. "reached_end".

@@ -7,6 +7,7 @@
 #include "ricochet/hybrid/event.hpp"
 #include "ricochet/hybrid/statistics.hpp"
 #include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/solution.hpp"
 
 namespace ricochet {
 
@@ -22,8 +23,14 @@ struct Run {
     Outcome outcome = Outcome::reached_end;
     double t = 0;  ///< [s] time reached
     State x{};     ///< state at that time
+    Mode mode = 0;
+    /// The guard that ended the run where one did, else `no_guard`; of two conflicting
+    /// resets the first, and the second in `other_guard`.
+    std::size_t guard = no_guard;
+    std::size_t other_guard = no_guard;
     std::vector<Event<State>> events;
     Trajectory<State> trajectory;  ///< empty unless `Options::sample_times` were given
+    Solution<State> solution;      ///< empty unless `Options::record_steps`
     Statistics statistics;
 };
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ricochet/locate/location.hpp"
+#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet {
 
@@ -21,7 +21,7 @@ struct Bisection {
             const GuardSample sample = probe.value(middle);
             (probe.has_left(sample) ? hi : lo) = sample;
         }
-        return {.lo = lo.s, .hi = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
+        return {.lo = lo.s, .hi = hi.s, .root = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
     }
 };
 

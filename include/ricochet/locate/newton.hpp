@@ -9,9 +9,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "ricochet/locate/location.hpp"
+#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet {
 
@@ -69,10 +68,16 @@ struct Newton {
             const double correction = -sample.value / sample.rate;
             const double distance = std::fabs(correction);
             // What a straight line neglects over that distance, as a shift in time.
-            const bool straight =
-                distance <= width &&
-                distance * distance * curvature <= std::fabs(sample.rate) * finest / 2;
-            if (straight && close_in(probe, sample, correction, tolerance, lo, hi)) break;
+            const bool straight = distance <= width && distance * distance * curvature <=
+                                                           std::fabs(sample.rate) * finest / 2;
+            if (straight && close_in(probe, sample, correction, tolerance, lo, hi)) {
+                const TwoSum predicted = two_sum(sample.s, correction);
+                const TwoSum root = predicted.value < lo.s   ? two_sum(lo.s, 0)
+                                    : predicted.value > hi.s ? two_sum(hi.s, 0)
+                                                             : predicted;
+                probe.settle((root.value - sample.s) + root.remainder);
+                return located(lo, hi, root);
+            }
             // Converged from one side: reach for the other.
             past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
             s += correction + (beyond ? -past : past);
@@ -83,14 +88,22 @@ struct Newton {
                 slow = 0;
             }
         }
+        return located(lo, hi, {hi.s, 0});
+    }
+
+private:
+    [[nodiscard]] static Location located(const GuardSample& lo, const GuardSample& hi,
+                                          const TwoSum& root) noexcept
+    {
         const double rounding = std::fabs(hi.value / hi.rate);
         return {.lo = lo.s,
                 .hi = hi.s,
+                .root = root.value,
+                .root_remainder = root.remainder,
                 .slope = hi.rate,
                 .error = rounding > hi.s - lo.s ? rounding : hi.s - lo.s};
     }
 
-private:
     /// Change of the rate from one sample to another, per second.
     [[nodiscard]] static double bend(const GuardSample& a, const GuardSample& b) noexcept
     {
@@ -98,7 +111,7 @@ private:
     }
 
     template <class Probe>
-    [[nodiscard]] static double first_guess(const Probe& probe, GuardSample& lo, GuardSample& hi)
+    [[nodiscard]] static double first_guess(Probe& probe, GuardSample& lo, GuardSample& hi)
     {
         probe.complete(lo);
         probe.complete(hi);
@@ -113,7 +126,7 @@ private:
     /// if it does not change within the bracket: the prediction was wrong.
     template <class Probe>
     [[nodiscard]] static bool close_in(Probe& probe, const GuardSample& sample, double correction,
-                         double tolerance, GuardSample& lo, GuardSample& hi)
+                                       double tolerance, GuardSample& lo, GuardSample& hi)
     {
         double s = sample.s + correction;
         // Three quarters of the relative epsilon always reach the next double, and

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "ricochet/locate/location.hpp"
+#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet {
 
@@ -42,7 +42,7 @@ struct Toms748 {
         // An exact zero ends the search from one side: close the other.
         if (!narrow_enough(lo.s, hi.s)) (void)sample_at(hi.s - probe.finest(hi.s));
         while (!narrow_enough(lo.s, hi.s)) halve();
-        return {.lo = lo.s, .hi = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
+        return {.lo = lo.s, .hi = hi.s, .root = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
     }
 };
 

@@ -1,0 +1,414 @@
+// Which events does a step hold, and which of them comes first?
+//
+// Guards that act, by a reset or by ending the run, cut the step short at the first
+// set of events. Its members are found without regard to the order in which the
+// guards were written: every candidate is located by itself, the earliest first, and
+// whichever else has left its side by the end of the window is located too. Guards
+// that only notify are located on the step's polynomial, one at a time, up to there.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/integrate/guard_bank.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/newton.hpp"
+
+namespace ricochet::detail {
+
+/// An event that changes nothing, found inside a step.
+struct Note {
+    std::size_t guard;
+    EventKind kind;
+    Side side;  ///< that the guard left
+    Location where;
+};
+
+/// A guard that acts, found to leave its side inside a step.
+struct Hit {
+    std::size_t guard = 0;
+    Finding finding;
+    double guess = 0;  ///< [s] offset
+    bool located = false;
+    Location where;
+};
+
+template <class System, class X, class CurrentStep, class Detector, class Locator>
+class EventSearch {
+    static constexpr std::size_t fixed = fixed_guard_count<System, X>();
+    using Bank = GuardBank<System, X, Detector>;
+    using Probe = StepProbe<GuardView<System, X>, CurrentStep>;
+
+public:
+    EventSearch(const X& like, std::size_t guards)
+        : space_(like), before_(like), hits_(guards), members_(guards)
+    {
+    }
+
+    /// Starts on another step; the state may have changed its dimension.
+    void begin(const X& like)
+    {
+        if (space_.x.size() != like.size()) {
+            space_ = ProbeSpace<X>(like);
+            before_ = like;
+        }
+        notes_.clear();
+    }
+
+    [[nodiscard]] GuardList<std::size_t, fixed>& members() noexcept { return members_; }
+    [[nodiscard]] std::vector<Note>& notes() noexcept { return notes_; }
+    [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
+
+    /// Whether the set was only found at a step after the one that held it.
+    [[nodiscard]] bool late() const noexcept { return late_; }
+
+    /// Where the set happens [s], as offset + remainder, and the state there.
+    [[nodiscard]] double at() const noexcept { return at_; }
+    [[nodiscard]] double at_remainder() const noexcept { return at_remainder_; }
+    [[nodiscard]] X& before() noexcept { return before_; }
+
+    /// The set that fires next is at the start of the step.
+    void stay_at_start() noexcept { at_ = at_remainder_ = 0; }
+    [[nodiscard]] const Location& where(std::size_t guard) noexcept
+    {
+        for (Hit& hit : hits_) {
+            if (hit.guard == guard) return hit.where;
+        }
+        return hits_[0].where;
+    }
+
+    /// Finds the first set of acting guards in the step. `window` [s]; events no
+    /// further than that from `due` [s], the end of the step if a time event is due
+    /// there, belong to it. False: none.
+    [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank, const Detector& detector,
+                                const Locator& locator, double tolerance, double window,
+                                bool time_event_due, std::uint64_t& calls)
+    {
+        hits_.clear();
+        members_.clear();
+        evidence_ = Detector::evidence;
+        late_ = false;
+        for (std::size_t i = 0; i < bank.size(); ++i) {
+            if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
+            examine(step, bank, i, detector, calls);
+        }
+        if (hits_.empty()) return false;
+        if (hits_.size() == 1) {
+            locate(step, bank, hits_[0], locator, tolerance, calls);
+            members_.push_back(hits_[0].guard);
+        } else {
+            close_set(step, bank, locator, tolerance, window, calls);
+        }
+        settle_place(step, time_event_due && at_ + window >= step.h());
+        return true;
+    }
+
+    /// Adds the crossings and touches of a notifying guard, up to the sample `end`.
+    void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
+                        const Detector& detector, const Locator& locator, double tolerance,
+                        std::uint64_t& calls)
+    {
+        GuardRecord& record = bank[i];
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_, record.info.boolean ? Path::restep : Path::dense);
+        for (int round = 0; round < most_rounds; ++round) {
+            Watch watch{
+                .side = record.side, .start = bank.start(i), .end = end, .touch = record.touch()};
+            if (is_plateau(probe, watch)) {
+                record.next = Side::plateau;
+                return;
+            }
+            const Finding finding = look(probe, watch, record, detector);
+            if (finding.touch) {
+                touched(bank, i, finding);
+                continue;
+            }
+            if (!finding.hit) {
+                record.next = watch.side_after;
+                return;
+            }
+            probe.watch(finding.side);
+            const Location where = find(probe, finding, record, locator, tolerance);
+            const Side side = opposite(finding.side);
+            bool counted = true;
+            if constexpr (has_predicate) {
+                counted = call_enabled_at(guard.system(), i, step.mode(), step.time(where.root),
+                                          probe.state_at(where));
+                if (!counted) ++disabled;
+            }
+            if (counted) {
+                notes_.push_back({.guard = i,
+                                  .kind = EventKind::crossing,
+                                  .side = finding.side,
+                                  .where = where});
+            }
+            pass(bank, i, side, where, probe);
+        }
+    }
+
+    /// Notes a located crossing of a guard that acts, but did not change anything.
+    void note(std::size_t i, Side side)
+    {
+        notes_.push_back(
+            {.guard = i, .kind = EventKind::crossing, .side = side, .where = where(i)});
+    }
+
+    /// A guard that has crossed without consequence goes on from there.
+    void pass(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        for (const Hit& hit : hits_) {
+            if (hit.guard == i) pass(bank, i, opposite(hit.finding.side), hit.where, probe);
+        }
+    }
+
+    /// The value and rate of a guard where the set happens.
+    [[nodiscard]] GuardSample sample_at_set(const CurrentStep& step, Bank& bank, std::size_t i,
+                                            std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        const double t = step.time(at_);
+        GuardSample sample{.s = at_, .value = guard.value(t, before_)};
+        if (Detector::uses_rates && !bank[i].info.boolean) {
+            step.flow(at_, before_, space_.dxdt);
+            sample.rate = guard.rate(t, before_, space_.dxdt, step.h());
+        }
+        return sample;
+    }
+
+    /// Drops what was noted beyond the offset s, and sorts the rest by time.
+    void keep_notes_until(double s)
+    {
+        std::erase_if(notes_, [&](const Note& note) { return note.where.root > s; });
+        std::stable_sort(notes_.begin(), notes_.end(),
+                         [](const Note& a, const Note& b) { return a.where.root < b.where.root; });
+    }
+
+    /// The state at a note on the step's polynomial.
+    [[nodiscard]] const X& state_at(const CurrentStep& step, const Note& note)
+    {
+        step.interpolate(note.where.root, space_.x);
+        return space_.x;
+    }
+
+    std::uint64_t disabled = 0;
+
+private:
+    static constexpr int most_rounds = 1000;
+    static constexpr bool has_predicate =
+        requires(const System& system, std::size_t i, double t, const X& x)
+    {
+        system.enabled(i, t, x);
+    }
+    || requires(const System& system, std::size_t i, Mode mode, double t, const X& x)
+    {
+        system.enabled(i, mode, t, x);
+    }
+    || requires(const System& system, double t, const X& x) { system.enabled(t, x); };
+
+    /// Both ends of the stretch are on the surface: so is the middle of a plateau.
+    [[nodiscard]] static bool is_plateau(Probe& probe, const Watch& watch)
+    {
+        return watch.end.value == 0 && watch.start.value == 0 &&
+               probe.value(watch.start.s + (watch.end.s - watch.start.s) / 2).value == 0;
+    }
+
+    [[nodiscard]] Finding look(Probe& probe, Watch& watch, const GuardRecord& record,
+                               const Detector& detector)
+    {
+        Finding finding =
+            record.info.boolean ? Ends{}.examine(probe, watch) : detector.examine(probe, watch);
+        if (!finding.hit) evidence_ = std::max(evidence_, finding.evidence);
+        return finding;
+    }
+
+    [[nodiscard]] static Location find(Probe& probe, const Finding& finding,
+                                       const GuardRecord& record, const Locator& locator,
+                                       double tolerance)
+    {
+        if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
+        probe.agree_on(finding.hi);
+        return record.info.boolean ? Bisection{}.locate(probe, finding.lo, finding.hi, tolerance)
+                                   : locator.locate(probe, finding.lo, finding.hi, tolerance);
+    }
+
+    void touched(Bank& bank, std::size_t i, const Finding& finding)
+    {
+        const GuardSample& at = finding.hi;
+        notes_.push_back({.guard = i,
+                          .kind = EventKind::touch,
+                          .side = finding.side,
+                          .where = {.lo = at.s, .hi = at.s, .root = at.s, .slope = 0}});
+        bank.go_on_from(i, finding.side, away(finding.side, at.s));
+    }
+
+    /// On the surface and heading for `side`, by next to nothing.
+    [[nodiscard]] static GuardSample away(Side side, double s) noexcept
+    {
+        const double least = sign_of(side) * std::numeric_limits<double>::min();
+        return {.s = s, .value = least, .rate = least};
+    }
+
+    void pass(Bank& bank, std::size_t i, Side side, const Location& where, Probe& probe)
+    {
+        GuardSample start = away(side, where.root);
+        if (Detector::uses_rates && !bank[i].info.boolean) {
+            start.rate =
+                std::isfinite(where.slope) ? where.slope : probe.value_and_rate(where.root).rate;
+            if (start.rate == 0) start.rate = start.value;
+        }
+        bank.go_on_from(i, side, start);
+    }
+
+    /// Adds a hit of a guard that acts, and notes its touches before it.
+    void examine(const CurrentStep& step, Bank& bank, std::size_t i, const Detector& detector,
+                 std::uint64_t& calls)
+    {
+        GuardRecord& record = bank[i];
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        for (int round = 0; round < most_rounds; ++round) {
+            Watch watch{.side = record.side,
+                        .start = bank.start(i),
+                        .end = bank.end(i, step.h()),
+                        .touch = record.touch()};
+            if (is_plateau(probe, watch)) {
+                record.next = Side::plateau;
+                return;
+            }
+            const Finding finding = look(probe, watch, record, detector);
+            if (finding.touch) {
+                touched(bank, i, finding);
+                continue;
+            }
+            if (!finding.hit) {
+                record.next = watch.side_after;
+                return;
+            }
+            late_ = late_ || finding.late;
+            Hit hit;
+            hit.guard = i;
+            hit.finding = finding;
+            hit.guess = guess(finding);
+            hits_.push_back(hit);
+            return;
+        }
+    }
+
+    /// Where a cubic through the ends of the stretch would have its root.
+    [[nodiscard]] static double guess(const Finding& finding) noexcept
+    {
+        const double width = finding.hi.s - finding.lo.s;
+        const double u = hermite_root(finding.lo.value, finding.lo.rate * width, finding.hi.value,
+                                      finding.hi.rate * width, sign_of(finding.side));
+        const double root = finding.lo.s + u * width;
+        return std::isfinite(root) ? root : finding.hi.s;
+    }
+
+    void locate(const CurrentStep& step, Bank& bank, Hit& hit, const Locator& locator,
+                double tolerance, std::uint64_t& calls)
+    {
+        const auto guard = bank.view(hit.guard, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        probe.watch(hit.finding.side);
+        hit.where = find(probe, hit.finding, bank[hit.guard], locator, tolerance);
+        hit.located = true;
+        if (hits_.size() == 1) {
+            at_ = hit.where.root;
+            at_remainder_ = hit.where.root_remainder;
+            if (hit.finding.late) {
+                assign(before_, step.x0());
+            } else {
+                assign(before_, probe.state_at(hit.where));
+            }
+        }
+    }
+
+    /// Locates candidates until every one that has left its side by the end of the
+    /// window is located; the set is whoever lies in the window.
+    void close_set(const CurrentStep& step, Bank& bank, const Locator& locator, double tolerance,
+                   double window, std::uint64_t& calls)
+    {
+        double first = std::numeric_limits<double>::infinity();
+        for (const Hit& hit : hits_) first = std::min(first, hit.guess);
+        for (Hit& hit : hits_) {
+            if (hit.guess == first) locate(step, bank, hit, locator, tolerance, calls);
+        }
+        double limit = window_end(window);
+        for (bool changed = true; changed;) {
+            changed = false;
+            const double at = std::min(limit, step.h());
+            bool placed = false;
+            for (Hit& hit : hits_) {
+                if (hit.located) continue;
+                if (hit.finding.hi.s > at) {
+                    if (!placed) step.restep(at, before_);
+                    placed = true;
+                    const auto guard = bank.view(hit.guard, step.mode(), calls);
+                    if (!has_left(hit.finding.side, guard.value(step.time(at), before_))) continue;
+                }
+                locate(step, bank, hit, locator, tolerance, calls);
+                changed = true;
+            }
+            limit = window_end(window);
+        }
+        for (Hit& hit : hits_) {
+            if (hit.located && hit.where.root <= limit) members_.push_back(hit.guard);
+        }
+    }
+
+    [[nodiscard]] double window_end(double window) noexcept
+    {
+        double first = std::numeric_limits<double>::infinity();
+        for (const Hit& hit : hits_) {
+            if (hit.located) first = std::min(first, hit.where.root);
+        }
+        return first + window;
+    }
+
+    /// The set happens at its latest root, or at the time event that it belongs to.
+    void settle_place(const CurrentStep& step, bool at_end)
+    {
+        if (members_.size() > 1) {
+            at_ = 0;
+            for (const Hit& hit : hits_) {
+                if (hit.located &&
+                    std::find(members_.begin(), members_.end(), hit.guard) != members_.end()) {
+                    at_ = std::max(at_, hit.where.root);
+                }
+            }
+            at_remainder_ = 0;
+            if (at_ == 0) {
+                assign(before_, step.x0());
+            } else {
+                step.restep(at_, before_);
+            }
+        }
+        if (at_end) {
+            at_ = step.h();
+            at_remainder_ = 0;
+            assign(before_, step.x1());
+        }
+    }
+
+    ProbeSpace<X> space_;
+    X before_;
+    GuardList<Hit, fixed> hits_;
+    GuardList<std::size_t, fixed> members_;
+    std::vector<Note> notes_;
+    Evidence evidence_ = Detector::evidence;
+    bool late_ = false;
+    double at_ = 0;
+    double at_remainder_ = 0;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,304 @@
+// All guards of a system at the ends of a step.
+//
+// What every step needs of every guard lies in plain arrays, so that a hundred guards
+// are screened in one loop; what only events need lies beside them.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "ricochet/detect/finding.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard_view.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/shrinking_intervals.hpp"
+
+namespace ricochet::detail {
+
+/// A T for every guard; on the stack where the system fixes their number.
+template <class T, std::size_t fixed>
+using PerGuard = std::conditional_t<fixed == counted_at_run_time, std::vector<T>,
+                                    std::array<T, fixed == counted_at_run_time ? 1 : fixed>>;
+
+/// As many elements as there are guards, at most.
+template <class T, std::size_t fixed>
+class GuardList {
+public:
+    explicit GuardList(std::size_t guards)
+    {
+        if constexpr (fixed == counted_at_run_time) items_.resize(guards);
+    }
+    void clear() noexcept { size_ = 0; }
+    void shrink(std::size_t size) noexcept { size_ = size; }
+    void push_back(const T& item) noexcept { items_[size_++] = item; }
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+    [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+    [[nodiscard]] T& operator[](std::size_t i) noexcept { return items_[i]; }
+    [[nodiscard]] T* begin() noexcept { return items_.data(); }
+    [[nodiscard]] T* end() noexcept { return items_.data() + size_; }
+    [[nodiscard]] std::span<const T> span() const noexcept { return {items_.data(), size_}; }
+
+private:
+    PerGuard<T, fixed> items_{};
+    std::size_t size_ = 0;
+};
+
+/// What is known of a guard beside its values.
+struct GuardRecord {
+    GuardInfo info;
+    bool enabled = true;
+    bool newly_enabled = false;
+    bool fired = false;
+    bool acting = false;  ///< resets, or may end the run; else a notification
+    Side side = Side::plateau;
+    Side next = Side::plateau;  ///< at the end of the step, if it stands
+    double band = 0;            ///< |g| where it fired: it counts as being on its surface
+    double from = 0;            ///< [s] offset in the step up to which it has been looked at
+    double size = 0;            ///< largest |g| seen at the end of a step
+    std::uint64_t events = 0;
+    double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
+    Side last_side = Side::plateau;                          ///< the side it left then
+    ShrinkingIntervals intervals;
+
+    /// Half the width of the band around the surface that counts as being on it where
+    /// the rate is zero.
+    [[nodiscard]] double touch() const noexcept
+    {
+        return std::fmax(info.touch, 64 * std::numeric_limits<double>::epsilon() * size);
+    }
+};
+
+[[nodiscard]] constexpr double sign_of(Side side) noexcept
+{
+    return side == Side::above ? 1 : side == Side::below ? -1 : 0;
+}
+
+template <class System, class X, class Detector>
+class GuardBank {
+    static constexpr std::size_t fixed = fixed_guard_count<System, X>();
+
+public:
+    GuardBank(const System& system, bool backward)
+        : system_(&system), backward_(backward), count_(guard_count_of<X>(system))
+    {
+        if constexpr (fixed == counted_at_run_time) {
+            for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_})
+                numbers->resize(count_);
+            records_.resize(count_);
+        }
+        for (std::size_t i = 0; i < count_; ++i) {
+            records_[i].info = guard_info_of<X>(system, i);
+        }
+    }
+
+    [[nodiscard]] std::size_t size() const noexcept
+    {
+        return fixed == counted_at_run_time ? count_ : fixed;
+    }
+    [[nodiscard]] GuardRecord& operator[](std::size_t i) noexcept { return records_[i]; }
+    [[nodiscard]] const GuardRecord& operator[](std::size_t i) const noexcept
+    {
+        return records_[i];
+    }
+    [[nodiscard]] bool backward() const noexcept { return backward_; }
+
+    [[nodiscard]] GuardView<System, X> view(std::size_t i, Mode mode,
+                                            std::uint64_t& calls) const noexcept
+    {
+        return {*system_, calls, i, mode, records_[i].info.crossing, backward_};
+    }
+
+    /// Samples all guards at the start of a step.
+    template <class Step>
+    void sample_start(const Step& step, std::uint64_t& calls, double scale)
+    {
+        sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
+    }
+
+    /// Samples all guards at the end of a step.
+    template <class Step>
+    void sample_end(const Step& step, std::uint64_t& calls)
+    {
+        sample(step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h(), calls, g1_,
+               rate1_);
+    }
+
+    /// Whether any guard deserves a look.
+    [[nodiscard]] bool suspicious(double h) const noexcept
+    {
+        bool any = false;
+        for (std::size_t i = 0; i < size(); ++i) {
+            any |= suspicious(i, h);
+        }
+        return any;
+    }
+
+    [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
+    {
+        return sign_[i] != 0 &&
+               Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+    }
+
+    /// The first guard that is not a number at the end of the step, or `no_guard`.
+    [[nodiscard]] std::size_t first_nan(double h) const noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (suspicious(i, h) && std::isnan(g1_[i])) return i;
+        }
+        return no_guard;
+    }
+
+    [[nodiscard]] GuardSample start(std::size_t i) const noexcept
+    {
+        return {.s = records_[i].from, .value = g0_[i], .rate = known(rate0_[i])};
+    }
+    [[nodiscard]] GuardSample end(std::size_t i, double h) const noexcept
+    {
+        return {.s = h, .value = g1_[i], .rate = known(rate1_[i])};
+    }
+
+    void arm(std::size_t i, Side side) noexcept
+    {
+        records_[i].side = side;
+        sign_[i] = records_[i].enabled ? sign_of(side) : 0;
+    }
+
+    /// Nothing inside the step has been looked at.
+    void begin_search() noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) records_[i].next = records_[i].side;
+    }
+
+    /// The guard goes on from `start` inside the step, on `side`.
+    void go_on_from(std::size_t i, Side side, const GuardSample& start) noexcept
+    {
+        arm(i, side);
+        records_[i].next = side;
+        records_[i].from = start.s;
+        g0_[i] = start.value;
+        rate0_[i] = start.rate;
+    }
+
+    /// The end of a clear step becomes the start of the next.
+    void pass_on() noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            g0_[i] = g1_[i];
+            rate0_[i] = rate1_[i];
+            if (Detector::uses_rates) {
+                records_[i].size = std::fmax(records_[i].size, std::fabs(g1_[i]));
+            }
+            if (sign_[i] == 0 && records_[i].enabled) arm(i, side_of(g1_[i]));
+        }
+    }
+
+    /// As `pass_on`, after events inside the step.
+    void pass_on_after_events() noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            records_[i].from = 0;
+            arm(i, records_[i].next);
+        }
+        pass_on();
+    }
+
+    /// The rate of a guard at the start of a step.
+    template <class Step>
+    [[nodiscard]] double complete_rate0(std::size_t i, const Step& step, double scale,
+                                        std::uint64_t& calls)
+    {
+        if (records_[i].info.boolean) return rate0_[i] = 0;
+        const auto guard = view(i, step.mode(), calls);
+        rate0_[i] = guard.rate(step.time(0), step.x0(), step.rate0(), scale);
+        return rate0_[i];
+    }
+
+    [[nodiscard]] double g0(std::size_t i) const noexcept { return g0_[i]; }
+    [[nodiscard]] double rate0(std::size_t i) const noexcept { return rate0_[i]; }
+    void set_rate0(std::size_t i, double rate) noexcept { rate0_[i] = rate; }
+
+    /// Calls `visit` with every number that is carried from step to step.
+    template <class Visit>
+    void visit(Visit&& visit)
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            GuardRecord& record = records_[i];
+            visit(sign_[i]);
+            visit(g0_[i]);
+            visit(rate0_[i]);
+            visit(record.enabled);
+            visit(record.side);
+            visit(record.size);
+            visit(record.events);
+            visit(record.last);
+            visit(record.last_side);
+            record.intervals.visit(visit);
+        }
+    }
+
+private:
+    using Doubles = PerGuard<double, fixed>;
+
+    [[nodiscard]] static double known(double rate) noexcept
+    {
+        return Detector::uses_rates ? rate : std::numeric_limits<double>::quiet_NaN();
+    }
+
+    [[nodiscard]] std::span<double> all(Doubles& numbers) const noexcept
+    {
+        return {numbers.data(), size()};
+    }
+
+    void sample(Mode mode, double t, const X& x, const X& dxdt, double scale, std::uint64_t& calls,
+                Doubles& g, Doubles& rates)
+    {
+        call_guards(*system_, mode, t, x, all(g));
+        calls += size();
+        if constexpr (Detector::uses_rates) {
+            if constexpr (RatesTogether<System, X>) {
+                if (!backward_) return call_rates(*system_, mode, t, x, dxdt, all(rates));
+                call_rates(*system_, mode, t, x, negated(dxdt), all(rates));
+                for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
+            } else if constexpr (RateAlone<System, X> || GuardAlone<System, X>) {
+                for (std::size_t i = 0; i < size(); ++i) {
+                    rates[i] = records_[i].info.boolean || !records_[i].enabled
+                                   ? 0
+                                   : view(i, mode, calls).rate(t, x, dxdt, scale);
+                }
+            } else {
+                difference(mode, t, x, dxdt, scale, rates);
+                calls += 2 * size();
+            }
+        }
+    }
+
+    /// Rates of all guards at once by the central difference along the flow.
+    void difference(Mode mode, double t, const X& x, const X& dxdt, double scale, Doubles& rates)
+    {
+        const double delta = 1e-5 * scale;
+        const double ahead = backward_ ? -delta : delta;
+        if (there_.size() != x.size()) there_ = x;
+        detail::move(there_, x, delta, dxdt);
+        call_guards(*system_, mode, t + ahead, there_, all(rates));
+        detail::move(there_, x, -delta, dxdt);
+        call_guards(*system_, mode, t - ahead, there_, all(behind_));
+        for (std::size_t i = 0; i < size(); ++i) {
+            rates[i] = records_[i].info.boolean ? 0 : (rates[i] - behind_[i]) / (2 * delta);
+        }
+    }
+
+    const System* system_;
+    bool backward_;
+    std::size_t count_;
+    Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{};
+    X there_{};
+    PerGuard<GuardRecord, fixed> records_{};
+};
+
+}  // namespace ricochet::detail

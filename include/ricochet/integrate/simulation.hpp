@@ -1,0 +1,1103 @@
+// A run in progress: smooth steps, events, resets, until the end or a reason to stop.
+//
+//     step from (t, x)              odeint, as a departure from the tangent
+//     guards at its end             screened, all at once
+//     search                        the first set of events in the step
+//     resets                        x⁻ becomes x⁺, the mode may change
+//     arming                        every guard anew; who was flipped fires in turn
+//
+// Steps are half-open, (t, t + h]. A system without a guard compiles to the step
+// alone. Between the first step and the last nothing is allocated for states of
+// fixed size, unless something is recorded.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/event_search.hpp"
+#include "ricochet/integrate/explicit_step.hpp"
+#include "ricochet/integrate/guard_bank.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/run.hpp"
+#include "ricochet/integrate/snapshot.hpp"
+#include "ricochet/integrate/step_control.hpp"
+#include "ricochet/locate/newton.hpp"
+
+namespace ricochet {
+
+namespace detail {
+
+/// @throws std::invalid_argument: the start has no components.
+[[noreturn]] void throw_start_empty();
+/// @throws std::invalid_argument: the start is not finite.
+[[noreturn]] void throw_start_not_finite(std::size_t component, double value);
+/// @throws std::invalid_argument: the start is behind a unilateral guard.
+[[noreturn]] void throw_start_outside_mode(std::size_t which, double t, double guard);
+/// @throws std::invalid_argument: a unilateral guard without a reset.
+[[noreturn]] void throw_no_reset(std::size_t which);
+/// @throws std::invalid_argument: a unilateral guard that does not fall.
+[[noreturn]] void throw_unilateral_not_falling(std::size_t which);
+/// @throws std::invalid_argument: a guard is not finite at the start.
+[[noreturn]] void throw_start_guard_not_finite(std::size_t which, double t, double guard);
+/// @throws std::invalid_argument: the start mode is none of the system's.
+[[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
+/// @throws std::invalid_argument: no previous_time_event for a run backward in time.
+[[noreturn]] void throw_no_previous_time_event();
+
+}  // namespace detail
+
+template <class System, class X, class Stepping = ErrorControlled<Dopri5>,
+          class Detector = Extremum, class Locator = Newton>
+requires Flowing<System, X> && StateVector<X>
+class Simulation {
+    using Method = typename Stepping::method;
+    using CurrentStep = detail::ExplicitStep<Method, System, X>;
+    using Guard = GuardView<System, X>;
+    using Bank = detail::GuardBank<System, X, Detector>;
+    using Search = detail::EventSearch<System, X, CurrentStep, Detector, Locator>;
+
+    static constexpr std::size_t fixed = fixed_guard_count<System, X>();
+    static constexpr bool guarded = Guarded<System, X>;
+    static constexpr bool resets = Resetting<System, X>;
+    static constexpr bool timed = Timed<System>;
+    static constexpr bool predicts =
+        requires(const Detector& detector, const CurrentStep& step, const Guard& guard) {
+            detector.clears(guard, step);
+        };
+    static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
+    static constexpr double infinity = std::numeric_limits<double>::infinity();
+
+    static_assert(!error_controlled || detail::has_error_estimate<typename CurrentStep::Stepper>,
+                  "ricochet: error control needs one of odeint's error steppers, such as Dopri5");
+    static_assert(!predicts || fixed == 1, "ricochet: a network predicts the events of one guard");
+
+public:
+    /// As `integrate`, but does not start. Keeps a reference to `system`.
+    Simulation(const System& system, const X& x0, const Options& options,
+               const Stepping& /*stepping*/ = {}, const Detector& detector = {},
+               const Locator& locator = {})
+        : system_(&system),
+          options_(checked(options, x0)),
+          detector_(detector),
+          locator_(locator),
+          backward_(options.t_end < options.t_start),
+          step_(system, options.t_start, x0, options.mode, backward_),
+          bank_(system, backward_),
+          search_(x0, bank_.size()),
+          after_(x0)
+    {
+        h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
+        if constexpr (error_controlled) {
+            if (options_.step == 0) h_next_ = initial_step();
+            h_next_ = std::min(h_next_, options_.h_max);
+        }
+        refuse_bad_modes();
+        if constexpr (guarded) refuse_bad_guards();
+        if constexpr (timed) {
+            if (backward_ && !requires_previous()) detail::throw_no_previous_time_event();
+            find_time_event();
+        }
+        if constexpr (predicts) {
+            const double smallest = error_controlled ? options_.h_min : options_.step;
+            const double largest = error_controlled ? options_.h_max : options_.step;
+            detector_.check(system, x0, smallest, largest);
+        }
+        if constexpr (guarded) arm_at_start();
+    }
+    Simulation(System&&, const X&, const Options&, const Stepping& = {}, const Detector& = {},
+               const Locator& = {}) = delete;
+
+    [[nodiscard]] double t() const noexcept { return step_.start().value; }  ///< [s]
+    [[nodiscard]] const X& x() const noexcept { return step_.x0(); }
+    [[nodiscard]] Mode mode() const noexcept { return step_.mode(); }
+    [[nodiscard]] bool ended() const noexcept { return ended_; }
+    /// What has been computed so far; its time and state are brought up to date by
+    /// `finish`.
+    [[nodiscard]] const Run<X>& run() const noexcept { return run_; }
+
+    /// Takes one step, with whatever events it holds. False: the run has ended.
+    bool step()
+    {
+        if (!ended_) advance_one();
+        return !ended_;
+    }
+
+    /// Goes on to the next event or sample time. False: the run has ended.
+    bool advance()
+    {
+        const std::uint64_t events = run_.statistics.events;
+        const std::size_t samples = next_sample_;
+        while (!ended_ && run_.statistics.events == events && next_sample_ == samples) {
+            advance_one();
+        }
+        return !ended_;
+    }
+
+    /// Goes on to the end, and calls `observe(event)` for every event recorded on the
+    /// way, `observe(simulation)` after every step; whichever of the two it takes.
+    template <class Observer>
+    void run_to_end(Observer&& observe)
+    {
+        std::size_t seen = run_.events.size();
+        while (!ended_) {
+            advance_one();
+            if constexpr (requires { observe(run_.events[0]); }) {
+                for (; seen < run_.events.size(); ++seen) observe(std::as_const(run_.events[seen]));
+            }
+            if constexpr (requires { observe(std::as_const(*this)); }) observe(std::as_const(*this));
+        }
+    }
+
+    /// Goes on to the end and hands over all that was computed.
+    [[nodiscard]] Run<X> take()
+    {
+        while (!ended_) advance_one();
+        return finish();
+    }
+
+    /// Hands over what has been computed so far. The simulation is over.
+    [[nodiscard]] Run<X> finish()
+    {
+        run_.t = step_.start().value;
+        run_.x = step_.x0();
+        run_.mode = step_.mode();
+        run_.statistics.flow_calls = step_.flow_calls();
+        run_.statistics.resteps = step_.resteps();
+        run_.statistics.disabled += search_.disabled;
+        emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
+        ended_ = true;
+        return std::move(run_);
+    }
+
+    /// All that the future depends on. A simulation of the same system with the same
+    /// options, stepping, detector and locator that restores it goes on with the same
+    /// bits. What was recorded is not part of it.
+    [[nodiscard]] Snapshot save()
+    {
+        Snapshot snapshot;
+        visit_state(detail::SnapshotWriter(snapshot));
+        return snapshot;
+    }
+
+    /// @throws std::invalid_argument if the snapshot is of another kind of simulation.
+    void restore(const Snapshot& snapshot)
+    {
+        detail::SnapshotReader reader(snapshot);
+        visit_state(reader);
+        reader.finish();
+        step_.restart(place_);
+        if constexpr (guarded) search_.begin(step_.x0());
+    }
+
+private:
+    // --- set-up ---
+
+    static const Options& checked(const Options& options, const X& x0)
+    {
+        detail::check_declarations<System, X>();
+        validate(options, !error_controlled);
+        if (x0.size() == 0) detail::throw_start_empty();
+        detail::for_each_component(x0, [&](auto i) {
+            if (!std::isfinite(x0[i])) {
+                detail::throw_start_not_finite(static_cast<std::size_t>(i), x0[i]);
+            }
+        });
+        return options;
+    }
+
+    void refuse_bad_modes() const
+    {
+        const std::size_t modes = mode_count_of(*system_);
+        if (modes > 0 && options_.mode >= modes) detail::throw_unknown_mode(options_.mode, modes);
+    }
+
+    void refuse_bad_guards()
+    {
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            detail::GuardRecord& record = bank_[i];
+            const GuardInfo& info = record.info;
+            record.acting = (resets && info.resets) || info.stop_after > 0 || options_.stop_at_event;
+            if (info.unilateral && !(resets && info.resets)) detail::throw_no_reset(i);
+            if (info.unilateral && info.crossing != Crossing::falling) {
+                detail::throw_unilateral_not_falling(i);
+            }
+        }
+    }
+
+    [[nodiscard]] static constexpr bool requires_previous() noexcept
+    {
+        return requires(const System& system, double t) { system.previous_time_event(t); };
+    }
+
+    void arm_at_start()
+    {
+        enable_guards();
+        bank_.sample_start(step_, calls(), h_next_);
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            const detail::GuardRecord& record = bank_[i];
+            const double g = bank_.g0(i);
+            if (!record.enabled) continue;
+            if (!std::isfinite(g)) {
+                detail::throw_start_guard_not_finite(i, options_.t_start, g);
+            }
+            if (record.info.unilateral && g < 0) {
+                detail::throw_start_outside_mode(i, options_.t_start, g);
+            }
+            bank_.arm(i, g != 0 ? side_of(g) : heading(i));
+            if (record.info.unilateral && record.side != Side::above) {
+                search_.members().push_back(i);
+            }
+        }
+        cascade();
+    }
+
+    // --- steps ---
+
+    [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
+
+    void end(Outcome outcome, std::size_t guard = no_guard) noexcept
+    {
+        run_.outcome = outcome;
+        run_.guard = guard;
+        ended_ = true;
+    }
+
+    /// One step, with whatever events it holds.
+    void advance_one()
+    {
+        const double remaining = step_.until(options_.t_end);
+        if (!(remaining > 0)) return end(Outcome::reached_end);
+        if (run_.statistics.steps == options_.max_steps) return end(Outcome::step_limit);
+        if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+            return end(Outcome::cancelled);
+        }
+        if (resting_) return hold(remaining);
+        if (!take_step(remaining)) return;
+
+        if constexpr (guarded) {
+            if (handle_events()) return;
+        }
+        if constexpr (timed) {
+            if (time_event_due_) return happen_on_time();
+        }
+        accept();
+    }
+
+    void accept()
+    {
+        emit_samples(step_.h());
+        record_step(step_.h());
+        if (is_last_) {
+            step_.accept_at(options_.t_end);
+        } else if (time_event_due_) {
+            step_.accept_at(time_event_);
+        } else {
+            step_.accept();
+        }
+        ++run_.statistics.steps;
+    }
+
+    /// Takes a step no longer than `remaining` [s] or the time to the next time event.
+    /// False: the run has ended.
+    [[nodiscard]] bool take_step(double remaining)
+    {
+        double longest = remaining;
+        time_event_due_ = false;
+        if constexpr (timed) {
+            const double ahead = step_.until(time_event_);
+            if (ahead <= remaining) {
+                longest = ahead;
+                // A remainder of a millionth of a step is rounding, not a step.
+                time_event_due_ = h_next_ * (1 + 1e-6) >= longest;
+            }
+        }
+        const bool to_the_end = h_next_ * (1 + 1e-6) >= longest;
+        is_last_ = to_the_end && longest == remaining;
+        const double h = to_the_end ? longest : h_next_;
+        if constexpr (error_controlled) {
+            return take_controlled_step(h, h_next_);
+        } else {
+            step_.attempt(h);
+            if (!step_.end_is_finite()) {
+                end(Outcome::non_finite);
+                return false;
+            }
+            return true;
+        }
+    }
+
+    /// `proposed`: what the step would have been if nothing had cut it short.
+    [[nodiscard]] bool take_controlled_step(double h, double proposed)
+    {
+        constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
+        double largest = rule_.largest;
+        for (;;) {
+            const double error = step_.attempt(h, options_.rtol, options_.atol);
+            if (rule_.accepts(error)) {
+                const double next = h * std::min(largest, rule_.factor(error, order));
+                const bool cut = largest > 1 && h < proposed;
+                h_next_ = std::min(cut ? std::max(next, proposed) : next, options_.h_max);
+                return true;
+            }
+            ++run_.statistics.rejected;
+            const bool finite = std::isfinite(error);
+            h *= finite ? rule_.factor(error, order) : 0.1;
+            is_last_ = false;
+            time_event_due_ = false;
+            largest = 1;
+            if (h < smallest_step()) {
+                end(finite ? Outcome::step_underflow : Outcome::non_finite);
+                return false;
+            }
+        }
+    }
+
+    [[nodiscard]] double smallest_step() const noexcept
+    {
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
+        return std::max(options_.h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
+    }
+
+    /// A first step at which an Euler step and the change of the flow over it stay
+    /// well inside the tolerance (Hairer, Norsett and Wanner I, section II.4).
+    [[nodiscard]] double initial_step()
+    {
+        constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
+        const X& x = step_.x0();
+        const X& dxdt = step_.rate0();
+        const auto scale = [&](auto i) { return options_.atol + options_.rtol * std::fabs(x[i]); };
+        double size = 0;
+        double speed = 0;
+        detail::for_each_component(x, [&](auto i) {
+            size = std::max(size, std::fabs(x[i]) / scale(i));
+            speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
+        });
+        const double span = std::fabs(options_.t_end - options_.t_start);
+        const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : 1e-6 * span;
+        X moved = x;
+        X rate = dxdt;
+        detail::move(moved, x, euler, dxdt);
+        step_.flow(euler, moved, rate);
+        double bend = 0;
+        detail::for_each_component(
+            x, [&](auto i) { bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i)); });
+        const double fastest = std::max(speed, bend / euler);
+        const double h = fastest <= 1e-15 ? std::max(1e-6 * span, euler * 1e-3)
+                                          : std::pow(0.01 / fastest, 1.0 / order);
+        const double first = std::min(std::min(100 * euler, h), options_.h_max);
+        return std::isfinite(first) && first > 0 ? first : 1e-6 * span;
+    }
+
+    /// A mode-less system at rest stays as it is, until a time event or the end.
+    void hold(double remaining)
+    {
+        double until = options_.t_end;
+        time_event_due_ = false;
+        if constexpr (timed) {
+            time_event_due_ = step_.until(time_event_) <= remaining;
+            if (time_event_due_) until = time_event_;
+        }
+        emit_held_samples(until);
+        step_.hold(until);
+        if constexpr (timed) {
+            if (time_event_due_) {
+                resting_ = false;
+                step_.refresh();
+                return apply_time_event();
+            }
+        }
+    }
+
+    // --- time events ---
+
+    void find_time_event()
+    {
+        if constexpr (timed) {
+            const double t = step_.start().value;
+            if (!backward_) {
+                time_event_ = system_->next_time_event(t);
+            } else if constexpr (requires { system_->previous_time_event(t); }) {
+                time_event_ = system_->previous_time_event(t);
+            }
+            if (!(step_.until(time_event_) > 0)) time_event_ = backward_ ? -infinity : infinity;
+        }
+    }
+
+    /// The step has ended at a time event.
+    void happen_on_time()
+    {
+        accept();
+        apply_time_event();
+    }
+
+    void apply_time_event()
+    {
+        search_.members().clear();
+        detail::assign(search_.before(), step_.x0());
+        transform(true);
+        fire({.located = false, .on_time = true});
+        if (!ended_) find_time_event();
+        if constexpr (guarded) cascade();
+    }
+
+    // --- events ---
+
+    [[nodiscard]] double event_tolerance(double t) const noexcept
+    {
+        return options_.event_tolerance + options_.event_rtol * std::fabs(t);
+    }
+
+    [[nodiscard]] double event_window(double t) const noexcept
+    {
+        return std::max(std::max(event_tolerance(t), options_.event_window),
+                        4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
+    }
+
+    /// Looks for events in the step; true if they have cut it short, or the run has
+    /// ended.
+    [[nodiscard]] bool handle_events()
+    {
+        bool cleared = false;
+        if constexpr (predicts) {
+            ++run_.statistics.network_calls;
+            cleared = detector_.clears(bank_.view(0, step_.mode(), calls()), step_);
+            if (cleared && !Detector::checks_every_step) {
+                ++run_.statistics.checks_put_off;
+                run_.statistics.evidence.add(Evidence::assumed);
+                return false;
+            }
+        }
+        bank_.sample_end(step_, calls());
+        if (!bank_.suspicious(step_.h())) {
+            if (predicts && !cleared) ++run_.statistics.false_alarms;
+            run_.statistics.evidence.add(Detector::evidence);
+            bank_.pass_on();
+            return false;
+        }
+        return search(cleared);
+    }
+
+    /// The step may hold events: finds out, and deals with them.
+    [[gnu::noinline]] bool search(bool cleared)
+    {
+        const std::size_t broken = bank_.first_nan(step_.h());
+        if (broken != no_guard) {
+            end(Outcome::non_finite, broken);
+            return true;
+        }
+        const double t1 = step_.time(step_.h());
+        search_.begin(step_.x0());
+        bank_.begin_search();
+        while (search_.find_set(step_, bank_, detector_, locator_, event_tolerance(t1),
+                                event_window(t1), time_event_due_, calls())) {
+            if (predicts && (cleared || search_.late())) ++run_.statistics.missed_events;
+            if (search_.late()) ++run_.statistics.late_events;
+            dismiss_members();
+            if (search_.members().empty()) continue;
+            const bool on_time = time_event_due_ && search_.at() == step_.h();
+            transform(on_time);
+            if (!on_time && changes_nothing()) {
+                go_on_past_members();
+                continue;
+            }
+            act(on_time);
+            return true;
+        }
+        note_crossings(step_.h());
+        if (search_.notes().empty()) {
+            if (predicts && !cleared) ++run_.statistics.false_alarms;
+            run_.statistics.evidence.add(search_.evidence());
+        } else {
+            record_notes(step_.h());
+        }
+        bank_.pass_on_after_events();
+        return ended_;
+    }
+
+    /// Members whose crossing is no event go on without one: those that `enabled`
+    /// rules out, and repeats of an event inside its own window.
+    void dismiss_members()
+    {
+        auto& members = search_.members();
+        std::size_t kept = 0;
+        for (std::size_t k = 0; k < members.size(); ++k) {
+            const std::size_t i = members[k];
+            const double t = step_.time(search_.at());
+            if (!detail::call_enabled_at(*system_, i, step_.mode(), t, search_.before())) {
+                ++run_.statistics.disabled;
+            } else if (repeats(i, t)) {
+                ++run_.statistics.suppressed;
+            } else {
+                members[kept++] = i;
+                continue;
+            }
+            search_.pass(step_, bank_, i, calls());
+        }
+        members.shrink(kept);
+    }
+
+    /// The guard has just had its event in the same direction.
+    [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
+    {
+        const detail::GuardRecord& record = bank_[i];
+        return !record.info.unilateral && record.side == record.last_side &&
+               std::fabs(t - record.last) <= event_window(t);
+    }
+
+    /// Computes what the resets of the members, all from the state before, make of it:
+    /// `after_`, `mode_after_`, or a conflict.
+    void transform(bool on_time)
+    {
+        const X& before = search_.before();
+        const Mode mode = step_.mode();
+        const double t = on_time ? time_event_ : step_.time(search_.at());
+        detail::assign(after_, before);
+        mode_after_ = mode;
+        conflict_ = {no_guard, no_guard};
+        if constexpr (detail::ResetsTogether<System, X>) {
+            std::size_t resetting = 0;
+            for (const std::size_t i : search_.members()) resetting += bank_[i].info.resets;
+            if (resetting > 0) {
+                mode_after_ = detail::call_reset_set(
+                    *system_, FiredGuards(search_.members().span(), on_time), mode, t, after_);
+                return;
+            }
+        } else if constexpr (resets) {
+            if (search_.members().size() == 1 && !on_time) {
+                const std::size_t i = search_.members()[0];
+                if (bank_[i].info.resets) {
+                    mode_after_ = detail::call_reset(*system_, i, mode, t, after_);
+                }
+                return;
+            }
+            mode_writer_ = no_guard;
+            writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
+            for (const std::size_t i : search_.members()) {
+                if (!bank_[i].info.resets) continue;
+                detail::assign(single_, before);
+                merge(i, detail::call_reset(*system_, i, mode, t, single_));
+            }
+        }
+        if constexpr (timed) {
+            if (on_time) {
+                if (search_.members().empty()) {
+                    mode_after_ = detail::call_time_reset(*system_, mode, t, after_);
+                } else {
+                    detail::assign(single_, before);
+                    merge(time_writer, detail::call_time_reset(*system_, mode, t, single_));
+                }
+            }
+        }
+    }
+
+    /// Adds to `after_` what one reset has made of the state before, in `single_`.
+    void merge(std::size_t writer, Mode mode)
+    {
+        const X& before = search_.before();
+        const auto claim = [&](std::size_t& owner, bool same) {
+            if (owner != no_guard && !same) conflict_ = {owner, writer};
+            owner = writer;
+        };
+        if (mode != step_.mode()) {
+            claim(mode_writer_, mode == mode_after_);
+            mode_after_ = mode;
+        }
+        if (single_.size() != before.size() || after_.size() != before.size()) {
+            conflict_ = {writers_.empty() ? writer : writers_[0], writer};
+            return;
+        }
+        detail::for_each_component(before, [&](auto c) {
+            if (single_[c] == before[c]) return;
+            claim(writers_[static_cast<std::size_t>(c)], single_[c] == after_[c]);
+            after_[c] = single_[c];
+        });
+    }
+
+    /// Whether the event leaves everything as it was, so that the step can stand.
+    [[nodiscard]] bool changes_nothing()
+    {
+        if (mode_after_ != step_.mode() || conflict_.first != no_guard) return false;
+        for (const std::size_t i : search_.members()) {
+            if (bank_[i].info.unilateral || ends_run(i)) return false;
+        }
+        return same(after_, search_.before());
+    }
+
+    [[nodiscard]] static bool same(const X& a, const X& b)
+    {
+        if (a.size() != b.size()) return false;
+        bool equal = true;
+        detail::for_each_component(a, [&](auto c) { equal = equal && a[c] == b[c]; });
+        return equal;
+    }
+
+    /// Whether this event of the guard, not yet counted, ends the run.
+    [[nodiscard]] bool ends_run(std::size_t i) const noexcept
+    {
+        const detail::GuardRecord& record = bank_[i];
+        return options_.stop_at_event ||
+               (record.info.stop_after > 0 && record.events + 1 >= record.info.stop_after);
+    }
+
+    void go_on_past_members()
+    {
+        for (const std::size_t i : search_.members()) {
+            search_.note(i, bank_[i].side);
+            search_.pass(step_, bank_, i, calls());
+        }
+    }
+
+    /// The set that was found cuts the step short.
+    void act(bool on_time)
+    {
+        const double s = search_.at();
+        const double t = on_time ? time_event_ : step_.time(s);
+        note_crossings(s);
+        for (const std::size_t i : search_.members()) {
+            bank_[i].band =
+                std::fabs(bank_.view(i, step_.mode(), calls()).value(t, search_.before()));
+        }
+        ++run_.statistics.steps;
+        emit_samples(s);
+        record_step(s);
+        record_notes(s);
+        fire({.located = true, .on_time = on_time});
+        if (on_time && !ended_) find_time_event();
+        cascade();
+    }
+
+    struct Firing {
+        bool located = false;  ///< inside the current step, else at its start
+        bool on_time = false;  ///< with a time event
+    };
+
+    /// The members fire: `search_.before()` becomes `after_`. Leaves who is flipped by
+    /// it as the new members.
+    void fire(const Firing& how)
+    {
+        const double s = how.located ? search_.at() : 0;
+        const double remainder = how.located ? search_.at_remainder() : 0;
+        const double t = how.on_time ? time_event_ : step_.time(s);
+        if (how.on_time) record_time_event(t);
+        for (const std::size_t i : search_.members()) record_crossing(i, t, how.located);
+        if (!goes_on()) {
+            step_.restart(s, remainder, search_.before(), step_.mode());
+            return;
+        }
+        step_.restart(s, remainder, after_, mode_after_);
+        if (how.on_time) step_.hold(t);
+        if (stops_) return end(Outcome::stopped_by_event, first_member());
+        if constexpr (guarded) {
+            if (accumulates()) return;
+            arm_all();
+        }
+    }
+
+    [[nodiscard]] std::size_t first_member()
+    {
+        return search_.members().empty() ? no_guard : search_.members()[0];
+    }
+
+    /// Whether the resets have left something to go on from; else the run has ended.
+    [[nodiscard]] bool goes_on()
+    {
+        const std::size_t modes = mode_count_of(*system_);
+        if (conflict_.first != no_guard) {
+            run_.other_guard = conflict_.second;
+            end(Outcome::conflicting_resets, conflict_.first);
+        } else if (modes > 0 && mode_after_ >= modes) {
+            end(Outcome::unknown_mode, first_member());
+        } else if (!detail::all_finite(after_) || after_.size() == 0) {
+            end(Outcome::non_finite, first_member());
+        }
+        return !ended_;
+    }
+
+    /// Whether the events of a member accumulate here. It comes to rest, or the run
+    /// ends.
+    [[nodiscard]] bool accumulates()
+    {
+        bool rested = false;
+        for (const std::size_t i : search_.members()) {
+            detail::GuardRecord& record = bank_[i];
+            const bool stalls = record.intervals.stalls(step_.start());
+            const double tolerance = event_tolerance(step_.start().value);
+            if (stalls || (resets && record.info.resets && record.intervals.accumulate(tolerance))) {
+                come_to_rest(i, stalls ? 0 : record.intervals.remainder());
+                rested = true;
+            }
+        }
+        if (rested && !ended_ && !resting_) arm_all();
+        return rested;
+    }
+
+    /// The limit of the events of guard i is `ahead` [s] from here.
+    void come_to_rest(std::size_t i, double ahead)
+    {
+        if constexpr (Resting<System, X>) {
+            if (resting_ || ended_) return;
+            const X before = step_.x0();
+            const Mode mode = step_.mode();
+            const double t = step_.time(ahead);
+            X after = before;
+            const Mode mode_after = detail::call_rest(*system_, i, mode, t, after);
+            ++run_.statistics.events;
+            record({.t = t,
+                    .kind = EventKind::accumulation,
+                    .guard = i,
+                    .mode_before = mode,
+                    .mode_after = mode_after,
+                    .before = before,
+                    .after = after,
+                    .bracket = {step_.time(0), t},
+                    .slope = 0,
+                    .error = ahead});
+            if (!detail::all_finite(after)) return end(Outcome::non_finite, i);
+            step_.restart(ahead, 0, after, mode_after);
+            bank_[i].intervals = {};
+            bank_[i].band = 0;
+            resting_ = fixed == 1 && !Moded<System, X>;
+        } else {
+            end(Outcome::zeno, i);
+        }
+    }
+
+    // --- arming ---
+
+    void enable_guards()
+    {
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            detail::GuardRecord& record = bank_[i];
+            const bool enabled = detail::call_enabled_in(*system_, i, step_.mode());
+            record.newly_enabled = enabled && !record.enabled;
+            record.enabled = enabled;
+        }
+    }
+
+    /// Arms every guard at the start of a flight. The members have fired and count as
+    /// being on their surface up to the residue of their location. Those that the
+    /// resets have carried across their surface become the new members.
+    void arm_all()
+    {
+        double widest = 0;
+        for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].fired = false;
+        for (const std::size_t i : search_.members()) {
+            bank_[i].fired = true;
+            widest = std::max(widest, bank_[i].band);
+        }
+        search_.members().clear();
+        if constexpr (Moded<System, X>) enable_guards();
+        bank_.sample_start(step_, calls(), h_next_);
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            if (!bank_[i].enabled) {
+                bank_.arm(i, Side::plateau);
+                continue;
+            }
+            if (!arm_one(i, widest)) return;
+        }
+    }
+
+    /// False: the run has ended.
+    [[nodiscard]] bool arm_one(std::size_t i, double widest)
+    {
+        detail::GuardRecord& record = bank_[i];
+        const double g = bank_.g0(i);
+        if (!std::isfinite(g)) {
+            end(Outcome::non_finite, i);
+            return false;
+        }
+        const Side before = record.side;
+        const double band = record.fired ? record.band : record.newly_enabled ? widest : 0;
+        const bool on_surface = std::fabs(g) <= band;
+        const Side side = on_surface ? heading(i) : side_of(g);
+        bank_.arm(i, side);
+        record.from = 0;
+        const bool kept_out = record.info.unilateral && side != Side::above;
+        if (record.fired) {
+            if (kept_out && on_surface) search_.members().push_back(i);
+        } else if (record.newly_enabled) {
+            const bool at_once = on_surface && counts(opposite(side), record.info.crossing);
+            if (record.acting && (at_once || (kept_out && on_surface))) {
+                search_.members().push_back(i);
+            }
+        } else if (side != Side::plateau && side == opposite(before) &&
+                   counts(before, record.info.crossing)) {
+            if (record.acting) {
+                search_.members().push_back(i);
+            } else {
+                record_jump(i, before);
+            }
+        }
+        const bool outside = kept_out && !on_surface && g < 0 && (record.fired || record.newly_enabled);
+        if (outside) end(Outcome::outside_mode, i);
+        return !outside;
+    }
+
+    /// The side that a guard on its surface is about to be on.
+    [[nodiscard]] Side heading(std::size_t i)
+    {
+        const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+        if (rate != 0) return side_of(rate);
+        if (bank_[i].info.boolean) return side_of(bank_.g0(i));
+        // The second derivative has the sign of the rate a little later.
+        const double delta = 1e-6 * h_next_;
+        detail::assign(after_, step_.x0());
+        detail::assign(single_, step_.x0());
+        detail::move(after_, step_.x0(), delta, step_.rate0());
+        step_.flow(delta, after_, single_);
+        const Side side = side_of(bank_.view(i, step_.mode(), calls())
+                                      .rate(step_.time(delta), after_, single_, h_next_));
+        bank_.set_rate0(i, detail::sign_of(side) * std::numeric_limits<double>::min());
+        return side;
+    }
+
+    /// Those that were flipped fire in turn, at the same instant, until nobody is.
+    void cascade()
+    {
+        for (int level = 0; !ended_ && !resting_ && !search_.members().empty(); ++level) {
+            if (level == most_levels) {
+                return end(Outcome::endless_cascade, search_.members()[0]);
+            }
+            search_.begin(step_.x0());
+            detail::assign(search_.before(), step_.x0());
+            search_.stay_at_start();
+            transform(false);
+            const std::size_t stuck = stuck_member();
+            if (stuck != no_guard) {
+                come_to_rest(stuck, 0);
+                if (!ended_ && !resting_) {
+                    search_.members().clear();
+                    search_.members().push_back(stuck);
+                    arm_all();
+                    if (bank_[stuck].info.unilateral && bank_[stuck].enabled &&
+                        bank_[stuck].side == Side::below) {
+                        end(Outcome::zeno, stuck);
+                    }
+                    if (bank_[stuck].side == Side::plateau) drop_member(stuck);
+                }
+                continue;
+            }
+            for (const std::size_t i : search_.members()) bank_[i].band = 0;
+            fire({});
+        }
+    }
+
+    void drop_member(std::size_t i)
+    {
+        auto& members = search_.members();
+        std::size_t kept = 0;
+        for (std::size_t k = 0; k < members.size(); ++k) {
+            if (members[k] != i) members[kept++] = members[k];
+        }
+        members.shrink(kept);
+    }
+
+    /// A unilateral guard on its surface that its reset does not turn back.
+    [[nodiscard]] std::size_t stuck_member()
+    {
+        if (mode_after_ != step_.mode() || !same(after_, step_.x0())) return no_guard;
+        for (const std::size_t i : search_.members()) {
+            if (bank_[i].info.unilateral) return i;
+        }
+        return no_guard;
+    }
+
+    // --- output ---
+
+    void note_crossings(double s)
+    {
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
+            const GuardSample last = s == step_.h() ? bank_.end(i, s)
+                                                    : search_.sample_at_set(step_, bank_, i, calls());
+            search_.note_crossings(step_, bank_, i, last, detector_, locator_,
+                                   event_tolerance(step_.time(s)), calls());
+        }
+    }
+
+    void record(Event<X>&& event)
+    {
+        if (!options_.record_events) return;
+        if (run_.events.empty()) run_.events.reserve(16);  // most runs grow no further
+        run_.events.push_back(std::move(event));
+    }
+
+    void count_event(std::size_t i, double t, Side side)
+    {
+        detail::GuardRecord& record = bank_[i];
+        ++run_.statistics.events;
+        ++record.events;
+        record.last = t;
+        record.last_side = side;
+    }
+
+    void record_time_event(double t)
+    {
+        stops_ = options_.stop_at_event;
+        ++run_.statistics.events;
+        record({.t = t,
+                .kind = EventKind::time,
+                .guard = no_guard,
+                .mode_before = step_.mode(),
+                .mode_after = mode_after_,
+                .before = search_.before(),
+                .after = after_,
+                .bracket = {t, t},
+                .slope = 0});
+    }
+
+    /// A member of the set, found inside the step or flipped at its start.
+    void record_crossing(std::size_t i, double t, bool located)
+    {
+        stops_ = (stops_ && i != first_member()) || ends_run(i);
+        count_event(i, t, bank_[i].side);
+        if (!options_.record_events) return;
+        const Location where = located ? search_.where(i) : Location{};
+        record({.t = t,
+                .guard = i,
+                .mode_before = step_.mode(),
+                .mode_after = mode_after_,
+                .before = search_.before(),
+                .after = after_,
+                .bracket = {step_.time(where.lo), step_.time(where.hi)},
+                .slope = where.slope,
+                .error = where.error,
+                .late = located && search_.late()});
+    }
+
+    /// A notification of a guard that a reset has carried across its surface.
+    void record_jump(std::size_t i, Side before)
+    {
+        const double t = step_.time(0);
+        count_event(i, t, before);
+        record({.t = t,
+                .guard = i,
+                .mode_before = step_.mode(),
+                .mode_after = step_.mode(),
+                .before = step_.x0(),
+                .after = step_.x0(),
+                .bracket = {t, t}});
+    }
+
+    /// What happened in the step up to offset s without consequence.
+    void record_notes(double s)
+    {
+        search_.keep_notes_until(s);
+        for (const detail::Note& note : search_.notes()) {
+            const double t = step_.time(note.where.root);
+            count_event(note.guard, t, note.side);
+            if (!options_.record_events) continue;
+            Event<X> event{.t = t,
+                           .kind = note.kind,
+                           .guard = note.guard,
+                           .mode_before = step_.mode(),
+                           .mode_after = step_.mode(),
+                           .bracket = {step_.time(note.where.lo), step_.time(note.where.hi)},
+                           .slope = note.where.slope,
+                           .error = note.where.error};
+            if (options_.event_states) {
+                event.before = search_.state_at(step_, note);
+                event.after = event.before;
+            }
+            record(std::move(event));
+        }
+    }
+
+    void record_step(double s)
+    {
+        if (options_.record_steps && s > 0) {
+            run_.solution.add(step_.time(0), backward_, step_.mode(), step_.dense(), s);
+        }
+    }
+
+    [[nodiscard]] bool lies_before(double t, double end) const noexcept
+    {
+        return backward_ ? t > end : t < end;
+    }
+
+    /// Samples of the current step before its offset s.
+    void emit_samples(double s)
+    {
+        const auto& times = options_.sample_times;
+        while (next_sample_ < times.size() && lies_before(times[next_sample_], step_.time(s))) {
+            const double offset = std::min(step_.until(times[next_sample_]), s);
+            X x = step_.x0();
+            if (offset > 0) step_.sample(offset, x);
+            add_sample(std::move(x));
+        }
+    }
+
+    /// Samples of a state that does not move, before the time `until`.
+    void emit_held_samples(double until)
+    {
+        const auto& times = options_.sample_times;
+        while (next_sample_ < times.size() && lies_before(times[next_sample_], until)) {
+            add_sample(X(step_.x0()));
+        }
+    }
+
+    void add_sample(X&& x)
+    {
+        run_.trajectory.t.push_back(options_.sample_times[next_sample_]);
+        run_.trajectory.x.push_back(std::move(x));
+        ++next_sample_;
+    }
+
+    // --- saving ---
+
+    template <class Visitor>
+    void visit_state(Visitor&& visit)
+    {
+        if constexpr (std::remove_cvref_t<Visitor>::saves) place_ = step_.place();
+        visit(place_.t.value);
+        visit(place_.t.remainder);
+        visit(place_.mode);
+        for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
+        visit(h_next_);
+        visit(time_event_);
+        visit(resting_);
+        visit(ended_);
+        visit(run_.outcome);
+        visit(next_sample_);
+        if constexpr (guarded) bank_.visit(visit);
+    }
+
+    static constexpr int most_levels = 100;
+    static constexpr std::size_t time_writer = static_cast<std::size_t>(-2);
+    static constexpr ErrorRule rule_{};
+
+    const System* system_;
+    Options options_;
+    Detector detector_;
+    Locator locator_;
+    bool backward_;
+    CurrentStep step_;
+    Bank bank_;
+    Search search_;
+    double h_next_ = 0;
+    double time_event_ = std::numeric_limits<double>::infinity();
+    bool time_event_due_ = false;
+    bool is_last_ = false;
+    bool ended_ = false;
+    bool resting_ = false;
+    bool stops_ = false;
+    X after_;
+    X single_ = after_;
+    Mode mode_after_ = 0;
+    std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
+    std::vector<std::size_t> writers_;
+    std::size_t mode_writer_ = no_guard;
+    std::size_t next_sample_ = 0;
+    detail::StepStart<X> place_;
+    Run<X> run_;
+};
+
+}  // namespace ricochet

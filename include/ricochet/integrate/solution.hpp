@@ -1,0 +1,105 @@
+// The whole solution, to be asked for any time afterwards.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "ricochet/hybrid/components.hpp"
+#include "ricochet/hybrid/dense_polynomial.hpp"
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet {
+
+/// Steps as polynomials, of the order that the method reaches over many steps. Where
+/// the state jumps there is a value on either side.
+template <class State>
+class Solution {
+public:
+    [[nodiscard]] bool empty() const noexcept { return pieces_.empty(); }
+    [[nodiscard]] std::size_t size() const noexcept { return pieces_.size(); }
+
+    /// x at time t [s], after an event at t. Before the first and after the last
+    /// recorded step the nearest state that was computed. Needs at least one step.
+    [[nodiscard]] State operator()(double t) const { return evaluate(pieces_[after(t)], t); }
+
+    /// x at time t [s], before an event at t.
+    [[nodiscard]] State before(double t) const
+    {
+        std::size_t k = after(t);
+        while (k > 0 && offset(pieces_[k], t) <= 0) --k;
+        return evaluate(pieces_[k], t);
+    }
+
+    /// The mode at time t [s], after an event at t.
+    [[nodiscard]] Mode mode(double t) const { return pieces_[after(t)].mode; }
+
+    /// Adds a step of which the first `length` [s] were used.
+    void add(double t0, bool backward, Mode mode, const DenseParts<State>& parts, double length)
+    {
+        Piece piece{.t = t0,
+                    .length = length,
+                    .h = parts.h,
+                    .backward = backward,
+                    .mode = mode,
+                    .nodes = parts.nodes,
+                    .x0 = *parts.x0,
+                    .remainder = *parts.remainder,
+                    .rate0 = *parts.rate0};
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (parts.w[k]) piece.w.push_back(*parts.w[k]);
+            if (parts.w[k] && parts.slope[k]) piece.slope.push_back(*parts.slope[k]);
+        }
+        pieces_.push_back(std::move(piece));
+    }
+
+private:
+    struct Piece {
+        double t, length, h;
+        bool backward;
+        Mode mode;
+        DenseNodes nodes;
+        State x0, remainder, rate0;
+        std::vector<State> w{}, slope{};
+    };
+
+    [[nodiscard]] static double offset(const Piece& piece, double t) noexcept
+    {
+        return piece.backward ? piece.t - t : t - piece.t;
+    }
+
+    /// The last piece that starts at t or before it.
+    [[nodiscard]] std::size_t after(double t) const noexcept
+    {
+        const auto later = [](double time, const Piece& piece) { return offset(piece, time) < 0; };
+        const auto it = std::upper_bound(pieces_.begin(), pieces_.end(), t, later);
+        return it == pieces_.begin() ? 0 : static_cast<std::size_t>(it - pieces_.begin()) - 1;
+    }
+
+    [[nodiscard]] static State evaluate(const Piece& piece, double t)
+    {
+        DenseParts<State> parts{.nodes = piece.nodes,
+                                .h = piece.h,
+                                .x0 = &piece.x0,
+                                .remainder = &piece.remainder,
+                                .rate0 = &piece.rate0};
+        const std::size_t without_slope = piece.w.size() - piece.slope.size();
+        for (std::size_t k = 0; k < piece.w.size(); ++k) {
+            parts.w[k] = &piece.w[k];
+            if (k >= without_slope) parts.slope[k] = &piece.slope[k - without_slope];
+        }
+        State x = piece.x0;
+        const double s = std::clamp(offset(piece, t), 0.0, piece.length);
+        if (s > 0) {
+            const DenseView<State, false> view(parts, s);
+            detail::for_each_component(x, [&](auto i) { x[i] = view[i]; });
+        }
+        return x;
+    }
+
+    std::vector<Piece> pieces_;
+};
+
+}  // namespace ricochet
