@@ -65,6 +65,13 @@ public:
 
     [[nodiscard]] GuardList<std::size_t, fixed>& members() noexcept { return members_; }
     [[nodiscard]] std::vector<Note>& notes() noexcept { return notes_; }
+    /// Crossings of guard i that are noted, but not yet recorded.
+    [[nodiscard]] std::uint64_t noted(std::size_t i) const noexcept
+    {
+        return static_cast<std::uint64_t>(std::count_if(
+            notes_.begin(), notes_.end(),
+            [i](const Note& note) { return note.guard == i && note.kind == EventKind::crossing; }));
+    }
     [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
 
     /// Whether the set was only found at a step after the one that held it.
@@ -102,11 +109,11 @@ public:
         }
         if (hits_.empty()) return false;
         if (hits_.size() == 1) {
-            locate(step, bank, hits_[0], locator, tolerance, calls);
             members_.push_back(hits_[0].guard);
         } else {
             close_set(step, bank, locator, tolerance, window, calls);
         }
+        if (members_.size() == 1) locate_alone(step, bank, locator, tolerance, calls);
         settle_place(step, time_event_due && at_ + window >= step.h());
         return true;
     }
@@ -122,19 +129,9 @@ public:
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch{
                 .side = record.side, .start = bank.start(i), .end = end, .touch = record.touch()};
-            if (is_plateau(probe, watch)) {
-                record.next = Side::plateau;
-                return;
-            }
-            const Finding finding = look(probe, watch, record, detector);
-            if (finding.touch) {
-                touched(bank, i, finding);
-                continue;
-            }
-            if (!finding.hit) {
-                record.next = watch.side_after;
-                return;
-            }
+            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            if (finding.touch) continue;
+            if (!finding.hit) return;
             probe.watch(finding.side);
             const Location where = find(probe, finding, record, locator, tolerance);
             const Side side = opposite(finding.side);
@@ -218,16 +215,35 @@ private:
     /// Both ends of the stretch are on the surface: so is the middle of a plateau.
     [[nodiscard]] static bool is_plateau(Probe& probe, const Watch& watch)
     {
-        return watch.end.value == 0 && watch.start.value == 0 &&
+        return watch.end.value == 0 &&
+               std::fabs(watch.start.value) <= std::numeric_limits<double>::min() &&
                probe.value(watch.start.s + (watch.end.s - watch.start.s) / 2).value == 0;
     }
 
-    [[nodiscard]] Finding look(Probe& probe, Watch& watch, const GuardRecord& record,
-                               const Detector& detector)
+    /// What the guard does next in the stretch. A touch is noted, and a clear stretch
+    /// decides on which side the guard is at its end.
+    [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i,
+                                       const Detector& detector)
     {
-        Finding finding =
+        GuardRecord& record = bank[i];
+        // What is left after an event at the end of a step is that event's residue.
+        const double h = probe.step().h();
+        if (record.from > 0 && watch.end.s - record.from <= 8 * finest_bracket(watch.end.s, h)) {
+            record.next = record.side;
+            return Finding::clear(evidence_);
+        }
+        if (is_plateau(probe, watch)) {
+            record.next = Side::plateau;
+            return Finding::clear(evidence_);
+        }
+        const Finding finding =
             record.info.boolean ? Ends{}.examine(probe, watch) : detector.examine(probe, watch);
-        if (!finding.hit) evidence_ = std::max(evidence_, finding.evidence);
+        if (finding.touch) {
+            touched(bank, i, finding);
+        } else if (!finding.hit) {
+            evidence_ = std::max(evidence_, finding.evidence);
+            record.next = watch.side_after;
+        }
         return finding;
     }
 
@@ -281,24 +297,13 @@ private:
                         .start = bank.start(i),
                         .end = bank.end(i, step.h()),
                         .touch = record.touch()};
-            if (is_plateau(probe, watch)) {
-                record.next = Side::plateau;
-                return;
-            }
-            const Finding finding = look(probe, watch, record, detector);
-            if (finding.touch) {
-                touched(bank, i, finding);
-                continue;
-            }
-            if (!finding.hit) {
-                record.next = watch.side_after;
-                return;
-            }
+            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            if (finding.touch) continue;
+            if (!finding.hit) return;
             late_ = late_ || finding.late;
             Hit hit;
             hit.guard = i;
             hit.finding = finding;
-            hit.guess = guess(finding);
             hits_.push_back(hit);
             return;
         }
@@ -307,6 +312,9 @@ private:
     /// Where a cubic through the ends of the stretch would have its root.
     [[nodiscard]] static double guess(const Finding& finding) noexcept
     {
+        if (!std::isfinite(finding.lo.rate) || !std::isfinite(finding.hi.rate)) {
+            return finding.hi.s;
+        }
         const double width = finding.hi.s - finding.lo.s;
         const double u = hermite_root(finding.lo.value, finding.lo.rate * width, finding.hi.value,
                                       finding.hi.rate * width, sign_of(finding.side));
@@ -322,15 +330,22 @@ private:
         probe.watch(hit.finding.side);
         hit.where = find(probe, hit.finding, bank[hit.guard], locator, tolerance);
         hit.located = true;
-        if (hits_.size() == 1) {
-            at_ = hit.where.root;
-            at_remainder_ = hit.where.root_remainder;
-            if (hit.finding.late) {
-                assign(before_, step.x0());
-            } else {
-                assign(before_, probe.state_at(hit.where));
-            }
-        }
+    }
+
+    /// Locates the only member of the set, and keeps the state at its root.
+    void locate_alone(const CurrentStep& step, Bank& bank, const Locator& locator, double tolerance,
+                      std::uint64_t& calls)
+    {
+        Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
+            return candidate.guard == members_[0];
+        });
+        const auto guard = bank.view(hit.guard, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        probe.watch(hit.finding.side);
+        hit.where = find(probe, hit.finding, bank[hit.guard], locator, tolerance);
+        at_ = hit.where.root;
+        at_remainder_ = hit.where.root_remainder;
+        assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
     }
 
     /// Locates candidates until every one that has left its side by the end of the
@@ -339,7 +354,10 @@ private:
                    double window, std::uint64_t& calls)
     {
         double first = std::numeric_limits<double>::infinity();
-        for (const Hit& hit : hits_) first = std::min(first, hit.guess);
+        for (Hit& hit : hits_) {
+            hit.guess = guess(hit.finding);
+            first = std::min(first, hit.guess);
+        }
         for (Hit& hit : hits_) {
             if (hit.guess == first) locate(step, bank, hit, locator, tolerance, calls);
         }

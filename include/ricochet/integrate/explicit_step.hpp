@@ -88,6 +88,13 @@ public:
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
     [[nodiscard]] bool backward() const noexcept { return backward_; }
 
+    /// The time at offset s + `remainder`.
+    [[nodiscard]] Instant instant(double s, double remainder) const noexcept
+    {
+        const Instant at = start_.after(in_time(s));
+        return remainder == 0 ? at : at.after(in_time(remainder));
+    }
+
     /// Seconds from the start to time t, positive if it lies ahead.
     [[nodiscard]] double until(double t) const noexcept
     {
@@ -227,8 +234,7 @@ public:
     /// an event. The state may have another dimension.
     void restart(double s, double remainder, const X& x, Mode mode)
     {
-        start_ = start_.after(in_time(s));
-        if (remainder != 0) start_ = start_.after(in_time(remainder));
+        start_ = instant(s, remainder);
         begin(x, mode);
         flow(0, x0_, rate0_);
     }

@@ -55,6 +55,7 @@ struct GuardRecord {
     bool enabled = true;
     bool newly_enabled = false;
     bool fired = false;
+    bool rested = false;  ///< its events have accumulated
     bool acting = false;  ///< resets, or may end the run; else a notification
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
@@ -119,6 +120,9 @@ public:
     void sample_start(const Step& step, std::uint64_t& calls, double scale)
     {
         sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
+        if (Detector::uses_rates) {
+            for (std::size_t i = 0; i < size(); ++i) note_size(i, g0_[i]);
+        }
     }
 
     /// Samples all guards at the end of a step.
@@ -191,9 +195,7 @@ public:
         for (std::size_t i = 0; i < size(); ++i) {
             g0_[i] = g1_[i];
             rate0_[i] = rate1_[i];
-            if (Detector::uses_rates) {
-                records_[i].size = std::fmax(records_[i].size, std::fabs(g1_[i]));
-            }
+            if (Detector::uses_rates) note_size(i, g1_[i]);
             if (sign_[i] == 0 && records_[i].enabled) arm(i, side_of(g1_[i]));
         }
     }
@@ -244,6 +246,12 @@ public:
 
 private:
     using Doubles = PerGuard<double, fixed>;
+
+    void note_size(std::size_t i, double g) noexcept
+    {
+        const double size = std::fabs(g);
+        if (size > records_[i].size) records_[i].size = size;
+    }
 
     [[nodiscard]] static double known(double rate) noexcept
     {

@@ -130,7 +130,8 @@ public:
         return !ended_;
     }
 
-    /// Goes on to the next event or sample time. False: the run has ended.
+    /// Takes steps until one of them holds an event or a sample time. False: the run has
+    /// ended.
     bool advance()
     {
         const std::uint64_t events = run_.statistics.events;
@@ -558,7 +559,7 @@ private:
     {
         const X& before = search_.before();
         const Mode mode = step_.mode();
-        const double t = on_time ? time_event_ : step_.time(search_.at());
+        const double t = on_time ? time_event_ : time_of_set();
         detail::assign(after_, before);
         mode_after_ = mode;
         conflict_ = {no_guard, no_guard};
@@ -643,8 +644,9 @@ private:
     [[nodiscard]] bool ends_run(std::size_t i) const noexcept
     {
         const detail::GuardRecord& record = bank_[i];
-        return options_.stop_at_event ||
-               (record.info.stop_after > 0 && record.events + 1 >= record.info.stop_after);
+        if (options_.stop_at_event) return true;
+        return record.info.stop_after > 0 &&
+               record.events + search_.noted(i) + 1 >= record.info.stop_after;
     }
 
     void go_on_past_members()
@@ -659,7 +661,7 @@ private:
     void act(bool on_time)
     {
         const double s = search_.at();
-        const double t = on_time ? time_event_ : step_.time(s);
+        const double t = on_time ? time_event_ : time_of_set();
         note_crossings(s);
         for (const std::size_t i : search_.members()) {
             bank_[i].band =
@@ -674,6 +676,11 @@ private:
         cascade();
     }
 
+    [[nodiscard]] double time_of_set() const noexcept
+    {
+        return step_.instant(search_.at(), search_.at_remainder()).value;
+    }
+
     struct Firing {
         bool located = false;  ///< inside the current step, else at its start
         bool on_time = false;  ///< with a time event
@@ -685,7 +692,7 @@ private:
     {
         const double s = how.located ? search_.at() : 0;
         const double remainder = how.located ? search_.at_remainder() : 0;
-        const double t = how.on_time ? time_event_ : step_.time(s);
+        const double t = how.on_time ? time_event_ : step_.instant(s, remainder).value;
         if (how.on_time) record_time_event(t);
         for (const std::size_t i : search_.members()) record_crossing(i, t, how.located);
         if (!goes_on()) {
@@ -764,6 +771,7 @@ private:
             step_.restart(ahead, 0, after, mode_after);
             bank_[i].intervals = {};
             bank_[i].band = 0;
+            bank_[i].rested = true;
             resting_ = fixed == 1 && !Moded<System, X>;
         } else {
             end(Outcome::zeno, i);
@@ -820,7 +828,9 @@ private:
         const Side side = on_surface ? heading(i) : side_of(g);
         bank_.arm(i, side);
         record.from = 0;
-        const bool kept_out = record.info.unilateral && side != Side::above;
+        if (side == Side::above) record.rested = false;
+        const bool lies = record.rested && side == Side::plateau;
+        const bool kept_out = record.info.unilateral && side != Side::above && !lies;
         if (record.fired) {
             if (kept_out && on_surface) search_.members().push_back(i);
         } else if (record.newly_enabled) {
@@ -877,11 +887,7 @@ private:
                     search_.members().clear();
                     search_.members().push_back(stuck);
                     arm_all();
-                    if (bank_[stuck].info.unilateral && bank_[stuck].enabled &&
-                        bank_[stuck].side == Side::below) {
-                        end(Outcome::zeno, stuck);
-                    }
-                    if (bank_[stuck].side == Side::plateau) drop_member(stuck);
+                    if (still_stuck(stuck)) end(Outcome::zeno, stuck);
                 }
                 continue;
             }
@@ -890,14 +896,10 @@ private:
         }
     }
 
-    void drop_member(std::size_t i)
+    /// The rest rule has not stopped the motion into the surface.
+    [[nodiscard]] bool still_stuck(std::size_t i) const noexcept
     {
-        auto& members = search_.members();
-        std::size_t kept = 0;
-        for (std::size_t k = 0; k < members.size(); ++k) {
-            if (members[k] != i) members[kept++] = members[k];
-        }
-        members.shrink(kept);
+        return bank_[i].info.unilateral && bank_[i].enabled && bank_[i].side == Side::below;
     }
 
     /// A unilateral guard on its surface that its reset does not turn back.

@@ -16,6 +16,7 @@ namespace ricochet {
 ///     flow    x' = (v, -gravity)
 ///     guard   u, falling
 ///     reset   u⁺ = 0,  v⁺ = -restitution v⁻
+///     rest    u = 0,   v = 0
 ///
 /// (Saunders, Steyer and Kuether, SAND2023-06682C, eqs. 1 and 2.) For 0 <
 /// restitution < 1 the impacts accumulate at `zeno_time`. Functions are generic
@@ -82,6 +83,14 @@ public:
     {
         x[0] = 0;
         x[1] *= -restitution_;
+    }
+
+    /// After infinitely many impacts the ball lies on the floor.
+    template <class X>
+    void rest(double /*t*/, X& x) const noexcept
+    {
+        x[0] = 0;
+        x[1] = 0;
     }
 
     /// Time [s] from `height` [m] >= 0 and `velocity` [m/s] to the first impact.
