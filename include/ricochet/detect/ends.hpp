@@ -20,6 +20,13 @@ struct Ends {
         return !(sign * g1 > 0);
     }
 
+    /// Whether the stretch holds one crossing and nothing else, as far as its ends tell.
+    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& /*start*/,
+                                             const GuardSample& end, double /*touch*/) noexcept
+    {
+        return sign * end.value < 0;
+    }
+
     template <class Probe>
     [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
     {

@@ -59,14 +59,26 @@ struct Extremum {
                                                  double rate1, double h) noexcept
     {
         const double v1 = sign * g1;
-        const double slope0 = sign * rate0 * h / 3;
-        const double slope1 = sign * rate1 * h / 3;
+        const double slope0 = sign * rate0 * (h / 3);
+        const double slope1 = sign * rate1 * (h / 3);
         const double b1 = sign * g0 + slope0;
         const double b2 = v1 - slope1;
         const double lowest = std::min(std::min(b1, b2), v1);
         const double highest = std::max(std::max(b1, b2), v1);
-        const bool turns = slope0 <= 0 && slope1 > 0;
-        return !(v1 > 0) || !(lowest > 0) || (turns && !(5 * lowest > 4 * highest));
+        const bool turns = (slope0 <= 0) & (slope1 > 0);
+        return !(v1 > 0) | !(lowest > 0) | (turns & !(5 * lowest > 4 * highest));
+    }
+
+    /// Whether the stretch holds one crossing and nothing else, as far as its ends tell:
+    /// the cubic is beyond the surface at the end, and its control points do not come
+    /// back.
+    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,
+                                             const GuardSample& end, double touch) noexcept
+    {
+        const double third = (end.s - start.s) / 3;
+        const double b1 = sign * (start.value + start.rate * third);
+        const double b2 = sign * (end.value - end.rate * third);
+        return sign * end.value < -touch && !(b1 < 0 && b2 > 0) && std::isfinite(b1 + b2);
     }
 
     template <class Probe>
@@ -107,8 +119,8 @@ private:
     /// The guard has left its side at the end, but its cubic says that it may have left
     /// before, come back and left again.
     template <class Probe>
-    [[nodiscard]] static Finding first_of_three(Probe& probe, const Watch& watch,
-                                                const detail::GuardCubic& cubic)
+    [[gnu::noinline]] static Finding first_of_three(Probe& probe, Watch watch,
+                                                    detail::GuardCubic cubic)
     {
         const Side side = watch.side;
         const bool leaving_counts = counts(side, probe.guard().crossing());
@@ -127,8 +139,8 @@ private:
 
     /// Both ends are on the armed side: is the extremum between them, too?
     template <class Probe>
-    [[nodiscard]] static Finding look_for_pair(Probe& probe, const Watch& watch,
-                                               const detail::GuardCubic& cubic)
+    [[gnu::noinline]] static Finding look_for_pair(Probe& probe, Watch watch,
+                                                   detail::GuardCubic cubic)
     {
         GuardSample lo = watch.start;
         GuardSample hi = watch.end;

@@ -111,6 +111,13 @@ public:
         return Ends::suspects(sign, g0, rate0, g1, rate1, h);
     }
 
+    /// A prediction may have been late, so that every event is looked at with care.
+    [[nodiscard]] static bool leaves_plainly(double, const GuardSample&, const GuardSample&,
+                                             double) noexcept
+    {
+        return false;
+    }
+
     template <class Probe>
     [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
     {

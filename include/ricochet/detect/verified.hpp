@@ -48,6 +48,12 @@ public:
         return Exact::suspects(sign, g0, rate0, g1, rate1, h);
     }
 
+    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,
+                                             const GuardSample& end, double touch) noexcept
+    {
+        return Exact::leaves_plainly(sign, start, end, touch);
+    }
+
     template <class Probe>
     [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
     {

@@ -24,6 +24,33 @@
 
 namespace ricochet::detail {
 
+/// How finely events are told apart, at a time.
+class EventResolution {
+public:
+    explicit EventResolution(const Options& options) noexcept
+        : absolute_(options.event_tolerance),
+          relative_(options.event_rtol),
+          window_(options.event_window)
+    {
+    }
+
+    /// Width [s] of a bracket that is narrow enough.
+    [[nodiscard]] double tolerance(double t) const noexcept
+    {
+        return absolute_ + relative_ * std::fabs(t);
+    }
+
+    /// Events no further apart [s] happen together.
+    [[nodiscard]] double window(double t) const noexcept
+    {
+        const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+        return std::max(std::max(tolerance(t), window_), ulps);
+    }
+
+private:
+    double absolute_, relative_, window_;
+};
+
 /// An event that changes nothing, found inside a step.
 struct Note {
     std::size_t guard;
@@ -35,6 +62,7 @@ struct Note {
 /// A guard that acts, found to leave its side inside a step.
 struct Hit {
     std::size_t guard = 0;
+    Side side = Side::plateau;  ///< that it leaves
     Finding finding;
     double guess = 0;  ///< [s] offset
     bool located = false;
@@ -92,48 +120,50 @@ public:
         return hits_[0].where;
     }
 
-    /// Finds the first set of acting guards in the step. `window` [s]; events no
-    /// further than that from `due` [s], the end of the step if a time event is due
-    /// there, belong to it. False: none.
+    /// Finds the first set of acting guards in the step; a time event that is due at
+    /// its end belongs to it if it lies in the window. False: none.
     [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank, const Detector& detector,
-                                const Locator& locator, double tolerance, double window,
+                                const Locator& locator, const EventResolution& resolution,
                                 bool time_event_due, std::uint64_t& calls)
     {
         hits_.clear();
         members_.clear();
         evidence_ = Detector::evidence;
         late_ = false;
+        std::size_t suspects = 0;
+        std::size_t last = 0;
         for (std::size_t i = 0; i < bank.size(); ++i) {
             if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
-            examine(step, bank, i, detector, calls);
+            ++suspects;
+            last = i;
         }
-        if (hits_.empty()) return false;
-        if (hits_.size() == 1) {
-            members_.push_back(hits_[0].guard);
-        } else {
-            close_set(step, bank, locator, tolerance, window, calls);
+        if (suspects == 0) return false;
+        if (suspects == 1) {
+            if (!find_only(step, bank, last, detector, locator, resolution, calls)) return false;
+        } else if (!find_among(step, bank, detector, locator, resolution, calls)) {
+            return false;
         }
-        if (members_.size() == 1) locate_alone(step, bank, locator, tolerance, calls);
+        const double window = resolution.window(step.time(at_));
         settle_place(step, time_event_due && at_ + window >= step.h());
         return true;
     }
 
     /// Adds the crossings and touches of a notifying guard, up to the sample `end`.
     void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
-                        const Detector& detector, const Locator& locator, double tolerance,
-                        std::uint64_t& calls)
+                        const Detector& detector, const Locator& locator,
+                        const EventResolution& resolution, std::uint64_t& calls)
     {
         GuardRecord& record = bank[i];
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_, record.info.boolean ? Path::restep : Path::dense);
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch{
-                .side = record.side, .start = bank.start(i), .end = end, .touch = record.touch()};
+                .side = record.side, .start = bank.start(i), .end = end, .touch = bank.touch(i)};
             const Finding finding = next_finding(probe, watch, bank, i, detector);
             if (finding.touch) continue;
             if (!finding.hit) return;
             probe.watch(finding.side);
-            const Location where = find(probe, finding, record, locator, tolerance);
+            const Location where = find(probe, finding, record, locator, resolution);
             const Side side = opposite(finding.side);
             bool counted = true;
             if constexpr (has_predicate) {
@@ -164,7 +194,7 @@ public:
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (const Hit& hit : hits_) {
-            if (hit.guard == i) pass(bank, i, opposite(hit.finding.side), hit.where, probe);
+            if (hit.guard == i) pass(bank, i, opposite(hit.side), hit.where, probe);
         }
     }
 
@@ -225,46 +255,57 @@ private:
     [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i,
                                        const Detector& detector)
     {
-        GuardRecord& record = bank[i];
-        // What is left after an event at the end of a step is that event's residue.
+        if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
+        if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
+        return heed(bank, i, watch, detector.examine(probe, watch));
+    }
+
+    /// Nothing more can be said of the stretch: what is left after an event at the end
+    /// of a step is that event's residue, and a plateau waits.
+    [[nodiscard]] static bool is_over(Probe& probe, const Watch& watch, GuardRecord& record)
+    {
         const double h = probe.step().h();
         if (record.from > 0 && watch.end.s - record.from <= 8 * finest_bracket(watch.end.s, h)) {
             record.next = record.side;
-            return Finding::clear(evidence_);
+            return true;
         }
         if (is_plateau(probe, watch)) {
             record.next = Side::plateau;
-            return Finding::clear(evidence_);
+            return true;
         }
-        const Finding finding =
-            record.info.boolean ? Ends{}.examine(probe, watch) : detector.examine(probe, watch);
+        return false;
+    }
+
+    [[nodiscard]] Finding heed(Bank& bank, std::size_t i, const Watch& watch,
+                               const Finding& finding)
+    {
         if (finding.touch) {
-            touched(bank, i, finding);
+            touched(bank, i, finding.side, finding.hi.s);
         } else if (!finding.hit) {
             evidence_ = std::max(evidence_, finding.evidence);
-            record.next = watch.side_after;
+            bank[i].next = watch.side_after;
         }
         return finding;
     }
 
     [[nodiscard]] static Location find(Probe& probe, const Finding& finding,
                                        const GuardRecord& record, const Locator& locator,
-                                       double tolerance)
+                                       const EventResolution& resolution)
     {
         if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
         probe.agree_on(finding.hi);
+        const double tolerance = resolution.tolerance(probe.step().time(finding.hi.s));
         return record.info.boolean ? Bisection{}.locate(probe, finding.lo, finding.hi, tolerance)
                                    : locator.locate(probe, finding.lo, finding.hi, tolerance);
     }
 
-    void touched(Bank& bank, std::size_t i, const Finding& finding)
+    [[gnu::noinline]] void touched(Bank& bank, std::size_t i, Side side, double s)
     {
-        const GuardSample& at = finding.hi;
         notes_.push_back({.guard = i,
                           .kind = EventKind::touch,
-                          .side = finding.side,
-                          .where = {.lo = at.s, .hi = at.s, .root = at.s, .slope = 0}});
-        bank.go_on_from(i, finding.side, away(finding.side, at.s));
+                          .side = side,
+                          .where = {.lo = s, .hi = s, .root = s, .slope = 0}});
+        bank.go_on_from(i, side, away(side, s));
     }
 
     /// On the surface and heading for `side`, by next to nothing.
@@ -296,13 +337,14 @@ private:
             Watch watch{.side = record.side,
                         .start = bank.start(i),
                         .end = bank.end(i, step.h()),
-                        .touch = record.touch()};
+                        .touch = bank.touch(i)};
             const Finding finding = next_finding(probe, watch, bank, i, detector);
             if (finding.touch) continue;
             if (!finding.hit) return;
             late_ = late_ || finding.late;
             Hit hit;
             hit.guard = i;
+            hit.side = finding.side;
             hit.finding = finding;
             hits_.push_back(hit);
             return;
@@ -323,26 +365,100 @@ private:
     }
 
     void locate(const CurrentStep& step, Bank& bank, Hit& hit, const Locator& locator,
-                double tolerance, std::uint64_t& calls)
+                const EventResolution& resolution, std::uint64_t& calls)
     {
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
-        probe.watch(hit.finding.side);
-        hit.where = find(probe, hit.finding, bank[hit.guard], locator, tolerance);
+        probe.watch(hit.side);
+        hit.where = find(probe, hit.finding, bank[hit.guard], locator, resolution);
         hit.located = true;
     }
 
+    /// The first set where guard i is the only one that deserves a look. What nearly
+    /// every event needs is inlined here: handing samples from one function to another
+    /// through memory takes as long as the location itself.
+    [[gnu::flatten]] bool find_only(const CurrentStep& step, Bank& bank, std::size_t i,
+                                    const Detector& detector, const Locator& locator,
+                                    const EventResolution& resolution, std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        const Side side = bank[i].side;
+        if (bank[i].from == 0 && !bank[i].info.boolean && counts(side, guard.crossing()) &&
+            Detector::leaves_plainly(sign_of(side), bank.start(i), bank.end(i, step.h()),
+                                     bank.touch(i))) {
+            probe.watch(side);
+            const double tolerance = resolution.tolerance(step.time(step.h()));
+            const Location where =
+                locator.locate(probe, bank.start(i), bank.end(i, step.h()), tolerance);
+            keep_only(i, side, where, probe.state_at(where));
+            return true;
+        }
+        return find_only_carefully(step, bank, i, detector, locator, resolution, calls);
+    }
+
+    [[gnu::noinline]] bool find_only_carefully(const CurrentStep& step, Bank& bank, std::size_t i,
+                                               const Detector& detector, const Locator& locator,
+                                               const EventResolution& resolution,
+                                               std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        for (int round = 0; round < most_rounds; ++round) {
+            Watch watch{.side = bank[i].side,
+                        .start = bank.start(i),
+                        .end = bank.end(i, step.h()),
+                        .touch = bank.touch(i)};
+            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            if (finding.touch) continue;
+            if (!finding.hit) return false;
+            late_ = finding.late;
+            probe.watch(finding.side);
+            const Location where = find(probe, finding, bank[i], locator, resolution);
+            keep_only(i, finding.side, where, finding.late ? step.x0() : probe.state_at(where));
+            return true;
+        }
+        return false;
+    }
+
+    void keep_only(std::size_t i, Side side, const Location& where, const X& before)
+    {
+        at_ = where.root;
+        at_remainder_ = where.root_remainder;
+        assign(before_, before);
+        Hit& hit = hits_.add();
+        hit.guard = i;
+        hit.side = side;
+        hit.where = where;
+        members_.push_back(i);
+    }
+
+    /// The first set among several candidates.
+    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, const Detector& detector,
+                                  const Locator& locator, const EventResolution& resolution,
+                                  std::uint64_t& calls)
+    {
+        for (std::size_t i = 0; i < bank.size(); ++i) {
+            if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
+            examine(step, bank, i, detector, calls);
+        }
+        if (hits_.empty()) return false;
+        close_set(step, bank, locator, resolution, calls);
+        if (members_.size() == 1) locate_alone(step, bank, locator, resolution, calls);
+        return true;
+    }
+
     /// Locates the only member of the set, and keeps the state at its root.
-    void locate_alone(const CurrentStep& step, Bank& bank, const Locator& locator, double tolerance,
-                      std::uint64_t& calls)
+    void locate_alone(const CurrentStep& step, Bank& bank, const Locator& locator,
+                      const EventResolution& resolution, std::uint64_t& calls)
     {
         Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
             return candidate.guard == members_[0];
         });
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
-        probe.watch(hit.finding.side);
-        hit.where = find(probe, hit.finding, bank[hit.guard], locator, tolerance);
+        probe.watch(hit.side);
+        hit.where = find(probe, hit.finding, bank[hit.guard], locator, resolution);
         at_ = hit.where.root;
         at_remainder_ = hit.where.root_remainder;
         assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
@@ -350,8 +466,8 @@ private:
 
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is whoever lies in the window.
-    void close_set(const CurrentStep& step, Bank& bank, const Locator& locator, double tolerance,
-                   double window, std::uint64_t& calls)
+    void close_set(const CurrentStep& step, Bank& bank, const Locator& locator,
+                   const EventResolution& resolution, std::uint64_t& calls)
     {
         double first = std::numeric_limits<double>::infinity();
         for (Hit& hit : hits_) {
@@ -359,9 +475,9 @@ private:
             first = std::min(first, hit.guess);
         }
         for (Hit& hit : hits_) {
-            if (hit.guess == first) locate(step, bank, hit, locator, tolerance, calls);
+            if (hit.guess == first) locate(step, bank, hit, locator, resolution, calls);
         }
-        double limit = window_end(window);
+        double limit = window_end(step, resolution);
         for (bool changed = true; changed;) {
             changed = false;
             const double at = std::min(limit, step.h());
@@ -372,25 +488,26 @@ private:
                     if (!placed) step.restep(at, before_);
                     placed = true;
                     const auto guard = bank.view(hit.guard, step.mode(), calls);
-                    if (!has_left(hit.finding.side, guard.value(step.time(at), before_))) continue;
+                    if (!has_left(hit.side, guard.value(step.time(at), before_))) continue;
                 }
-                locate(step, bank, hit, locator, tolerance, calls);
+                locate(step, bank, hit, locator, resolution, calls);
                 changed = true;
             }
-            limit = window_end(window);
+            limit = window_end(step, resolution);
         }
         for (Hit& hit : hits_) {
             if (hit.located && hit.where.root <= limit) members_.push_back(hit.guard);
         }
     }
 
-    [[nodiscard]] double window_end(double window) noexcept
+    [[nodiscard]] double window_end(const CurrentStep& step,
+                                    const EventResolution& resolution) noexcept
     {
         double first = std::numeric_limits<double>::infinity();
         for (const Hit& hit : hits_) {
             if (hit.located) first = std::min(first, hit.where.root);
         }
-        return first + window;
+        return first + resolution.window(step.time(first));
     }
 
     /// The set happens at its latest root, or at the time event that it belongs to.

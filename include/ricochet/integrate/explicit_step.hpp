@@ -110,7 +110,7 @@ public:
 
     /// x(t0 + s) on the dense output: the method's own where it has one, else the
     /// polynomial of `dense`.
-    void interpolate(double s, X& x) const
+    [[gnu::noinline]] void interpolate(double s, X& x) const
     {
         if constexpr (has_dense_output) {
             advancing_.calc_state(s, x, zero_, zero_, 0.0, w_, w_rate1_, h_);
@@ -138,7 +138,7 @@ public:
     }
 
     /// x(t0 + s) by the method's own step of length s from the start.
-    void restep(double s, X& x) const
+    [[gnu::noinline]] void restep(double s, X& x) const
     {
         ++resteps_;
         advance<false>(probing_, s, x, unused_rate_, error_);
@@ -157,7 +157,7 @@ public:
     }
 
     /// x(t0 + s) by the method's own step, and the flow there.
-    void restep(double s, X& x, X& dxdt) const
+    [[gnu::noinline]] void restep(double s, X& x, X& dxdt) const
     {
         ++resteps_;
         advance<false>(probing_, s, x, dxdt, error_);
@@ -301,7 +301,7 @@ private:
         dense_ready_ = false;
     }
 
-    void prepare_dense() const
+    [[gnu::noinline]] void prepare_dense() const
     {
         for_components([&](auto i) { w_slope1_[i] = rate1_[i] - rate0_[i]; });
         if constexpr (has_dense_output) {

@@ -37,6 +37,7 @@ public:
     void clear() noexcept { size_ = 0; }
     void shrink(std::size_t size) noexcept { size_ = size; }
     void push_back(const T& item) noexcept { items_[size_++] = item; }
+    [[nodiscard]] T& add() noexcept { return items_[size_++]; }
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
     [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
     [[nodiscard]] T& operator[](std::size_t i) noexcept { return items_[i]; }
@@ -61,18 +62,10 @@ struct GuardRecord {
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     double band = 0;            ///< |g| where it fired: it counts as being on its surface
     double from = 0;            ///< [s] offset in the step up to which it has been looked at
-    double size = 0;            ///< largest |g| seen at the end of a step
     std::uint64_t events = 0;
     double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
     Side last_side = Side::plateau;                          ///< the side it left then
     ShrinkingIntervals intervals;
-
-    /// Half the width of the band around the surface that counts as being on it where
-    /// the rate is zero.
-    [[nodiscard]] double touch() const noexcept
-    {
-        return std::fmax(info.touch, 64 * std::numeric_limits<double>::epsilon() * size);
-    }
 };
 
 [[nodiscard]] constexpr double sign_of(Side side) noexcept
@@ -89,7 +82,7 @@ public:
         : system_(&system), backward_(backward), count_(guard_count_of<X>(system))
     {
         if constexpr (fixed == counted_at_run_time) {
-            for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_})
+            for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_, &sizes_})
                 numbers->resize(count_);
             records_.resize(count_);
         }
@@ -136,11 +129,13 @@ public:
     /// Whether any guard deserves a look.
     [[nodiscard]] bool suspicious(double h) const noexcept
     {
-        bool any = false;
+        double any = 0;  // a double, so that the loop is vectorised
         for (std::size_t i = 0; i < size(); ++i) {
-            any |= suspicious(i, h);
+            const bool suspected =
+                Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            any = (suspected & (sign_[i] != 0)) ? 1.0 : any;
         }
-        return any;
+        return any != 0;
     }
 
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
@@ -165,6 +160,14 @@ public:
     [[nodiscard]] GuardSample end(std::size_t i, double h) const noexcept
     {
         return {.s = h, .value = g1_[i], .rate = known(rate1_[i])};
+    }
+
+    /// Half the width of the band around the surface that counts as being on it where
+    /// the rate is zero.
+    [[nodiscard]] double touch(std::size_t i) const noexcept
+    {
+        constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
+        return std::fmax(records_[i].info.touch, ulps * sizes_[i]);
     }
 
     void arm(std::size_t i, Side side) noexcept
@@ -192,10 +195,19 @@ public:
     /// The end of a clear step becomes the start of the next.
     void pass_on() noexcept
     {
+        double plateaus = 0;
         for (std::size_t i = 0; i < size(); ++i) {
             g0_[i] = g1_[i];
-            rate0_[i] = rate1_[i];
-            if (Detector::uses_rates) note_size(i, g1_[i]);
+            plateaus = sign_[i] == 0 ? 1.0 : plateaus;
+        }
+        if (Detector::uses_rates) {
+            for (std::size_t i = 0; i < size(); ++i) {
+                rate0_[i] = rate1_[i];
+                note_size(i, g1_[i]);
+            }
+        }
+        if (plateaus == 0) return;
+        for (std::size_t i = 0; i < size(); ++i) {
             if (sign_[i] == 0 && records_[i].enabled) arm(i, side_of(g1_[i]));
         }
     }
@@ -236,7 +248,7 @@ public:
             visit(rate0_[i]);
             visit(record.enabled);
             visit(record.side);
-            visit(record.size);
+            visit(sizes_[i]);
             visit(record.events);
             visit(record.last);
             visit(record.last_side);
@@ -250,7 +262,7 @@ private:
     void note_size(std::size_t i, double g) noexcept
     {
         const double size = std::fabs(g);
-        if (size > records_[i].size) records_[i].size = size;
+        sizes_[i] = size > sizes_[i] ? size : sizes_[i];
     }
 
     [[nodiscard]] static double known(double rate) noexcept
@@ -304,7 +316,7 @@ private:
     const System* system_;
     bool backward_;
     std::size_t count_;
-    Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{};
+    Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{}, sizes_{};
     X there_{};
     PerGuard<GuardRecord, fixed> records_{};
 };

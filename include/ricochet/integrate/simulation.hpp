@@ -88,6 +88,7 @@ public:
           options_(checked(options, x0)),
           detector_(detector),
           locator_(locator),
+          resolution_(options),
           backward_(options.t_end < options.t_start),
           step_(system, options.t_start, x0, options.mode, backward_),
           bank_(system, backward_),
@@ -451,17 +452,6 @@ private:
 
     // --- events ---
 
-    [[nodiscard]] double event_tolerance(double t) const noexcept
-    {
-        return options_.event_tolerance + options_.event_rtol * std::fabs(t);
-    }
-
-    [[nodiscard]] double event_window(double t) const noexcept
-    {
-        return std::max(std::max(event_tolerance(t), options_.event_window),
-                        4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
-    }
-
     /// Looks for events in the step; true if they have cut it short, or the run has
     /// ended.
     [[nodiscard]] bool handle_events()
@@ -494,11 +484,9 @@ private:
             end(Outcome::non_finite, broken);
             return true;
         }
-        const double t1 = step_.time(step_.h());
         search_.begin(step_.x0());
         bank_.begin_search();
-        while (search_.find_set(step_, bank_, detector_, locator_, event_tolerance(t1),
-                                event_window(t1), time_event_due_, calls())) {
+        while (search_.find_set(step_, bank_, detector_, locator_, resolution_, time_event_due_, calls())) {
             if (predicts && (cleared || search_.late())) ++run_.statistics.missed_events;
             if (search_.late()) ++run_.statistics.late_events;
             dismiss_members();
@@ -550,7 +538,7 @@ private:
     {
         const detail::GuardRecord& record = bank_[i];
         return !record.info.unilateral && record.side == record.last_side &&
-               std::fabs(t - record.last) <= event_window(t);
+               std::fabs(t - record.last) <= resolution_.window(t);
     }
 
     /// Computes what the resets of the members, all from the state before, make of it:
@@ -736,7 +724,7 @@ private:
         for (const std::size_t i : search_.members()) {
             detail::GuardRecord& record = bank_[i];
             const bool stalls = record.intervals.stalls(step_.start());
-            const double tolerance = event_tolerance(step_.start().value);
+            const double tolerance = resolution_.tolerance(step_.start().value);
             if (stalls || (resets && record.info.resets && record.intervals.accumulate(tolerance))) {
                 come_to_rest(i, stalls ? 0 : record.intervals.remainder());
                 rested = true;
@@ -920,8 +908,8 @@ private:
             if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
             const GuardSample last = s == step_.h() ? bank_.end(i, s)
                                                     : search_.sample_at_set(step_, bank_, i, calls());
-            search_.note_crossings(step_, bank_, i, last, detector_, locator_,
-                                   event_tolerance(step_.time(s)), calls());
+            search_.note_crossings(step_, bank_, i, last, detector_, locator_, resolution_,
+                                   calls());
         }
     }
 
@@ -1080,6 +1068,7 @@ private:
     Options options_;
     Detector detector_;
     Locator locator_;
+    detail::EventResolution resolution_;
     bool backward_;
     CurrentStep step_;
     Bank bank_;
