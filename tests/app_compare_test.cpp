@@ -26,7 +26,9 @@ TEST_F(App, CompareFindsAllImpactsByEveryDetector)
         EXPECT_EQ(method["missed"], 0);
         EXPECT_EQ(method["spurious"], 0);
         EXPECT_EQ(method["times"].size(), 13U);
-        EXPECT_LE(method["largest_error"].get<double>(), 2e-14);
+        // Where error control makes a flight one step, its rounding is larger: see
+        // integrate_test.cpp.
+        EXPECT_LE(method["largest_error"].get<double>(), method["step"].is_null() ? 1.7e-13 : 2e-14);
         EXPECT_GT(method["seconds"]["median"].get<double>(), 0);
     }
     for (const nlohmann::json& method : table["methods"]) {

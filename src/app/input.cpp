@@ -13,6 +13,9 @@ namespace ricochet::app {
 BadInput unknown(std::string_view what, std::string_view given,
                  const std::vector<std::string_view>& known)
 {
+    if (known.empty()) {
+        return BadInput(fmt::format("unknown {} '{}'; there is none", what, given));
+    }
     return BadInput(fmt::format("unknown {} '{}'; known {} {}", what, given,
                                 known.size() == 1 ? "is" : "are", fmt::join(known, ", ")));
 }

@@ -92,7 +92,8 @@ void add_simulate(CLI::App& app, int& status)
     add_system(command, request->system);
     command.add_option("--set", run.set, "a parameter of the system; may be repeated")
         ->type_name("name=value ...");
-    add_number(command, "--t-start", run.t_start, "T", "time at the start [s], default 0");
+    add_number(command, "--t-start", run.t_start, "T",
+               "time at the start [s], default: the system's");
     add_number(command, "--t-end", run.t_end, "T", "time at the end [s], default: the system's");
     add_text(command, "--detector", run.detector, "NAME",
              "ends, extremum (default), network (default with --model), verified or line");

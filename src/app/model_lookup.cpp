@@ -145,10 +145,6 @@ FoundModel named_model(const SystemEntry& system, const RunSettings& settings,
 
 FoundModel suitable_model(const SystemEntry& system, const RunSettings& settings)
 {
-    if (system.models.empty()) {
-        throw BadInput(
-            fmt::format("no model for {} comes with ricochet; expected --model FILE", system.name));
-    }
     std::vector<std::string> reasons;
     for (const OwnModel& own : system.models) {
         fs::path file;

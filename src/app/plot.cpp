@@ -86,7 +86,7 @@ std::string script(const SystemEntry& system, const RunSettings& settings, const
 {
     const std::size_t panels = system.state.size();
     const std::size_t height = 100 + 320 * panels;
-    const std::string_view event = system.guards.empty() ? "event" : system.guards.front().event;
+    const std::string_view event = system.guards.size() == 1 ? system.guards[0].event : "event";
 
     std::string out = "set encoding utf8\n";
     out +=

@@ -22,7 +22,12 @@ std::string to_string(const Range& range)
 const std::vector<SystemEntry>& systems()
 {
     static const std::vector<SystemEntry> all{
-        bouncing_ball_entry(),
+        bouncing_ball_entry(),      pendulum_entry(),    henon_heiles_entry(),
+        three_body_entry(),         hidden_pair_entry(), near_tangent_entry(),
+        thermostat_entry(),         grow_decay_entry(),  impact_oscillator_entry(),
+        coulomb_oscillator_entry(), stick_slip_entry(),  detest_f1_entry(),
+        detest_f2_entry(),          detest_f3_entry(),   detest_f4_entry(),
+        detest_f5_entry(),
     };
     return all;
 }

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/learn/classifier.hpp"
 #include "settings.hpp"
@@ -102,14 +103,19 @@ struct SystemEntry {
     std::string_view description;  ///< one sentence
     std::vector<Parameter> parameters;
     std::vector<Component> state;
-    std::vector<GuardLabel> guards;
-    double t_end;  ///< [s] default
+    std::vector<GuardLabel> guards{};
+    std::vector<std::string_view> modes{};  ///< their names; empty where there is but one
+    double t_start = 0;                     ///< [s] default
+    double t_end;                           ///< [s] default
 
     /// The start that these parameters give.
     std::vector<double> (*start)(const std::vector<double>& parameters);
 
     /// Runs it `repeats` times over; the runs are alike and the last is returned.
     TimedRun (*run)(const RunSettings& settings, int repeats);
+
+    /// The mode that these parameters start in; mode 0: null.
+    Mode (*start_mode)(const std::vector<double>& parameters) = nullptr;
 
     /// The more special before the more general.
     std::vector<OwnModel> models{};

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <limits>
 
 #include "files.hpp"
 #include "json_text.hpp"
@@ -14,26 +16,35 @@ namespace ricochet::app {
 namespace {
 
 using PlainRun = Run<std::vector<double>>;
+using PlainEvent = Event<std::vector<double>>;
 
 std::string_view name(EventKind kind)
 {
     switch (kind) {
         case EventKind::crossing: break;
+        case EventKind::touch: return "touch";
+        case EventKind::time: return "time";
+        case EventKind::accumulation: return "accumulation";
     }
     return "crossing";
 }
 
-Json json(const SystemEntry& system, const Event<std::vector<double>>& event)
+Json json(const SystemEntry& system, const PlainEvent& event)
 {
-    return {{"t", event.t},
-            {"guards", Json::array({system.guards.at(event.guard).name})},
-            {"kind", name(event.kind)},
-            {"state_before", event.before},
-            {"state_after", event.after},
-            {"bracket", Json::array({event.bracket.lo, event.bracket.hi})},
-            {"slope", event.slope},
-            {"error", event.error},
-            {"late", event.late}};
+    Json guards = Json::array();
+    if (event.guard != no_guard) guards.push_back(system.guards.at(event.guard).name);
+    Json out{{"t", event.t}, {"guards", guards}, {"kind", name(event.kind)}};
+    if (!system.modes.empty()) {
+        out["mode_before"] = system.modes.at(event.mode_before);
+        out["mode_after"] = system.modes.at(event.mode_after);
+    }
+    out["state_before"] = event.before;
+    out["state_after"] = event.after;
+    out["bracket"] = Json::array({event.bracket.lo, event.bracket.hi});
+    out["slope"] = event.slope;
+    out["error"] = event.error;
+    out["late"] = event.late;
+    return out;
 }
 
 Json json(const Statistics& s)
@@ -48,6 +59,8 @@ Json json(const Statistics& s)
             {"missed_events", s.missed_events},
             {"late_events", s.late_events},
             {"checks_put_off", s.checks_put_off},
+            {"suppressed", s.suppressed},
+            {"disabled", s.disabled},
             {"evidence",
              {{"proved", s.evidence.proved},
               {"checked", s.evidence.checked},
@@ -66,11 +79,35 @@ std::string label(const Component& component)
     return fmt::format("{} [{}]", component.name, component.unit);
 }
 
+/// What made the event: the guard, or the time.
+std::string_view cause(const SystemEntry& system, const PlainEvent& event)
+{
+    return event.guard == no_guard ? name(event.kind) : system.guards.at(event.guard).name;
+}
+
+/// "floor", "floor, touch", "too-cold: off -> on"
+std::string title(const SystemEntry& system, const PlainEvent& event)
+{
+    std::string out(cause(system, event));
+    if (event.guard != no_guard && event.kind != EventKind::crossing) {
+        out += fmt::format(", {}", name(event.kind));
+    }
+    if (event.mode_before != event.mode_after) {
+        out += fmt::format(": {} -> {}", system.modes.at(event.mode_before),
+                           system.modes.at(event.mode_after));
+    }
+    return out;
+}
+
 std::string events_table(const SystemEntry& system, const PlainRun& run)
 {
     constexpr int wide = 24;
     const bool any_late = run.statistics.late_events > 0;
-    std::string out = fmt::format("{:>4}  {:<8}{:>{}}", "", "guard", "t [s]", wide - 2);
+    std::size_t first = 8;
+    for (const PlainEvent& event : run.events) {
+        first = std::max(first, title(system, event).size() + 1);
+    }
+    std::string out = fmt::format("{:>4}  {:<{}}{:>{}}", "", "guard", first, "t [s]", wide - 2);
     for (const char* side : {"before", "after"}) {
         for (const Component& component : system.state) {
             out += fmt::format("{:>{}}", fmt::format("{} {}", label(component), side), wide);
@@ -79,7 +116,7 @@ std::string events_table(const SystemEntry& system, const PlainRun& run)
     out += '\n';
     for (std::size_t i = 0; i < run.events.size(); ++i) {
         const auto& event = run.events[i];
-        out += fmt::format("{:>4}  {:<8}{:>{}}", i + 1, system.guards.at(event.guard).name, event.t,
+        out += fmt::format("{:>4}  {:<{}}{:>{}}", i + 1, title(system, event), first, event.t,
                            wide - 2);
         for (const auto* x : {&event.before, &event.after}) {
             for (const double value : *x) out += fmt::format("{:>{}}", value, wide);
@@ -102,9 +139,9 @@ std::vector<Row> rows(const SystemEntry& system, const PlainRun& run)
     };
     for (const auto& event : run.events) {
         samples_before(event.t);
-        const std::string_view guard = system.guards.at(event.guard).name;
-        out.push_back({event.t, event.before, fmt::format("before {}", guard)});
-        out.push_back({event.t, event.after, fmt::format("after {}", guard)});
+        const std::string_view what = cause(system, event);
+        out.push_back({event.t, event.before, fmt::format("before {}", what)});
+        out.push_back({event.t, event.after, fmt::format("after {}", what)});
     }
     samples_before(std::numeric_limits<double>::infinity());
     if (out.empty() || out.back().t < run.t) out.push_back({.t = run.t, .x = run.x});
@@ -118,7 +155,7 @@ std::string title(const SystemEntry& system, const RunSettings& settings)
         parts.push_back(fmt::format("{} {}", system.parameters[i].name,
                                     with_unit(settings.parameters[i], system.parameters[i].unit)));
     }
-    return fmt::format("{}: {}", system.name, fmt::join(parts, ", "));
+    return fmt::format("{}{}{}", system.name, parts.empty() ? "" : ": ", fmt::join(parts, ", "));
 }
 
 std::string to_json(const SystemEntry& system, const RunSettings& settings, const TimedRun& timed,
@@ -147,6 +184,8 @@ std::string to_json(const SystemEntry& system, const RunSettings& settings, cons
     out["outcome"] = ricochet::name(run.outcome);
     out["t"] = run.t;
     out["state"] = run.x;
+    if (!system.modes.empty()) out["mode"] = system.modes.at(run.mode);
+    if (run.guard != no_guard) out["ended_by"] = system.guards.at(run.guard).name;
     out["events"] = std::move(events);
     out["statistics"] = json(run.statistics);
     if (with_trajectory) out["trajectory"] = {{"t", run.trajectory.t}, {"state", run.trajectory.x}};
@@ -169,6 +208,9 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     for (std::size_t i = 0; i < system.state.size(); ++i) {
         state.push_back(fmt::format("{} = {}", system.state[i].name,
                                     with_unit(run.x[i], system.state[i].unit)));
+    }
+    if (!system.modes.empty()) {
+        state.push_back(fmt::format("mode {}", system.modes.at(run.mode)));
     }
     out += fmt::format("{} at t = {} s, {}\n", ricochet::name(run.outcome), run.t,
                        fmt::join(state, ", "));

@@ -121,6 +121,12 @@ void choose_detector(const SystemEntry& system, const RunRequest& request, RunSe
         }
         return;
     }
+    if (system.models.empty()) {
+        throw BadInput(
+            fmt::format("the detector {} needs a network, and none can be used with {}; expected "
+                        "ends or extremum",
+                        name(settings.detector), system.name));
+    }
     FoundModel found = request.model ? named_model(system, settings, *request.model)
                                      : suitable_model(system, settings);
     if (bare && !settings.fixed_step) {  // `verified` takes the steps of its exact detector
@@ -179,12 +185,13 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     settings.parameters = parameter_values(system, request.set);
 
     Options& options = settings.options;
-    options.t_start = request.t_start.value_or(0);
+    options.t_start = request.t_start.value_or(system.t_start);
     options.t_end = request.t_end.value_or(system.t_end);
     if (options.t_end < options.t_start) {
         throw BadInput(fmt::format("--t-end must not lie before the start at {} s, got {}",
                                    options.t_start, options.t_end));
     }
+    if (system.start_mode != nullptr) options.mode = system.start_mode(settings.parameters);
     options.event_tolerance = request.event_tolerance.value_or(0);
     require_not_negative("--event-tolerance", options.event_tolerance);
     options.max_steps = request.max_steps.value_or(default_max_steps);

@@ -1,6 +1,7 @@
 #include "systems.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 
@@ -37,9 +38,10 @@ Json json(const SystemEntry& system)
     }
     Json guards = Json::array();
     for (const GuardLabel& guard : system.guards) guards.push_back(guard.name);
-    return {{"name", system.name},      {"description", system.description},
-            {"parameters", parameters}, {"state", state},
-            {"guards", guards},         {"t_end", system.t_end}};
+    return {{"name", system.name},       {"description", system.description},
+            {"parameters", parameters},  {"state", state},
+            {"guards", guards},          {"modes", system.modes},
+            {"t_start", system.t_start}, {"t_end", system.t_end}};
 }
 
 std::string text(const SystemEntry& system)
@@ -47,11 +49,18 @@ std::string text(const SystemEntry& system)
     std::string out = fmt::format("{}\n    {}\n", system.name, system.description);
     for (const Parameter& parameter : system.parameters) {
         const std::string_view unit = parameter.unit == "1" ? "" : parameter.unit;
-        out += fmt::format("    {:<12} {:>6} {:<5} {:<12} {}\n", parameter.name, parameter.initial,
+        out += fmt::format("    {:<15} {:>6} {:<5} {:<12} {}\n", parameter.name, parameter.initial,
                            unit, to_string(parameter.range), parameter.meaning);
     }
+    if (!system.modes.empty()) {
+        out += fmt::format("    {:<15} {}\n", "modes", fmt::join(system.modes, ", "));
+    }
+    if (system.t_start != 0) {
+        out += fmt::format("    {:<15} {:>6} s     default start of a run\n", "t-start",
+                           system.t_start);
+    }
     return out +
-           fmt::format("    {:<12} {:>6} s     default end of a run\n", "t-end", system.t_end);
+           fmt::format("    {:<15} {:>6} s     default end of a run\n", "t-end", system.t_end);
 }
 
 }  // namespace

@@ -6,5 +6,20 @@
 namespace ricochet::app {
 
 [[nodiscard]] SystemEntry bouncing_ball_entry();
+[[nodiscard]] SystemEntry pendulum_entry();
+[[nodiscard]] SystemEntry henon_heiles_entry();
+[[nodiscard]] SystemEntry three_body_entry();
+[[nodiscard]] SystemEntry hidden_pair_entry();
+[[nodiscard]] SystemEntry near_tangent_entry();
+[[nodiscard]] SystemEntry thermostat_entry();
+[[nodiscard]] SystemEntry grow_decay_entry();
+[[nodiscard]] SystemEntry impact_oscillator_entry();
+[[nodiscard]] SystemEntry coulomb_oscillator_entry();
+[[nodiscard]] SystemEntry stick_slip_entry();
+[[nodiscard]] SystemEntry detest_f1_entry();
+[[nodiscard]] SystemEntry detest_f2_entry();
+[[nodiscard]] SystemEntry detest_f3_entry();
+[[nodiscard]] SystemEntry detest_f4_entry();
+[[nodiscard]] SystemEntry detest_f5_entry();
 
 }  // namespace ricochet::app

@@ -81,7 +81,8 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
     return use(Extremum{});
 }
 
-/// The same run with states of one type for all systems.
+/// The same run with states of one type for all systems; without its solution, which
+/// nobody asks for here.
 template <class X>
 [[nodiscard]] Run<std::vector<double>> with_plain_states(const Run<X>& run)
 {
@@ -93,13 +94,19 @@ template <class X>
     Run<std::vector<double>> out{.outcome = run.outcome,
                                  .t = run.t,
                                  .x = plain(run.x),
+                                 .mode = run.mode,
+                                 .guard = run.guard,
+                                 .other_guard = run.other_guard,
                                  .events = {},
                                  .trajectory = {.t = run.trajectory.t, .x = {}},
+                                 .solution = {},
                                  .statistics = run.statistics};
     for (const Event<X>& event : run.events) {
         out.events.push_back({.t = event.t,
                               .kind = event.kind,
                               .guard = event.guard,
+                              .mode_before = event.mode_before,
+                              .mode_after = event.mode_after,
                               .before = plain(event.before),
                               .after = plain(event.after),
                               .bracket = event.bracket,
@@ -111,21 +118,30 @@ template <class X>
     return out;
 }
 
-/// Runs `system` from x0 `repeats` times and returns the last run.
+/// Runs `system` from x0 `repeats` times with this stepping and detector, and returns
+/// the last run.
+template <class System, class X, class Stepping, class Detector>
+[[nodiscard]] TimedRun run_with(const System& system, const X& x0, const RunSettings& settings,
+                                int repeats, const Stepping& stepping, const Detector& detector)
+{
+    const ChosenLocator locator{settings.locator};
+    Run<X> run;
+    const auto start = std::chrono::steady_clock::now();
+    for (int i = 0; i < repeats; ++i) {
+        run = integrate(system, x0, settings.options, stepping, detector, locator);
+    }
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    return TimedRun{.run = with_plain_states(run), .seconds = spent.count() / repeats};
+}
+
+/// As `run_with`, with the stepping and the detector of the settings.
 template <class System, class X>
 [[nodiscard]] TimedRun run_system(const System& system, const X& x0, const RunSettings& settings,
                                   int repeats)
 {
     return with_stepping(settings, [&](auto stepping) {
         return with_detector<System, X>(settings, [&](const auto& detector) {
-            const ChosenLocator locator{settings.locator};
-            Run<X> run;
-            const auto start = std::chrono::steady_clock::now();
-            for (int i = 0; i < repeats; ++i) {
-                run = integrate(system, x0, settings.options, stepping, detector, locator);
-            }
-            const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-            return TimedRun{.run = with_plain_states(run), .seconds = spent.count() / repeats};
+            return run_with(system, x0, settings, repeats, stepping, detector);
         });
     });
 }

@@ -1,0 +1,57 @@
+// An oscillator with dry friction comes to rest after finitely many turns.
+#pragma once
+
+#include <string_view>
+
+#include "ricochet/systems/friction_oscillator.hpp"
+
+namespace ricochet {
+
+/// A mass on a spring under Coulomb's friction of constant size.
+///
+/// A `FrictionOscillator` on ground at rest: the modes slip-left, slip-right and stick,
+///
+///     flow    mass u'' = -stiffness u -+ friction, against the motion
+///     guard   stop: the velocity reaches zero
+///     reset   stick where stiffness |u| <= static_friction, else turn back
+///
+/// Known solution: half a cosine between turning points, so that the turns are at
+/// multiples of pi sqrt(mass / stiffness), each 2 friction / stiffness nearer than the
+/// one before; see `turning_time` and `turning_point`. By default, from u = 2, they are
+/// at u = -1.4, 0.8 and -0.2, where the mass sticks.
+class CoulombOscillator : public FrictionOscillator {
+public:
+    struct Parameters {
+        double mass = 1;               ///< [kg], positive
+        double stiffness = 1;          ///< [N/m], positive
+        double friction = 0.3;         ///< [N] while slipping, zero or positive
+        double static_friction = 0.3;  ///< [N] that sticking bears, at least `friction`
+    };
+
+    CoulombOscillator() : CoulombOscillator(Parameters{}) {}
+
+    /// @throws std::invalid_argument if a parameter is outside its range.
+    explicit CoulombOscillator(const Parameters& parameters);
+
+    static constexpr std::string_view name = "coulomb-oscillator";
+    static constexpr State start{2, 0};
+    static constexpr Mode start_mode = slip_left;
+
+    /// Time [s] of the n-th stop after a start at rest, n = 1, 2, ...
+    [[nodiscard]] double turning_time(int n) const noexcept;
+
+    /// Where [m] the n-th stop is after a start at rest at u = `from` [m] > 0, as long as
+    /// none of those before it sticks.
+    [[nodiscard]] double turning_point(int n, double from = start[0]) const noexcept;
+
+    /// The number of stops from u = `from` [m] > 0, the last of which sticks; zero from a
+    /// start that sticks at once, the largest integer if it never does.
+    [[nodiscard]] int stops(double from = start[0]) const noexcept;
+
+private:
+    double half_period_;  ///< [s]
+    double loss_;         ///< of amplitude at each turn [m]
+    double reach_;        ///< [m] within which it sticks
+};
+
+}  // namespace ricochet

@@ -1,0 +1,84 @@
+// Growth and decay between two levels.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet {
+
+/// A quantity that doubles, halves, doubles, ...
+///
+/// State (y); modes grow and decay.
+///
+///     flow    grow: y' = y,  decay: y' = -y / 2
+///     guard   grow: 2 - y, falling, to decay;  decay: y - 1, falling, to grow
+///     reset   none but of the mode
+///
+/// Known solution: from y = 1 in mode grow, which lies on the surface of the guard that
+/// is not looked at, the modes take log 2 and 2 log 2, so that the switches are at log 2
+/// times 1, 3, 4, 6, 7, 9, ... Functions are generic in the state type.
+class GrowDecay {
+public:
+    using State = std::array<double, 1>;
+
+    enum : Mode { grow, decay };
+    enum : std::size_t { full, empty };  // the guards
+
+    static constexpr std::string_view name = "grow-decay";
+    static constexpr State start{1};
+    static constexpr std::size_t guard_count = 2;
+    static constexpr std::size_t mode_count = 2;
+
+    [[nodiscard]] static constexpr std::string_view mode_name(Mode mode) noexcept
+    {
+        return mode == grow ? "grow" : "decay";
+    }
+
+    [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t which) noexcept
+    {
+        return {.name = which == full ? "full" : "empty", .degree = 1};
+    }
+
+    [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
+    {
+        return mode == (which == full ? grow : decay);
+    }
+
+    template <class X>
+    void flow(Mode mode, double /*t*/, const X& x, X& dxdt) const noexcept
+    {
+        dxdt[0] = mode == grow ? x[0] : -x[0] / 2;
+    }
+
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, double /*t*/, const X& x) const noexcept
+    {
+        return which == full ? 2 - x[0] : x[0] - 1;
+    }
+
+    template <class X, class D>
+    [[nodiscard]] double guard_rate(std::size_t which, double /*t*/, const X& /*x*/,
+                                    const D& dxdt) const noexcept
+    {
+        return which == full ? -dxdt[0] : dxdt[0];
+    }
+
+    template <class X>
+    [[nodiscard]] Mode reset(std::size_t which, Mode /*mode*/, double /*t*/,
+                             X& /*x*/) const noexcept
+    {
+        return which == full ? decay : grow;
+    }
+
+    /// Time [s] of switch n = 0, 1, 2, ... from `start`; the even ones begin a decay.
+    [[nodiscard]] static constexpr double switch_time(int n) noexcept
+    {
+        constexpr long double log_two = 0.693147180559945309417232121458L;
+        return static_cast<double>((3 * (n / 2) + (n % 2 == 0 ? 1 : 3)) * log_two);
+    }
+};
+
+}  // namespace ricochet

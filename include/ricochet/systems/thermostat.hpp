@@ -1,0 +1,101 @@
+// A thermostat: two modes that take turns.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet {
+
+/// The temperature of a room with a heater that is switched on and off.
+///
+/// State (x), a temperature [degrees]; modes off and on.
+///
+///     flow    off: x' = -rate (x - ambient),  on: x' = -rate (x - heated)
+///     guard   off: x - low, falling, to on;  on: high - x, falling, to off
+///     reset   none but of the mode
+///
+/// (R. Alur et al., The algorithmic analysis of hybrid systems, Theoretical Computer
+/// Science 138, 1995, where the ambient temperature is zero.)
+///
+/// Known solution: exponentials, so that the heater is off for
+/// log((high - ambient) / (low - ambient)) / rate and on for
+/// log((heated - low) / (heated - high)) / rate, in turn; see `switch_time`. Functions
+/// are generic in the state type.
+class Thermostat {
+public:
+    using State = std::array<double, 1>;
+
+    enum : Mode { off, on };
+    enum : std::size_t { too_cold, too_warm };  // the guards
+
+    struct Parameters {
+        double rate = 0.1;   ///< [1/s], positive
+        double ambient = 0;  ///< [degrees], what the room cools to; below low
+        double heated = 30;  ///< [degrees], what it warms to; above high
+        double low = 18;     ///< [degrees], where the heater is switched on
+        double high = 22;    ///< [degrees], where it is switched off; above low
+    };
+
+    Thermostat() : Thermostat(Parameters{}) {}
+
+    /// @throws std::invalid_argument if a parameter is outside its range.
+    explicit Thermostat(const Parameters& parameters);
+
+    static constexpr std::string_view name = "thermostat";
+    static constexpr State start{20};
+    static constexpr std::size_t guard_count = 2;
+    static constexpr std::size_t mode_count = 2;
+
+    [[nodiscard]] static constexpr std::string_view mode_name(Mode mode) noexcept
+    {
+        return mode == off ? "off" : "on";
+    }
+
+    [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t which) noexcept
+    {
+        return {.name = which == too_cold ? "too-cold" : "too-warm", .degree = 1};
+    }
+
+    [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
+    {
+        return mode == (which == too_cold ? off : on);
+    }
+
+    template <class X>
+    void flow(Mode mode, double /*t*/, const X& x, X& dxdt) const noexcept
+    {
+        dxdt[0] = -p_.rate * (x[0] - (mode == off ? p_.ambient : p_.heated));
+    }
+
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, double /*t*/, const X& x) const noexcept
+    {
+        return which == too_cold ? x[0] - p_.low : p_.high - x[0];
+    }
+
+    template <class X, class D>
+    [[nodiscard]] double guard_rate(std::size_t which, double /*t*/, const X& /*x*/,
+                                    const D& dxdt) const noexcept
+    {
+        return which == too_cold ? dxdt[0] : -dxdt[0];
+    }
+
+    template <class X>
+    [[nodiscard]] Mode reset(std::size_t which, Mode /*mode*/, double /*t*/,
+                             X& /*x*/) const noexcept
+    {
+        return which == too_cold ? on : off;
+    }
+
+    /// Time [s] of switch n = 0, 1, 2, ... after a start at `temperature` [degrees] in
+    /// (low, heated) with the heater off; the even ones switch it on.
+    [[nodiscard]] double switch_time(int n, double temperature = start[0]) const noexcept;
+
+private:
+    Parameters p_;
+};
+
+}  // namespace ricochet

@@ -1,0 +1,37 @@
+#include "ricochet/systems/detest_f1.hpp"
+
+#include "../any_system.hpp"
+#include "entries.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+std::vector<double> start(const std::vector<double>& /*p*/)
+{
+    return {DetestF1::start[0], DetestF1::start[1]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    return run_any(AnySystem(DetestF1{}), start(settings.parameters), settings, repeats);
+}
+
+}  // namespace
+
+SystemEntry detest_f1_entry()
+{
+    return {
+        .name = DetestF1::name,
+        .description = "A growing oscillator under a square wave of one second.",
+        .parameters = {},
+        .state = {{.name = "y", .unit = "1", .meaning = "value"},
+                  {.name = "v", .unit = "1", .meaning = "rate"}},
+        .modes = mode_names<DetestF1>(),
+        .t_end = DetestF1::t_end,
+        .start = start,
+        .run = run,
+    };
+}
+
+}  // namespace ricochet::app

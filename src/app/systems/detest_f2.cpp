@@ -1,0 +1,36 @@
+#include "ricochet/systems/detest_f2.hpp"
+
+#include "../any_system.hpp"
+#include "entries.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+std::vector<double> start(const std::vector<double>& /*p*/)
+{
+    return {DetestF2::start[0]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    return run_any(AnySystem(DetestF2{}), start(settings.parameters), settings, repeats);
+}
+
+}  // namespace
+
+SystemEntry detest_f2_entry()
+{
+    return {
+        .name = DetestF2::name,
+        .description = "A relaxation whose rate changes every second.",
+        .parameters = {},
+        .state = {{.name = "y", .unit = "1", .meaning = "value"}},
+        .modes = mode_names<DetestF2>(),
+        .t_end = DetestF2::t_end,
+        .start = start,
+        .run = run,
+    };
+}
+
+}  // namespace ricochet::app

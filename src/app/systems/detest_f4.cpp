@@ -1,0 +1,36 @@
+#include "ricochet/systems/detest_f4.hpp"
+
+#include "../any_system.hpp"
+#include "entries.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+std::vector<double> start(const std::vector<double>& /*p*/)
+{
+    return {DetestF4::start[0]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    return run_any(AnySystem(DetestF4{}), start(settings.parameters), settings, repeats);
+}
+
+}  // namespace
+
+SystemEntry detest_f4_entry()
+{
+    return {
+        .name = DetestF4::name,
+        .description = "A steep pulse, then a decay.",
+        .parameters = {},
+        .state = {{.name = "y", .unit = "1", .meaning = "value"}},
+        .modes = mode_names<DetestF4>(),
+        .t_end = DetestF4::t_end,
+        .start = start,
+        .run = run,
+    };
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,35 @@
+#include "ricochet/systems/detest_f5.hpp"
+
+#include "../any_system.hpp"
+#include "entries.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+std::vector<double> start(const std::vector<double>& /*p*/)
+{
+    return {DetestF5::start[0]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    return run_any(AnySystem(DetestF5{}), start(settings.parameters), settings, repeats);
+}
+
+}  // namespace
+
+SystemEntry detest_f5_entry()
+{
+    return {
+        .name = DetestF5::name,
+        .description = "A flow with a vertical tangent every second.",
+        .parameters = {},
+        .state = {{.name = "y", .unit = "1", .meaning = "value"}},
+        .t_end = DetestF5::t_end,
+        .start = start,
+        .run = run,
+    };
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,74 @@
+#include "ricochet/systems/three_body.hpp"
+
+#include "../any_system.hpp"
+#include "entries.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+enum : std::size_t { mass_ratio, vx, vy };  // the order of parameters
+
+ThreeBody system(const std::vector<double>& p)
+{
+    return ThreeBody({.mass_ratio = p[mass_ratio]});
+}
+
+std::vector<double> start(const std::vector<double>& p)
+{
+    return {ThreeBody::start[0], ThreeBody::start[1], p[vx], p[vy]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
+                   repeats);
+}
+
+std::vector<double> exact_events(const std::vector<double>& /*p*/, double t_end)
+{
+    std::vector<double> times;
+    for (const double t : {ThreeBody::farthest_time, ThreeBody::return_time}) {
+        if (t <= t_end) times.push_back(t);
+    }
+    return times;
+}
+
+}  // namespace
+
+SystemEntry three_body_entry()
+{
+    return {
+        .name = ThreeBody::name,
+        .description =
+            "A spacecraft circles Earth and Moon; where it is farthest from its start and back "
+            "there is found.",
+        .parameters = {{.name = "mass-ratio",
+                        .initial = 1 / 82.45,
+                        .unit = "1",
+                        .range = {.lower = 0, .upper = 0.5, .upper_included = true},
+                        .meaning = "Moon over Earth and Moon"},
+                       {.name = "vx",
+                        .initial = ThreeBody::start[2],
+                        .unit = "1",
+                        .range = {},
+                        .meaning = "velocity at the start"},
+                       {.name = "vy",
+                        .initial = ThreeBody::start[3],
+                        .unit = "1",
+                        .range = {},
+                        .meaning = "velocity at the start"}},
+        .state = {{.name = "x", .unit = "1", .meaning = "position"},
+                  {.name = "y", .unit = "1", .meaning = "position"},
+                  {.name = "vx", .unit = "1", .meaning = "velocity along x"},
+                  {.name = "vy", .unit = "1", .meaning = "velocity along y"}},
+        .guards = labels(ThreeBody{}, {"farthest or nearest"}),
+        .t_end = 6.2,
+        .start = start,
+        .run = run,
+        .exact_events = exact_events,
+        .comparison_step = 0.0005,
+    };
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,129 @@
+#include "ricochet/systems/impact_oscillator.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+#include "require.hpp"
+
+namespace ricochet {
+
+namespace {
+
+using Real = long double;
+
+struct Motion {
+    Real u;
+    Real v;
+};
+
+/// The motion between impacts, as a function of the time since the last:
+///
+///     u = a cos w t + b sin w t + exp(-c s / 2) (p cos k s + q sin k s),
+///
+/// with k² = 1 - c² / 4 and t = t0 + s.
+class Flight {
+public:
+    Flight(const ImpactOscillator::Parameters& parameters, Real t0, Motion start)
+        : w_(parameters.frequency), c_(parameters.damping), k_(std::sqrt(1 - c_ * c_ / 4)), t0_(t0)
+    {
+        const Real stiff = 1 - w_ * w_;
+        const Real size = stiff * stiff + c_ * w_ * c_ * w_;
+        a_ = stiff / size;
+        b_ = c_ * w_ / size;
+        const Motion forced = this->forced(0);
+        p_ = start.u - forced.u;
+        q_ = (start.v - forced.v + c_ / 2 * p_) / k_;
+    }
+
+    [[nodiscard]] Motion operator()(Real s) const noexcept
+    {
+        const Motion forced = this->forced(s);
+        const Real decay = std::exp(-c_ / 2 * s);
+        const Real cosine = std::cos(k_ * s);
+        const Real sine = std::sin(k_ * s);
+        const Real u = decay * (p_ * cosine + q_ * sine);
+        return {forced.u + u, forced.v + decay * k_ * (q_ * cosine - p_ * sine) - c_ / 2 * u};
+    }
+
+private:
+    [[nodiscard]] Motion forced(Real s) const noexcept
+    {
+        const Real angle = w_ * (t0_ + s);
+        const Real cosine = std::cos(angle);
+        const Real sine = std::sin(angle);
+        return {a_ * cosine + b_ * sine, w_ * (b_ * cosine - a_ * sine)};
+    }
+
+    Real w_, c_, k_, t0_;
+    Real a_, b_;  // of the forced oscillation
+    Real p_, q_;  // of the free one
+};
+
+/// Where `positive` turns false in (lo, hi], to neighbouring numbers.
+template <class Positive>
+Real bisect(Real lo, Real hi, const Positive& positive)
+{
+    for (;;) {
+        const Real middle = lo + (hi - lo) / 2;
+        if (middle <= lo || middle >= hi) return hi;
+        (positive(middle) ? lo : hi) = middle;
+    }
+}
+
+/// The first time in (0, longest] at which the flight reaches the wall; negative: none.
+Real first_impact(const Flight& flight, Real wall, Real step, Real longest)
+{
+    const auto inside = [&](Real s) { return flight(s).u < wall; };
+    const auto rising = [&](Real s) { return flight(s).v > 0; };
+    Real s = 0;
+    Motion here = flight(0);
+    while (s < longest) {
+        const Real next = s + step;
+        const Motion there = flight(next);
+        if (there.u >= wall) return bisect(s, next, inside);
+        if (here.v > 0 && there.v <= 0) {
+            const Real crest = bisect(s, next, rising);
+            if (!inside(crest)) return bisect(s, crest, inside);
+        }
+        s = next;
+        here = there;
+    }
+    return -1;
+}
+
+}  // namespace
+
+ImpactOscillator::ImpactOscillator(const Parameters& parameters) : p_(parameters)
+{
+    constexpr std::string_view self = "ImpactOscillator";
+    detail::require_positive(self, "frequency", p_.frequency);
+    detail::require_positive(self, "wall", p_.wall);
+    detail::require(p_.restitution >= 0 && p_.restitution <= 1, self, "restitution",
+                    "lie in [0, 1]", p_.restitution);
+    detail::require(p_.damping > 0 && p_.damping < 2, self, "damping", "lie in (0, 2)", p_.damping);
+}
+
+double ImpactOscillator::period() const noexcept
+{
+    return 2 * std::numbers::pi / p_.frequency;
+}
+
+std::vector<double> ImpactOscillator::impacts(double t_end) const
+{
+    constexpr Real shortest = 1e-9L;  // of a flight
+    const Real step = 2 * std::numbers::pi_v<Real> / (128 * std::max(1.0, p_.frequency));
+    std::vector<double> times;
+    Real t = 0;
+    Motion now{start[0], start[1]};
+    for (;;) {
+        const Flight flight(p_, t, now);
+        const Real s = first_impact(flight, p_.wall, step, t_end - t);
+        if (s < 0 || t + s > t_end) return times;
+        if (!times.empty() && s < shortest) return times;
+        t += s;
+        now = {p_.wall, -p_.restitution * flight(s).v};
+        times.push_back(static_cast<double>(t));
+    }
+}
+
+}  // namespace ricochet

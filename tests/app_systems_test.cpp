@@ -1,0 +1,233 @@
+// The ready systems on the command line.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/systems/detest_f1.hpp"
+#include "ricochet/systems/detest_f4.hpp"
+#include "ricochet/systems/stick_slip.hpp"
+#include "ricochet/systems/thermostat.hpp"
+
+namespace ricochet {
+namespace {
+
+const Words with_guards{"pendulum",           "henon-heiles", "three-body", "hidden-pair",
+                        "near-tangent",       "thermostat",   "grow-decay", "impact-oscillator",
+                        "coulomb-oscillator", "stick-slip"};
+const Words with_time_events{"detest-f1", "detest-f2", "detest-f3", "detest-f4", "detest-f5"};
+
+TEST_F(App, SystemsListsEveryReadySystemWithItsGuardsAndModes)
+{
+    const nlohmann::json all = json({"systems", "--json"});
+    const auto find = [&](const std::string& name) {
+        const auto found =
+            std::find_if(all.begin(), all.end(), [&](const auto& s) { return s["name"] == name; });
+        return found == all.end() ? nlohmann::json() : *found;
+    };
+    for (const std::string& name : with_guards) {
+        EXPECT_FALSE(find(name)["guards"].empty()) << name;
+    }
+    for (const std::string& name : with_time_events) {
+        EXPECT_EQ(find(name)["guards"], nlohmann::json::array()) << name;
+    }
+    const nlohmann::json thermostat = find("thermostat");
+    EXPECT_EQ(thermostat["guards"], (nlohmann::json{"too-cold", "too-warm"}));
+    EXPECT_EQ(thermostat["modes"], (nlohmann::json{"off", "on"}));
+    EXPECT_EQ(find("pendulum")["modes"], nlohmann::json::array());
+    EXPECT_EQ(find("hidden-pair")["t_start"], -8.0);
+    EXPECT_EQ(find("grow-decay")["parameters"], nlohmann::json::array());
+
+    const Result text = run({"systems"});
+    EXPECT_NE(text.out.find("off, on"), std::string::npos);
+    EXPECT_NE(text.out.find("default start of a run"), std::string::npos);
+}
+
+TEST_F(App, SimulateReachesTheEndOfEverySystemWithEveryStepperAndDetector)
+{
+    Words all = with_guards;
+    all.insert(all.end(), with_time_events.begin(), with_time_events.end());
+    std::vector<Words> steppings;
+    for (const char* stepper : {"dopri5", "fehlberg78", "cash-karp54"}) {
+        steppings.push_back({"--stepper", stepper});
+        steppings.push_back({"--stepper", stepper, "--step", "0.001"});
+    }
+    steppings.push_back({"--stepper", "rk4", "--step", "0.001"});
+    for (const std::string& name : all) {
+        for (const Words& stepping : steppings) {
+            for (const char* detector : {"ends", "extremum"}) {
+                Words words{"simulate", name, "--json", "--detector", detector};
+                words.insert(words.end(), stepping.begin(), stepping.end());
+                SCOPED_TRACE(name + ' ' + detector + ' ' + stepping[1]);
+                const nlohmann::json run = json(words);
+                EXPECT_EQ(run["outcome"], "reached_end");
+                EXPECT_EQ(run["detector"], detector);
+                // The ends alone may miss what is near a tangent.
+                EXPECT_TRUE(run["events"].size() > 0 || detector == std::string("ends"));
+            }
+        }
+    }
+}
+
+TEST_F(App, CompareFindsEveryEventOfTheSystemsWithGuards)
+{
+    // The errors are those of dopri5 at 1e-8 and of rk4 in the steps of the comparison:
+    // 3e-5 of the orbit that passes near the Moon is the largest measured.
+    for (const std::string& name : with_guards) {
+        const Result result = run({"compare", name, "--json"});
+        ASSERT_TRUE(result.err.empty()) << result.err;
+        const nlohmann::json table = nlohmann::json::parse(result.out);
+        EXPECT_GT(table["closed_form"].size(), 1U) << name;
+        for (const nlohmann::json& method : table["methods"]) {
+            if (method["detector"] != "extremum") continue;
+            SCOPED_TRACE(name + ' ' + method["stepper"].get<std::string>());
+            EXPECT_EQ(method["missed"], 0);
+            EXPECT_EQ(method["spurious"], 0);
+            EXPECT_LT(method["largest_error"].get<double>(), 1e-4);
+        }
+    }
+}
+
+TEST_F(App, CompareSaysThatTheEndsMissTheHiddenPair)
+{
+    const nlohmann::json table = json({"compare", "hidden-pair", "--json"}, 1);
+    const auto ends = std::find_if(
+        table["methods"].begin(), table["methods"].end(), [](const nlohmann::json& method) {
+            return method["detector"] == "ends" && method["stepper"] == "dopri5";
+        });
+    ASSERT_NE(ends, table["methods"].end());
+    EXPECT_EQ((*ends)["missed"], 2);
+}
+
+TEST_F(App, SimulateTakesTheSameStepsAsTheLibrary)
+{
+    // States are vectors here and arrays there, with the same bits.
+    const nlohmann::json run = json({"simulate", "stick-slip", "--json"});
+    const auto expected =
+        integrate(StickSlip(), StickSlip::start, {.t_end = 40, .mode = StickSlip::start_mode});
+    ASSERT_EQ(run["events"].size(), expected.events.size());
+    for (std::size_t i = 0; i < expected.events.size(); ++i) {
+        EXPECT_EQ(run["events"][i]["t"].get<double>(), expected.events[i].t);
+        EXPECT_EQ(run["events"][i]["state_after"][0].get<double>(), expected.events[i].after[0]);
+    }
+    EXPECT_EQ(run["state"][0].get<double>(), expected.x[0]);
+    EXPECT_EQ(run["statistics"]["steps"], expected.statistics.steps);
+}
+
+TEST_F(App, EventsNameTheirGuardsAndModes)
+{
+    const nlohmann::json run = json({"simulate", "thermostat", "--json"});
+    const nlohmann::json& event = run["events"][0];
+    EXPECT_EQ(event["guards"], nlohmann::json::array({"too-cold"}));
+    EXPECT_EQ(event["kind"], "crossing");
+    EXPECT_EQ(event["mode_before"], "off");
+    EXPECT_EQ(event["mode_after"], "on");
+    EXPECT_EQ(event["state_before"], event["state_after"]);
+    EXPECT_EQ(run["mode"], "on");
+    EXPECT_FALSE(json(simulate({"--json"})).contains("mode"));  // the ball has but one
+
+    const Result text = this->run({"simulate", "thermostat"});
+    EXPECT_NE(text.out.find("too-cold: off -> on"), std::string::npos) << text.out;
+    EXPECT_NE(text.out.find("mode on"), std::string::npos);
+}
+
+TEST_F(App, TimeEventsHaveNoGuard)
+{
+    const nlohmann::json run = json({"simulate", "detest-f1", "--json"});
+    ASSERT_EQ(run["events"].size(), 20U);
+    EXPECT_EQ(run["events"][2]["kind"], "time");
+    EXPECT_EQ(run["events"][2]["t"], 3.0);
+    EXPECT_EQ(run["events"][2]["guards"], nlohmann::json::array());
+    EXPECT_EQ(run["events"][2]["mode_before"], "even");
+    EXPECT_EQ(run["events"][2]["mode_after"], "odd");
+    EXPECT_NEAR(run["state"][0].get<double>(), DetestF1::solution(20)[0], 1e-5);
+    EXPECT_EQ(run["statistics"]["evidence"]["checked"], 0);  // there is no guard to check
+
+    ASSERT_EQ(this->run({"simulate", "detest-f4", "--csv", "f4.csv"}).status, 0);
+    EXPECT_NE(content(work() / "f4.csv").find("before time"), std::string::npos);
+}
+
+TEST_F(App, TouchIsCalledATouch)
+{
+    // The crest is moved by some 1e-8 in a default run.
+    const nlohmann::json run =
+        json({"simulate", "near-tangent", "--json", "--set", "depth=0", "touch=1e-6"});
+    ASSERT_EQ(run["events"].size(), 3U);
+    EXPECT_EQ(run["events"][0]["kind"], "touch");
+    const Result text = this->run({"simulate", "near-tangent", "--set", "depth=0", "touch=1e-6"});
+    EXPECT_NE(text.out.find("level, touch"), std::string::npos) << text.out;
+}
+
+TEST_F(App, ParametersReachEverySystem)
+{
+    const nlohmann::json thermostat =
+        json({"simulate", "thermostat", "--json", "--set", "rate=0.3", "low=19", "high=19.5"});
+    const Thermostat expected({.rate = 0.3, .low = 19, .high = 19.5});
+    ASSERT_GT(thermostat["events"].size(), 5U);
+    for (int n = 0; n < 5; ++n) {
+        EXPECT_NEAR(thermostat["events"][static_cast<std::size_t>(n)]["t"].get<double>(),
+                    expected.switch_time(n), 1e-6);
+    }
+    // A mass to the left of rest starts out to the right.
+    const nlohmann::json coulomb =
+        json({"simulate", "coulomb-oscillator", "--json", "--set", "position=-2"});
+    ASSERT_EQ(coulomb["events"].size(), 3U);
+    EXPECT_EQ(coulomb["events"][0]["mode_before"], "slip-right");
+    EXPECT_NEAR(coulomb["events"][0]["state_after"][0].get<double>(), 1.4, 1e-7);
+    // And one that sticks does so.
+    const nlohmann::json stuck =
+        json({"simulate", "coulomb-oscillator", "--json", "--set", "position=0.1"});
+    EXPECT_EQ(stuck["events"].size(), 0U);
+    EXPECT_EQ(stuck["mode"], "stick");
+}
+
+TEST_F(App, AccumulatingImpactsNameTheGuardThatEndsTheRun)
+{
+    // Strong damping and a low wall: the oscillator comes to rest against it.
+    const nlohmann::json run = json({"simulate", "impact-oscillator", "--json", "--set",
+                                     "frequency=0.1", "wall=0.5", "restitution=0.3"},
+                                    1);
+    EXPECT_EQ(run["outcome"], "zeno");
+    EXPECT_EQ(run["ended_by"], "wall");
+}
+
+TEST_F(App, SystemsWithoutNetworksRefuseThem)
+{
+    expect_refused({"simulate", "pendulum", "--detector", "network"},
+                   {"network", "pendulum", "ends or extremum"});
+    expect_refused({"simulate", "pendulum", "--model", "bouncing-ball"},
+                   {"network", "pendulum", "ends or extremum"});
+    expect_refused({"simulate", "thermostat", "--detector", "verified"},
+                   {"verified", "thermostat"});
+    expect_refused({"simulate", "thermostat", "--detector", "line"}, {"line", "thermostat"});
+    expect_refused({"train", "pendulum", "--out", "m"}, {"no training", "pendulum"});
+    expect_refused({"compare", "detest-f1"}, {"no exact event times", "detest-f1"});
+}
+
+TEST_F(App, ParametersThatContradictEachOtherAreRefused)
+{
+    expect_refused({"simulate", "thermostat", "--set", "low=23"},
+                   {"high", "above low 23", "got 22"});
+    expect_refused({"simulate", "coulomb-oscillator", "--set", "friction=1"},
+                   {"static_friction", "at least friction 1", "got 0.3"});
+    expect_refused({"simulate", "grow-decay", "--set", "rate=1"},
+                   {"parameter of grow-decay", "rate", "there is none"});
+}
+
+TEST_F(App, SystemsWithModesAndTimeEventsAreDrawn)
+{
+    for (const char* name : {"stick-slip", "detest-f3", "hidden-pair"}) {
+        const Result result = run({"simulate", name, "--plot", "plot.svg"});
+        if (result.err.find("gnuplot-nox") != std::string::npos) {
+            GTEST_SKIP() << "gnuplot is not installed";
+        }
+        ASSERT_EQ(result.status, 0) << result.err;
+        EXPECT_NE(content(work() / "plot.svg").find("</svg>"), std::string::npos) << name;
+    }
+}
+
+}  // namespace
+}  // namespace ricochet
