@@ -759,6 +759,57 @@ TEST(Events, AGuardThatAResetFlipsFiresAtTheSameInstant)
     EXPECT_EQ(run.x[1], -100);
 }
 
+TEST(Events, AGuardThatHasPassedWithoutAnEventIsFlippedFromItsNewSide)
+{
+    // x = 1 - t. Guard 0 rises at t = 1, which does not count; at 1.5 guard 1 resets x to
+    // 1, which carries guard 0 from above to below.
+    struct Passed {
+        std::size_t guard_count = 2;
+        void flow(double, const X1&, X1& dxdt) const { dxdt = {-1}; }
+        [[nodiscard]] double guard(std::size_t which, double, const X1& x) const
+        {
+            return which == 0 ? -x[0] : x[0] + 0.5;
+        }
+        void reset(std::size_t which, double, X1& x) const
+        {
+            if (which == 1) x[0] = 1;
+        }
+    };
+    for (const double h : {2.0, 0.7, 0.1}) {
+        const auto run = integrate(Passed{}, X1{1}, {.t_end = 2, .step = h}, FixedStep<Rk4>{});
+        EXPECT_EQ(guards(run), (std::vector<std::size_t>{1, 0})) << h;
+        EXPECT_EQ(run.events[0].t, run.events[1].t);
+    }
+}
+
+TEST(Events, ANotificationThatCoincidesWithAResetIsNotLost)
+{
+    // Every impact is noted by a twin of the floor that only watches.
+    struct Twin {
+        std::size_t guard_count = 2;
+        bool swapped = false;
+        void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+        [[nodiscard]] double guard(std::size_t, double, const X& x) const { return x[0]; }
+        void reset(std::size_t, double, X& x) const { x = {0, -0.9 * x[1]}; }
+        [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+        {
+            const bool floor = (which == 0) != swapped;
+            return {.resets = floor, .unilateral = floor};
+        }
+    };
+    for (const bool swapped : {false, true}) {
+        for (const double height : {10.0, 1.0, 3.7, 0.123}) {
+            const double t_end = 14 * std::sqrt(2 * height / 9.81);
+            const auto run = integrate(Twin{.swapped = swapped}, X{height, 0}, {.t_end = t_end});
+            ASSERT_EQ(run.events.size(), 26u) << height;
+            for (std::size_t i = 0; i < run.events.size(); i += 2) {
+                EXPECT_NE(run.events[i].guard, run.events[i + 1].guard);
+                EXPECT_NEAR(run.events[i].t, run.events[i + 1].t, 1e-14);
+            }
+        }
+    }
+}
+
 TEST(Events, AResetBehindTheSurfaceIsNamed)
 {
     struct Behind : BouncingBall {

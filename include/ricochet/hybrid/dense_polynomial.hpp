@@ -135,8 +135,9 @@ public:
     }
 
     template <class Index>
-    [[nodiscard]] double operator[](Index i) const noexcept
+    [[nodiscard]] double operator[](Index index) const noexcept
     {
+        const auto i = static_cast<decltype(parts_.x0->size())>(index);
         double bent = 0;
         for (std::size_t k = 0; k < 3 && parts_.w[k]; ++k) {
             bent += weights_.value[k] * (*parts_.w[k])[i];

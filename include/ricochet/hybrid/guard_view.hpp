@@ -23,6 +23,13 @@ struct GuardSample {
 
 namespace detail {
 
+/// The index in the type that x counts with.
+template <class Index, class X>
+[[nodiscard]] constexpr auto own(Index i, const X& x) noexcept
+{
+    return static_cast<decltype(x.size())>(i);
+}
+
 /// x + factor * direction, a component at a time.
 template <class X, class D>
 class MovedView {
@@ -34,7 +41,7 @@ public:
     template <class Index>
     [[nodiscard]] double operator[](Index i) const noexcept
     {
-        return (*x_)[i] + factor_ * (*direction_)[i];
+        return (*x_)[own(i, *x_)] + factor_ * (*direction_)[own(i, *direction_)];
     }
     [[nodiscard]] auto size() const noexcept { return x_->size(); }
 
@@ -52,7 +59,7 @@ public:
     template <class Index>
     [[nodiscard]] double operator[](Index i) const noexcept
     {
-        return -(*x_)[i];
+        return -(*x_)[own(i, *x_)];
     }
     [[nodiscard]] auto size() const noexcept { return x_->size(); }
 

@@ -86,7 +86,7 @@ public:
     {
         if (space_.x.size() != like.size()) {
             space_ = ProbeSpace<X>(like);
-            before_ = like;
+            before_ = after_window_ = rate_after_window_ = like;
         }
         notes_.clear();
     }
@@ -198,18 +198,37 @@ public:
         }
     }
 
-    /// The value and rate of a guard where the set happens.
-    [[nodiscard]] GuardSample sample_at_set(const CurrentStep& step, Bank& bank, std::size_t i,
-                                            std::uint64_t& calls)
+    /// Computes the state at the end of the window of the set.
+    void look_past_set(const CurrentStep& step, const EventResolution& resolution)
+    {
+        past_ = std::min(at_ + resolution.window(step.time(at_)), step.h());
+        step.restep(past_, after_window_, rate_after_window_);
+    }
+
+    /// The value and rate of a guard at the end of the window of the set.
+    [[nodiscard]] GuardSample sample_past_set(const CurrentStep& step, Bank& bank, std::size_t i,
+                                              std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
-        const double t = step.time(at_);
-        GuardSample sample{.s = at_, .value = guard.value(t, before_)};
+        const double t = step.time(past_);
+        GuardSample sample{.s = past_, .value = guard.value(t, after_window_)};
         if (Detector::uses_rates && !bank[i].info.boolean) {
-            step.flow(at_, before_, space_.dxdt);
-            sample.rate = guard.rate(t, before_, space_.dxdt, step.h());
+            sample.rate = guard.rate(t, after_window_, rate_after_window_, step.h());
         }
         return sample;
+    }
+
+    /// A crossing of a notifying guard inside the window of the set at offset s happens
+    /// with it, and leaves the guard on its surface.
+    void join_set(const CurrentStep& step, Bank& bank, std::size_t i, double s,
+                  const EventResolution& resolution, std::uint64_t& calls)
+    {
+        if (s == step.h() || notes_.empty() || notes_.back().guard != i) return;
+        Location& where = notes_.back().where;
+        if (where.root < s - resolution.window(step.time(s))) return;
+        where.root = std::min(where.root, s);
+        bank[i].coincides = true;
+        bank[i].band = std::fabs(bank.view(i, step.mode(), calls).value(step.time(s), before_));
     }
 
     /// Drops what was noted beyond the offset s, and sorts the rest by time.
@@ -537,6 +556,9 @@ private:
 
     ProbeSpace<X> space_;
     X before_;
+    X after_window_ = before_;
+    X rate_after_window_ = before_;
+    double past_ = 0;  ///< [s] offset of the end of the window
     GuardList<Hit, fixed> hits_;
     GuardList<std::size_t, fixed> members_;
     std::vector<Note> notes_;

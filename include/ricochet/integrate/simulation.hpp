@@ -466,6 +466,7 @@ private:
                 return false;
             }
         }
+        if (bank_.size() == 0) return false;
         bank_.sample_end(step_, calls());
         if (!bank_.suspicious(step_.h())) {
             if (predicts && !cleared) ++run_.statistics.false_alarms;
@@ -651,6 +652,7 @@ private:
         const double s = search_.at();
         const double t = on_time ? time_event_ : time_of_set();
         note_crossings(s);
+        settle_sides(t);
         for (const std::size_t i : search_.members()) {
             bank_[i].band =
                 std::fabs(bank_.view(i, step_.mode(), calls()).value(t, search_.before()));
@@ -662,6 +664,22 @@ private:
         fire({.located = true, .on_time = on_time});
         if (on_time && !ended_) find_time_event();
         cascade();
+    }
+
+    /// Guards that have crossed before the set without an event are on their new side.
+    void settle_sides(double t)
+    {
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            detail::GuardRecord& record = bank_[i];
+            if (!bank_.suspicious(i, step_.h())) continue;
+            if (!record.acting) {
+                bank_.arm(i, record.next);
+            } else if (!counts(record.side, record.info.crossing) &&
+                       has_left(record.side, bank_.view(i, step_.mode(), calls())
+                                                 .value(t, search_.before()))) {
+                bank_.arm(i, opposite(record.side));
+            }
+        }
     }
 
     [[nodiscard]] double time_of_set() const noexcept
@@ -774,6 +792,7 @@ private:
             detail::GuardRecord& record = bank_[i];
             const bool enabled = detail::call_enabled_in(*system_, i, step_.mode());
             record.newly_enabled = enabled && !record.enabled;
+            if (record.newly_enabled) record.last = std::numeric_limits<double>::quiet_NaN();
             record.enabled = enabled;
         }
     }
@@ -784,7 +803,9 @@ private:
     void arm_all()
     {
         double widest = 0;
-        for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].fired = false;
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            bank_[i].fired = std::exchange(bank_[i].coincides, false);
+        }
         for (const std::size_t i : search_.members()) {
             bank_[i].fired = true;
             widest = std::max(widest, bank_[i].band);
@@ -904,12 +925,18 @@ private:
 
     void note_crossings(double s)
     {
+        bool past_set_is_known = false;
         for (std::size_t i = 0; i < bank_.size(); ++i) {
             if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
-            const GuardSample last = s == step_.h() ? bank_.end(i, s)
-                                                    : search_.sample_at_set(step_, bank_, i, calls());
+            GuardSample last = bank_.end(i, s);
+            if (s < step_.h()) {
+                if (!past_set_is_known) search_.look_past_set(step_, resolution_);
+                past_set_is_known = true;
+                last = search_.sample_past_set(step_, bank_, i, calls());
+            }
             search_.note_crossings(step_, bank_, i, last, detector_, locator_, resolution_,
                                    calls());
+            search_.join_set(step_, bank_, i, s, resolution_, calls());
         }
     }
 
