@@ -86,7 +86,7 @@ public:
     {
         if (space_.x.size() != like.size()) {
             space_ = ProbeSpace<X>(like);
-            before_ = after_window_ = rate_after_window_ = like;
+            before_ = like;
         }
         notes_.clear();
     }
@@ -143,8 +143,7 @@ public:
         } else if (!find_among(step, bank, detector, locator, resolution, calls)) {
             return false;
         }
-        const double window = resolution.window(step.time(at_));
-        settle_place(step, time_event_due && at_ + window >= step.h());
+        settle_place(step, resolution, time_event_due);
         return true;
     }
 
@@ -198,37 +197,41 @@ public:
         }
     }
 
-    /// Computes the state at the end of the window of the set.
-    void look_past_set(const CurrentStep& step, const EventResolution& resolution)
-    {
-        past_ = std::min(at_ + resolution.window(step.time(at_)), step.h());
-        step.restep(past_, after_window_, rate_after_window_);
-    }
-
-    /// The value and rate of a guard at the end of the window of the set.
-    [[nodiscard]] GuardSample sample_past_set(const CurrentStep& step, Bank& bank, std::size_t i,
-                                              std::uint64_t& calls)
+    /// The value and rate of a guard where the set happens.
+    [[nodiscard]] GuardSample sample_at_set(const CurrentStep& step, Bank& bank, std::size_t i,
+                                            std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
-        const double t = step.time(past_);
-        GuardSample sample{.s = past_, .value = guard.value(t, after_window_)};
-        if (Detector::uses_rates && !bank[i].info.boolean) {
-            sample.rate = guard.rate(t, after_window_, rate_after_window_, step.h());
+        const double t = step.time(at_);
+        GuardSample sample{.s = at_, .value = guard.value(t, before_)};
+        if (!bank[i].info.boolean) {
+            step.flow(at_, before_, space_.dxdt);
+            sample.rate = guard.rate(t, before_, space_.dxdt, step.h());
         }
         return sample;
     }
 
-    /// A crossing of a notifying guard inside the window of the set at offset s happens
-    /// with it, and leaves the guard on its surface.
-    void join_set(const CurrentStep& step, Bank& bank, std::size_t i, double s,
-                  const EventResolution& resolution, std::uint64_t& calls)
+    /// Whether a guard crosses its surface with the set: it is within rounding of it
+    /// there. `sample` has its rate.
+    [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Bank& bank, std::size_t i,
+                                        const GuardSample& sample,
+                                        const EventResolution& resolution) const
     {
-        if (s == step.h() || notes_.empty() || notes_.back().guard != i) return;
-        Location& where = notes_.back().where;
-        if (where.root < s - resolution.window(step.time(s))) return;
-        where.root = std::min(where.root, s);
-        bank[i].coincides = true;
-        bank[i].band = std::fabs(bank.view(i, step.mode(), calls).value(step.time(s), before_));
+        const double reach = std::fabs(sample.rate) * resolution.window(step.time(sample.s));
+        const double scale =
+            std::fabs(bank.end(i, step.h()).value);  // of a step that may be the first
+        const double rounding = 64 * std::numeric_limits<double>::epsilon() * scale;
+        return std::fabs(sample.value) <= std::max({reach, bank.touch(i), rounding});
+    }
+
+    /// Notes a crossing that happens with the set.
+    void note_at_set(Bank& bank, std::size_t i, Side side, double slope)
+    {
+        notes_.push_back({.guard = i,
+                          .kind = EventKind::crossing,
+                          .side = side,
+                          .where = {.lo = at_, .hi = at_, .root = at_, .slope = slope}});
+        bank.arm(i, opposite(side));
     }
 
     /// Drops what was noted beyond the offset s, and sorts the rest by time.
@@ -530,7 +533,8 @@ private:
     }
 
     /// The set happens at its latest root, or at the time event that it belongs to.
-    void settle_place(const CurrentStep& step, bool at_end)
+    void settle_place(const CurrentStep& step, const EventResolution& resolution,
+                      bool time_event_due)
     {
         if (members_.size() > 1) {
             at_ = 0;
@@ -547,7 +551,7 @@ private:
                 step.restep(at_, before_);
             }
         }
-        if (at_end) {
+        if (time_event_due && at_ + resolution.window(step.time(at_)) >= step.h()) {
             at_ = step.h();
             at_remainder_ = 0;
             assign(before_, step.x1());
@@ -556,9 +560,6 @@ private:
 
     ProbeSpace<X> space_;
     X before_;
-    X after_window_ = before_;
-    X rate_after_window_ = before_;
-    double past_ = 0;  ///< [s] offset of the end of the window
     GuardList<Hit, fixed> hits_;
     GuardList<std::size_t, fixed> members_;
     std::vector<Note> notes_;

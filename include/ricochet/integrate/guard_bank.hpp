@@ -56,9 +56,8 @@ struct GuardRecord {
     bool enabled = true;
     bool newly_enabled = false;
     bool fired = false;
-    bool coincides = false;  ///< a notification inside the window of a set
-    bool rested = false;     ///< its events have accumulated
-    bool acting = false;     ///< resets, or may end the run; else a notification
+    bool rested = false;  ///< its events have accumulated
+    bool acting = false;  ///< resets, or may end the run; else a notification
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     double band = 0;            ///< |g| where it fired: it counts as being on its surface

@@ -22,13 +22,19 @@ public:
     {
         const double interval =
             std::fabs((t.value - last_.value) + (t.remainder - last_.remainder));
+        stalled_ = interval < std::max(resolution(), std::numeric_limits<double>::min()) / 4
+                       ? stalled_ + 1
+                       : 0;
+        if (stalled_ > 0 && seen_ > 0) {  // another event of the same instant: no interval
+            last_ = t;
+            return stalled_ > 100;
+        }
         shrinking_ = seen_ >= 2 && interval < interval_ ? shrinking_ + 1 : 0;
         ratio_ = shrinking_ > 0 ? interval / interval_ : 1;
         last_ = t;
         interval_ = interval;
         seen_ = std::min(seen_ + 1, 2u);
-        stalled_ = interval < resolution() / 4 ? stalled_ + 1 : 0;
-        return stalled_ > 100;
+        return false;
     }
 
     /// Whether what is left after the event just noted is below `tolerance` [s] or

@@ -154,7 +154,9 @@ public:
             if constexpr (requires { observe(run_.events[0]); }) {
                 for (; seen < run_.events.size(); ++seen) observe(std::as_const(run_.events[seen]));
             }
-            if constexpr (requires { observe(std::as_const(*this)); }) observe(std::as_const(*this));
+            if constexpr (requires { observe(std::as_const(*this)); }) {
+                observe(std::as_const(*this));
+            }
         }
     }
 
@@ -226,7 +228,8 @@ private:
         for (std::size_t i = 0; i < bank_.size(); ++i) {
             detail::GuardRecord& record = bank_[i];
             const GuardInfo& info = record.info;
-            record.acting = (resets && info.resets) || info.stop_after > 0 || options_.stop_at_event;
+            record.acting =
+                (resets && info.resets) || info.stop_after > 0 || options_.stop_at_event;
             if (info.unilateral && !(resets && info.resets)) detail::throw_no_reset(i);
             if (info.unilateral && info.crossing != Crossing::falling) {
                 detail::throw_unilateral_not_falling(i);
@@ -442,6 +445,9 @@ private:
 
     void apply_time_event()
     {
+        if constexpr (guarded) {
+            for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
+        }
         search_.members().clear();
         detail::assign(search_.before(), step_.x0());
         transform(true);
@@ -487,7 +493,8 @@ private:
         }
         search_.begin(step_.x0());
         bank_.begin_search();
-        while (search_.find_set(step_, bank_, detector_, locator_, resolution_, time_event_due_, calls())) {
+        while (search_.find_set(step_, bank_, detector_, locator_, resolution_, time_event_due_,
+                                calls())) {
             if (predicts && (cleared || search_.late())) ++run_.statistics.missed_events;
             if (search_.late()) ++run_.statistics.late_events;
             dismiss_members();
@@ -651,8 +658,8 @@ private:
     {
         const double s = search_.at();
         const double t = on_time ? time_event_ : time_of_set();
-        note_crossings(s);
-        settle_sides(t);
+        for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
+        note_crossings_to_set();
         for (const std::size_t i : search_.members()) {
             bank_[i].band =
                 std::fabs(bank_.view(i, step_.mode(), calls()).value(t, search_.before()));
@@ -664,22 +671,6 @@ private:
         fire({.located = true, .on_time = on_time});
         if (on_time && !ended_) find_time_event();
         cascade();
-    }
-
-    /// Guards that have crossed before the set without an event are on their new side.
-    void settle_sides(double t)
-    {
-        for (std::size_t i = 0; i < bank_.size(); ++i) {
-            detail::GuardRecord& record = bank_[i];
-            if (!bank_.suspicious(i, step_.h())) continue;
-            if (!record.acting) {
-                bank_.arm(i, record.next);
-            } else if (!counts(record.side, record.info.crossing) &&
-                       has_left(record.side, bank_.view(i, step_.mode(), calls())
-                                                 .value(t, search_.before()))) {
-                bank_.arm(i, opposite(record.side));
-            }
-        }
     }
 
     [[nodiscard]] double time_of_set() const noexcept
@@ -743,7 +734,8 @@ private:
             detail::GuardRecord& record = bank_[i];
             const bool stalls = record.intervals.stalls(step_.start());
             const double tolerance = resolution_.tolerance(step_.start().value);
-            if (stalls || (resets && record.info.resets && record.intervals.accumulate(tolerance))) {
+            const bool resetting = resets && record.info.resets;
+            if (stalls || (resetting && record.intervals.accumulate(tolerance))) {
                 come_to_rest(i, stalls ? 0 : record.intervals.remainder());
                 rested = true;
             }
@@ -803,9 +795,7 @@ private:
     void arm_all()
     {
         double widest = 0;
-        for (std::size_t i = 0; i < bank_.size(); ++i) {
-            bank_[i].fired = std::exchange(bank_[i].coincides, false);
-        }
+        for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].fired = false;
         for (const std::size_t i : search_.members()) {
             bank_[i].fired = true;
             widest = std::max(widest, bank_[i].band);
@@ -832,7 +822,7 @@ private:
             return false;
         }
         const Side before = record.side;
-        const double band = record.fired ? record.band : record.newly_enabled ? widest : 0;
+        const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
         const bool on_surface = std::fabs(g) <= band;
         const Side side = on_surface ? heading(i) : side_of(g);
         bank_.arm(i, side);
@@ -855,7 +845,8 @@ private:
                 record_jump(i, before);
             }
         }
-        const bool outside = kept_out && !on_surface && g < 0 && (record.fired || record.newly_enabled);
+        const bool is_new = record.fired || record.newly_enabled;
+        const bool outside = kept_out && !on_surface && g < 0 && is_new;
         if (outside) end(Outcome::outside_mode, i);
         return !outside;
     }
@@ -900,7 +891,6 @@ private:
                 }
                 continue;
             }
-            for (const std::size_t i : search_.members()) bank_[i].band = 0;
             fire({});
         }
     }
@@ -925,19 +915,47 @@ private:
 
     void note_crossings(double s)
     {
-        bool past_set_is_known = false;
         for (std::size_t i = 0; i < bank_.size(); ++i) {
             if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
-            GuardSample last = bank_.end(i, s);
-            if (s < step_.h()) {
-                if (!past_set_is_known) search_.look_past_set(step_, resolution_);
-                past_set_is_known = true;
-                last = search_.sample_past_set(step_, bank_, i, calls());
-            }
-            search_.note_crossings(step_, bank_, i, last, detector_, locator_, resolution_,
-                                   calls());
-            search_.join_set(step_, bank_, i, s, resolution_, calls());
+            search_.note_crossings(step_, bank_, i, bank_.end(i, s), detector_, locator_,
+                                   resolution_, calls());
         }
+    }
+
+    /// All that other guards do up to the set of the members: crossings before it, which
+    /// leave a guard on its other side, and crossings with it.
+    void note_crossings_to_set()
+    {
+        if (search_.members().size() == bank_.size()) return;
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            detail::GuardRecord& record = bank_[i];
+            if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
+            const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
+            const bool with_set = !record.info.boolean && at.s > record.from &&
+                                  search_.crosses_with_set(step_, bank_, i, at, resolution_);
+            GuardSample last = at;
+            // On the side that it comes from, until it crosses.
+            if (with_set) record.band = std::fabs(at.value);
+            if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
+            if (!record.acting) {
+                search_.note_crossings(step_, bank_, i, last, detector_, locator_, resolution_,
+                                       calls());
+            }
+            if (has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
+            const Side side = record.side;
+            if (!with_set || side_of(last.value) != side) continue;
+            if (!record.acting && counts(side, record.info.crossing)) {
+                search_.note_at_set(bank_, i, side, at.rate);
+            } else {
+                bank_.arm(i, opposite(side));
+            }
+        }
+    }
+
+    [[nodiscard]] bool is_member(std::size_t i) noexcept
+    {
+        auto& members = search_.members();
+        return std::find(members.begin(), members.end(), i) != members.end();
     }
 
     void record(Event<X>&& event)
@@ -1007,9 +1025,13 @@ private:
     /// What happened in the step up to offset s without consequence.
     void record_notes(double s)
     {
+        if (search_.notes().empty()) return;
         search_.keep_notes_until(s);
+        const double remainder = s == search_.at() ? search_.at_remainder() : 0;
+        const double latest = step_.instant(s, remainder).value;
         for (const detail::Note& note : search_.notes()) {
-            const double t = step_.time(note.where.root);
+            const double t = backward_ ? std::max(step_.time(note.where.root), latest)
+                                       : std::min(step_.time(note.where.root), latest);
             count_event(note.guard, t, note.side);
             if (!options_.record_events) continue;
             Event<X> event{.t = t,
