@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ricochet/detect/ballistic_line.hpp"
+#include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/features.hpp"
@@ -11,6 +12,7 @@
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/step.hpp"
 #include "ricochet/hybrid/system.hpp"
+#include "ricochet/hybrid/filippov.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/integrate/options.hpp"

@@ -86,6 +86,19 @@ public:
         return {.s = s, .value = guard_->value(step_->time(s), space_->x)};
     }
 
+    /// The guard at offset s on the step's polynomial, whatever the path.
+    [[nodiscard]] GuardSample dense_value(double s)
+    {
+        const double t = step_->time(s);
+        if constexpr (by_component) {
+            return {.s = s, .value = guard_->value(t, view(s))};
+        } else {
+            step_->interpolate(s, space_->x);
+            placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
+            return {.s = s, .value = guard_->value(t, space_->x)};
+        }
+    }
+
     /// The guard and its rate at offset s.
     [[nodiscard]] GuardSample value_and_rate(double s)
     {

@@ -217,11 +217,13 @@ public:
                                         const GuardSample& sample,
                                         const EventResolution& resolution) const
     {
-        const double reach = std::fabs(sample.rate) * resolution.window(step.time(sample.s));
-        const double scale =
-            std::fabs(bank.end(i, step.h()).value);  // of a step that may be the first
-        const double rounding = 64 * std::numeric_limits<double>::epsilon() * scale;
-        return std::fabs(sample.value) <= std::max({reach, bank.touch(i), rounding});
+        // The rounding of a step of length s moves an event by a few ulp(s).
+        const double rounding = 64 * std::numeric_limits<double>::epsilon() * sample.s;
+        const double reach = std::max(resolution.window(step.time(sample.s)), rounding);
+        // A guard that acts must be located in the set; one that only notifies may be as far
+        // from its surface as the rounding of its largest values.
+        const double band = bank[i].acting ? 0 : bank.touch(i);
+        return std::fabs(sample.value) <= std::max(std::fabs(sample.rate) * reach, band);
     }
 
     /// Notes a crossing that happens with the set.
@@ -238,8 +240,10 @@ public:
     void keep_notes_until(double s)
     {
         std::erase_if(notes_, [&](const Note& note) { return note.where.root > s; });
-        std::stable_sort(notes_.begin(), notes_.end(),
-                         [](const Note& a, const Note& b) { return a.where.root < b.where.root; });
+        // std::stable_sort would allocate.
+        std::sort(notes_.begin(), notes_.end(), [](const Note& a, const Note& b) {
+            return a.where.root != b.where.root ? a.where.root < b.where.root : a.guard < b.guard;
+        });
     }
 
     /// The state at a note on the step's polynomial.
@@ -264,12 +268,15 @@ private:
     }
     || requires(const System& system, double t, const X& x) { system.enabled(t, x); };
 
-    /// Both ends of the stretch are on the surface: so is the middle of a plateau.
+    /// Both ends of the stretch are on the surface: so is all of a plateau between, of
+    /// which the middle and a place that no symmetry singles out are looked at.
     [[nodiscard]] static bool is_plateau(Probe& probe, const Watch& watch)
     {
+        const double width = watch.end.s - watch.start.s;
         return watch.end.value == 0 &&
                std::fabs(watch.start.value) <= std::numeric_limits<double>::min() &&
-               probe.value(watch.start.s + (watch.end.s - watch.start.s) / 2).value == 0;
+               probe.value(watch.start.s + 0.5 * width).value == 0 &&
+               probe.value(watch.start.s + 0.381966 * width).value == 0;
     }
 
     /// What the guard does next in the stretch. A touch is noted, and a clear stretch

@@ -1042,7 +1042,7 @@ private:
                            .bracket = {step_.time(note.where.lo), step_.time(note.where.hi)},
                            .slope = note.where.slope,
                            .error = note.where.error};
-            if (options_.event_states) {
+            if (options_.event_states || detail::fixed_size<X>() > 0) {
                 event.before = search_.state_at(step_, note);
                 event.after = event.before;
             }

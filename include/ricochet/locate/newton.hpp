@@ -132,6 +132,7 @@ private:
         // Three quarters of the relative epsilon always reach the next double, and
         // never pass the one after it.
         double margin = std::max(tolerance / 2, 0.75 * probe.finest(s));
+        const double widest = 0x1p20 * margin;
         int direction = 0;
         if (s <= lo.s) {
             direction = 1;
@@ -148,6 +149,7 @@ private:
             direction = toward;
             s += toward * margin;
             margin *= 2;
+            if (margin > widest) return false;  // the prediction was wrong
         }
         return false;
     }

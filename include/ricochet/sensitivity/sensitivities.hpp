@@ -1,0 +1,275 @@
+// A run and its derivatives by initial state and parameters.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/sensitivity/directions.hpp"
+#include "ricochet/sensitivity/undefined.hpp"
+#include "ricochet/sensitivity/variational.hpp"
+
+namespace ricochet {
+
+/// Derivatives of one event, a column for each direction. NaN where they do not exist.
+struct EventSensitivity {
+    Eigen::VectorXd dt;        ///< of its time [s]
+    Eigen::MatrixXd before;    ///< S⁻: of the state, at the fixed time of the event
+    Eigen::MatrixXd after;     ///< S⁺
+    Eigen::MatrixXd at_event;  ///< of the state before the reset at the event as it moves:
+                               ///< S⁻ + x' dt
+};
+
+/// Where the derivatives ended.
+struct UndefinedAt {
+    std::size_t event;  ///< index into `Run::events`
+    Undefined reason;
+};
+
+/// A run with its derivatives. Columns are the directions: the components of the
+/// initial state, where asked for, then the parameters.
+template <class X>
+struct Sensitivities {
+    /// The run itself. Its `solution` stays empty.
+    Run<X> run;
+    /// For each of `run.events`.
+    std::vector<EventSensitivity> events;
+    /// Derivatives of `run.x` at the fixed time `run.t`: n x directions. (At the event
+    /// that ended a run, `events.back()` tells how the time moves.)
+    Eigen::MatrixXd state;
+    /// Derivatives at each of `run.trajectory.t`.
+    std::vector<Eigen::MatrixXd> trajectory;
+    /// The first event through which there is no derivative, if there is one: from it
+    /// on every derivative is NaN. The run is not affected.
+    std::optional<UndefinedAt> undefined_at;
+};
+
+namespace detail {
+
+/// Takes a run of the variational system apart.
+template <class System, class X>
+class Separation {
+    using Flat = std::vector<double>;
+
+public:
+    Separation(const Variational<System, X>& variational, Run<Flat>&& flat, bool backward)
+        : variational_(variational), flat_(std::move(flat)), backward_(backward)
+    {
+    }
+
+    [[nodiscard]] Sensitivities<X> take(bool keep_events)
+    {
+        separate_run();
+        name_conflict();
+        separate_events();
+        result_.state = derivatives_at(flat_.x, flat_.t);
+        for (std::size_t k = 0; k < flat_.trajectory.t.size(); ++k) {
+            result_.trajectory.push_back(
+                derivatives_at(flat_.trajectory.x[k], flat_.trajectory.t[k]));
+        }
+        if (!keep_events) {
+            result_.run.events.clear();
+            result_.events.clear();
+        }
+        return std::move(result_);
+    }
+
+private:
+    static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+    void separate_run()
+    {
+        Run<X>& run = result_.run;
+        run.outcome = flat_.outcome;
+        run.t = flat_.t;
+        run.x = variational_.state(flat_.x);
+        run.mode = flat_.mode;
+        run.guard = flat_.guard;
+        run.other_guard = flat_.other_guard;
+        run.statistics = flat_.statistics;
+        run.trajectory.t = flat_.trajectory.t;
+        for (const Flat& y : flat_.trajectory.x) {
+            run.trajectory.x.push_back(variational_.state(y));
+        }
+        for (const Event<Flat>& event : flat_.events) {
+            run.events.push_back({.t = event.t,
+                                  .kind = event.kind,
+                                  .guard = event.guard,
+                                  .mode_before = event.mode_before,
+                                  .mode_after = event.mode_after,
+                                  .before = variational_.state(event.before),
+                                  .after = variational_.state(event.after),
+                                  .bracket = event.bracket,
+                                  .slope = event.slope,
+                                  .error = event.error,
+                                  .late = event.late});
+        }
+    }
+
+    /// The variational system answers contradictory resets with NaN: says what it was.
+    void name_conflict()
+    {
+        if constexpr (Resetting<System, X>) {
+            if (flat_.outcome != Outcome::non_finite || flat_.events.empty()) return;
+            const Event<Flat>& last = flat_.events.back();
+            std::vector<std::size_t> guards;
+            bool on_time = false;
+            for (const Event<Flat>& event : flat_.events) {
+                if (event.t != last.t || event.before != last.before) continue;
+                if (event.kind == EventKind::time) on_time = true;
+                if (event.kind == EventKind::crossing) guards.push_back(event.guard);
+            }
+            const Conflict conflict = variational_.conflict(FiredGuards(guards, on_time),
+                                                            last.mode_before, last.t, last.before);
+            if (!conflict.any()) return;
+            result_.run.outcome = Outcome::conflicting_resets;
+            result_.run.guard = conflict.first;
+            result_.run.other_guard = conflict.second;
+        }
+    }
+
+    void separate_events()
+    {
+        for (std::size_t k = 0; k < flat_.events.size(); ++k) {
+            const Event<Flat>& event = flat_.events[k];
+            note_undefined(k);
+            EventSensitivity derivatives;
+            const bool before = variational_.undefined(event.before) == Undefined::no &&
+                                !(result_.undefined_at && result_.undefined_at->event < k);
+            derivatives.before = matrix_of(event.before, before);
+            derivatives.after = matrix_of(event.after, !result_.undefined_at);
+            derivatives.dt = time_of(k, before);
+            derivatives.at_event = derivatives.before;
+            if (before && variational_.columns() > 0) {
+                const X rate = variational_.rate(event.mode_before, event.t, event.before);
+                for_each_component(rate, [&](auto i) {
+                    derivatives.at_event.row(static_cast<Eigen::Index>(i)) +=
+                        rate[i] * derivatives.dt.transpose();
+                });
+            }
+            result_.events.push_back(std::move(derivatives));
+        }
+    }
+
+    /// The derivatives end at an event that says so, and at a touch of a guard that
+    /// resets: some neighbours of the motion cross there.
+    void note_undefined(std::size_t k)
+    {
+        if (result_.undefined_at || variational_.columns() == 0) return;
+        const Event<Flat>& event = flat_.events[k];
+        Undefined reason = variational_.undefined(event.after);
+        if (event.kind == EventKind::touch && Resetting<System, X> &&
+            variational_.guard_info(event.guard).resets) {
+            reason = Undefined::grazing;
+        }
+        if (reason != Undefined::no) result_.undefined_at = UndefinedAt{k, reason};
+    }
+
+    [[nodiscard]] Eigen::MatrixXd matrix_of(const Flat& y, bool defined) const
+    {
+        Eigen::MatrixXd derivatives = variational_.derivatives(y);
+        if (!defined) derivatives.setConstant(nan);
+        return derivatives;
+    }
+
+    [[nodiscard]] Eigen::VectorXd undefined_time() const
+    {
+        return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(variational_.columns()), nan);
+    }
+
+    /// Derivatives of the time of event k; `before` if those of the state exist there.
+    [[nodiscard]] Eigen::VectorXd time_of(std::size_t k, bool before) const
+    {
+        const Event<Flat>& event = flat_.events[k];
+        if (!before || event.kind == EventKind::touch) return undefined_time();
+        EventTime time;
+        if (event.kind == EventKind::time) {
+            time = variational_.time_event(event.t);
+        } else if (event.kind == EventKind::crossing) {
+            time = variational_.crossing(event.guard, event.mode_before, event.t, event.before);
+        } else if (!result_.undefined_at) {
+            time.dt = variational_.last_event_derivatives(event.after);
+        } else {
+            return undefined_time();
+        }
+        return time.undefined == Undefined::no ? time.dt : undefined_time();
+    }
+
+    /// A state at the time of an event is the one after it.
+    [[nodiscard]] Eigen::MatrixXd derivatives_at(const Flat& y, double t) const
+    {
+        bool defined = true;
+        if (result_.undefined_at) {
+            const double from = flat_.events[result_.undefined_at->event].t;
+            defined = backward_ ? t > from : t < from;
+        }
+        return matrix_of(y, defined);
+    }
+
+    const Variational<System, X>& variational_;
+    Run<Flat> flat_;
+    bool backward_;
+    Sensitivities<X> result_;
+};
+
+}  // namespace detail
+
+/// Integrates `system` as `integrate` does, together with the derivatives of state and
+/// event times by the initial state and by parameters, exact through events (see
+/// saltation.hpp) up to the error of the method and of differences.
+///
+/// @param directions  what to differentiate by; {} is the initial state
+/// @param options     as for the run alone; the derivatives are under its error control
+///                    too, so that the steps differ from those of the run alone, and
+///                    its results by the tolerance. `record_steps` is ignored.
+/// @throws std::invalid_argument as `integrate`, and for directions that make no sense.
+///         Where derivatives do not exist, `undefined_at` says so.
+template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
+          class Detector = Extremum, class Locator = Newton>
+requires Flowing<System, X> && StateVector<X>
+[[nodiscard]] Sensitivities<X> sensitivities(const System& system, const X& x0,
+                                             const Directions<System>& directions,
+                                             const Options& options, const Stepping& stepping = {},
+                                             const Detector& detector = {},
+                                             const Locator& locator = {})
+{
+    detail::check_declarations<System, X>();
+    const Variational<System, X> variational(system, x0, directions, options);
+    Options all = options;
+    all.record_events = true;
+    all.event_states = true;
+    all.record_steps = false;
+    auto flat = integrate(variational, variational.start(), all, stepping, detector, locator);
+    return detail::Separation<System, X>(variational, std::move(flat),
+                                         options.t_end < options.t_start)
+        .take(options.record_events);
+}
+
+/// The derivative of the state after one `period` [s] by the state at its start: the
+/// product of the fundamental matrices of the flights and the saltation matrices of the
+/// events. NaN where it does not exist, or where the run does not reach its end.
+///
+/// @param options  `t_end` is not used
+/// @throws std::invalid_argument as `sensitivities`.
+template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
+          class Detector = Extremum, class Locator = Newton>
+requires Flowing<System, X> && StateVector<X>
+[[nodiscard]] Eigen::MatrixXd monodromy(const System& system, const X& x0, double period,
+                                        const Options& options, const Stepping& stepping = {},
+                                        const Detector& detector = {}, const Locator& locator = {})
+{
+    Options one = options;
+    one.t_end = options.t_start + period;
+    auto result = sensitivities(system, x0, {}, one, stepping, detector, locator);
+    if (result.run.outcome != Outcome::reached_end) {
+        result.state.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+    return result.state;
+}
+
+}  // namespace ricochet
