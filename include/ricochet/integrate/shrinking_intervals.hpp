@@ -25,9 +25,11 @@ public:
         stalled_ = interval < std::max(resolution(), std::numeric_limits<double>::min()) / 4
                        ? stalled_ + 1
                        : 0;
-        if (stalled_ > 0 && seen_ > 0) {  // another event of the same instant: no interval
+        if (stalled_ > 100) return true;
+        const double instant = std::max(resolution(), std::numeric_limits<double>::min()) / 256;
+        if (interval <= instant && seen_ > 0) {  // another event of the same instant: no interval
             last_ = t;
-            return stalled_ > 100;
+            return false;
         }
         shrinking_ = seen_ >= 2 && interval < interval_ ? shrinking_ + 1 : 0;
         ratio_ = shrinking_ > 0 ? interval / interval_ : 1;
