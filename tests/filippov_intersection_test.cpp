@@ -445,9 +445,7 @@ struct ObliqueTwisting {
     }
 };
 
-// Known defect, so not run: in oblique coordinates a guard within rounding of its surface
-// at the end of the twisting is armed beyond a surface that it has not met.
-TEST(Filippov, DISABLED_TwistingComesToRestWhereRoundingKeepsItOffTheSurfaces)
+TEST(Filippov, TwistingComesToRestWhereRoundingKeepsItOffTheSurfaces)
 {
     // From y = 1 at rest. The speed that rounding leaves at rest, 1e-16,
     // makes y drift by that much per second.
@@ -458,6 +456,13 @@ TEST(Filippov, DISABLED_TwistingComesToRestWhereRoundingKeepsItOffTheSurfaces)
     EXPECT_EQ(run.mode, (Two::mode_of(s, s)));
     EXPECT_NEAR(system.fields().surface(0, run.t, run.x), 0, 1e-13);
     EXPECT_NEAR(system.fields().surface(1, run.t, run.x), 0, 1e-14);
+}
+
+TEST(Filippov, AStartOnTheWrongSideOfASurfaceIsRefused)
+{
+    const Filippov<ObliqueTwisting> system;
+    const std::array x0 = {-1.0 / 3, 2.0 / 3};  // y = 1
+    EXPECT_THROW((void)integrate(system, x0, tight(1, Two::mode_of(b, b))), std::invalid_argument);
 }
 
 TEST(Filippov, SpiralsOfAnyContractionEndOnTheIntersection)

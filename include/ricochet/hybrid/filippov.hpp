@@ -75,12 +75,18 @@ struct FilippovState<Fields> {
 /// A mode says for each surface whether the motion is below, above or sliding; digit i
 /// of its number to base 3 is the `Place` at surface i. Start a run in `start_mode`.
 ///
-/// There are four guards per surface, numbered 4 surface + kind:
+/// There are four guards per surface, numbered 4 surface + kind. All fall:
 ///
-///     0  h, rising      while below
-///     1  h, falling     while above
-///     2  exit below     while sliding: falls where the motion may leave to h < 0
-///     3  exit above     while sliding: falls where it may leave to h > 0
+///     0  -h             while below
+///     1  h              while above
+///     2  exit below     while sliding: zero where the motion may leave to h < 0
+///     3  exit above     while sliding: zero where it may leave to h > 0
+///
+/// The first two are unilateral, so that no motion goes on unseen beyond a surface: a
+/// start on the wrong side is refused, and a run that a reset leaves there ends with
+/// `Outcome::outside_mode`. That may happen where rounding hides a surface, as at the end
+/// of twisting in skew coordinates. Sliding has no such bound: with surfaces whose rates
+/// differ in size by 1e3, rounding may lead sliding on both off its surfaces unseen.
 ///
 /// Along one surface the exits are r_below and -r_above: as smooth as the fields, with
 /// neither quotient nor pole, and zero just where the share a is 0 or 1. On two they
@@ -135,7 +141,7 @@ public:
     {
         GuardInfo info;
         info.name = detail::filippov_guard_name(which);
-        info.crossing = kind_of(which) == rises ? Crossing::rising : Crossing::falling;
+        info.unilateral = !is_exit(which);
         return info;
     }
 
@@ -143,8 +149,8 @@ public:
     {
         const Place at = place(surface_of(which), mode);
         switch (kind_of(which)) {
-            case rises: return at == Place::below;
-            case falls: return at == Place::above;
+            case leaves_below: return at == Place::below;
+            case leaves_above: return at == Place::above;
             default: return at == Place::sliding;
         }
     }
@@ -160,7 +166,8 @@ public:
     template <StateVector X>
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const X& x) const
     {
-        if (!is_exit(which)) return rules_.surface(surface_of(which), t, x);
+        if (kind_of(which) == leaves_below) return -rules_.surface(surface_of(which), t, x);
+        if (kind_of(which) == leaves_above) return rules_.surface(surface_of(which), t, x);
         return exits(places(mode), t, x)[exit_of(which)];
     }
 
@@ -170,7 +177,8 @@ public:
         const detail::Exits exit = exits(places(mode), t, x);
         for (std::size_t surface = 0; surface < surface_count; ++surface) {
             const std::size_t first = guards_per_surface * surface;
-            g[first + rises] = g[first + falls] = rules_.surface(surface, t, x);
+            g[first + leaves_above] = rules_.surface(surface, t, x);
+            g[first + leaves_below] = -g[first + leaves_above];
             g[first + exits_below] = exit[2 * surface];
             g[first + exits_above] = exit[2 * surface + 1];
         }
@@ -184,8 +192,9 @@ public:
                                     const X& dxdt) const
     {
         const Places at = places(mode);
-        return is_exit(which) ? exit_rates(at, t, x, dxdt)[exit_of(which)]
-                              : surface_rate(surface_of(which), at, t, x, dxdt);
+        if (is_exit(which)) return exit_rates(at, t, x, dxdt)[exit_of(which)];
+        const double rate = surface_rate(surface_of(which), at, t, x, dxdt);
+        return kind_of(which) == leaves_above ? rate : -rate;
     }
 
     template <StateVector X>
@@ -197,7 +206,8 @@ public:
             const std::size_t first = guards_per_surface * surface;
             const bool slides = at[surface] == Place::sliding;
             const double rate = slides ? 0 : surface_rate(surface, at, t, x, dxdt);
-            rates[first + rises] = rates[first + falls] = rate;
+            rates[first + leaves_above] = rate;
+            rates[first + leaves_below] = -rate;
             rates[first + exits_below] = exit[2 * surface];
             rates[first + exits_above] = exit[2 * surface + 1];
         }
@@ -215,6 +225,8 @@ public:
     /// to 2e-13 of the larger, takes the sign that it will have next along its field; an
     /// exit that has fired is a way out.
     ///
+    /// A surface that the state is on or beyond counts as met, whichever guard has fired.
+    ///
     /// On two surfaces: as steep but continuous switching would do, see
     /// `detail::follow_shares`, with the rates of each surface in units of the largest.
     /// It starts from the shares with which the motion arrives; after an exit from those
@@ -227,7 +239,7 @@ public:
         Places from = places(mode);
         bool exits_only = !fired.time_event();
         if (fired.time_event()) from = after_time_event(from, t, x);
-        Surfaces on = Rules::sliding_in(from);
+        Surfaces on = Rules::sliding_in(from) | rules_.reached_in(from, t, x);
         typename Rules::FiredExits exits = 0;
         for (const std::size_t which : fired) {
             on |= Rules::bit(surface_of(which));
@@ -327,7 +339,7 @@ public:
     }
 
 private:
-    enum Kind : std::size_t { rises, falls, exits_below, exits_above };
+    enum Kind : std::size_t { leaves_below, leaves_above, exits_below, exits_above };
 
     [[nodiscard]] static constexpr std::size_t surface_of(std::size_t which) noexcept
     {

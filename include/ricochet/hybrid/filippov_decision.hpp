@@ -95,18 +95,10 @@ public:
         // What leaves at no rate may turn back.
         const auto later = [&](double time, const X& at) {
             const RegionRates r = around(both, slides, time, at).rates;
-            const Continuation same = follow_shares(normalised(r), corner_of(way.to));
+            const Continuation same = follow_shares(normalised(r), middle_of(way.to));
             return same.to == way.to ? same.margin : -1;
         };
         return leads_away(way.margin, way.to, t, x, later) ? way.to : slides;
-    }
-
-    [[nodiscard]] static Shares corner_of(const Places& at) noexcept
-    {
-        const auto share = [](Place place) {
-            return place == Place::above ? 1.0 : place == Place::below ? 0.0 : 0.5;
-        };
-        return {share(at[0]), share(at[1])};
     }
 
     /// The same after an exit: with the rates and shares of a moment later, when there is
@@ -223,36 +215,57 @@ public:
         if (next == all) {
             assign(x, there[0]);
         } else if (next == from) {
-            go_on(next, t, x);
+            go_on(on, next, t, x);
         } else {
             settle(on, from, next, t, x);
         }
         return next;
     }
 
-    /// Whether the motion from one surface meets the other one so soon, within 8 units in
-    /// the last place of the time, that it has met both.
+    /// Whether the motion from one surface meets the other one so soon that it has met
+    /// both: before the time is over by which the first meeting is uncertain.
     template <class X>
     [[nodiscard]] bool meets_other(Surfaces on, const Places& next, double t, const X& x) const
     {
         const std::size_t other = on == bit(0) ? 1 : 0;
         const double h = surface(other, t, x);
         const double rate = rate_along(other, next, t, x);
-        const double soon = 8 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+        const double soon = uncertainty(only(on), next, t, x);
         return h * rate < 0 && std::fabs(h) <= soon * std::fabs(rate);
     }
 
-    /// Moves x along its motion by the least that there is. Where a surface was met but
-    /// the motion stays on its side, that makes the loop judge it anew from here.
+    /// [s] By how much it is uncertain when a motion has met a surface: 8 units in the last
+    /// place of the time, and where it is on the wrong side, twice the time in which it
+    /// comes from there to its own.
     template <class X>
-    void go_on(const Places& at, double t, X& x) const
+    [[nodiscard]] double uncertainty(std::size_t which, const Places& next, double t,
+                                     const X& x) const
+    {
+        const double clock = 8 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+        if (!Motion::is_beyond(which, next[which], t, x)) return clock;
+        const double h = surface(which, t, x);
+        const double rate = rate_along(which, next, t, x);
+        return h * rate < 0 ? std::max(clock, 2 * std::fabs(h / rate)) : clock;
+    }
+
+    /// Moves x along its motion by the least that there is, or onto its own side of the
+    /// surfaces in `on`. Where a surface was met but the motion stays on its side, that
+    /// makes the loop judge it anew from here.
+    template <class X>
+    void go_on(Surfaces on, const Places& at, double t, X& x) const
     {
         Scratch<X, 1> v(x);
         flow(at, t, x, v[0]);
+        double time = 0;
+        for (std::size_t i = 0; i < surface_count; ++i) {
+            const bool beyond = (on & bit(i)) && Motion::is_beyond(i, at[i], t, x);
+            if (beyond) time = std::max(time, uncertainty(i, at, t, x));
+        }
         const double speed = largest_component(v[0]);
         for_each_component(x, [&](auto i) {
             const bool fastest = speed > 0 && std::fabs(v[0][i]) == speed;
             if (fastest) x[i] = std::nextafter(x[i], x[i] + v[0][i]);
+            x[i] += time * v[0][i];
         });
     }
 };

@@ -182,6 +182,30 @@ public:
         }
     }
 
+    /// The same, and 0 where it is no more than the rounding of its terms, those of the
+    /// single components of v. Only a rate that is small by any measure is worth the look.
+    template <class X>
+    [[nodiscard]] double resolved_rate(std::size_t which, double t, const X& x, const X& v) const
+    {
+        const double rate = surface_rate(which, t, x, v);
+        if constexpr (RatedSurfaces<Fields, X>) {
+            if (rate == 0 || std::fabs(rate) > 1e-6 * largest_component(v)) return rate;
+            Scratch<X, 1> part(x);
+            for_each_component(x, [&](auto i) { part[0][i] = 0; });
+            const double base = surface_rate(which, t, x, part[0]);
+            double terms = std::fabs(base);
+            for_each_component(x, [&](auto i) {
+                part[0][i] = v[i];
+                terms += std::fabs(surface_rate(which, t, x, part[0]) - base);
+                part[0][i] = 0;
+            });
+            constexpr double rounding = 64 * std::numeric_limits<double>::epsilon();
+            return std::fabs(rate) <= rounding * terms ? 0 : rate;
+        } else {
+            return rate;
+        }
+    }
+
     /// The rate of a surface along the motion at some places.
     template <class X>
     [[nodiscard]] double rate_along(std::size_t which, const Places& at, double t, const X& x) const
@@ -210,7 +234,7 @@ public:
             fields_.field(region, t, x, f[0]);
             result.speed = std::max(result.speed, largest_component(f[0]));
             for (std::size_t i = 0; i < surface_count; ++i) {
-                if (on & bit(i)) result.rates[i][region] = surface_rate(i, t, x, f[0]);
+                if (on & bit(i)) result.rates[i][region] = resolved_rate(i, t, x, f[0]);
             }
         }
         return result;
@@ -251,13 +275,36 @@ public:
 
     // --- onto the surface ---
 
+    /// The surfaces to whose other side a motion beside them has come, or which it is on:
+    /// rounding may hide from the loop that they were met.
+    template <class X>
+    [[nodiscard]] Surfaces reached_in(const Places& at, double t, const X& x) const
+    {
+        Surfaces result = 0;
+        for (std::size_t i = 0; i < surface_count; ++i) {
+            const double h = surface(i, t, x);
+            if (at[i] == Place::above ? h <= 0 : at[i] == Place::below && h >= 0) result |= bit(i);
+        }
+        return result;
+    }
+
+    /// Whether x is on the wrong side of a surface.
+    template <class X>
+    [[nodiscard]] bool is_beyond(std::size_t which, Place place, double t, const X& x) const
+    {
+        const double h = surface(which, t, x);
+        return place == Place::above ? h < 0 : place == Place::below && h > 0;
+    }
+
     /// Moves x along the jumps of the field: onto the surfaces on which the motion is to
     /// slide, and off those on which it has slid to the side to which it leaves, by no
     /// more than rounding makes necessary.
     template <class X>
     void settle(Surfaces on, const Places& from, const Places& next, double t, X& x) const
     {
-        const Surfaces held = on & (sliding_in(from) | sliding_in(next));
+        Surfaces held = on & (sliding_in(from) | sliding_in(next));
+        // What moves x onto one of two surfaces moves it with respect to the other.
+        if (on == both && (held | misplaced_in(next, t, x))) held = both;
         if (!held) return;
         Scratch<X, 4> f(x);
         RegionRates rates{};
@@ -266,12 +313,19 @@ public:
             // Regions that do not meet here repeat those that do: no jump between them.
             fields_.field((region & held) | aside, t, x, f[region]);
             for (std::size_t i = 0; i < surface_count; ++i) {
-                if (held & bit(i)) rates[i][region] = surface_rate(i, t, x, f[region]);
+                if (held & bit(i)) rates[i][region] = resolved_rate(i, t, x, f[region]);
             }
         }
-        const Shares shares = held == both ? sliding_shares(rates).shares : Shares{};
-        const auto normal = normals(shares, rates);
-        if (!transversal(normal, rates)) return;
+        // Where sliding on both ends the jumps at its own shares may be parallel.
+        const bool slides = sliding_in(next) == both;
+        const Shares shares = slides ? sliding_shares(rates).shares : middle_of(next);
+        auto normal = normals(shares, rates);
+        for (std::size_t i = 0; i < surface_count; ++i) {
+            if (!transversal(normal[i], rates[i])) {
+                held &= ~bit(i);
+                normal[i] = {};
+            }
+        }
         for (int round = 0; round < 8; ++round) {
             std::array<double, 2> residue{};
             for (std::size_t i = 0; i < surface_count; ++i) {
@@ -323,7 +377,7 @@ private:
         for (unsigned region = 0; region < 4; ++region) {
             fields_.field(region, t, x, f[region]);
             for (std::size_t i = 0; i < 2; ++i) {
-                rates[i][region] = surface_rate(i, t, x, f[region]);
+                rates[i][region] = resolved_rate(i, t, x, f[region]);
             }
         }
         const Shares shares = sliding_shares(rates).shares;
@@ -375,18 +429,23 @@ private:
         return right_side ? 0 : std::ldexp(h, round);
     }
 
-    /// Whether the jumps lead across the surfaces rather than along them. Where fields
-    /// hold the motion on a surface, the jump is larger than either rate.
-    [[nodiscard]] static bool transversal(const std::array<std::array<double, 2>, 2>& normal,
-                                          const RegionRates& rates) noexcept
+    /// The surfaces on whose wrong side x is.
+    template <class X>
+    [[nodiscard]] Surfaces misplaced_in(const Places& at, double t, const X& x) const
     {
-        double largest = 0;
-        double jump = 0;
-        for (std::size_t i = 0; i < 2; ++i) {
-            largest = std::max(largest, largest_component(rates[i]));
-            jump = std::max(jump, largest_component(normal[i]));
+        Surfaces result = 0;
+        for (std::size_t i = 0; i < surface_count; ++i) {
+            if (is_beyond(i, at[i], t, x)) result |= bit(i);
         }
-        return jump > 0x1p-6 * largest;
+        return result;
+    }
+
+    /// Whether the jumps lead across a surface rather than along it. Where fields hold the
+    /// motion on a surface, the jump is larger than either rate.
+    [[nodiscard]] static bool transversal(const std::array<double, 2>& jump,
+                                          const std::array<double, 4>& rates) noexcept
+    {
+        return largest_component(jump) > 0x1p-6 * largest_component(rates);
     }
 
     Fields fields_;

@@ -60,6 +60,15 @@ struct Shares {
     }
 };
 
+/// The shares of a motion beside a surface, and the middle of those along it.
+[[nodiscard]] constexpr Shares middle_of(const Places& at) noexcept
+{
+    const auto share = [](Place place) {
+        return place == Place::above ? 1.0 : place == Place::below ? 0.0 : 0.5;
+    };
+    return {share(at[0]), share(at[1])};
+}
+
 /// The sum over four regions, in an order that does not depend on which surface is
 /// called the first.
 [[nodiscard]] constexpr double blend(const std::array<double, 4>& weights, double f0, double f1,
