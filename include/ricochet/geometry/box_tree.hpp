@@ -1,0 +1,237 @@
+// A tree of boxes around many small things, for questions of the kind "which is nearest?".
+//
+// The things are put in an order in which neighbours are near one another; then four of
+// them make a block, four blocks a node, four nodes the node above, and so on. Position
+// alone says who belongs to whom, so there are no pointers, and four boxes are compared
+// with a question at once.
+//
+// The nearest so far bounds the search, so it pays to begin with a good guess: with the
+// answer of the last question little more is opened than the way down to the new one. The
+// guess decides what is opened, never what is found.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace ricochet::geometry {
+
+/// An axis-parallel box; empty until something is put in.
+template <std::size_t Dim>
+struct Box {
+    std::array<double, Dim> lower = filled(std::numeric_limits<double>::infinity());
+    std::array<double, Dim> upper = filled(-std::numeric_limits<double>::infinity());
+
+    constexpr void add(const std::array<double, Dim>& point) noexcept
+    {
+        for (std::size_t k = 0; k < Dim; ++k) {
+            lower[k] = std::min(lower[k], point[k]);
+            upper[k] = std::max(upper[k], point[k]);
+        }
+    }
+    constexpr void add(const Box& box) noexcept
+    {
+        for (std::size_t k = 0; k < Dim; ++k) {
+            lower[k] = std::min(lower[k], box.lower[k]);
+            upper[k] = std::max(upper[k], box.upper[k]);
+        }
+    }
+    constexpr void widen(double by) noexcept
+    {
+        for (double& value : lower) value -= by;
+        for (double& value : upper) value += by;
+    }
+    /// The largest magnitude of a coordinate.
+    [[nodiscard]] constexpr double reach() const noexcept
+    {
+        double out = 0;
+        for (const double value : lower) out = std::max(out, value < 0 ? -value : value);
+        for (const double value : upper) out = std::max(out, value < 0 ? -value : value);
+        return out;
+    }
+
+private:
+    static constexpr std::array<double, Dim> filled(double value) noexcept
+    {
+        std::array<double, Dim> out{};
+        out.fill(value);
+        return out;
+    }
+};
+
+/// Four boxes, a coordinate of all of them together.
+template <std::size_t Dim>
+struct alignas(32) FourBoxes {
+    double lower[Dim][4];
+    double upper[Dim][4];
+};
+
+/// Squares of distances between a box and four, rounded down a little. In pairs, for which
+/// every machine has registers.
+template <std::size_t Dim>
+[[gnu::always_inline]] inline std::array<double, 4> squared_distances(
+    const FourBoxes<Dim>& boxes, const std::array<double, Dim>& lower,
+    const std::array<double, Dim>& upper) noexcept
+{
+    typedef double Pair __attribute__((vector_size(16), may_alias));
+    const auto load = [](const double* from) { return *reinterpret_cast<const Pair*>(from); };
+    const Pair zero{};
+    Pair sum[2]{};
+    for (std::size_t k = 0; k < Dim; ++k) {
+        for (std::size_t i = 0; i < 2; ++i) {
+            const Pair below = load(boxes.lower[k] + 2 * i) - upper[k];
+            const Pair above = lower[k] - load(boxes.upper[k] + 2 * i);
+            const Pair outside = below > above ? below : above;
+            const Pair gap = outside > zero ? outside : zero;
+            sum[i] += gap * gap;
+        }
+    }
+    sum[0] *= 1 - 1e-14;
+    sum[1] *= 1 - 1e-14;
+    return {sum[0][0], sum[0][1], sum[1][0], sum[1][1]};
+}
+
+template <std::size_t Dim>
+class BoxTree {
+public:
+    BoxTree() = default;
+
+    /// Over boxes, one for each thing; widened by 1e-14 of the largest coordinate, so that
+    /// the rounding of a distance computed from a thing's corners never takes it
+    /// below that to its box.
+    explicit BoxTree(std::vector<Box<Dim>> boxes)
+    {
+        double reach = 0;
+        for (const Box<Dim>& box : boxes) reach = std::max(reach, box.reach());
+        for (Box<Dim>& box : boxes) box.widen(1e-14 * reach);
+        order_.resize(boxes.size());
+        for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<std::uint32_t>(i);
+        sort(boxes, order_);
+        build(boxes);
+    }
+
+    /// The things in the order of the tree: block b holds places 4 b to 4 b + 3.
+    [[nodiscard]] const std::vector<std::uint32_t>& order() const noexcept { return order_; }
+
+    /// The box around everything.
+    [[nodiscard]] const Box<Dim>& bounds() const noexcept { return bounds_; }
+
+    /// Opens whatever may hold something at a squared distance of at most `best`, nearer
+    /// things first. `bound(four)` gives lower bounds for four boxes; `open(first, last)`
+    /// looks at the places of a block, and lowers `best`. Finite `best` only.
+    template <class Bound, class Open>
+    void search(double& best, const Bound& bound, const Open& open) const
+    {
+        if (levels_.empty()) return;
+        struct Waiting {
+            double bound;
+            std::uint32_t level, index;
+        };
+        // Each level leaves at most three waiting, and there are at most 16 levels.
+        std::array<Waiting, 64> waiting;
+        std::size_t count = 0;
+        waiting[count++] = {0, static_cast<std::uint32_t>(levels_.size()), 0};
+        while (count > 0) {
+            const Waiting next = waiting[--count];
+            if (next.bound > best) continue;
+            if (next.level == 0) {
+                const std::size_t first = std::size_t{4} * next.index;
+                open(first, std::min(first + 4, order_.size()));
+                continue;
+            }
+            const std::array<double, 4> bounds = bound(levels_[next.level - 1][next.index]);
+            const std::size_t from = count;
+            for (std::uint32_t i = 0; i < 4; ++i) {
+                if (!(bounds[i] <= best)) continue;
+                waiting[count++] = {bounds[i], next.level - 1, 4 * next.index + i};
+            }
+            for (std::size_t i = from + 1; i < count; ++i) {  // the nearest last
+                for (std::size_t j = i; j > from && waiting[j].bound > waiting[j - 1].bound; --j) {
+                    std::swap(waiting[j], waiting[j - 1]);
+                }
+            }
+        }
+    }
+
+private:
+    /// Splits at multiples of powers of four, so that every block and node is compact.
+    static void sort(const std::vector<Box<Dim>>& boxes, std::span<std::uint32_t> range)
+    {
+        if (range.size() <= 4) return;
+        Box<Dim> centres;
+        for (const std::uint32_t i : range) centres.add(twice_centre(boxes[i]));
+        std::size_t axis = 0;
+        for (std::size_t k = 1; k < Dim; ++k) {
+            if (centres.upper[k] - centres.lower[k] > centres.upper[axis] - centres.lower[axis]) {
+                axis = k;
+            }
+        }
+        std::size_t unit = 4;
+        while (4 * unit < range.size()) unit *= 4;
+        const std::size_t units = (range.size() + unit - 1) / unit;
+        const std::size_t half = (units + 1) / 2 * unit;
+        std::nth_element(range.begin(), range.begin() + static_cast<std::ptrdiff_t>(half),
+                         range.end(), [&](std::uint32_t a, std::uint32_t b) {
+                             const double left = twice_centre(boxes[a])[axis];
+                             const double right = twice_centre(boxes[b])[axis];
+                             return left < right || (left == right && a < b);
+                         });
+        sort(boxes, range.first(half));
+        sort(boxes, range.subspan(half));
+    }
+
+    static std::array<double, Dim> twice_centre(const Box<Dim>& box) noexcept
+    {
+        std::array<double, Dim> out{};
+        for (std::size_t k = 0; k < Dim; ++k) out[k] = box.lower[k] + box.upper[k];
+        return out;
+    }
+
+    void build(const std::vector<Box<Dim>>& boxes)
+    {
+        std::vector<Box<Dim>> below;
+        for (std::size_t i = 0; i < order_.size(); ++i) {
+            if (i % 4 == 0) below.emplace_back();
+            below.back().add(boxes[order_[i]]);
+            bounds_.add(boxes[order_[i]]);
+        }
+        while (!below.empty()) {
+            std::vector<FourBoxes<Dim>> level;
+            std::vector<Box<Dim>> above;
+            for (std::size_t i = 0; i < below.size(); i += 4) {
+                level.push_back(four(std::span(below).subspan(i)));
+                above.emplace_back();
+                for (std::size_t j = i; j < std::min(i + 4, below.size()); ++j) {
+                    above.back().add(below[j]);
+                }
+            }
+            levels_.push_back(std::move(level));
+            if (above.size() == 1) break;
+            below = std::move(above);
+        }
+    }
+
+    /// The first four; what is missing is infinitely far away.
+    static FourBoxes<Dim> four(std::span<const Box<Dim>> boxes)
+    {
+        FourBoxes<Dim> out;
+        for (std::size_t i = 0; i < 4; ++i) {
+            const Box<Dim> box = i < boxes.size() ? boxes[i] : Box<Dim>{};
+            for (std::size_t k = 0; k < Dim; ++k) {
+                out.lower[k][i] = box.lower[k];
+                out.upper[k][i] = box.upper[k];
+            }
+        }
+        return out;
+    }
+
+    std::vector<std::uint32_t> order_;
+    std::vector<std::vector<FourBoxes<Dim>>> levels_;  ///< [0] holds the boxes of the blocks
+    Box<Dim> bounds_;
+};
+
+}  // namespace ricochet::geometry
