@@ -16,6 +16,7 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::step_limit: return "step_limit";
         case Outcome::non_finite: return "non_finite";
         case Outcome::cancelled: return "cancelled";
+        case Outcome::wrong_bound: return "wrong_bound";
     }
     return "unknown";
 }
@@ -48,6 +49,9 @@ std::string_view describe(Outcome outcome) noexcept
             return "the flow, the guard or the reset returned NaN or infinity; "
                    "the last finite state is kept";
         case Outcome::cancelled: return "the run was cancelled; it can be continued";
+        case Outcome::wrong_bound:
+            return "a guard changed faster than its declared bounds allow, or lies below its lower "
+                   "bound; correct speed_bound, acceleration_bound, lipschitz or lower_bound";
     }
     return "unknown outcome";
 }

@@ -256,6 +256,16 @@ public:
 
     [[nodiscard]] StepStart<X> place() const { return {start_, mode_, x0_, remainder_, rate0_}; }
 
+    /// As `place`, into what is there already.
+    void store(StepStart<X>& at) const
+    {
+        at.t = start_;
+        at.mode = mode_;
+        assign(at.x, x0_);
+        assign(at.remainder, remainder_);
+        assign(at.rate, rate0_);
+    }
+
     [[nodiscard]] std::uint64_t flow_calls() const noexcept { return flow_calls_; }
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
 

@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "ricochet/detect/finding.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/event.hpp"
 #include "ricochet/hybrid/guard_view.hpp"
 #include "ricochet/hybrid/system.hpp"
@@ -41,6 +43,7 @@ public:
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
     [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
     [[nodiscard]] T& operator[](std::size_t i) noexcept { return items_[i]; }
+    [[nodiscard]] const T& operator[](std::size_t i) const noexcept { return items_[i]; }
     [[nodiscard]] T* begin() noexcept { return items_.data(); }
     [[nodiscard]] T* end() noexcept { return items_.data() + size_; }
     [[nodiscard]] std::span<const T> span() const noexcept { return {items_.data(), size_}; }
@@ -58,6 +61,7 @@ struct GuardRecord {
     bool fired = false;
     bool rested = false;  ///< its events have accumulated
     bool acting = false;  ///< resets, or may end the run; else a notification
+    bool asleep = false;  ///< its check is put off: nothing in the bank is of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     double band = 0;            ///< |g| where it fired: it counts as being on its surface
@@ -76,6 +80,7 @@ struct GuardRecord {
 template <class System, class X, class Detector>
 class GuardBank {
     static constexpr std::size_t fixed = fixed_guard_count<System, X>();
+    static constexpr bool puts_off = puts_off_checks<Detector, System, X>();
 
 public:
     GuardBank(const System& system, bool backward)
@@ -112,7 +117,16 @@ public:
     template <class Step>
     void sample_start(const Step& step, std::uint64_t& calls, double scale)
     {
-        sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
+        if constexpr (puts_off) {
+            call_guards(*system_, step.mode(), step.time(0), step.x0(), all(g0_));
+            calls += size();
+            for (std::size_t i = 0; i < size(); ++i) {
+                rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until somebody asks
+                records_[i].asleep = false;
+            }
+        } else {
+            sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
+        }
         if (Detector::uses_rates) {
             for (std::size_t i = 0; i < size(); ++i) note_size(i, g0_[i]);
         }
@@ -163,17 +177,59 @@ public:
     }
 
     /// Half the width of the band around the surface that counts as being on it where
-    /// the rate is zero.
+    /// the rate is zero. The values of a guard with declared bounds may never be taken where
+    /// it is far away; its size is that of the values at which it was armed and of this step.
     [[nodiscard]] double touch(std::size_t i) const noexcept
     {
+        if constexpr (Bounded<System, X>) {
+            return touch_of(i, std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
+        } else {
+            return touch_of(i, 0);
+        }
+    }
+
+    /// As `touch`, in a stretch in which |g| reaches `largest`.
+    [[nodiscard]] double touch_of(std::size_t i, double largest) const noexcept
+    {
         constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
-        return std::fmax(records_[i].info.touch, ulps * sizes_[i]);
+        return std::fmax(records_[i].info.touch, ulps * std::fmax(sizes_[i], largest));
     }
 
     void arm(std::size_t i, Side side) noexcept
     {
         records_[i].side = side;
-        sign_[i] = records_[i].enabled ? sign_of(side) : 0;
+        sign_[i] = records_[i].enabled && !records_[i].asleep ? sign_of(side) : 0;
+    }
+
+    /// Guard i is not looked at until it is woken.
+    void put_to_sleep(std::size_t i) noexcept
+    {
+        records_[i].asleep = true;
+        sign_[i] = 0;
+    }
+
+    /// Guard i takes part in the step, with its samples at both ends.
+    void wake(std::size_t i, const GuardSample& start, const GuardSample& end) noexcept
+    {
+        records_[i].asleep = false;
+        g0_[i] = start.value;
+        rate0_[i] = start.rate;
+        g1_[i] = end.value;
+        rate1_[i] = end.rate;
+        arm(i, records_[i].side);
+    }
+
+    /// The rate of guard i, as `sample_start` and `sample_end` compute it.
+    [[nodiscard]] double rate_of(std::size_t i, Mode mode, double t, const X& x, const X& dxdt,
+                                 double scale, std::uint64_t& calls)
+    {
+        if (records_[i].info.boolean || !Detector::uses_rates) return 0;
+        if constexpr (RatesTogether<System, X>) {
+            rates_together(mode, t, x, dxdt, behind_);
+            return behind_[i];
+        } else {
+            return view(i, mode, calls).rate(t, x, dxdt, scale);
+        }
     }
 
     /// Nothing inside the step has been looked at.
@@ -203,13 +259,17 @@ public:
         if (Detector::uses_rates) {
             for (std::size_t i = 0; i < size(); ++i) {
                 rate0_[i] = rate1_[i];
-                note_size(i, g1_[i]);
+                if constexpr (!Bounded<System, X>) note_size(i, g1_[i]);
             }
         }
         if (plateaus == 0) return;
-        for (std::size_t i = 0; i < size(); ++i) {
-            if (sign_[i] == 0 && records_[i].enabled) arm(i, side_of(g1_[i]));
-        }
+        for (std::size_t i = 0; i < size(); ++i) leave_plateau(i);
+    }
+
+    /// A guard on a plateau takes the side that it is on at the end of the step.
+    void leave_plateau(std::size_t i) noexcept
+    {
+        if (sign_[i] == 0 && records_[i].enabled && !records_[i].asleep) arm(i, side_of(g1_[i]));
     }
 
     /// As `pass_on`, after events inside the step.
@@ -252,6 +312,7 @@ public:
             visit(record.events);
             visit(record.last);
             visit(record.last_side);
+            if constexpr (puts_off) visit(record.asleep);
             record.intervals.visit(visit);
         }
     }
@@ -282,9 +343,7 @@ private:
         calls += size();
         if constexpr (Detector::uses_rates) {
             if constexpr (RatesTogether<System, X>) {
-                if (!backward_) return call_rates(*system_, mode, t, x, dxdt, all(rates));
-                call_rates(*system_, mode, t, x, negated(dxdt), all(rates));
-                for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
+                rates_together(mode, t, x, dxdt, rates);
             } else if constexpr (RateAlone<System, X> || GuardAlone<System, X>) {
                 for (std::size_t i = 0; i < size(); ++i) {
                     rates[i] = records_[i].info.boolean || !records_[i].enabled
@@ -296,6 +355,14 @@ private:
                 calls += 2 * size();
             }
         }
+    }
+
+    /// Rates of all guards at once from the system.
+    void rates_together(Mode mode, double t, const X& x, const X& dxdt, Doubles& rates)
+    {
+        if (!backward_) return call_rates(*system_, mode, t, x, dxdt, all(rates));
+        call_rates(*system_, mode, t, x, negated(dxdt), all(rates));
+        for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
     }
 
     /// Rates of all guards at once by the central difference along the flow.

@@ -17,6 +17,7 @@ enum class Outcome {
     step_limit,          ///< `Options::max_steps` steps were taken
     non_finite,          ///< the flow, a guard or a reset returned NaN or infinity
     cancelled,           ///< `Options::cancelled` was set
+    wrong_bound,         ///< a guard broke a bound that the system declares for it
 };
 
 /// The enumerator's name, e.g. "reached_end".

@@ -2,6 +2,7 @@
 // the time, the state and the events up to there are here.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "ricochet/hybrid/event.hpp"
@@ -18,6 +19,19 @@ struct Trajectory {
     std::vector<State> x;
 };
 
+/// A guard that has broken a bound that its system declares.
+template <class State>
+struct WrongBound {
+    std::size_t guard = no_guard;
+    bool lower_bound = false;  ///< the guard lies below it; else the guard changed too fast
+    double t = 0;              ///< [s]
+    State x{};                 ///< where it was seen
+    double value = 0;          ///< of the guard there
+    double since = 0;          ///< [s] when it was last looked at; t for a lower bound
+    double value_then = 0;     ///< of the guard then
+    double allowed = 0;        ///< the lower bound, or the largest change since then
+};
+
 template <class State>
 struct Run {
     Outcome outcome = Outcome::reached_end;
@@ -31,6 +45,7 @@ struct Run {
     std::vector<Event<State>> events;
     Trajectory<State> trajectory;  ///< empty unless `Options::sample_times` were given
     Solution<State> solution;      ///< empty unless `Options::record_steps`
+    std::optional<WrongBound<State>> wrong_bound;  ///< with `Outcome::wrong_bound`
     Statistics statistics;
 };
 

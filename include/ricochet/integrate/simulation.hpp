@@ -18,14 +18,18 @@
 #include <limits>
 #include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/event_search.hpp"
 #include "ricochet/integrate/explicit_step.hpp"
 #include "ricochet/integrate/guard_bank.hpp"
 #include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/planner.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/integrate/step_control.hpp"
@@ -68,6 +72,16 @@ class Simulation {
     static constexpr bool guarded = Guarded<System, X>;
     static constexpr bool resets = Resetting<System, X>;
     static constexpr bool timed = Timed<System>;
+    static constexpr bool puts_off = puts_off_checks<Detector, System, X>();
+    template <bool wanted, class D>
+    struct PlannerOf {
+        using type = std::monostate;
+    };
+    template <class D>
+    struct PlannerOf<true, D> {
+        using type = detail::Planner<System, X, D>;
+    };
+    using Planner = typename PlannerOf<puts_off, Detector>::type;
     static constexpr bool predicts =
         requires(const Detector& detector, const CurrentStep& step, const Guard& guard) {
             detector.clears(guard, step);
@@ -93,6 +107,7 @@ public:
           step_(system, options.t_start, x0, options.mode, backward_),
           bank_(system, backward_),
           search_(x0, bank_.size()),
+          planner_(make_planner(x0)),
           after_(x0)
     {
         h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
@@ -124,10 +139,11 @@ public:
     /// `finish`.
     [[nodiscard]] const Run<X>& run() const noexcept { return run_; }
 
-    /// Takes one step, with whatever events it holds. False: the run has ended.
+    /// Takes one step, with whatever events it holds. False: the run has ended. A detector
+    /// that puts off checks does not look ahead here, since every step is final.
     bool step()
     {
-        if (!ended_) advance_one();
+        if (!ended_) advance_one({.look_ahead = false});
         return !ended_;
     }
 
@@ -137,20 +153,23 @@ public:
     {
         const std::uint64_t events = run_.statistics.events;
         const std::size_t samples = next_sample_;
-        while (!ended_ && run_.statistics.events == events && next_sample_ == samples) {
-            advance_one();
+        while (!ended_ &&
+               (is_tentative() || (run_.statistics.events == events && next_sample_ == samples))) {
+            advance_one({.to_next_sample = true});
         }
         return !ended_;
     }
 
     /// Goes on to the end, and calls `observe(event)` for every event recorded on the
-    /// way, `observe(simulation)` after every step; whichever of the two it takes.
+    /// way, `observe(simulation)` after every step; whichever of the two it takes. Neither
+    /// sees what is not final: with the second, no detector looks ahead.
     template <class Observer>
     void run_to_end(Observer&& observe)
     {
+        constexpr bool watches_steps = requires { observe(std::as_const(*this)); };
         std::size_t seen = run_.events.size();
         while (!ended_) {
-            advance_one();
+            advance_one({.look_ahead = !watches_steps});
             if constexpr (requires { observe(run_.events[0]); }) {
                 for (; seen < run_.events.size(); ++seen) observe(std::as_const(run_.events[seen]));
             }
@@ -163,7 +182,7 @@ public:
     /// Goes on to the end and hands over all that was computed.
     [[nodiscard]] Run<X> take()
     {
-        while (!ended_) advance_one();
+        while (!ended_) advance_one({});
         return finish();
     }
 
@@ -199,6 +218,7 @@ public:
         reader.finish();
         step_.restart(place_);
         if constexpr (guarded) search_.begin(step_.x0());
+        if constexpr (puts_off) planner_.restore(bank_);
     }
 
 private:
@@ -207,6 +227,7 @@ private:
     static const Options& checked(const Options& options, const X& x0)
     {
         detail::check_declarations<System, X>();
+        detail::check_bound_declarations<System, X>();
         validate(options, !error_controlled);
         if (x0.size() == 0) detail::throw_start_empty();
         detail::for_each_component(x0, [&](auto i) {
@@ -215,6 +236,15 @@ private:
             }
         });
         return options;
+    }
+
+    [[nodiscard]] Planner make_planner([[maybe_unused]] const X& x0) const
+    {
+        if constexpr (puts_off) {
+            return Planner(*system_, detector_, x0, backward_, bank_.size());
+        } else {
+            return {};
+        }
     }
 
     void refuse_bad_modes() const
@@ -245,6 +275,8 @@ private:
     void arm_at_start()
     {
         enable_guards();
+        newly_armed_ = true;
+        last_h_ = h_next_;
         bank_.sample_start(step_, calls(), h_next_);
         for (std::size_t i = 0; i < bank_.size(); ++i) {
             const detail::GuardRecord& record = bank_[i];
@@ -275,21 +307,37 @@ private:
         ended_ = true;
     }
 
+    /// What a detector that puts off checks may do.
+    struct Advance {
+        bool look_ahead = true;       ///< take steps that are closed only later
+        bool to_next_sample = false;  ///< but none beyond one with a sample time
+    };
+
     /// One step, with whatever events it holds.
-    void advance_one()
+    void advance_one([[maybe_unused]] const Advance& how)
     {
         const double remaining = step_.until(options_.t_end);
         if (!(remaining > 0)) return end(Outcome::reached_end);
         if (run_.statistics.steps == options_.max_steps) return end(Outcome::step_limit);
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+            if (is_tentative()) take_back();
             return end(Outcome::cancelled);
         }
         if (resting_) return hold(remaining);
-        if (!take_step(remaining)) return;
-
-        if constexpr (guarded) {
-            if (handle_events()) return;
+        if constexpr (puts_off) {
+            advance_by_plan(remaining, how);
+        } else {
+            if (!take_step(remaining)) return;
+            if constexpr (guarded) {
+                if (handle_events()) return;
+            }
+            pass();
         }
+    }
+
+    /// The step stands, with a time event at its end if one is due.
+    void pass()
+    {
         if constexpr (timed) {
             if (time_event_due_) return happen_on_time();
         }
@@ -307,7 +355,164 @@ private:
         } else {
             step_.accept();
         }
+        if constexpr (puts_off) last_h_ = step_.h();
         ++run_.statistics.steps;
+    }
+
+    // --- steps whose checks may be put off ---
+
+    [[nodiscard]] bool is_tentative() const noexcept
+    {
+        if constexpr (puts_off) {
+            return planner_.in_stretch();
+        } else {
+            return false;
+        }
+    }
+
+    void advance_by_plan(double remaining, const Advance& how)
+    {
+        if (newly_armed_) {
+            newly_armed_ = false;
+            planner_.begin(step_, bank_);
+        }
+        const double proposed = h_next_;
+        const std::uint64_t rejected = run_.statistics.rejected;
+        if (!take_step(remaining)) {
+            if (is_tentative()) {
+                // The failure may lie beyond an event: without looking ahead it will be seen.
+                ended_ = false;
+                run_.outcome = Outcome::reached_end;
+                take_back();
+            }
+            return;
+        }
+        const double t = step_.time(step_.h());
+        const double ends = backward_ ? -t : t;
+        if (planner_.covers(ends)) {
+            count_put_off(1);
+            return pass();
+        }
+        remember_step(proposed, rejected);
+        planner_.overrun(ends);
+        if (may_go_on(ends, how)) return accept();
+        close_stretch();
+    }
+
+    void remember_step(double proposed, std::uint64_t rejected)
+    {
+        auto& tentative = planner_.steps().add();
+        step_.store(tentative.start);
+        tentative.h_next = proposed;
+        tentative.last_h = last_h_;
+        tentative.samples = next_sample_;
+        tentative.pieces = run_.solution.size();
+        tentative.rejected = rejected;
+    }
+
+    /// Whether the next step, too, may be taken before the stretch is closed.
+    [[nodiscard]] bool may_go_on(double ends, const Advance& how)
+    {
+        if (careful_steps_ > 0) {
+            --careful_steps_;
+            return false;
+        }
+        const bool must_close =
+            !how.look_ahead || planner_.steps().full() || is_last_ || time_event_due_ ||
+            run_.statistics.steps + 1 >= options_.max_steps ||
+            (how.to_next_sample && holds_sample()) || !planner_.hopes(ends + h_next_);
+        return !must_close;
+    }
+
+    /// The step in hand is the last of its stretch: closes it, or goes back to the first step
+    /// that could not be closed.
+    void close_stretch()
+    {
+        const std::size_t steps = planner_.steps().size();
+        const std::size_t doubt = planner_.close(step_, bank_, run_.statistics, h_next_);
+        if (planner_.wrong()) {
+            run_.wrong_bound = planner_.wrong();
+            return end(Outcome::wrong_bound, planner_.wrong()->guard);
+        }
+        if (doubt == Planner::none) {
+            count_put_off(steps);
+            planner_.steps().clear();
+            return pass();
+        }
+        count_put_off(doubt);
+        if (doubt + 1 < steps) return take_back_to(doubt);
+        planner_.steps().clear();
+        judge();
+    }
+
+    /// The exact detector looks at the step in hand, for the guards in doubt.
+    void judge()
+    {
+        planner_.wake(step_, bank_, run_.statistics, last_h_);
+        bool suspicious = false;
+        for (const std::size_t i : planner_.judged()) {
+            suspicious = suspicious || bank_.suspicious(i, step_.h());
+        }
+        if (suspicious) {
+            if (search(false)) return;
+        } else {
+            run_.statistics.evidence.add(Detector::evidence);
+            for (const std::size_t i : planner_.judged()) bank_.leave_plateau(i);
+        }
+        planner_.settle(step_, bank_);
+        if (planner_.wrong()) {
+            run_.wrong_bound = planner_.wrong();
+            return end(Outcome::wrong_bound, planner_.wrong()->guard);
+        }
+        pass();
+    }
+
+    void count_put_off(std::size_t steps) noexcept
+    {
+        run_.statistics.checks_put_off += steps;
+        if constexpr (Detector::put_off == Evidence::proved) {
+            run_.statistics.evidence.proved += steps;
+        } else {
+            run_.statistics.evidence.assumed += steps;
+        }
+    }
+
+    /// Takes back the whole stretch, without having looked, and goes on carefully.
+    void take_back()
+    {
+        if constexpr (puts_off) {
+            careful_steps_ = planner_.steps().size() + 1;
+            planner_.abandon();
+            take_back_to(0);
+        }
+    }
+
+    /// Goes back to the start of tentative step k.
+    void take_back_to(std::size_t k)
+    {
+        const auto& tentative = planner_.steps()[k];
+        // The step in hand has not been accepted.
+        const std::size_t taken = planner_.steps().size() - 1 - k;
+        ++run_.statistics.rollbacks;
+        run_.statistics.repeated_steps += taken;
+        run_.statistics.steps -= taken;
+        run_.statistics.rejected = tentative.rejected;
+        step_.restart(tentative.start);
+        h_next_ = tentative.h_next;
+        last_h_ = tentative.last_h;
+        for (; next_sample_ > tentative.samples; --next_sample_) {
+            run_.trajectory.t.pop_back();
+            run_.trajectory.x.pop_back();
+        }
+        run_.solution.shrink(tentative.pieces);
+        planner_.steps().clear();
+    }
+
+    [[nodiscard]] bool holds_sample() const noexcept
+    {
+        const auto& times = options_.sample_times;
+        return next_sample_ < times.size() &&
+               lies_before(times[next_sample_], step_.time(step_.h()));
     }
 
     /// Takes a step no longer than `remaining` [s] or the time to the next time event.
@@ -802,6 +1007,8 @@ private:
         }
         search_.members().clear();
         if constexpr (Moded<System, X>) enable_guards();
+        newly_armed_ = true;
+        last_h_ = h_next_;
         bank_.sample_start(step_, calls(), h_next_);
         for (std::size_t i = 0; i < bank_.size(); ++i) {
             if (!bank_[i].enabled) {
@@ -863,8 +1070,8 @@ private:
         detail::assign(single_, step_.x0());
         detail::move(after_, step_.x0(), delta, step_.rate0());
         step_.flow(delta, after_, single_);
-        const Side side = side_of(bank_.view(i, step_.mode(), calls())
-                                      .rate(step_.time(delta), after_, single_, h_next_));
+        const Side side = side_of(
+            bank_.view(i, step_.mode(), calls()).rate(step_.time(delta), after_, single_, h_next_));
         bank_.set_rate0(i, detail::sign_of(side) * std::numeric_limits<double>::min());
         return side;
     }
@@ -1107,6 +1314,11 @@ private:
         visit(run_.outcome);
         visit(next_sample_);
         if constexpr (guarded) bank_.visit(visit);
+        if constexpr (puts_off) {
+            visit(last_h_);
+            visit(newly_armed_);
+            planner_.visit(visit);
+        }
     }
 
     static constexpr int most_levels = 100;
@@ -1122,7 +1334,11 @@ private:
     CurrentStep step_;
     Bank bank_;
     Search search_;
+    [[no_unique_address]] Planner planner_;
     double h_next_ = 0;
+    double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
+    bool newly_armed_ = true;  ///< nothing is planned yet
+    std::size_t careful_steps_ = 0;  ///< without looking ahead
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
     bool is_last_ = false;

@@ -55,6 +55,12 @@ public:
         pieces_.push_back(std::move(piece));
     }
 
+    /// Keeps the first `size` steps.
+    void shrink(std::size_t size)
+    {
+        pieces_.erase(pieces_.begin() + static_cast<std::ptrdiff_t>(size), pieces_.end());
+    }
+
 private:
     struct Piece {
         double t, length, h;

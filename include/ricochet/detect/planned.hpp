@@ -1,0 +1,220 @@
+// Detectors that put off exact checks.
+//
+// A detector of this kind wraps an exact one, and says of a guard that has just been
+// looked at how long it need not be looked at again, how long it is hoped to need none,
+// and whether two looks close the stretch between them. The loop keeps the calendar: it
+// goes on without a look while every guard is covered, tentatively while there is hope,
+// and returns to the first step that could not be closed to put it before the exact
+// detector. The steps are those of a run without any of this.
+//
+//     Planned      by declared bounds (hybrid/bounds.hpp); the events are those of the exact
+//                  detector, bit for bit, and what is skipped is `proved`
+//     EveryK       looks every k steps and returns where the sign has changed; two crossings
+//                  between two looks are missed
+//     SlopeSkip    skips a fraction of the time in which the guard would reach its surface at
+//                  its last slope; may miss, too
+//
+// `Planned` on a system without bounds is the exact detector, and compiles to it.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/hybrid/bounds.hpp"
+
+namespace ricochet {
+
+/// How `Planned` plans.
+struct PlannerOptions {
+    /// Look ahead: a stretch is taken before it is closed by the value at its end, and
+    /// taken back where it could not be. Off: only as far as the bound covers for certain.
+    bool two_ended = true;
+    /// Steps taken before they are closed, at most; as many starts of steps are kept.
+    std::size_t longest_stretch = 256;
+    /// Bounds are of the motion, steps have errors: every bound is taken larger by this
+    /// fraction. At least 0.
+    double margin = 0.01;
+    /// Compare bounds with the values of the guard as they are taken; a wrong one ends the
+    /// run as `Outcome::wrong_bound`.
+#ifdef NDEBUG
+    bool check_bounds = false;
+#else
+    bool check_bounds = true;
+#endif
+};
+
+namespace detail {
+
+/// @throws std::invalid_argument naming the option.
+void validate(const PlannerOptions& options);
+/// @throws std::invalid_argument: EveryK needs at least one step.
+[[noreturn]] void throw_no_steps_between_looks();
+/// @throws std::invalid_argument: SlopeSkip's fraction is not in (0, 1], or it has no steps.
+[[noreturn]] void throw_bad_slope_skip(double fraction, std::size_t longest);
+
+/// What a detector that puts off checks leaves to its exact detector.
+template <class Exact>
+class PutsOff {
+public:
+    static constexpr bool uses_rates = Exact::uses_rates;
+    static constexpr Evidence evidence = Exact::evidence;  ///< of a step it has looked at
+    static constexpr bool puts_off = true;
+
+    explicit PutsOff(const Exact& exact) : exact_(exact) {}
+
+    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
+                                                 double rate1, double h) noexcept
+    {
+        return Exact::suspects(sign, g0, rate0, g1, rate1, h);
+    }
+
+    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,
+                                             const GuardSample& end, double touch) noexcept
+    {
+        return Exact::leaves_plainly(sign, start, end, touch);
+    }
+
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        return exact_.examine(probe, watch);
+    }
+
+private:
+    Exact exact_;
+};
+
+}  // namespace detail
+
+template <class Exact = Extremum>
+class Planned : public detail::PutsOff<Exact> {
+public:
+    static constexpr bool needs_bounds = true;
+    static constexpr Evidence put_off = Evidence::proved;  ///< of a step without a look
+
+    Planned() : Planned(PlannerOptions{}) {}
+    /// @throws std::invalid_argument if the margin is negative or there is no stretch.
+    explicit Planned(const PlannerOptions& options, const Exact& exact = {})
+        : detail::PutsOff<Exact>(exact), options_(options)
+    {
+        detail::validate(options);
+    }
+
+    [[nodiscard]] std::size_t longest() const noexcept
+    {
+        return options_.two_ended ? options_.longest_stretch : 1;
+    }
+    [[nodiscard]] bool checks_bounds() const noexcept { return options_.check_bounds; }
+    [[nodiscard]] double margin() const noexcept { return options_.margin; }
+
+    /// Time [s] for which the guard is covered from here.
+    [[nodiscard]] double sure(GuardBound at, double band) const noexcept
+    {
+        at.distance = (at.distance - band) / (1 + options_.margin);
+        return time_covered(at);
+    }
+
+    /// Time [s] after which a second look is hoped to close the stretch.
+    [[nodiscard]] double hoped(GuardBound at, double slope, double band) const noexcept
+    {
+        at.distance -= band;
+        return options_.two_ended ? time_to_look(at, slope) : 0;
+    }
+
+    [[nodiscard]] bool closes(const GuardBound& from, const GuardBound& to, double tau,
+                              double band) const noexcept
+    {
+        return stays_clear(from, to, tau, options_.margin, band);
+    }
+
+private:
+    PlannerOptions options_;
+};
+
+/// The simplest rival: every k-th step is looked at.
+template <class Exact = Extremum>
+class EveryK : public detail::PutsOff<Exact> {
+public:
+    static constexpr bool needs_bounds = false;
+    static constexpr Evidence put_off = Evidence::assumed;
+
+    /// @throws std::invalid_argument if `steps` is 0.
+    explicit EveryK(std::size_t steps, const Exact& exact = {})
+        : detail::PutsOff<Exact>(exact), steps_(steps)
+    {
+        if (steps == 0) detail::throw_no_steps_between_looks();
+    }
+
+    [[nodiscard]] std::size_t longest() const noexcept { return steps_; }
+    [[nodiscard]] static constexpr bool checks_bounds() noexcept { return false; }
+    [[nodiscard]] static constexpr double margin() noexcept { return 0; }
+    [[nodiscard]] static double sure(const GuardBound&, double) noexcept { return 0; }
+    /// From its surface, where an event has left it, one step.
+    [[nodiscard]] static double hoped(const GuardBound& at, double, double band) noexcept
+    {
+        return at.distance > band ? std::numeric_limits<double>::infinity() : 0;
+    }
+    [[nodiscard]] static bool closes(const GuardBound& from, const GuardBound& to, double,
+                                     double band) noexcept
+    {
+        return from.distance > 0 && to.distance > band;
+    }
+
+private:
+    std::size_t steps_;
+};
+
+/// The rival where no bound is known: skips `fraction` |g| / |slope|, with the slope of the
+/// last two looks, and at most `longest` steps.
+template <class Exact = Extremum>
+class SlopeSkip : public detail::PutsOff<Exact> {
+public:
+    static constexpr bool needs_bounds = false;
+    static constexpr Evidence put_off = Evidence::assumed;
+
+    /// @throws std::invalid_argument unless `fraction` is in (0, 1] and `longest` above 0.
+    explicit SlopeSkip(double fraction = 0.1, std::size_t longest = 20, const Exact& exact = {})
+        : detail::PutsOff<Exact>(exact), fraction_(fraction), longest_(longest)
+    {
+        if (!(fraction > 0 && fraction <= 1) || longest == 0) {
+            detail::throw_bad_slope_skip(fraction, longest);
+        }
+    }
+
+    [[nodiscard]] std::size_t longest() const noexcept { return longest_; }
+    [[nodiscard]] static constexpr bool checks_bounds() noexcept { return false; }
+    [[nodiscard]] static constexpr double margin() noexcept { return 0; }
+    [[nodiscard]] static double sure(const GuardBound&, double) noexcept { return 0; }
+    [[nodiscard]] double hoped(const GuardBound& at, double slope, double) const noexcept
+    {
+        if (!std::isfinite(slope)) return 0;
+        return std::max(fraction_ * at.distance / std::fabs(slope), 0.0);
+    }
+    [[nodiscard]] static bool closes(const GuardBound& from, const GuardBound& to, double,
+                                     double band) noexcept
+    {
+        return from.distance > 0 && to.distance > band;
+    }
+
+private:
+    double fraction_;
+    std::size_t longest_;
+};
+
+/// Whether a run of `System` on states X with this detector puts off checks.
+template <class Detector, class System, class X>
+[[nodiscard]] constexpr bool puts_off_checks() noexcept
+{
+    if constexpr (Guarded<System, X> && requires { Detector::puts_off; }) {
+        return !Detector::needs_bounds || Bounded<System, X>;
+    } else {
+        return false;
+    }
+}
+
+}  // namespace ricochet

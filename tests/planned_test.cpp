@@ -1,0 +1,750 @@
+#include "ricochet/detect/planned.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/integrate/integrate.hpp"
+
+namespace ricochet {
+namespace {
+
+using X = std::array<double, 4>;  // position [m], velocity [m/s]
+using PlanRun = ricochet::Run<X>;
+using Controlled = ErrorControlled<Dopri5>;
+using Fixed = FixedStep<Rk4>;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double inf = std::numeric_limits<double>::infinity();
+
+bool same_bits(double a, double b)
+{
+    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+bool same_bits(const X& a, const X& b)
+{
+    return std::equal(a.begin(), a.end(), b.begin(),
+                      [](double p, double q) { return same_bits(p, q); });
+}
+
+/// All that a run says about the motion, to the last bit.
+void expect_same(const PlanRun& exact, const PlanRun& planned)
+{
+    EXPECT_EQ(exact.outcome, planned.outcome) << name(planned.outcome);
+    EXPECT_EQ(exact.guard, planned.guard);
+    EXPECT_EQ(exact.mode, planned.mode);
+    EXPECT_TRUE(same_bits(exact.t, planned.t)) << exact.t << ' ' << planned.t;
+    EXPECT_TRUE(same_bits(exact.x, planned.x));
+    ASSERT_EQ(exact.events.size(), planned.events.size());
+    for (std::size_t k = 0; k < exact.events.size(); ++k) {
+        const auto& a = exact.events[k];
+        const auto& b = planned.events[k];
+        ASSERT_EQ(a.kind, b.kind) << k;
+        ASSERT_EQ(a.guard, b.guard) << k;
+        ASSERT_TRUE(same_bits(a.t, b.t)) << k << ": " << a.t << ' ' << b.t;
+        ASSERT_TRUE(same_bits(a.before, b.before) && same_bits(a.after, b.after)) << k;
+        ASSERT_TRUE(same_bits(a.bracket.lo, b.bracket.lo) && same_bits(a.bracket.hi, b.bracket.hi));
+        ASSERT_TRUE(same_bits(a.slope, b.slope) && same_bits(a.error, b.error)) << k;
+        ASSERT_EQ(a.mode_after, b.mode_after) << k;
+    }
+    ASSERT_EQ(exact.trajectory.t, planned.trajectory.t);
+    for (std::size_t k = 0; k < exact.trajectory.x.size(); ++k) {
+        ASSERT_TRUE(same_bits(exact.trajectory.x[k], planned.trajectory.x[k])) << k;
+    }
+    ASSERT_EQ(exact.solution.size(), planned.solution.size());
+    if (!exact.solution.empty()) {
+        for (double u = 0; u <= 1; u += 1.0 / 64) {
+            ASSERT_TRUE(same_bits(exact.solution(u * exact.t), planned.solution(u * exact.t)));
+        }
+    }
+    const Statistics& a = exact.statistics;
+    const Statistics& b = planned.statistics;
+    EXPECT_EQ(a.steps, b.steps);
+    EXPECT_EQ(a.rejected, b.rejected);
+    EXPECT_EQ(a.events, b.events);
+    EXPECT_EQ(a.suppressed, b.suppressed);
+    EXPECT_EQ(a.disabled, b.disabled);
+    // Every step without an event has its evidence.
+    const auto total = [](const EvidenceCounts& counts) {
+        return counts.proved + counts.checked + counts.gated + counts.assumed;
+    };
+    EXPECT_EQ(total(a.evidence), total(b.evidence));
+}
+
+/// Runs with the exact detector, and planned with and without looking ahead. Returns the
+/// planned run that looks ahead.
+template <class Stepping, class Exact = Extremum, class System>
+PlanRun expect_planned_same(const System& system, const X& start, const Options& options)
+{
+    const auto exact = integrate(system, start, options, Stepping{}, Exact{});
+    for (const std::size_t longest : {1u, 3u, 64u}) {
+        SCOPED_TRACE(longest);
+        PlannerOptions plan;
+        plan.longest_stretch = longest;
+        plan.two_ended = longest > 1;
+        plan.check_bounds = true;
+        const auto planned =
+            integrate(system, start, options, Stepping{}, Planned<Exact>(plan, Exact{}));
+        expect_same(exact, planned);
+        if (longest == 64) return planned;
+    }
+    return exact;
+}
+
+struct Disc {
+    double x, y, r;
+};
+
+/// A point among discs in a circular room, under gravity, reflected by what it meets. The
+/// guard is its distance from the nearest of them.
+struct Room {
+    using State = X;
+    double gravity = 1;
+    double restitution = 1;
+    double radius = 3;
+    std::vector<Disc> discs;
+
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], x[3], 0, -gravity}; }
+
+    template <class V>
+    [[nodiscard]] double guard(double, const V& x) const
+    {
+        double nearest = radius - std::hypot(x[0], x[1]);
+        for (const Disc& disc : discs) {
+            nearest = std::min(nearest, std::hypot(x[0] - disc.x, x[1] - disc.y) - disc.r);
+        }
+        return nearest;
+    }
+
+    void reset(double, X& x) const
+    {
+        double nearest = radius - std::hypot(x[0], x[1]);
+        Disc from{0, 0, -1};
+        for (const Disc& disc : discs) {
+            const double d = std::hypot(x[0] - disc.x, x[1] - disc.y) - disc.r;
+            if (d < nearest) from = disc;
+            nearest = std::min(nearest, d);
+        }
+        reflect(from, restitution, x);
+    }
+
+    static void reflect(const Disc& disc, double restitution, X& x)
+    {
+        const double outward = disc.r < 0 ? -1 : 1;
+        const double distance = std::hypot(x[0] - disc.x, x[1] - disc.y);
+        const double nx = outward * (x[0] - disc.x) / distance;
+        const double ny = outward * (x[1] - disc.y) / distance;
+        const double speed = x[2] * nx + x[3] * ny;
+        if (speed >= 0) return;
+        x[2] -= (1 + restitution) * speed * nx;
+        x[3] -= (1 + restitution) * speed * ny;
+    }
+
+    [[nodiscard]] double speed_bound(double, const X& x) const { return std::hypot(x[2], x[3]); }
+    [[nodiscard]] double acceleration_bound(double, const X&) const { return gravity; }
+};
+
+Room random_room(std::mt19937_64& random, X& start)
+{
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    Room room;
+    room.gravity = uniform(random) < -0.5 ? 0 : std::exp(uniform(random));
+    room.restitution = uniform(random) < 0 ? 1 : 0.9;
+    for (int k = 0; k < 6; ++k) {
+        room.discs.push_back(
+            {2 * uniform(random), 2 * uniform(random), 0.3 + 0.2 * uniform(random)});
+    }
+    do {
+        start = {2 * uniform(random), 2 * uniform(random), 2 * uniform(random),
+                 2 * uniform(random)};
+    } while (room.guard(0, start) <= 0.01);
+    return room;
+}
+
+TEST(Planned, RandomRoomsHaveTheEventsOfTheExactDetector)
+{
+    std::mt19937_64 random(20);
+    std::uint64_t events = 0;
+    std::uint64_t proved = 0;
+    std::uint64_t steps = 0;
+    std::uint64_t rollbacks = 0;
+    for (int i = 0; i < 1200 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        X start;
+        const Room room = random_room(random, start);
+        const double step = i % 3 == 0 ? 0.05 : 0.01;
+        const auto fixed =
+            expect_planned_same<Fixed>(room, start, {.t_end = 3, .step = step, .max_steps = 400});
+        const auto controlled = expect_planned_same<Controlled>(
+            room, start, {.t_end = 3, .rtol = 1e-8, .h_max = i % 2 ? 0.03 : 10, .max_steps = 400});
+        for (const PlanRun* run : {&fixed, &controlled}) {
+            events += run->statistics.events;
+            proved += run->statistics.evidence.proved;
+            steps += run->statistics.steps;
+            rollbacks += run->statistics.rollbacks;
+        }
+    }
+    // The bounds did most of the work, and the ways back were taken.
+    EXPECT_GT(events, 3000u);
+    EXPECT_GT(proved, steps * 8 / 10);
+    EXPECT_GT(rollbacks, 500u);
+}
+
+TEST(Planned, SamplesAndSolutionAreThoseOfTheExactRun)
+{
+    std::mt19937_64 random(21);
+    std::uniform_real_distribution<double> uniform(0, 6);
+    for (int i = 0; i < 40 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        X start;
+        const Room room = random_room(random, start);
+        Options options{.t_end = 6, .step = 0.01, .record_steps = true};
+        for (int k = 0; k < 50; ++k) options.sample_times.push_back(uniform(random));
+        std::sort(options.sample_times.begin(), options.sample_times.end());
+        expect_planned_same<Fixed>(room, start, options);
+        options.step = 0;
+        options.h_max = 0.05;
+        expect_planned_same<Controlled>(room, start, options);
+    }
+}
+
+TEST(Planned, BackwardRunsHaveTheEventsOfTheExactDetector)
+{
+    std::mt19937_64 random(22);
+    std::uint64_t events = 0;
+    for (int i = 0; i < 60 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        X start;
+        Room room = random_room(random, start);
+        room.restitution = 1;
+        // Backward in time the velocity after an event is the one with which it leads away.
+        struct Backward : Room {
+            void reset(double t, X& x) const
+            {
+                x[2] = -x[2];
+                x[3] = -x[3];
+                Room::reset(t, x);
+                x[2] = -x[2];
+                x[3] = -x[3];
+            }
+        };
+        const Backward backward{room};
+        const auto run = expect_planned_same<Controlled>(backward, start,
+                                                         {.t_start = 5, .t_end = 0, .h_max = 0.05});
+        events += run.statistics.events;
+    }
+    EXPECT_GT(events, 100u);
+}
+
+TEST(Planned, EndsAsTheExactDetectorKeepsItsEvents)
+{
+    std::mt19937_64 random(23);
+    for (int i = 0; i < 60 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        X start;
+        const Room room = random_room(random, start);
+        expect_planned_same<Fixed, Ends>(room, start, {.t_end = 5, .step = 0.01});
+    }
+}
+
+/// Every disc is a guard: some reflect, some only say that their zone was entered or left.
+struct ManyDiscs {
+    using State = X;
+    std::vector<Disc> discs;
+    std::vector<bool> zone;
+    double gravity = 0.5;
+    double radius = 6;
+
+    [[nodiscard]] std::size_t guard_count() const { return discs.size() + 1; }
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], x[3], 0, -gravity}; }
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        GuardInfo info;
+        if (which < discs.size() && zone[which]) {
+            info.crossing = Crossing::either;
+            info.resets = false;
+        }
+        return info;
+    }
+
+    template <class V>
+    [[nodiscard]] double guard(std::size_t which, double, const V& x) const
+    {
+        if (which == discs.size()) return radius - std::hypot(x[0], x[1]);
+        return std::hypot(x[0] - discs[which].x, x[1] - discs[which].y) - discs[which].r;
+    }
+
+    void reset(std::size_t which, double, X& x) const
+    {
+        Room::reflect(which == discs.size() ? Disc{0, 0, -1} : discs[which], 1, x);
+    }
+
+    [[nodiscard]] double speed_bound(double, const X& x) const { return std::hypot(x[2], x[3]); }
+    [[nodiscard]] double acceleration_bound(double, const X&) const { return gravity; }
+};
+
+TEST(Planned, ManyGuardsInAnyOrderHaveTheEventsOfTheExactDetector)
+{
+    std::mt19937_64 random(24);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    std::uint64_t events = 0;
+    for (int i = 0; i < 24 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        ManyDiscs many;
+        const X start{0, 0, 2 * uniform(random), 2 * uniform(random)};
+        while (many.discs.size() < 63) {
+            const Disc disc{6 * uniform(random), 6 * uniform(random), 0.2 + 0.1 * uniform(random)};
+            if (std::hypot(disc.x, disc.y) < disc.r + 0.1) continue;
+            many.discs.push_back(disc);
+            many.zone.push_back(uniform(random) < 0);
+        }
+        const auto fixed = expect_planned_same<Fixed>(many, start, {.t_end = 10, .step = 0.01});
+        const auto controlled =
+            expect_planned_same<Controlled>(many, start, {.t_end = 10, .h_max = 0.1});
+        events += fixed.statistics.events + controlled.statistics.events;
+
+        // Permuted guards: the same times, and the same discs by another number.
+        std::vector<std::size_t> order(many.discs.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::shuffle(order.begin(), order.end(), random);
+        ManyDiscs permuted = many;
+        for (std::size_t k = 0; k < order.size(); ++k) {
+            permuted.discs[k] = many.discs[order[k]];
+            permuted.zone[k] = many.zone[order[k]];
+        }
+        const auto again =
+            integrate(permuted, start, {.t_end = 10, .step = 0.01}, Fixed{}, Planned{});
+        ASSERT_EQ(again.events.size(), fixed.events.size());
+        for (std::size_t k = 0; k < again.events.size(); ++k) {
+            const std::size_t guard = again.events[k].guard;
+            EXPECT_EQ(guard < order.size() ? order[guard] : guard, fixed.events[k].guard);
+            EXPECT_TRUE(same_bits(again.events[k].t, fixed.events[k].t));
+        }
+    }
+    EXPECT_GT(events, 200u);
+}
+
+/// A point that circles an origin at the speed `rate`, and a wall that it never reaches.
+struct Far {
+    using State = X;
+    double rate = 2;
+    double distance = 5;  ///< of the wall from the origin
+    bool tabulated = false;
+
+    void flow(double, const X& x, X& dxdt) const { dxdt = {-rate * x[1], rate * x[0], 0, 0}; }
+    [[nodiscard]] double guard(double, const X& x) const { return distance - x[0]; }
+    [[nodiscard]] double speed_bound(double, const X& x) const
+    {
+        return rate * std::hypot(x[0], x[1]);
+    }
+};
+
+TEST(Planned, AGuardThatIsNeverApproachedIsHardlyCalled)
+{
+    // On a circle of radius 1 the speed is 2 and the distance at least 4: every look covers
+    // 4 / (1.01 * 2) s or more, 100 s need 51 of them, and one is made at the start.
+    const double t_end = 100;
+    for (const bool two_ended : {false, true}) {
+        const auto run = integrate(Far{}, X{1, 0, 0, 0}, {.t_end = t_end, .step = 0.01}, Fixed{},
+                                   Planned({.two_ended = two_ended}));
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_LE(run.statistics.guard_calls, 52u);
+        EXPECT_EQ(run.statistics.evidence.proved, run.statistics.steps);
+        EXPECT_EQ(run.statistics.checks_put_off, run.statistics.steps);
+        EXPECT_EQ(run.statistics.rollbacks, 0u);
+    }
+}
+
+TEST(Planned, LookingAheadSavesLooks)
+{
+    // Away from a wall at the full speed two values cover any stretch; one covers a distance
+    // as long as that behind it, which takes log2(1000) looks from 0.01 to 10.
+    struct Leaving {
+        void flow(double, const X&, X& dxdt) const { dxdt = {1, 0, 0, 0}; }
+        double guard(double, const X& x) const { return x[0]; }
+        double speed_bound(double, const X&) const { return 1; }
+    };
+    const auto calls = [](bool two_ended) {
+        const PlannerOptions plan{.two_ended = two_ended, .longest_stretch = 100000};
+        return integrate(Leaving{}, X{0.01, 0, 0, 0}, {.t_end = 10, .step = 0.001}, Fixed{},
+                         Planned(plan))
+            .statistics.guard_calls;
+    };
+    EXPECT_LE(calls(true), 5u);
+    EXPECT_GE(calls(false), 10u);
+}
+
+TEST(Planned, AStartOnTheSurfaceIsNotAnEvent)
+{
+    Room room;
+    room.discs = {{0, -1, 1}};
+    for (const double up : {0.5, 0.0}) {  // up, or off along the top of the disc
+        const X start{0, 0, 0.7, up};
+        const auto run = expect_planned_same<Fixed>(room, start, {.t_end = 5, .step = 0.01});
+        EXPECT_GT(run.statistics.events, 0u);
+        expect_planned_same<Controlled>(room, start, {.t_end = 5, .h_max = 0.1});
+    }
+}
+
+TEST(Planned, TouchesAreThoseOfTheExactDetector)
+{
+    Room room;
+    room.gravity = 0;
+    room.discs = {{0, -1, 1}};
+    for (const double height : {0.0, 1e-15, -1e-15, 1e-13, -1e-13, 1e-9, -1e-9, 1e-4, -1e-4}) {
+        SCOPED_TRACE(height);
+        const X start{-1, height, 0.9, 0};
+        expect_planned_same<Fixed>(room, start, {.t_end = 2, .step = 0.013});
+        expect_planned_same<Controlled>(room, start, {.t_end = 2, .h_max = 0.2});
+    }
+}
+
+/// The room, with gravity that turns by a quarter at every impact, and kicks at known times.
+struct TurningRoom : Room {
+    std::size_t mode_count = 4;
+
+    [[nodiscard]] X field(Mode mode, const X& x) const
+    {
+        constexpr std::array<double, 4> gx = {0, 1, 0, -1};
+        constexpr std::array<double, 4> gy = {-1, 0, 1, 0};
+        return {x[2], x[3], gravity * gx[mode], gravity * gy[mode]};
+    }
+    void flow(Mode mode, double, const X& x, X& dxdt) const { dxdt = field(mode, x); }
+    template <class V>
+    [[nodiscard]] double guard(Mode, double t, const V& x) const
+    {
+        return Room::guard(t, x);
+    }
+    Mode reset(Mode mode, double t, X& x) const
+    {
+        Room::reset(t, x);
+        return (mode + 1) % 4;
+    }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        return 0.75 * (std::floor(t / 0.75) + 1);
+    }
+    Mode time_reset(Mode mode, double, X& x) const
+    {
+        x[2] = -x[2];
+        return mode;
+    }
+    [[nodiscard]] double speed_bound(Mode, double, const X& x) const
+    {
+        return std::hypot(x[2], x[3]);
+    }
+    [[nodiscard]] double acceleration_bound(Mode, double, const X&) const { return gravity; }
+};
+
+TEST(Planned, ModesAndTimeEventsAreThoseOfTheExactDetector)
+{
+    std::mt19937_64 random(25);
+    for (int i = 0; i < 60 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        X start;
+        TurningRoom room{random_room(random, start)};
+        room.restitution = 1;
+        const auto run = expect_planned_same<Fixed>(room, start, {.t_end = 5, .step = 0.01});
+        EXPECT_GE(run.statistics.events, 6u);  // the kicks
+        expect_planned_same<Controlled>(room, start, {.t_end = 5, .h_max = 0.04});
+    }
+}
+
+/// The room, with whatever bounds a test deals out.
+struct HostileRoom : Room {
+    double speed = nan;
+    double acceleration = nan;
+    double below = nan;
+
+    [[nodiscard]] double speed_bound(double, const X&) const { return speed; }
+    [[nodiscard]] double acceleration_bound(double, const X&) const { return acceleration; }
+    [[nodiscard]] double lower_bound(double, const X&) const { return below; }
+};
+
+TEST(Planned, BoundsThatAreNoneCoverNothing)
+{
+    std::mt19937_64 random(26);
+    X start;
+    const Room room = random_room(random, start);
+    for (const double bad : {nan, inf, -inf, -1.0}) {
+        for (const double below : {nan, -inf, -1.0, 0.0}) {
+            SCOPED_TRACE(bad);
+            HostileRoom hostile{room};
+            hostile.speed = bad;
+            hostile.acceleration = room.gravity;
+            hostile.below = below;
+            auto run = expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01});
+            EXPECT_EQ(run.statistics.evidence.proved, 0u);
+            hostile.speed = 10;
+            hostile.acceleration = bad;
+            run = expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01});
+            EXPECT_EQ(run.statistics.evidence.proved, 0u);
+        }
+    }
+}
+
+TEST(Planned, AWrongSpeedBoundIsNamed)
+{
+    Room room;
+    room.gravity = 0;
+    HostileRoom slow{room};
+    slow.speed = 0.4;  // the ball flies at 1
+    slow.acceleration = 0;
+    const X start{-2.5, 0, 1, 0};
+    const Options options{.t_end = 10, .step = 0.01};
+    for (const bool check : {true, false}) {
+        const auto run = integrate(slow, start, options, Fixed{},
+                                   Planned({.two_ended = false, .check_bounds = check}));
+        // Unchecked it is seen where the ball is found beyond the wall.
+        ASSERT_EQ(run.outcome, Outcome::wrong_bound);
+        EXPECT_EQ(run.guard, 0u);
+        ASSERT_TRUE(run.wrong_bound);
+        const auto& wrong = *run.wrong_bound;
+        EXPECT_FALSE(wrong.lower_bound);
+        EXPECT_TRUE(same_bits(wrong.value, room.guard(0, wrong.x)));
+        EXPECT_GT(std::fabs(wrong.value - wrong.value_then), wrong.allowed);
+        EXPECT_GT(wrong.t, wrong.since);
+        // What was allowed is what the bound says, with its margin of one per cent.
+        EXPECT_NEAR(wrong.allowed, 1.01 * 0.4 * (wrong.t - wrong.since), 1e-9);
+    }
+}
+
+TEST(Planned, AWrongLowerBoundIsNamed)
+{
+    Room room;
+    HostileRoom high{room};
+    high.speed = 4;
+    high.acceleration = 1;
+    high.below = 0.5;  // also where the wall is nearer
+    const auto run = integrate(high, X{0, 0, 1, 0}, {.t_end = 10, .step = 0.01}, Fixed{},
+                               Planned({.check_bounds = true}));
+    ASSERT_EQ(run.outcome, Outcome::wrong_bound);
+    ASSERT_TRUE(run.wrong_bound);
+    EXPECT_EQ(run.wrong_bound->allowed, 0.5);
+    EXPECT_LT(run.wrong_bound->value, 0.5);
+    EXPECT_TRUE(run.wrong_bound->lower_bound);
+}
+
+/// The distance to the room's wall is a lower bound of that to whatever is nearest, less the
+/// largest disc's way into it.
+struct TabulatedRoom : Room {
+    [[nodiscard]] double lower_bound(double t, const X& x) const
+    {
+        const double cell = 0.05;
+        const X centre{cell * std::round(x[0] / cell), cell * std::round(x[1] / cell), 0, 0};
+        return guard(t, centre) - cell * std::sqrt(0.5);
+    }
+};
+
+TEST(Planned, ALowerBoundSavesLooksAndKeepsTheEvents)
+{
+    std::mt19937_64 random(27);
+    std::uint64_t with = 0;
+    std::uint64_t without = 0;
+    for (int i = 0; i < 60 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        X start;
+        const Room room = random_room(random, start);
+        const Options options{.t_end = 5, .step = 0.002};
+        const auto run = expect_planned_same<Fixed>(TabulatedRoom{room}, start, options);
+        EXPECT_GT(run.statistics.bound_calls, 0u);
+        with += run.statistics.guard_calls;
+        without += integrate(room, start, options, Fixed{}, Planned{}).statistics.guard_calls;
+    }
+    EXPECT_LT(with, without);
+}
+
+/// A guard that is not a number beyond x = 1.
+struct Hole : Room {
+    [[nodiscard]] double guard(double t, const X& x) const
+    {
+        return x[0] > 1 ? nan : Room::guard(t, x);
+    }
+};
+
+TEST(Planned, AGuardThatIsNotANumberEndsTheRunWhereItDid)
+{
+    Room room;
+    room.gravity = 0;
+    const X start{-0.5, 2.6, 0.3, 0};
+    const Options options{.t_end = 10, .step = 0.01};
+    // A bound that covers no step leaves every step to the exact detector.
+    struct FastHole : Hole {
+        double speed_bound(double, const X&) const { return 1e6; }
+    };
+    const auto run = expect_planned_same<Fixed>(FastHole{{room}}, start, options);
+    EXPECT_EQ(run.outcome, Outcome::non_finite);
+    // A guard with a bound is promised to be a number; its hole is met where it is looked at.
+    const auto planned = integrate(Hole{room}, start, options, Fixed{}, Planned{});
+    EXPECT_EQ(planned.outcome, Outcome::non_finite);
+    EXPECT_GE(planned.t, run.t);
+}
+
+TEST(Planned, AFlowThatFailsBeyondAnEventIsNotBlamed)
+{
+    // The square root is of a negative number beyond the wall at x = 1.
+    struct Edge {
+        void flow(double, const X& x, X& dxdt) const
+        {
+            dxdt = {x[2], x[3], -0.1 * std::sqrt(1.0005 - x[0]), 0};
+        }
+        double guard(double, const X& x) const { return 1 - x[0]; }
+        void reset(double, X& x) const { x[2] = -0.5 * std::fabs(x[2]); }
+        double speed_bound(double, const X&) const { return 2; }
+    };
+    const auto run =
+        expect_planned_same<Fixed>(Edge{}, X{0, 0, 1, 0}, {.t_end = 4, .step = 0.0004});
+    EXPECT_EQ(run.statistics.events, 1u);
+}
+
+TEST(Planned, ASavedRunGoesOnToTheSameBits)
+{
+    std::mt19937_64 random(28);
+    for (int i = 0; i < 20 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        X start;
+        const Room room = random_room(random, start);
+        const Options options{.t_end = 4, .step = 0.01};
+        const auto whole = integrate(room, start, options, Fixed{}, Planned{});
+        using Planning = Simulation<Room, X, Fixed, Planned<>>;
+        Planning first(room, start, options);
+        for (int k = 0; k < 100 + 7 * i; ++k) first.step();
+        const Snapshot snapshot = first.save();
+        Planning second(room, start, options);
+        second.restore(snapshot);
+        const auto a = first.take();
+        const auto b = second.take();
+        EXPECT_TRUE(same_bits(a.x, b.x) && same_bits(a.x, whole.x));
+        EXPECT_EQ(a.events.size(), whole.events.size());
+        ASSERT_LE(b.events.size(), a.events.size());
+        const std::size_t before = a.events.size() - b.events.size();
+        for (std::size_t k = 0; k < b.events.size(); ++k) {
+            EXPECT_TRUE(same_bits(a.events[before + k].t, b.events[k].t));
+        }
+    }
+}
+
+TEST(Planned, NobodySeesWhatIsNotFinal)
+{
+    std::mt19937_64 random(29);
+    X start;
+    const Room room = random_room(random, start);
+    Options options{.t_end = 5, .step = 0.01};
+    for (double t = 0.3; t < 5; t += 0.9) options.sample_times.push_back(t);
+    using Planning = Simulation<Room, X, Fixed, Planned<>>;
+    const auto exact = integrate(room, start, options, Fixed{});
+
+    // Every step once, in the order of time.
+    std::uint64_t steps = 0;
+    double last = 0;
+    Planning watched(room, start, options);
+    watched.run_to_end([&](const Planning& simulation) {
+        if (simulation.t() > last) ++steps;
+        EXPECT_GE(simulation.t(), last);
+        last = simulation.t();
+    });
+    EXPECT_EQ(steps, exact.statistics.steps);
+    expect_same(exact, watched.finish());
+
+    // Events, looking ahead.
+    std::size_t seen = 0;
+    Planning listened(room, start, options);
+    listened.run_to_end([&](const Event<X>& event) {
+        EXPECT_TRUE(same_bits(event.t, exact.events[seen].t));
+        ++seen;
+    });
+    EXPECT_EQ(seen, exact.events.size());
+
+    // `advance` stops at the step with the sample or the event, as it does without a plan.
+    Planning advanced(room, start, options);
+    Simulation<Room, X, Fixed> plain(room, start, options);
+    for (bool more = true; more && !HasFailure();) {
+        more = plain.advance();
+        EXPECT_EQ(advanced.advance(), more);
+        EXPECT_TRUE(same_bits(advanced.t(), plain.t())) << plain.t();
+        EXPECT_TRUE(same_bits(advanced.x(), plain.x()));
+    }
+}
+
+TEST(Planned, ARunThatIsCutShortEndsWhereItDid)
+{
+    std::mt19937_64 random(30);
+    X start;
+    const Room room = random_room(random, start);
+    for (const std::uint64_t most : {1u, 17u, 100u, 101u}) {
+        const auto run =
+            expect_planned_same<Fixed>(room, start, {.t_end = 5, .step = 0.01, .max_steps = most});
+        EXPECT_EQ(run.outcome, Outcome::step_limit);
+    }
+    expect_planned_same<Fixed>(room, start, {.t_end = 5, .step = 0.01, .stop_at_event = true});
+
+    // Cancelled within a stretch: whatever is returned is final.
+    std::atomic<bool> cancelled = false;
+    Options options{.t_end = 5, .step = 0.01};
+    options.cancelled = &cancelled;
+    Simulation<Room, X, Fixed, Planned<>> simulation(room, start, options);
+    simulation.step();
+    cancelled = true;
+    const auto run = simulation.take();
+    EXPECT_EQ(run.outcome, Outcome::cancelled);
+    EXPECT_EQ(run.statistics.steps, 1u);
+}
+
+TEST(Planned, RefusesPlansThatAreNone)
+{
+    EXPECT_THROW(Planned({.margin = -0.1}), std::invalid_argument);
+    EXPECT_THROW(Planned({.margin = nan}), std::invalid_argument);
+    EXPECT_THROW(Planned({.longest_stretch = 0}), std::invalid_argument);
+    EXPECT_THROW(EveryK(0), std::invalid_argument);
+    EXPECT_THROW(SlopeSkip(0), std::invalid_argument);
+    EXPECT_THROW(SlopeSkip(1.5), std::invalid_argument);
+    EXPECT_THROW(SlopeSkip(0.1, 0), std::invalid_argument);
+}
+
+TEST(EveryK, FindsWhatLastsLongerThanKSteps)
+{
+    // A ball that bounces on the floor of a wide room is beyond it until it is reflected: no
+    // two crossings lie between two looks, and the events are those of every step.
+    Room room;
+    room.radius = 1e3;
+    room.discs = {{0, -1e3, 1e3}};
+    const X start{0, 1, 0.1, 0};
+    const Options options{.t_end = 10, .step = 0.01};
+    const auto exact = integrate(room, start, options, Fixed{});
+    for (const std::size_t k : {1u, 2u, 7u, 50u}) {
+        const auto run = integrate(room, start, options, Fixed{}, EveryK(k));
+        expect_same(exact, run);
+        EXPECT_GT(run.statistics.events, 2u);
+    }
+    const auto run = integrate(room, start, options, Fixed{}, EveryK(10, Ends{}));
+    EXPECT_LT(run.statistics.guard_calls, exact.statistics.guard_calls / 4);
+}
+
+TEST(SlopeSkip, FindsWhatIsApproachedSmoothly)
+{
+    Room room;
+    room.radius = 1e3;
+    room.discs = {{0, -1e3, 1e3}};
+    const X start{0, 1, 0.1, 0};
+    const Options options{.t_end = 10, .step = 0.001};
+    const auto exact = integrate(room, start, options, Fixed{});
+    const auto run = integrate(room, start, options, Fixed{}, SlopeSkip(0.25, 40));
+    expect_same(exact, run);
+    EXPECT_LT(run.statistics.guard_calls, exact.statistics.guard_calls / 10);
+}
+
+}  // namespace
+}  // namespace ricochet
