@@ -287,9 +287,12 @@ TEST(DistanceGrid, IsBelowTheDistanceByNoMoreThanTwiceTheWayToTheCentre)
         const std::array<double, 2> p{random.uniform(-1.6, 1.8), random.uniform(-1.7, 1.5)};
         EXPECT_LE(grid.lower_bound(p), distance(p) + 1e-15);
         EXPECT_GE(grid.lower_bound(p), distance(p) - 2 * half_diagonal - 1e-6);
+        EXPECT_LE(grid.lower_bound_of_cell(p), grid.lower_bound(p) + 1e-15);
+        EXPECT_GE(grid.lower_bound_of_cell(p), distance(p) - 2 * half_diagonal - 1e-6);
     }
     for (const auto& p : {std::array{-1.7, 0.0}, std::array{0.0, 1.6}, std::array{nan, 0.0}}) {
         EXPECT_EQ(grid.lower_bound(p), -infinity);
+        EXPECT_EQ(grid.lower_bound_of_cell(p), -infinity);
     }
     EXPECT_NE(refusal([&] { DistanceGrid<2>(box, 0, 0, distance); }), "accepted");
     EXPECT_NE(refusal([&] { DistanceGrid<2>(Box<2>{}, 3, 0, distance); }), "accepted");

@@ -1,12 +1,18 @@
 // Scenes with dear guards: what they promise, along real runs.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/cavern.hpp"
+#include "ricochet/systems/least_eigenvalue.hpp"
+#include "ricochet/systems/opaque.hpp"
+#include "ricochet/systems/planar_arm.hpp"
+#include "ricochet/systems/zones.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet {
@@ -139,6 +145,283 @@ TEST(Cavern, WrongSetUpIsRefused)
     EXPECT_NE(wall({}).find("got 0"), std::string::npos);
     EXPECT_NE(wall({{0, -1}, {nan, 0}, {0, 1}}).find("vertex 1"), std::string::npos);
     EXPECT_NE(wall({{3, 3}, {4, 3}, {4, 4}}).find("does not fit at the origin"), std::string::npos);
+}
+
+// --- zones ---
+
+/// The guard as it is written in the header.
+double flower(double r, double angle, double t, double radius, double a, int m, double turn)
+{
+    const double s = 2 * r * r / (r * r + radius * radius);
+    return r - radius * (1 + a * s * std::cos(m * (angle - turn * t)));
+}
+
+TEST(Zones, BoundsHoldForEveryZone)
+{
+    const Zones system;
+    ASSERT_EQ(system.guard_count(), 256U);
+    const auto run = sampled_run(system, system.start(), 60, 1e-2, 1500);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_GT(run.events.size(), 100U);
+    BoundsSampled all;
+    for (std::size_t which = 0; which < system.guard_count(); ++which) {
+        const BoundsSampled one = sample_bounds(system, run, which);
+        all.samples += one.samples;
+        all.broken_way += one.broken_way;
+        all.broken_speed += one.broken_speed;
+        all.broken_lower += one.broken_lower;
+        all.closest_way = std::max(all.closest_way, one.closest_way);
+    }
+    expect_bounds_hold(all, 100'000, 0.5);
+}
+
+TEST(Zones, AreFlowersThatTurn)
+{
+    // A single zone is found by its values: g = -radius in the centre, r - radius (1 + 2 a
+    // cos) far away; its petals repeat with the angle.
+    const Zones system({.count = 5, .turn = 2});
+    std::size_t inside = 0;
+    for (std::size_t which = 0; which < 5; ++which) {
+        for (int i = 0; i < 2000; ++i) {
+            const Zones::State x{0.005 * i - 5, 0.0037 * i - 3, 1, 0.3};
+            const double g = system.guard(which, 1.5, x);
+            EXPECT_LE(system.lower_bound(which, 1.5, x), g);
+            if (g < 0) ++inside;
+            // The rate against a difference along the motion, with turning zones.
+            const Zones::State dxdt{x[2], x[3], 0, 0};
+            const double h = 1e-6;
+            const auto moved = [&](double by) {
+                return system.guard(which, 1.5 + by,
+                                    Zones::State{x[0] + by * x[2], x[1] + by * x[3], 0, 0});
+            };
+            // Third derivatives of some 1e3 times h² and rounding of 1e-15 / h.
+            EXPECT_NEAR(system.guard_rate(which, 1.5, x, dxdt), (moved(h) - moved(-h)) / (2 * h),
+                        1e-6);
+        }
+    }
+    EXPECT_GT(inside, 10U);
+    EXPECT_TRUE(std::isnan(system.guard(0, 0, Zones::State{nan, 0, 0, 0})));
+    EXPECT_NEAR(flower(1, 0, 0, 1, 0.2, 3, 0), -0.2, 1e-15);
+}
+
+TEST(Zones, AllTogetherAreTheSameAsEachAlone)
+{
+    const Zones system;
+    std::vector<double> all(system.guard_count());
+    const Zones::State x{0.3, -1.7, 0.2, 0.1};
+    system.guards(3.5, x, all);
+    for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i], system.guard(i, 3.5, x));
+}
+
+TEST(Zones, WrongSetUpIsRefused)
+{
+    EXPECT_NE(refusal([] { Zones({.count = 0}); }).find("count must be positive"),
+              std::string::npos);
+    EXPECT_NE(refusal([] { Zones({.size = -1}); }).find("size"), std::string::npos);
+    EXPECT_NE(refusal([] { Zones({.turn = nan}); }).find("turn"), std::string::npos);
+}
+
+// --- smallest eigenvalue ---
+
+TEST(LeastEigenvalue, BoundsHold)
+{
+    const LeastEigenvalue system;
+    const auto run = sampled_run(system, system.start(), 100, 1e-2, 60'000);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_GT(run.events.size(), 4U);
+    expect_bounds_hold(sample_bounds(system, run, 0), 100'000, 0.05);
+}
+
+TEST(LeastEigenvalue, RateIsTheDerivativeAlongTheMotion)
+{
+    const LeastEigenvalue system;
+    for (int i = 0; i < 200; ++i) {
+        const LeastEigenvalue::State q{std::sin(i), std::cos(2.0 * i), std::sin(3.0 * i), 0.3};
+        const LeastEigenvalue::State rates{1, -0.5, 0.25, 2};
+        const auto moved = [&](double by) {
+            LeastEigenvalue::State at = q;
+            for (std::size_t k = 0; k < 4; ++k) at[k] += by * rates[k];
+            return system.guard(0, at);
+        };
+        // Eigenvalues are some 0.1 apart: third derivatives below 1e4, times h² = 1e-8.
+        const double h = 1e-4;
+        EXPECT_NEAR(system.guard_rate(0, q, rates), (moved(h) - moved(-h)) / (2 * h), 1e-4);
+    }
+}
+
+TEST(LeastEigenvalue, TheSlowFormHasTheSameValuesAndTakesItsTime)
+{
+    const LeastEigenvalue fast;
+    const LeastEigenvalue slow({.slow = 2e-3});
+    const auto start = std::chrono::steady_clock::now();
+    for (int i = 0; i < 5; ++i) {
+        const LeastEigenvalue::State q{0.1 * i, 0.2, 0.3, -0.4};
+        EXPECT_EQ(fast.guard(0, q), slow.guard(0, q));
+    }
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    EXPECT_GE(spent.count(), 5 * 2e-3);
+    EXPECT_TRUE(std::isnan(fast.guard(0, LeastEigenvalue::State{nan, 0, 0, 0})));
+    EXPECT_NE(refusal([] { LeastEigenvalue({.slow = -1}); }).find("slow"), std::string::npos);
+    EXPECT_NE(refusal([] { LeastEigenvalue({.amplitude = 0}); }).find("amplitude"),
+              std::string::npos);
+}
+
+// --- arm ---
+
+template <std::size_t N>
+void expect_same_run(std::size_t obstacles)
+{
+    ArmScene::Parameters p{.obstacles = obstacles};
+    const PlanarArm<N> tree(p);
+    p.search = ArmScene::Search::brute;
+    const PlanarArm<N> brute(p);
+    const Options options{.t_end = 10, .step = 1e-3};
+    const auto a = integrate(tree, tree.start(), options, FixedStep<Rk4>{}, Ends{});
+    const auto b = integrate(brute, brute.start(), options, FixedStep<Rk4>{}, Ends{});
+    EXPECT_EQ(a.outcome, Outcome::reached_end);
+    EXPECT_GT(a.events.size(), 1U);
+    ASSERT_EQ(a.events.size(), b.events.size());
+    for (std::size_t i = 0; i < a.events.size(); ++i) EXPECT_EQ(a.events[i].t, b.events[i].t);
+    EXPECT_EQ(a.x, b.x);
+}
+
+TEST(PlanarArm, BothSearchesGiveTheSameRunToTheBit)
+{
+    expect_same_run<4>(8);
+    expect_same_run<6>(40);
+}
+
+template <std::size_t N>
+void expect_arm_bounds(std::size_t obstacles)
+{
+    const PlanarArm<N> system({.obstacles = obstacles});
+    const auto run = sampled_run(system, system.start(), 200, 1e-3, 60'000);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_GT(run.events.size(), 20U);
+    expect_bounds_hold(sample_bounds(system, run, 0), 100'000, 0.3);
+    for (std::size_t i = 0; i < run.trajectory.t.size(); ++i) {
+        ASSERT_GT(system.guard(run.trajectory.t[i], run.trajectory.x[i]), -1e-9);
+    }
+}
+
+TEST(PlanarArm, BoundsHoldAndTheArmStaysOutside)
+{
+    expect_arm_bounds<4>(8);
+    expect_arm_bounds<6>(40);
+}
+
+TEST(PlanarArm, TheRateIsTheDerivativeOfTheGuard)
+{
+    const PlanarArm<4> system;
+    const auto run = sampled_run(system, system.start(), 20, 1e-3, 2000);
+    std::size_t compared = 0;
+    for (std::size_t i = 0; i < run.trajectory.t.size(); ++i) {
+        const auto& x = run.trajectory.x[i];
+        PlanarArm<4>::State dxdt{};
+        system.flow(run.trajectory.t[i], x, dxdt);
+        const auto moved = [&](double by) {
+            auto at = x;
+            for (std::size_t k = 0; k < 4; ++k) at[k] += by * dxdt[k];
+            return system.guard(0, at);
+        };
+        const double h = 1e-6;
+        const double forward = (moved(h) - moved(0)) / h;
+        const double backward = (moved(0) - moved(-h)) / h;
+        // Kinks, where another point becomes the nearest, are rare; else the guard bends by
+        // speed² / distance, at most 1e2 / 0.02, times h.
+        if (std::fabs(forward - backward) > 1e-2) continue;
+        ++compared;
+        EXPECT_NEAR(system.guard_rate(0, x, dxdt), (forward + backward) / 2, 1e-2);
+    }
+    EXPECT_GT(compared, 1900U);
+}
+
+TEST(PlanarArm, TheLowerBoundOftenTellsThatThereIsRoom)
+{
+    const PlanarArm<4> system({.obstacles = 8});
+    const auto run = sampled_run(system, system.start(), 50, 1e-3, 5000);
+    std::size_t far = 0, told = 0;
+    for (std::size_t i = 0; i < run.trajectory.t.size(); ++i) {
+        // Discs of radius 2 / 4 / 12 and cells of 4 / 256 cost 0.06 at most.
+        if (system.guard(0, run.trajectory.x[i]) < 0.08) continue;
+        ++far;
+        if (system.lower_bound(0, run.trajectory.x[i]) > 0) ++told;
+    }
+    EXPECT_GT(far, 100U);
+    EXPECT_EQ(told, far);
+}
+
+TEST(PlanarArm, WrongSetUpIsRefused)
+{
+    using geometry::Point2;
+    const std::vector<Point2> away{{0, 5}, {1, 5}, {0, 6}};
+    const std::vector<Point2> around{{-9, -9}, {9, -9}, {9, 9}, {-9, 9}};
+    const auto sentence = [](const std::vector<std::vector<Point2>>& obstacles) {
+        return refusal([&] { PlanarArm<4>(ArmScene::Parameters{}, obstacles); });
+    };
+    EXPECT_EQ(sentence({away}), "accepted");
+    EXPECT_NE(sentence({}).find("no obstacle"), std::string::npos);
+    EXPECT_NE(sentence({away, around}).find("obstacle 1 must leave link 0 free"),
+              std::string::npos);
+    EXPECT_NE(sentence({away, {{0, 5}, {nan, 5}, {0, 6}}}).find("obstacle 1: Outline: vertex 1"),
+              std::string::npos);
+    EXPECT_NE(sentence({away, {{0, 5}}}).find("obstacle 1"), std::string::npos);
+    const auto with = [](ArmScene::Parameters p) { return refusal([&] { PlanarArm<4>{p}; }); };
+    EXPECT_NE(with({.obstacles = 0}).find("obstacles"), std::string::npos);
+    EXPECT_NE(with({.reach = nan}).find("reach"), std::string::npos);
+    EXPECT_NE(with({.least_rate = 9}).find("least_rate"), std::string::npos);
+    EXPECT_NE(with({.discs = 0}).find("discs"), std::string::npos);
+    const PlanarArm<4> system;
+    auto x = system.start();
+    x[2] = nan;
+    EXPECT_TRUE(std::isnan(system.guard(0, x)));
+    EXPECT_EQ(system.lower_bound(0, x), -std::numeric_limits<double>::infinity());
+}
+
+// --- seen through a pinhole ---
+
+template <class System>
+concept HasSpeedBound = requires(const System& s, const typename System::State& x)
+{
+    s.speed_bound(0.0, x);
+};
+
+TEST(Opaque, ABlackBoxMeetsTheSameObstaclesAndCostsWhatItSays)
+{
+    const PlanarArm<4> arm({.obstacles = 8});
+    const BlackBox box(arm, 20e-6);
+    const Options options{.t_end = 10, .step = 1e-3};
+    const auto known = integrate(arm, arm.start(), options, FixedStep<Rk4>{}, Ends{});
+    const auto start = std::chrono::steady_clock::now();
+    const auto run = integrate(box, box.start(), options, FixedStep<Rk4>{}, Ends{});
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    ASSERT_EQ(run.events.size(), known.events.size());
+    ASSERT_GT(run.events.size(), 1U);
+    for (std::size_t i = 0; i < run.events.size(); ++i) {
+        // Bisection and Newton's method close on the same root of the step's map; what they
+        // differ by, a few units in the last place, later motion magnifies.
+        EXPECT_NEAR(run.events[i].t, known.events[i].t, 1e-9);
+    }
+    EXPECT_GE(spent.count(), 20e-6 * static_cast<double>(run.statistics.guard_calls) * 0.99);
+}
+
+TEST(Opaque, AHiddenGuardHasNeitherRateNorBounds)
+{
+    using Arm = PlanarArm<4>;
+    static_assert(RatedGuard<Arm, Arm::State> && !RatedGuard<Hidden<Arm>, Arm::State>);
+    static_assert(!HasSpeedBound<Hidden<Arm>> && HasSpeedBound<Arm>);
+    const Arm arm({.obstacles = 8});
+    const Hidden hidden(arm);
+    const Options options{.t_end = 10, .step = 1e-3};
+    const auto known = integrate(arm, arm.start(), options, FixedStep<Rk4>{}, Ends{});
+    const auto run = integrate(hidden, hidden.start(), options, FixedStep<Rk4>{}, Ends{});
+    ASSERT_EQ(run.events.size(), known.events.size());
+    for (std::size_t i = 0; i < run.events.size(); ++i) {
+        EXPECT_NEAR(run.events[i].t, known.events[i].t, 1e-9);
+    }
+    EXPECT_NE(refusal([&] { BlackBox(arm, 2); }).find("cost must lie in [0, 1] s"),
+              std::string::npos);
+    EXPECT_NE(refusal([&] { Hidden(arm, -1); }).find("cost"), std::string::npos);
 }
 
 }  // namespace

@@ -212,33 +212,134 @@ NearestPair nearest_points(const Segment2& s, const Segment2& other) noexcept
     return best;
 }
 
+namespace {
+
+/// A segment that is asked about, with what all the others are compared with.
+struct Asked {
+    explicit Asked(const Segment2& s) noexcept
+        : a(s.a), b(s.b), d(s.b - s.a), inverse(dot(d, d) > 0 ? 1 / dot(d, d) : 0)
+    {
+    }
+    Point2 a, b, d;
+    double inverse;
+};
+
+/// Squares of distances between a segment and several; 0 where they cross.
+template <class T>
+[[gnu::always_inline]] inline T squared_distances(const Asked& s, const T& ax, const T& ay,
+                                                  const T& dx, const T& dy,
+                                                  const T& inverse) noexcept
+{
+    const T zero{};
+    const T one = zero + 1.0;
+    const auto less = [](const T& u, const T& v) { return u < v ? u : v; };
+    const T bx = ax + dx;
+    const T by = ay + dy;
+    // Those that do not cross are nearest at an end of one of them.
+    T least = less(detail::squared_distance<T>(ax, ay, dx, dy, inverse, s.a.x, s.a.y),
+                   detail::squared_distance<T>(ax, ay, dx, dy, inverse, s.b.x, s.b.y));
+    const auto from_end = [&](const T& x, const T& y) {
+        const T wx = x - s.a.x;
+        const T wy = y - s.a.y;
+        T t = (wx * s.d.x + wy * s.d.y) * s.inverse;
+        t = t > zero ? t : zero;
+        t = t < one ? t : one;
+        const T ex = wx - t * s.d.x;
+        const T ey = wy - t * s.d.y;
+        return ex * ex + ey * ey;
+    };
+    least = less(least, from_end(ax, ay));
+    least = less(least, from_end(bx, by));
+    const T from = s.d.x * (ay - s.a.y) - s.d.y * (ax - s.a.x);
+    const T to = s.d.x * (by - s.a.y) - s.d.y * (bx - s.a.x);
+    const T start = dx * (s.a.y - ay) - dy * (s.a.x - ax);
+    const T end = dx * (s.b.y - ay) - dy * (s.b.x - ax);
+    least = from * to < zero ? (start * end < zero ? zero : least) : least;
+    return least;
+}
+
+/// Lower bounds from the boxes, and from the discs around them: a long oblique segment
+/// has a large box.
+std::array<double, 4> squared_bounds(const Asked& s, const FourBoxes<2>& boxes,
+                                     const std::array<double, 2>& lower,
+                                     const std::array<double, 2>& upper) noexcept
+{
+    std::array<double, 4> out = squared_distances(boxes, lower, upper);
+    for (std::size_t i = 0; i < 4; ++i) {
+        const double sides[]{boxes.upper[0][i] - boxes.lower[0][i],
+                             boxes.upper[1][i] - boxes.lower[1][i]};
+        const Point2 centre{0.5 * (boxes.lower[0][i] + boxes.upper[0][i]),
+                            0.5 * (boxes.lower[1][i] + boxes.upper[1][i])};
+        const Point2 w = centre - s.a;
+        double t = dot(w, s.d) * s.inverse;
+        t = t > 0 ? t : 0;
+        t = t < 1 ? t : 1;
+        const Point2 e = w - t * s.d;
+        const double radius = 0.5 * std::sqrt(sides[0] * sides[0] + sides[1] * sides[1]);
+        const double gap = std::sqrt(dot(e, e)) * (1 - 1e-14) - radius * (1 + 1e-14);
+        const double square = gap > 0 ? gap * gap : 0;
+        out[i] = square > out[i] ? square : out[i];  // missing boxes: NaN, and out is kept
+    }
+    return out;
+}
+
+}  // namespace
+
+std::array<double, 4> Segments::Columns::four_squared_distances(std::size_t first,
+                                                                const Segment2& s) const noexcept
+{
+    const Asked asked(s);
+    std::array<double, 4> out;
+    for (std::size_t i = 0; i < 4; i += detail::lanes) {
+        const auto load = [&](const std::vector<double>& column) {
+            return *reinterpret_cast<const detail::Lanes*>(column.data() + first + i);
+        };
+        const detail::Lanes squares = squared_distances<detail::Lanes>(
+            asked, load(ax), load(ay), load(dx), load(dy), load(inverse));
+        for (std::size_t k = 0; k < detail::lanes; ++k) out[i + k] = squares[k];
+    }
+    return out;
+}
+
+NearestPair Segments::pair_at(std::uint32_t segment, double squared,
+                              const Segment2& s) const noexcept
+{
+    NearestPair out = nearest_points(s, segments_[segment]);
+    out.segment = segment;
+    out.distance = std::sqrt(squared);
+    return out;
+}
+
 NearestPair Segments::nearest(const Segment2& s, double limit, std::uint32_t hint) const noexcept
 {
     NearestPair out;
     out.distance = limit;
     if (!finite(s.a) || !finite(s.b)) {
-        out.distance = s.a.x + s.a.y + s.b.x + s.b.y;
+        out.distance = std::numeric_limits<double>::quiet_NaN();
         return out;
     }
-    const auto offer = [&](std::uint32_t segment) {
-        NearestPair pair = nearest_points(s, segments_[segment]);
-        if (pair.distance < out.distance ||
-            (pair.distance == out.distance && pair.distance < limit && segment < out.segment)) {
-            pair.segment = segment;
-            out = pair;
-        }
+    const double allowed = std::min(limit * limit, largest);
+    double best = allowed;
+    std::uint32_t which = 0;
+    const auto offer = [&](std::uint32_t segment, double square) {
+        if (square > best) return;
+        if (square < best || segment < which) which = segment;
+        best = square;
     };
-    offer(hint < segments_.size() ? hint : 0);
-    double best = std::min(out.distance * out.distance, largest);
+    {
+        const std::uint32_t first = hint < segments_.size() ? hint : 0;
+        offer(first, given_.four_squared_distances(first / 4 * 4, s)[first % 4]);
+    }
+    const Asked asked(s);
     const std::array<double, 2> lower{std::min(s.a.x, s.b.x), std::min(s.a.y, s.b.y)};
     const std::array<double, 2> upper{std::max(s.a.x, s.b.x), std::max(s.a.y, s.b.y)};
     tree_.search(
-        best, [&](const FourBoxes<2>& boxes) { return squared_distances(boxes, lower, upper); },
+        best, [&](const FourBoxes<2>& boxes) { return squared_bounds(asked, boxes, lower, upper); },
         [&](std::size_t first, std::size_t last) {
-            for (std::size_t i = first; i < last; ++i) offer(tree_.order()[i]);
-            best = std::min(out.distance * out.distance, largest);
+            const std::array<double, 4> squares = sorted_.four_squared_distances(first, s);
+            for (std::size_t i = first; i < last; ++i) offer(tree_.order()[i], squares[i - first]);
         });
-    return out;
+    return best < allowed ? pair_at(which, best, s) : out;
 }
 
 NearestPair Segments::nearest_brute(const Segment2& s, double limit) const noexcept
@@ -246,17 +347,22 @@ NearestPair Segments::nearest_brute(const Segment2& s, double limit) const noexc
     NearestPair out;
     out.distance = limit;
     if (!finite(s.a) || !finite(s.b)) {
-        out.distance = s.a.x + s.a.y + s.b.x + s.b.y;
+        out.distance = std::numeric_limits<double>::quiet_NaN();
         return out;
     }
-    for (std::uint32_t i = 0; i < segments_.size(); ++i) {
-        NearestPair pair = nearest_points(s, segments_[i]);
-        if (pair.distance < out.distance) {
-            pair.segment = i;
-            out = pair;
+    const double allowed = std::min(limit * limit, largest);
+    double best = allowed;
+    std::size_t which = 0;
+    for (std::size_t i = 0; i < segments_.size(); i += 4) {
+        const std::array<double, 4> squares = given_.four_squared_distances(i, s);
+        for (std::size_t k = 0; k < 4; ++k) {
+            if (squares[k] < best) {
+                best = squares[k];
+                which = i + k;
+            }
         }
     }
-    return out;
+    return best < allowed ? pair_at(static_cast<std::uint32_t>(which), best, s) : out;
 }
 
 }  // namespace ricochet::geometry

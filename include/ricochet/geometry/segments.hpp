@@ -89,12 +89,17 @@ private:
         std::vector<double> ax, ay, dx, dy, inverse;
         void append(const Segment2& s);
         [[nodiscard]] double squared_distance(std::size_t i, Point2 p) const noexcept;
+        [[nodiscard]] std::array<double, 4> four_squared_distances(
+            std::size_t first, const Segment2& s) const noexcept;
         [[nodiscard]] std::array<double, 4> four_squared_distances(std::size_t first,
                                                                    Point2 p) const noexcept;
     };
 
     [[nodiscard]] NearestOnSegment at(std::uint32_t segment, double squared,
                                       Point2 p) const noexcept;
+
+    [[nodiscard]] NearestPair pair_at(std::uint32_t segment, double squared,
+                                      const Segment2& s) const noexcept;
 
     std::vector<Segment2> segments_;
     Columns given_;   ///< in the order given
