@@ -29,6 +29,9 @@ struct Check {
 /// The network: kernels, models, training, gate.
 [[nodiscard]] std::vector<Check> checks_of_part_2();
 
+/// The semantics of events.
+[[nodiscard]] std::vector<Check> checks_of_part_3();
+
 /// Whether every state type gives the same events, bit for bit.
 [[nodiscard]] Measured compare_state_types();
 
@@ -46,5 +49,41 @@ struct Check {
 
 /// The cost of one step with each detector.
 [[nodiscard]] Measured compare_detectors();
+
+/// Every problem with a known solution, in every way it can be run.
+[[nodiscard]] Measured compare_systems();
+
+/// Pairs of crossings a hair apart, and near misses.
+[[nodiscard]] Measured find_near_tangent_pairs();
+
+/// Balls that are alike to the bit.
+[[nodiscard]] Measured drop_identical_balls();
+
+/// Balls of every restitution for 1e7 s.
+[[nodiscard]] Measured bounce_for_ever();
+
+/// The energy of a ball that loses none.
+[[nodiscard]] Measured keep_elastic_energy();
+
+/// Saving and restoring at random points.
+[[nodiscard]] Measured restore_anywhere();
+
+/// The guards of a system in another order.
+[[nodiscard]] Measured reorder_guards();
+
+/// Random hybrid systems against their closed forms.
+[[nodiscard]] Measured check_random_systems();
+
+/// The impact oscillator: fastest setting within an error of 1e-8 s and 1e-12 s; four
+/// errors beside odeint by hand; a thousand periods. `limit` in seconds.
+[[nodiscard]] Measured time_impacts_to_1e8();
+[[nodiscard]] Measured time_impacts_to_1e12(double limit);
+[[nodiscard]] Measured compare_impacts();
+[[nodiscard]] Measured time_long_impacts();
+
+/// What watching costs: crossings that are only recorded, guards that never fire.
+[[nodiscard]] Measured time_recorded_crossings();
+[[nodiscard]] Measured time_idle_guard();
+[[nodiscard]] Measured time_hundred_idle_guards();
 
 }  // namespace ricochet::bench

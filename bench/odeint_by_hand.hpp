@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ricochet/systems/bouncing_ball.hpp"
+#include "ricochet/systems/impact_oscillator.hpp"
 
 namespace ricochet::bench {
 
@@ -30,5 +31,18 @@ struct ByHand {
 /// second stepper, so that events are as accurate as the method.
 [[nodiscard]] ByHand by_hand_on_step_map(const BouncingBall& ball, const std::array<double, 2>& x0,
                                          double t_end, double tolerance);
+
+/// The same for the impact oscillator, which needs real steps.
+[[nodiscard]] ByHand by_hand_on_dense_output(const ImpactOscillator& oscillator,
+                                             const std::array<double, 2>& x0, double t_end,
+                                             double tolerance);
+[[nodiscard]] ByHand by_hand_on_step_map(const ImpactOscillator& oscillator,
+                                         const std::array<double, 2>& x0, double t_end,
+                                         double tolerance);
+
+/// As `by_hand_on_step_map`, by TOMS 748 instead of bisection: a fifth of the steps.
+[[nodiscard]] ByHand by_hand_with_toms748(const ImpactOscillator& oscillator,
+                                          const std::array<double, 2>& x0, double t_end,
+                                          double tolerance);
 
 }  // namespace ricochet::bench

@@ -137,7 +137,7 @@ struct Spiral {
             .events = {period, 2 * period, 3 * period, 4 * period}};
 }
 
-/// A pendulum of 1 m, x'' = -9.81 sin x, with a guard far above it: the cost of
+/// A pendulum of 1 m, x'' = -9.8 sin x, with a guard far above it: the cost of
 /// watching for what never happens.
 struct WatchedPendulum {
     using State = std::array<double, 2>;
@@ -146,7 +146,7 @@ struct WatchedPendulum {
     void flow(double /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = x[1];
-        dxdt[1] = -9.81 * std::sin(x[0]);
+        dxdt[1] = -9.8 * std::sin(x[0]);
     }
 
     template <class X>

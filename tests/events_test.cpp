@@ -9,12 +9,14 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
+#include "ricochet/systems/near_tangent.hpp"
 
 namespace ricochet {
 namespace {
@@ -22,7 +24,6 @@ namespace {
 using X1 = std::array<double, 1>;
 using X = std::array<double, 2>;
 constexpr double pi = std::numbers::pi;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 template <class State>
 std::vector<double> times(const ricochet::Run<State>& run)
@@ -181,6 +182,36 @@ TEST(Events, ATouchIsReportedOnceWhereverTheStepsFall)
         EXPECT_EQ(run.events[0].kind, EventKind::touch);
         // |g| <= 64 eps within sqrt(64 eps / 4) of the touch
         EXPECT_NEAR(run.events[0].t, 0.5, 1e-7) << h;
+    }
+}
+
+TEST(Events, ADeclaredBandTurnsDipsOfLessThanItIntoTouches)
+{
+    // Crests of cos(t + 1) that reach beyond the level by less than the band, or fall short
+    // of it by less, are one touch each, wherever the steps fall; higher ones are crossed.
+    const auto kinds = [](double depth, double touch, double h_max) {
+        const ricochet::NearTangent system({.depth = depth, .phase = 1, .touch = touch});
+        const Options options{.t_end = 20, .rtol = 1e-9, .atol = 1e-9, .h_max = h_max};
+        const auto run = integrate(system, system.start(), options);
+        std::string found;
+        for (const auto& event : run.events) {
+            const bool is_touch = event.kind == EventKind::touch;
+            // The search for the crest ends where the value no longer changes by touch / 64.
+            const double turn = 2 * pi * std::round((event.t + 1) / (2 * pi)) - 1;
+            const double late = is_touch ? event.t - turn : 0;
+            EXPECT_LE(std::fabs(late), std::sqrt(touch / 32)) << depth << ' ' << touch;
+            found += is_touch ? 'T' : 'C';
+        }
+        return found;
+    };
+    for (const double h_max : {0.03, 0.3, 10.0}) {
+        for (const double depth : {1e-2, 1e-4, 0.0, -1e-4, -1e-2}) {
+            for (const double touch : {0.05, 0.012}) {
+                EXPECT_EQ(kinds(depth, touch, h_max), "TTT") << depth << ' ' << touch;
+            }
+        }
+        EXPECT_EQ(kinds(1e-2, 1e-3, h_max), "CCCCCC");
+        EXPECT_EQ(kinds(-1e-2, 1e-3, h_max), "");
     }
 }
 

@@ -151,7 +151,11 @@ private:
             }
             const double width = hi.s - lo.s;
             const GuardSample dip = probe.value_and_rate(lo.s + width * cubic.critical(true));
-            if (!has_left(watch.side, dip.value)) return Finding::clear(Evidence::checked);
+            // A start in the band is on its way out of a touch.
+            const bool in_band = std::max(std::fabs(cubic.v0), std::fabs(dip.value)) <= watch.touch;
+            if (in_band || !has_left(watch.side, dip.value)) {
+                return Finding::clear(Evidence::checked);
+            }
             return pair(probe, watch, dip);
         }
         const double sign = watch.side == Side::above ? 1 : -1;

@@ -93,6 +93,7 @@ public:
         }
         for (std::size_t i = 0; i < count_; ++i) {
             records_[i].info = guard_info_of<X>(system, i);
+            bands_ = bands_ || records_[i].info.touch > 0;
         }
     }
 
@@ -143,6 +144,12 @@ public:
     /// Whether any guard deserves a look.
     [[nodiscard]] bool suspicious(double h) const noexcept
     {
+        if (bands_) {
+            for (std::size_t i = 0; i < size(); ++i) {
+                if (suspicious(i, h)) return true;
+            }
+            return false;
+        }
         double any = 0;  // a double, so that the loop is vectorised
         for (std::size_t i = 0; i < size(); ++i) {
             const bool suspected =
@@ -154,8 +161,9 @@ public:
 
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
-        return sign_[i] != 0 &&
-               Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+        const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
+        return sign_[i] != 0 && Detector::suspects(sign_[i], g0_[i] - band, rate0_[i],
+                                                   g1_[i] - band, rate1_[i], h);
     }
 
     /// The first guard that is not a number at the end of the step, or `no_guard`.
@@ -383,6 +391,7 @@ private:
     const System* system_;
     bool backward_;
     std::size_t count_;
+    bool bands_ = false;  ///< whether any guard declares one
     Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{}, sizes_{};
     X there_{};
     PerGuard<GuardRecord, fixed> records_{};
