@@ -1,0 +1,152 @@
+// Rules that choose the next step from the errors of the last ones.
+//
+// A controller is a value. It is told of every attempt, either the error of a step,
+// scaled so that 1 is just acceptable, or that the step could not be computed, and says
+// whether the step is accepted and by what the next one differs:
+//
+//     StepVerdict judge(error, h)      error >= 0, finite; h was the step
+//     double failed()                  factor after a step without a solution
+//     void reset()                     forgets the past, as after a jump of the motion
+//
+// Some of these rules accept steps of an error above 1, and some reject below it.
+#pragma once
+
+#include <variant>
+
+#include "ricochet/integrate/step_control.hpp"
+
+namespace ricochet {
+
+struct StepVerdict {
+    bool accepted = true;
+    double factor = 1;  ///< the next step over this one
+};
+
+/// Every step as long as the first. A step without a solution is halved, and the length
+/// is then regained step by step.
+struct ConstantStep {
+    [[nodiscard]] static StepVerdict judge(double /*error*/, double /*h*/) noexcept { return {}; }
+    [[nodiscard]] static double failed() noexcept { return 0.5; }
+    static void reset() noexcept {}
+};
+
+/// `ErrorRule`, of the smooth steppers, for an error proportional to h^order.
+///
+/// Where the motion has kinks the error of a step across one falls only like h, and
+/// rejecting it costs more than it gains: with `reject_above` = 100 such a step is
+/// taken, and the next is shorter.
+struct ErrorStep {
+    int order = 3;            ///< of a local error: one more than that of the method
+    double reject_above = 1;  ///< at least 1
+    ErrorRule rule{};
+
+    [[nodiscard]] StepVerdict judge(double error, double h) const noexcept;
+    [[nodiscard]] double failed() const noexcept { return 0.5; }
+    void reset() const noexcept {}
+};
+
+/// The heuristic of D. M. Riley and others (Reinforcement Learning-based adaptive
+/// time-integration for nonsmooth dynamics, eq. 5 and table 2), with q = 1 / (order + 1):
+///
+///     error <= 1    accepted, factor min(up, error^-q)
+///     error > 1     rejected, factor error^-q
+///     no solution   factor down
+///
+/// As printed, its first case counts a step of error > 1 as successful and its second has
+/// the time that is left inside a maximum; both are taken for slips.
+struct HeuristicStep {
+    int order = 1;
+    double up = 2;
+    double down = 0.6;
+
+    [[nodiscard]] StepVerdict judge(double error, double h) const noexcept;
+    [[nodiscard]] double failed() const noexcept { return down; }
+    void reset() const noexcept {}
+};
+
+/// What the code of the same authors runs under the name of a heuristic: accepted where
+/// error <= 1, with the factor
+///
+///     0.9 error^(-0.7 / (order + 1)) error_before^(-0.4 / (order + 1)) in [down, up],
+///
+/// 0.9 error^(-1 / (order + 1)) at the first step; rejected otherwise, with the factor
+/// down. (The sign of the second exponent is the opposite of Gustafsson's.)
+struct ClassicStep {
+    int order = 1;
+    double safety = 0.9;
+    double up = 2;
+    double down = 0.6;
+
+    [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
+    [[nodiscard]] double failed() const noexcept { return down; }
+    void reset() noexcept { error_before = 0; }
+
+    double error_before = 0;  ///< memory; 0: none
+};
+
+/// Eq. 6 of the same paper as printed, with the constants of its table 3:
+///
+///     factor = error^(-q / gamma1) error_before^(q / gamma2) (h / h_before)^-kappa
+///
+/// rejected where that is below c1, and at most c2. With equal gammas only the ratio of
+/// two errors enters: nothing draws the error to 1, and with c1 = 1.8 a step is accepted
+/// only if the next may be nearly twice as long. It is here to be compared; use
+/// `FilteredStep`. A rejected step is at least cut to 0.6, lest it repeat for ever.
+struct PrintedPiStep {
+    int order = 1;
+    double gamma1 = 1.0 / 6;
+    double gamma2 = 1.0 / 6;
+    double kappa = 1.0 / 6;
+    double c1 = 1.8;
+    double c2 = 2.2;
+
+    [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
+    [[nodiscard]] double failed() const noexcept { return 0.6; }
+    void reset() noexcept { error_before = h_before = 0; }
+
+    double error_before = 0;  ///< memory; 0: none
+    double h_before = 0;
+};
+
+/// A digital filter (G. Söderlind, Digital filters in adaptive time-stepping, ACM
+/// Transactions on Mathematical Software 29, 2003): with k = order + 1
+///
+///     factor = error^(-beta1 / k) error_before^(-beta2 / k) factor_before^-alpha
+///
+/// rejected below `least`, with the factor `down`; at most `most`. After three
+/// rejections in a row the past is forgotten. The defaults are h211b with b = 4, which
+/// the code of the paper above runs as its PI control.
+struct FilteredStep {
+    double beta1 = 0.25;
+    double beta2 = 0.25;
+    double alpha = 0.25;
+    int order = 1;
+    double least = 0.8;
+    double most = 1.2;
+    double down = 0.8;
+
+    /// h211b; b from 2 to 8, the larger the smoother.
+    [[nodiscard]] static FilteredStep h211b(double b) noexcept;
+    [[nodiscard]] static FilteredStep h211pi() noexcept;      ///< 1/6, 1/6, 0
+    [[nodiscard]] static FilteredStep pi3040() noexcept;      ///< 0.7, -0.4, 0
+    [[nodiscard]] static FilteredStep pi3333() noexcept;      ///< 2/3, -1/3, 0
+    [[nodiscard]] static FilteredStep pi4020() noexcept;      ///< 0.6, -0.2, 0
+    [[nodiscard]] static FilteredStep elementary() noexcept;  ///< 1, 0, 0
+
+    [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
+    [[nodiscard]] double failed() noexcept;
+    void reset() noexcept { error_before = factor_before = 1, rejections = 0; }
+
+    double error_before = 1;  ///< memory
+    double factor_before = 1;
+    int rejections = 0;
+};
+
+using StepController =
+    std::variant<ConstantStep, ErrorStep, HeuristicStep, ClassicStep, PrintedPiStep, FilteredStep>;
+
+/// @throws std::invalid_argument for an order below 1, factors that do not shrink or grow,
+/// or exponents that are not finite.
+void validate(const StepController& controller);
+
+}  // namespace ricochet

@@ -1,0 +1,438 @@
+// Integrating an inclusion, a step at a time or to the end.
+//
+//     SetValuedMotion motion(DiodeCircuit{}, w0, {.t_end = 20, .step = 0.01});
+//     const SetValuedOutcome outcome = motion.run();
+//
+// A step is computed, its error judged by the controller, and accepted or repeated; a
+// stage that has no solution shortens the step and in the end stops the run. The state,
+// with its reaction, is all that a step depends on.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+
+#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/minimal_selection.hpp"
+
+namespace ricochet {
+
+enum class SetValuedOutcome {
+    running,  ///< not yet ended
+    reached_end,
+    not_converged,   ///< a stage could not be solved however short the step
+    step_underflow,  ///< no step above h_min met the tolerance
+    step_limit,      ///< `SetValuedOptions::max_attempts` steps were tried
+};
+
+[[nodiscard]] std::string_view name(SetValuedOutcome outcome) noexcept;
+/// One sentence with the remedy.
+[[nodiscard]] std::string_view describe(SetValuedOutcome outcome) noexcept;
+
+enum class ErrorEstimate {
+    none,      ///< what a `ConstantStep` needs
+    embedded,  ///< `CompositeStep::embedded_error`: Bathe's scheme, averaged reaction
+    doubling,  ///< one step against two of half the length, of which the result is kept
+};
+
+enum class Switches {
+    stepped_over,  ///< as the source does: of order 1 at a jump of the reaction
+    /// Where a branch changes within a step, the step ends there: the last instant at
+    /// which the motion on the branches of its start agrees with them. Boxes only.
+    located,
+};
+
+struct SetValuedOptions {
+    double t_start = 0;
+    double t_end = std::numeric_limits<double>::quiet_NaN();
+    double step = 0;  ///< the first, and all of them with `ConstantStep`; positive
+    StepController controller = ConstantStep{};
+    ErrorEstimate estimate = ErrorEstimate::none;
+    double rtol = 1e-4;  ///< errors are measured against atol + rtol |w|, root mean square
+    double atol = 1e-6;
+    int error_order = 2;  ///< p in (two half steps - one step) / (2^p - 1)
+    double h_min = 0;     ///< 0: 1e-12 of the time integrated
+    double h_max = std::numeric_limits<double>::infinity();
+    Switches switches = Switches::stepped_over;
+    SchemeOptions scheme{};
+    std::uint64_t max_attempts = 100'000'000;
+};
+
+/// @throws std::invalid_argument naming the option, what was given and what was expected.
+void validate(const SetValuedOptions& options);
+
+struct SetValuedStatistics {
+    std::uint64_t attempted = 0;
+    std::uint64_t accepted = 0;
+    std::uint64_t rejected = 0;    ///< by the controller
+    std::uint64_t unsolved = 0;    ///< attempts whose stages did not converge
+    std::uint64_t stages = 0;      ///< solved, whatever became of them
+    std::uint64_t iterations = 0;  ///< of their solvers
+    std::uint64_t switches = 0;    ///< located changes of branch
+};
+
+template <Inclusion System>
+class SetValuedMotion {
+public:
+    using Vector = StateOf<System>;
+    using Reaction = ReactionOf<System>;
+    using State = SetValuedState<System>;
+    using Branches = detail::BranchesOf<System>;
+
+    /// Starts with the minimal selection.
+    /// @throws std::invalid_argument for options, systems and initial states that cannot be
+    /// right.
+    SetValuedMotion(const System& system, const Vector& w0, const SetValuedOptions& options)
+        : options_(options), step_(system, options.scheme)
+    {
+        validate(options);
+        validate(options.controller);
+        if (options.estimate == ErrorEstimate::embedded &&
+            (options.scheme.scheme != Scheme::bathe ||
+             options.scheme.first_stage == FirstStage::at_end)) {
+            detail::refuse_inclusion("the embedded estimate needs Bathe's scheme with the reaction averaged");
+        }
+        if (options.switches == Switches::located && !step_.box) {
+            detail::refuse_inclusion("only the branches of a box can be located");
+        }
+        if (w0.size() != step_.matrices().size()) {
+            detail::refuse_inclusion("the initial state must have as many components as the system, not",
+                                     static_cast<double>(w0.size()));
+        }
+        h_ = options.step;
+        h_min_ = options.h_min > 0 ? options.h_min : 1e-12 * (options.t_end - options.t_start);
+        now_.w = error_ = w0;
+        now_.reaction.setZero(step_.matrices().reactions());
+        before_ = trial_ = half_ = now_;
+        start_branches_.setConstant(now_.reaction.size(), Branch::inside);
+        restart(options.t_start, w0);
+        before_ = now_;
+    }
+
+    /// Goes on from (t, w) as from a start: after a jump, or when an event-driven
+    /// integrator hands over.
+    void restart(double t, const Vector& w)
+    {
+        now_.reaction = minimal_selection(step_.matrices(), t, w);
+        now_.t = t;
+        now_.w = w;
+        begin();
+    }
+
+    /// Goes on from a state with a known reaction.
+    /// @throws std::invalid_argument where the reaction is outside the set.
+    void restart(const State& state)
+    {
+        check_reaction(state);
+        now_ = state;
+        begin();
+    }
+
+    [[nodiscard]] const State& state() const noexcept { return now_; }
+    /// Where the last accepted step began, and its middle stage.
+    [[nodiscard]] const State& before() const noexcept { return before_; }
+    [[nodiscard]] const State& middle() const noexcept { return step_.middle(); }
+    [[nodiscard]] const SetValuedStatistics& statistics() const noexcept { return statistics_; }
+    [[nodiscard]] SetValuedOutcome outcome() const noexcept { return outcome_; }
+    /// The stage that ended the run as `not_converged`.
+    [[nodiscard]] const StageReport& failure() const noexcept { return failure_; }
+    /// The step that will be tried next.
+    [[nodiscard]] double next_step() const noexcept { return h_; }
+    /// The scaled error of the last attempt.
+    [[nodiscard]] double error() const noexcept { return scaled_error_; }
+    [[nodiscard]] CompositeStep<System>& stepper() noexcept { return step_; }
+    /// The branches of the state, kept where switches are located.
+    [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
+
+    /// The next accepted step. `running`, or how the run ended.
+    SetValuedOutcome advance()
+    {
+        if (outcome_ != SetValuedOutcome::running) return outcome_;
+        int failures = 0;
+        bool solved = true;
+        for (;;) {
+            if (statistics_.attempted == options_.max_attempts) {
+                return end_with(SetValuedOutcome::step_limit);
+            }
+            const double left = options_.t_end - now_.t;
+            double h = std::min(h_, options_.h_max);
+            // No sliver is left for the last step: a step within a part in 1e9 takes it all.
+            const bool last = left <= h * (1 + 1e-9);
+            if (last) h = left;
+            ++statistics_.attempted;
+            const StageReport report = attempt(h);
+            if (!report.converged) {
+                ++statistics_.unsolved;
+                failure_ = report;
+                solved = false;
+                h_ = h * std::visit([](auto& c) { return c.failed(); }, options_.controller);
+                ++failures;
+            } else {
+                const StepVerdict verdict = std::visit(
+                    [&](auto& c) { return c.judge(scaled_error_, h); }, options_.controller);
+                if (verdict.accepted) {
+                    if (!holds_length_) h_ = h * verdict.factor;
+                    else if (failures == 0 && !last) h_ = std::min(options_.step, 2 * h_);
+                    accept(last);
+                    return outcome_;
+                }
+                ++statistics_.rejected;
+                h_ = h * verdict.factor;
+                solved = true;
+            }
+            if (!(h_ >= h_min_)) {
+                return end_with(solved ? SetValuedOutcome::step_underflow
+                                       : SetValuedOutcome::not_converged);
+            }
+        }
+    }
+
+    /// To the end. `observer(state)` sees the start and every accepted step.
+    template <class Observer>
+    SetValuedOutcome run(const Observer& observer)
+    {
+        observer(std::as_const(now_));
+        while (advance() == SetValuedOutcome::running) observer(std::as_const(now_));
+        if (outcome_ == SetValuedOutcome::reached_end) observer(std::as_const(now_));
+        return outcome_;
+    }
+
+    SetValuedOutcome run()
+    {
+        return run([](const State&) {});
+    }
+
+    /// The state within the last step at which the scalar `g(state)`, of opposite signs at
+    /// its ends, vanishes: by repeating the step with other lengths, so that it is as
+    /// accurate as a step; to `tolerance` in time. `g` may look at the reaction, as for the
+    /// release of what sticks. Nothing if the signs are equal or a step fails.
+    template <class Function>
+    [[nodiscard]] std::optional<State> locate(const Function& g, double tolerance = 0)
+    {
+        State at = now_;
+        const double width = find(0, g(before_), now_.t - before_.t, g(now_), tolerance,
+                                  [&](double h) {
+                                      return step_.take(before_, h, at).converged
+                                                 ? g(std::as_const(at))
+                                                 : std::numeric_limits<double>::quiet_NaN();
+                                  });
+        if (!(width > 0) || !step_.take(before_, width, at).converged) return std::nullopt;
+        return at;
+    }
+
+private:
+    void begin()
+    {
+        std::visit([](auto& c) { c.reset(); }, options_.controller);
+        holds_length_ = std::holds_alternative<ConstantStep>(options_.controller);
+        if constexpr (CompositeStep<System>::box) step_.branches_of(now_, start_branches_);
+        remainder_ = 0;
+        outcome_ = now_.t < options_.t_end ? SetValuedOutcome::running
+                                           : SetValuedOutcome::reached_end;
+    }
+
+    void check_reaction(const State& state) const
+    {
+        const auto set = step_.system().reaction_set(state.t, state.w);
+        if constexpr (detail::confines<System>() == Confines::reaction) {
+            Reaction nearest = state.reaction;
+            set.project(detail::span_of(state.reaction), detail::span_of(nearest));
+            const double off = (nearest - state.reaction).template lpNorm<Eigen::Infinity>();
+            // States of earlier steps are in the set to the solver's tolerance.
+            if (!(off <= 1e-9 * (1 + nearest.template lpNorm<Eigen::Infinity>()))) {
+                detail::refuse_inclusion("the reaction at the start is outside its set by", off);
+            }
+        }
+    }
+
+    SetValuedOutcome end_with(SetValuedOutcome outcome)
+    {
+        return outcome_ = outcome;
+    }
+
+    /// One attempt into trial_, with its error.
+    StageReport attempt(double h)
+    {
+        switched_ = false;
+        StageReport report = counted(step_.take(now_, h, trial_));
+        if (!report.converged) return report;
+        scaled_error_ = 0;
+        if (options_.estimate == ErrorEstimate::embedded) {
+            step_.embedded_error(now_, h, trial_, error_);
+            scaled_error_ = scaled(error_, now_.w, trial_.w);
+        } else if (options_.estimate == ErrorEstimate::doubling) {
+            report = counted(step_.take(now_, h / 2, half_));
+            if (!report.converged) return report;
+            error_ = trial_.w;
+            report = counted(step_.take(half_, h / 2, trial_));
+            if (!report.converged) return report;
+            error_ -= trial_.w;
+            const double divisor = std::pow(2.0, options_.error_order) - 1;
+            const Vector coarse = trial_.w + error_;
+            error_ /= divisor;
+            scaled_error_ = scaled(error_, coarse, trial_.w);
+        }
+        if (!std::isfinite(scaled_error_)) report.converged = false;
+        if constexpr (CompositeStep<System>::box) {
+            if (options_.switches == Switches::located) return end_at_switch(h, report);
+        }
+        return report;
+    }
+
+    StageReport counted(const StageReport& report)
+    {
+        statistics_.stages += options_.scheme.scheme == Scheme::bathe ? 2 : 1;
+        statistics_.iterations += static_cast<std::uint64_t>(report.iterations);
+        return report;
+    }
+
+    [[nodiscard]] double scaled(const Vector& error, const Vector& a, const Vector& b) const
+    {
+        double sum = 0;
+        for (Eigen::Index i = 0; i < error.size(); ++i) {
+            const double size = options_.atol +
+                                options_.rtol * std::max(std::abs(a[i]), std::abs(b[i]));
+            sum += (error[i] / size) * (error[i] / size);
+        }
+        return std::sqrt(sum / static_cast<double>(error.size()));
+    }
+
+    /// Where the step as taken leaves the branches of its start: trial_ becomes the end
+    /// of the shorter step that stays on them.
+    StageReport end_at_switch(double h, const StageReport& whole)
+        requires(CompositeStep<System>::box)
+    {
+        const auto slack_after = [&](double width) {
+            const StageReport report = counted(step_.take(now_, width, half_, &start_branches_));
+            return report.converged ? step_.slack(half_, start_branches_)
+                                    : std::numeric_limits<double>::quiet_NaN();
+        };
+        double end = slack_after(h);
+        double low = 0;
+        double high = h;
+        double at_high = end;
+        if (end >= 0) {
+            // Out and back again within the step? The middle stage would show it.
+            const double middle = step_.slack(step_.middle(), start_branches_);
+            if (middle >= 0) {
+                trial_ = half_;
+                return whole;
+            }
+            high = h / 2;
+            at_high = slack_after(high);
+        }
+        double at_low = slack_after(1e-6 * high);
+        low = 1e-6 * high;
+        if (!(at_high < 0) || !(at_low > 0)) return whole;
+        const double width = find(low, at_low, high, at_high, 0, slack_after);
+        if (!(width > 0)) return whole;
+        StageReport report = counted(step_.take(now_, width, half_, &start_branches_));
+        if (!report.converged) return whole;
+        trial_ = half_;
+        switched_ = true;
+        return report;
+    }
+
+    /// A root of `function` between low and high, whose values have opposite signs: the
+    /// Illinois variant of false position, halved where it dawdles. Zero without a root.
+    template <class Function>
+    [[nodiscard]] static double find(double low, double at_low, double high, double at_high,
+                                     double tolerance, const Function& function)
+    {
+        if (!(at_low * at_high <= 0)) return 0;
+        const double floor = std::max(tolerance, 4 * std::numeric_limits<double>::epsilon() * high);
+        for (int i = 0; i < 200 && high - low > floor && at_high != 0; ++i) {
+            double middle = (low * at_high - high * at_low) / (at_high - at_low);
+            if (i % 3 == 2 || !(middle > low && middle < high)) middle = low + (high - low) / 2;
+            if (!(middle > low && middle < high)) break;
+            const double value = function(middle);
+            if (std::isnan(value)) return 0;
+            if ((value < 0) == (at_high < 0)) {
+                high = middle;
+                at_high = value;
+                at_low /= 2;
+            } else {
+                low = middle;
+                at_low = value;
+                at_high /= 2;
+            }
+        }
+        return high;
+    }
+
+    void accept(bool last)
+    {
+        before_ = now_;
+        const double t = now_.t;
+        std::swap(now_.w, trial_.w);
+        std::swap(now_.reaction, trial_.reaction);
+        if (last && !switched_) {
+            now_.t = options_.t_end;
+            outcome_ = SetValuedOutcome::reached_end;
+        } else {
+            // The time is carried with the remainder of its additions.
+            const double increment = (trial_.t - t) + remainder_;
+            now_.t = t + increment;
+            remainder_ = increment - (now_.t - t);
+        }
+        ++statistics_.accepted;
+        if constexpr (CompositeStep<System>::box) {
+            if (options_.switches == Switches::located) enter_next_branches();
+        }
+    }
+
+    /// After a switch the reaction is that of the branch now entered; a bound that has
+    /// just been reached is left for good, whatever rounding says of it.
+    void enter_next_branches()
+        requires(CompositeStep<System>::box)
+    {
+        if (!switched_) {
+            step_.branches_of(now_, start_branches_);
+            return;
+        }
+        ++statistics_.switches;
+        Eigen::Index which = 0;
+        (void)step_.slack(now_, start_branches_, &which);
+        const Branch from = start_branches_[which];
+        constexpr bool of_reactions = detail::confines<System>() == Confines::reaction;
+        constexpr bool bounded_held = !of_reactions;
+        const bool held_before = (from == Branch::inside) != bounded_held;
+        if (held_before && of_reactions) {
+            const auto set = step_.system().reaction_set(now_.t, now_.w);
+            const auto k = static_cast<std::size_t>(which);
+            const bool up = now_.reaction[which] - set.lower(k) > set.upper(k) - now_.reaction[which];
+            start_branches_[which] = up ? Branch::upper : Branch::lower;
+            now_.reaction[which] = up ? set.upper(k) : set.lower(k);
+            return;
+        }
+        // Sliding has come to a stop: it sticks, or goes on across.
+        zero_observed(which);
+        now_.reaction = minimal_selection(step_.matrices(), now_.t, now_.w);
+        step_.branches_of(now_, start_branches_);
+    }
+
+    void zero_observed(Eigen::Index which)
+    {
+        if constexpr (detail::confines<System>() == Confines::reaction) {
+            Reaction s;
+            step_.matrices().offset(now_.t, s);
+            step_.matrices().hold(which, 0, s[which], now_.w);
+        }
+    }
+
+    SetValuedOptions options_;
+    CompositeStep<System> step_;
+    State now_, before_, trial_, half_;
+    Vector error_;
+    Branches start_branches_;
+    SetValuedStatistics statistics_;
+    StageReport failure_;
+    SetValuedOutcome outcome_ = SetValuedOutcome::running;
+    double h_ = 0;
+    double h_min_ = 0;
+    double remainder_ = 0;
+    double scaled_error_ = 0;
+    bool holds_length_ = true;
+    bool switched_ = false;
+};
+
+}  // namespace ricochet

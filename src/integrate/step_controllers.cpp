@@ -1,0 +1,134 @@
+#include "ricochet/integrate/step_controllers.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <type_traits>
+
+namespace ricochet {
+namespace {
+
+// An error of zero would make the factors infinite or not a number.
+double positive(double error)
+{
+    return std::max(error, 1e-30);
+}
+
+}  // namespace
+
+StepVerdict ErrorStep::judge(double error, double /*h*/) const noexcept
+{
+    return {error <= reject_above, rule.factor(error, order)};
+}
+
+StepVerdict HeuristicStep::judge(double error, double /*h*/) const noexcept
+{
+    const double factor = std::pow(positive(error), -1.0 / (order + 1));
+    return error <= 1 ? StepVerdict{true, std::min(up, factor)} : StepVerdict{false, factor};
+}
+
+StepVerdict ClassicStep::judge(double error, double /*h*/) noexcept
+{
+    if (error > 1) return {false, down};
+    const double q = 1.0 / (order + 1);
+    const double now = positive(error);
+    const double factor = error_before > 0
+                              ? safety * std::pow(now, -0.7 * q) * std::pow(error_before, -0.4 * q)
+                              : safety * std::pow(now, -q);
+    error_before = now;
+    return {true, std::min(up, std::max(down, factor))};
+}
+
+StepVerdict PrintedPiStep::judge(double error, double h) noexcept
+{
+    const double q = 1.0 / (order + 1);
+    const double now = positive(error);
+    const double before = error_before > 0 ? error_before : 1;
+    const double ratio = h_before > 0 ? h / h_before : 1;
+    const double factor =
+        std::pow(now, -q / gamma1) * std::pow(before, q / gamma2) * std::pow(ratio, -kappa);
+    if (!(factor >= c1)) return {false, std::min(factor, 0.6)};
+    error_before = now;
+    h_before = h;
+    return {true, std::min(factor, c2)};
+}
+
+FilteredStep FilteredStep::h211b(double b) noexcept
+{
+    return {.beta1 = 1 / b, .beta2 = 1 / b, .alpha = 1 / b};
+}
+FilteredStep FilteredStep::h211pi() noexcept
+{
+    return {.beta1 = 1.0 / 6, .beta2 = 1.0 / 6, .alpha = 0};
+}
+FilteredStep FilteredStep::pi3040() noexcept
+{
+    return {.beta1 = 0.7, .beta2 = -0.4, .alpha = 0};
+}
+FilteredStep FilteredStep::pi3333() noexcept
+{
+    return {.beta1 = 2.0 / 3, .beta2 = -1.0 / 3, .alpha = 0};
+}
+FilteredStep FilteredStep::pi4020() noexcept
+{
+    return {.beta1 = 0.6, .beta2 = -0.2, .alpha = 0};
+}
+FilteredStep FilteredStep::elementary() noexcept
+{
+    return {.beta1 = 1, .beta2 = 0, .alpha = 0};
+}
+
+StepVerdict FilteredStep::judge(double error, double /*h*/) noexcept
+{
+    const double k = order + 1;
+    const double now = positive(error);
+    const double factor = std::pow(now, -beta1 / k) * std::pow(error_before, -beta2 / k) *
+                          std::pow(factor_before, -alpha);
+    if (!(factor >= least)) return {false, failed()};
+    rejections = 0;
+    error_before = now;
+    factor_before = std::min(factor, most);
+    return {true, factor_before};
+}
+
+double FilteredStep::failed() noexcept
+{
+    if (++rejections >= 3) reset();
+    return down;
+}
+
+void validate(const StepController& controller)
+{
+    const auto require = [](bool holds, const char* what, double given) {
+        if (!holds)
+            throw std::invalid_argument(fmt::format("step controller: {}, got {}", what, given));
+    };
+    std::visit(
+        [&](const auto& c) {
+            using C = std::decay_t<decltype(c)>;
+            if constexpr (requires { c.order; })
+                require(c.order >= 1, "order must be at least 1", c.order);
+            if constexpr (requires { c.down; }) {
+                require(c.down > 0 && c.down < 1, "down must lie in (0, 1)", c.down);
+            }
+            if constexpr (requires { c.up; }) require(c.up >= 1, "up must be at least 1", c.up);
+            if constexpr (std::is_same_v<C, ErrorStep>) {
+                require(c.reject_above >= 1, "reject_above must be at least 1", c.reject_above);
+            }
+            if constexpr (std::is_same_v<C, FilteredStep>) {
+                require(c.least > 0 && c.least <= 1, "least must lie in (0, 1]", c.least);
+                require(c.most > 1, "most must be above 1", c.most);
+                require(std::isfinite(c.beta1 + c.beta2 + c.alpha), "the exponents must be finite",
+                        c.beta1 + c.beta2 + c.alpha);
+            }
+            if constexpr (std::is_same_v<C, PrintedPiStep>) {
+                require(c.gamma1 != 0 && c.gamma2 != 0, "gamma must not be zero",
+                        std::min(std::abs(c.gamma1), std::abs(c.gamma2)));
+            }
+        },
+        controller);
+}
+
+}  // namespace ricochet

@@ -1,0 +1,61 @@
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+
+#include <fmt/format.h>
+
+namespace ricochet {
+
+std::string_view name(SetValuedOutcome outcome) noexcept
+{
+    switch (outcome) {
+        case SetValuedOutcome::running: return "running";
+        case SetValuedOutcome::reached_end: return "reached_end";
+        case SetValuedOutcome::not_converged: return "not_converged";
+        case SetValuedOutcome::step_underflow: return "step_underflow";
+        case SetValuedOutcome::step_limit: return "step_limit";
+    }
+    return "unknown";
+}
+
+std::string_view describe(SetValuedOutcome outcome) noexcept
+{
+    switch (outcome) {
+        case SetValuedOutcome::running: return "the run has not ended";
+        case SetValuedOutcome::reached_end: return "the run reached its end";
+        case SetValuedOutcome::not_converged:
+            return "a stage has no solution that the solver could find; try another stage method "
+                   "or a looser tolerance";
+        case SetValuedOutcome::step_underflow:
+            return "step fell below h_min; loosen rtol or let the controller accept larger errors";
+        case SetValuedOutcome::step_limit: return "max_attempts steps were tried; allow more";
+    }
+    return "unknown outcome";
+}
+
+void validate(const SetValuedOptions& options)
+{
+    const auto require = [](bool holds, std::string_view what, double given) {
+        if (!holds) {
+            throw std::invalid_argument(fmt::format("SetValuedOptions: {}, got {}", what, given));
+        }
+    };
+    require(std::isfinite(options.t_start), "t_start must be finite", options.t_start);
+    require(std::isfinite(options.t_end) && options.t_end >= options.t_start,
+            "t_end must be finite and no earlier than t_start", options.t_end);
+    require(options.step > 0 && std::isfinite(options.step), "step must be positive and finite",
+            options.step);
+    require(options.rtol >= 0 && options.rtol < 1, "rtol must lie in [0, 1)", options.rtol);
+    require(options.atol >= 0 && std::isfinite(options.atol), "atol must be zero or positive",
+            options.atol);
+    require(options.atol + options.rtol > 0, "one of atol and rtol must be positive",
+            options.atol + options.rtol);
+    require(options.error_order >= 1, "error_order must be at least 1", options.error_order);
+    require(options.h_min >= 0, "h_min must be zero or positive", options.h_min);
+    require(options.h_max > options.h_min, "h_max must be above h_min", options.h_max);
+    const bool constant = std::holds_alternative<ConstantStep>(options.controller);
+    if (!constant && options.estimate == ErrorEstimate::none) {
+        throw std::invalid_argument(
+            "SetValuedOptions: a controller other than ConstantStep needs an error estimate");
+    }
+}
+
+}  // namespace ricochet

@@ -1,0 +1,172 @@
+// Contact problems with friction: closed forms, then random ones.
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "random_contacts.hpp"
+#include "ricochet/nonsmooth/contact_problem.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
+
+namespace ricochet {
+namespace {
+
+using testing_support::RandomContacts;
+
+TEST(ContactSolver, OneContactSeparatesSticksOrSlides)
+{
+    ContactSolver solver;
+    const Eigen::MatrixXd w = Eigen::Vector3d(2, 2, 2).asDiagonal();
+    const std::array friction = {0.5};
+    const auto solve = [&](double n, double t1, double t2) {
+        Eigen::VectorXd q(3);
+        q << n, t1, t2;
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(3);
+        const ContactReport report = solver.solve(w, q, friction, 3, p);
+        EXPECT_TRUE(report.converged);
+        return p;
+    };
+    EXPECT_EQ(solve(1, 5, 5).norm(), 0);
+    // Sticks: p = -q / 2, within the cone.
+    EXPECT_LT((solve(-2, 0.3, -0.4) - Eigen::Vector3d(1, -0.15, 0.2)).norm(), 1e-10);
+    // Slides: p_n = 1, friction 0.5 against the direction (3, -4) / 5.
+    EXPECT_LT((solve(-2, 3, -4) - Eigen::Vector3d(1, -0.3, 0.4)).norm(), 1e-10);
+    EXPECT_LT(solve(0, 0, 0).norm(), 1e-300);
+}
+
+TEST(ContactSolver, WithoutFrictionItIsALinearComplementarityProblem)
+{
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal;
+    ContactSolver solver;
+    for (int trial = 0; trial < 200; ++trial) {
+        LinearInequality<3> cases;
+        const Eigen::Matrix3d a = Eigen::Matrix3d::NullaryExpr([&] { return normal(random); });
+        cases.w = a * a.transpose() + 0.01 * Eigen::Matrix3d::Identity();
+        cases.y0 = Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
+        cases.lower.setZero();
+        cases.upper.setConstant(std::numeric_limits<double>::infinity());
+        LinearInequality<3>::Branches branches;
+        branches.setConstant(Branch::inside);
+        Eigen::Vector3d expected, u;
+        ASSERT_TRUE(cases.solve(expected, u, branches));
+        // The same with a tangent that has nothing to do.
+        Eigen::MatrixXd w = Eigen::MatrixXd::Identity(6, 6);
+        Eigen::VectorXd q = Eigen::VectorXd::Ones(6);
+        for (int i = 0; i < 3; ++i) {
+            q[2 * i] = cases.y0[i];
+            for (int j = 0; j < 3; ++j) w(2 * i, 2 * j) = cases.w(i, j);
+        }
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(6);
+        const std::array friction = {0.0, 0.0, 0.0};
+        ASSERT_TRUE(solver.solve(w, q, friction, 2, p).converged);
+        for (int i = 0; i < 3; ++i) {
+            EXPECT_NEAR(p[2 * i], expected[i], 1e-7 * (1 + expected.norm()));
+            EXPECT_EQ(p[2 * i + 1], 0);
+        }
+    }
+}
+
+TEST(ContactSolver, RedundantContactsShareAForceThatIsRight)
+{
+    // Four feet under one weight: the sum is determined, its parts are not.
+    Eigen::MatrixXd h(8, 2);
+    for (int i = 0; i < 4; ++i) h.row(2 * i) << 1, 0, h.row(2 * i + 1) << 0, 1;
+    const Eigen::MatrixXd w = h * h.transpose();
+    const Eigen::VectorXd q = h * Eigen::Vector2d(-3, 0.5);
+    Eigen::VectorXd p = Eigen::VectorXd::Zero(8);
+    const std::array friction = {0.4, 0.4, 0.4, 0.4};
+    ContactSolver solver;
+    ASSERT_TRUE(solver.solve(w, q, friction, 2, p).converged);
+    const Eigen::Vector2d sum = h.transpose() * p;
+    EXPECT_NEAR(sum[0], 3, 1e-9);
+    EXPECT_NEAR(sum[1], -0.5, 1e-9);
+}
+
+// Residuals of the law itself, written out.
+void expect_law_holds(const RandomContacts& problem, const Eigen::VectorXd& p, double tolerance)
+{
+    const Eigen::VectorXd u = problem.w * p + problem.q;
+    const int n = problem.components;
+    for (std::size_t c = 0; c < problem.friction.size(); ++c) {
+        const auto i = static_cast<Eigen::Index>(c) * n;
+        const double inverse_mass = problem.w.diagonal().segment(i, n).mean();
+        // Impulse and velocity in units of one over the root of the mass.
+        const double unit = std::sqrt(inverse_mass);
+        EXPECT_GE(p[i] * unit, -tolerance);
+        EXPECT_GE(u[i] / unit, -tolerance);
+        EXPECT_LE(std::min(p[i] * unit, u[i] / unit), tolerance);
+        const double sliding = u.segment(i + 1, n - 1).norm() / unit;
+        const double friction = p.segment(i + 1, n - 1).norm() * unit;
+        const double bound = problem.friction[c] * std::max(0.0, p[i]) * unit;
+        EXPECT_LE(friction, bound + 3 * tolerance);
+        if (sliding > 100 * tolerance) {
+            // Against the sliding and at the bound: p_t.u_t = -|p_t| |u_t|, to first order.
+            const double power = p.segment(i + 1, n - 1).dot(u.segment(i + 1, n - 1));
+            EXPECT_NEAR(power, -bound * sliding, 20 * tolerance * (sliding + bound + tolerance));
+        }
+    }
+}
+
+TEST(ContactSolver, RandomProblemsAreSolvedOrReported)
+{
+    RandomContacts problem(1);
+    ContactSolver solver;
+    int converged = 0;
+    const int problems = 300;
+    for (int k = 0; k < problems; ++k) {
+        problem.draw(12);
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(problem.q.size());
+        const ContactReport report =
+            solver.solve(problem.w, problem.q, problem.friction, problem.components, p);
+        EXPECT_EQ(report.converged, report.residual <= 1e-10);
+        EXPECT_LE(report.sweeps, 4000);
+        if (!report.converged) continue;
+        ++converged;
+        double size = 0;
+        for (Eigen::Index i = 0; i < p.size(); ++i) {
+            const auto c = i / problem.components * problem.components;
+            const double unit =
+                std::sqrt(problem.w.diagonal().segment(c, problem.components).mean());
+            size = std::max({size, std::abs(p[i]) * unit, std::abs(problem.q[i]) / unit});
+        }
+        expect_law_holds(problem, p, 1.1e-10 * size);
+    }
+    // Sliding with much friction may have no solution, or none that is found.
+    EXPECT_GE(converged, problems * 95 / 100);
+}
+
+TEST(ContactSolver, AStartAtTheSolutionTakesNoIteration)
+{
+    RandomContacts problem(2);
+    ContactSolver solver;
+    for (int k = 0; k < 20; ++k) {
+        problem.draw(6);
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(problem.q.size());
+        if (!solver.solve(problem.w, problem.q, problem.friction, problem.components, p).converged)
+            continue;
+        const Eigen::VectorXd solution = p;
+        const auto again =
+            solver.solve(problem.w, problem.q, problem.friction, problem.components, p);
+        EXPECT_LE(again.iterations, 1);
+        EXPECT_LE((p - solution).norm(), 1e-8 * solution.norm());
+    }
+}
+
+TEST(ContactSolver, WrongInputIsRefused)
+{
+    ContactSolver solver;
+    Eigen::MatrixXd w = Eigen::MatrixXd::Identity(2, 2);
+    Eigen::VectorXd q = Eigen::VectorXd::Zero(2);
+    Eigen::VectorXd p = q;
+    const std::array negative = {-0.1};
+    const std::array fine = {0.1};
+    EXPECT_THROW(solver.solve(w, q, negative, 2, p), std::invalid_argument);
+    EXPECT_THROW(solver.solve(w, q, fine, 3, p), std::invalid_argument);
+    EXPECT_THROW(solver.solve(w, q, fine, 4, p), std::invalid_argument);
+    q[0] = std::nan("");
+    EXPECT_THROW(solver.solve(w, q, fine, 2, p), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ricochet

@@ -1,0 +1,114 @@
+// Step controllers: their formulas, and what they do to a model of the error.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "ricochet/integrate/step_controllers.hpp"
+
+namespace ricochet {
+namespace {
+
+TEST(StepControllers, TheHeuristicGrowsByErrorToTheMinusQAtMostTwice)
+{
+    HeuristicStep rule;  // order 1: q = 1/2
+    EXPECT_TRUE(rule.judge(0.5, 1).accepted);
+    EXPECT_DOUBLE_EQ(rule.judge(0.5, 1).factor, std::sqrt(2.0));
+    EXPECT_DOUBLE_EQ(rule.judge(1e-4, 1).factor, 2);
+    EXPECT_EQ(rule.judge(0, 1).factor, 2);
+    EXPECT_FALSE(rule.judge(4, 1).accepted);
+    EXPECT_DOUBLE_EQ(rule.judge(4, 1).factor, 0.5);
+    EXPECT_EQ(rule.failed(), 0.6);
+}
+
+TEST(StepControllers, TheClassicRuleRemembersTheErrorBefore)
+{
+    ClassicStep rule;
+    EXPECT_DOUBLE_EQ(rule.judge(0.5, 1).factor, 0.9 * std::pow(0.5, -0.5));
+    EXPECT_DOUBLE_EQ(rule.judge(0.8, 1).factor, 0.9 * std::pow(0.8, -0.35) * std::pow(0.5, -0.2));
+    EXPECT_FALSE(rule.judge(1.1, 1).accepted);
+    EXPECT_EQ(rule.judge(1.1, 1).factor, 0.6);
+    rule.reset();
+    EXPECT_DOUBLE_EQ(rule.judge(0.5, 1).factor, 0.9 * std::pow(0.5, -0.5));
+}
+
+TEST(StepControllers, TheFilterIsH211bAndForgetsAfterThreeRejections)
+{
+    FilteredStep rule = FilteredStep::h211b(4);  // k = 2: exponents 1/8, 1/8, 1/4
+    const double first = std::pow(0.6, -0.125);
+    EXPECT_DOUBLE_EQ(rule.judge(0.6, 1).factor, first);
+    EXPECT_DOUBLE_EQ(rule.judge(0.9, 1).factor,
+                     std::pow(0.9, -0.125) * std::pow(0.6, -0.125) * std::pow(first, -0.25));
+    EXPECT_EQ(rule.judge(1e-9, 1).factor, 1.2);
+    // Errors somewhat above 1 are let pass, as the factor stays above 0.8.
+    EXPECT_TRUE(FilteredStep::h211b(4).judge(2, 1).accepted);
+    FilteredStep harsh = FilteredStep::h211b(4);
+    for (int i = 0; i < 3; ++i) {
+        EXPECT_FALSE(harsh.judge(1e3, 1).accepted);
+        EXPECT_EQ(harsh.judge(1e3, 1).factor, 0.8);
+        harsh.reset();
+    }
+    (void)rule.judge(0.5, 1);
+    (void)rule.judge(1e6, 1), (void)rule.judge(1e6, 1), (void)rule.judge(1e6, 1);
+    EXPECT_DOUBLE_EQ(rule.judge(0.6, 1).factor, first);
+}
+
+// The closed loop of a controller with error = (h / goal)^k at every step.
+template <class Controller>
+double step_after(Controller rule, int k, double h, int steps)
+{
+    for (int i = 0; i < steps; ++i) {
+        h *= rule.judge(std::pow(h / 0.01, k), h).factor;
+    }
+    return h;
+}
+
+TEST(StepControllers, AllButThePrintedRuleSettleAtAnErrorOfOne)
+{
+    for (const double from : {1e-4, 0.3}) {
+        EXPECT_NEAR(step_after(HeuristicStep{}, 2, from, 200), 0.01, 1e-9);
+        EXPECT_NEAR(step_after(FilteredStep::h211b(4), 2, from, 400), 0.01, 1e-6);
+        EXPECT_NEAR(step_after(FilteredStep::h211pi(), 2, from, 400), 0.01, 1e-6);
+        EXPECT_NEAR(step_after(FilteredStep::pi3040(), 2, from, 400), 0.01, 1e-6);
+        EXPECT_NEAR(step_after(FilteredStep::pi3333(), 2, from, 400), 0.01, 1e-6);
+        EXPECT_NEAR(step_after(FilteredStep::pi4020(), 2, from, 400), 0.01, 1e-6);
+        EXPECT_NEAR(step_after(FilteredStep::elementary(), 2, from, 400), 0.01, 1e-6);
+        // 0.9 (h / goal)^-1 has its fixed point at 0.9 goal.
+        EXPECT_NEAR(step_after(ErrorStep{.order = 2}, 2, from, 200), 0.009, 1e-9);
+    }
+}
+
+TEST(StepControllers, ThePrintedPiRuleDoesNotControlTheError)
+{
+    // Its factor depends on the ratio of two errors alone: errors a million times larger
+    // give the same steps.
+    PrintedPiStep small;
+    PrintedPiStep large;
+    (void)small.judge(1e-9, 1), (void)large.judge(1e-3, 1);
+    for (const double ratio : {0.5, 0.7, 0.9}) {
+        const StepVerdict a = small.judge(1e-9 * ratio, 1);
+        const StepVerdict b = large.judge(1e-3 * ratio, 1);
+        EXPECT_EQ(a.accepted, b.accepted);
+        EXPECT_NEAR(a.factor, b.factor, 1e-12);
+    }
+    // And a constant error, however small, is rejected for ever: 1 < c1 = 1.8.
+    PrintedPiStep rule;
+    EXPECT_TRUE(rule.judge(0.1, 1).accepted);
+    EXPECT_FALSE(rule.judge(0.1, 1).accepted);
+    EXPECT_FALSE(rule.judge(0.1, 1).accepted);
+}
+
+TEST(StepControllers, ImpossibleOnesAreRefused)
+{
+    EXPECT_THROW(validate(HeuristicStep{.order = 0}), std::invalid_argument);
+    EXPECT_THROW(validate(HeuristicStep{.up = 0.5}), std::invalid_argument);
+    EXPECT_THROW(validate(ClassicStep{.down = 1.5}), std::invalid_argument);
+    EXPECT_THROW(validate(ErrorStep{.reject_above = 0.5}), std::invalid_argument);
+    EXPECT_THROW(validate(FilteredStep{.most = 0.9}), std::invalid_argument);
+    EXPECT_THROW(validate(PrintedPiStep{.gamma1 = 0}), std::invalid_argument);
+    EXPECT_NO_THROW(validate(FilteredStep::h211b(2)));
+}
+
+}  // namespace
+}  // namespace ricochet

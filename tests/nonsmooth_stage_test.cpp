@@ -1,0 +1,407 @@
+// Solvers of one stage: cases, semismooth Newton, fixed point; Newton's method on its own.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/Sparse>
+
+#include <random>
+
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/systems/diode_circuit.hpp"
+#include "ricochet/systems/friction_inclusion.hpp"
+
+namespace ricochet {
+namespace {
+
+// --- semismooth Newton ---
+
+// y + c y^3 = 0 in every component.
+struct Cubic {
+    double c = 0.1;
+    void residual(const Eigen::VectorXd& x, Eigen::VectorXd& f) const
+    {
+        f = x.array() + c * x.array().cube();
+    }
+    [[nodiscard]] bool direction(const Eigen::VectorXd& x, const Eigen::VectorXd& f,
+                                 Eigen::VectorXd& d) const
+    {
+        d = -(f.array() / (1 + 3 * c * x.array().square()));
+        return true;
+    }
+};
+
+TEST(SemismoothNewton, SolvesACubicWithAndWithoutLineSearch)
+{
+    for (const bool search : {true, false}) {
+        Eigen::VectorXd x(2);
+        x << 5, -3;
+        Cubic cubic;
+        const auto report = semismooth_newton(cubic, x, {.line_search = search});
+        EXPECT_TRUE(report.converged);
+        EXPECT_LT(x.norm(), 1e-12);
+        EXPECT_LE(report.iterations, 10);
+    }
+}
+
+// max(x, 2 x) - 1 and |x| type kinks: M x + min(x, 0) = b with random positive M.
+struct Kinked {
+    Eigen::MatrixXd m;
+    Eigen::VectorXd b;
+    void residual(const Eigen::VectorXd& x, Eigen::VectorXd& f) const
+    {
+        f = m * x + x.cwiseMin(0.0) - b;
+    }
+    [[nodiscard]] bool direction(const Eigen::VectorXd& x, const Eigen::VectorXd& f,
+                                 Eigen::VectorXd& d) const
+    {
+        Eigen::MatrixXd v = m;
+        v.diagonal() += (x.array() < 0).select(Eigen::VectorXd::Ones(x.size()), 0.0);
+        Eigen::PartialPivLU<Eigen::MatrixXd> lu;
+        return dense_direction(v, lu, f, d);
+    }
+};
+
+TEST(SemismoothNewton, EndsInAFewIterationsOnPiecewiseLinearEquations)
+{
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    for (int trial = 0; trial < 50; ++trial) {
+        const Eigen::MatrixXd a =
+            Eigen::MatrixXd::NullaryExpr(8, 8, [&] { return normal(random); });
+        Kinked problem{a * a.transpose() + Eigen::MatrixXd::Identity(8, 8),
+                       Eigen::VectorXd::NullaryExpr(8, [&] { return 10 * normal(random); })};
+        Eigen::VectorXd x = Eigen::VectorXd::Zero(8);
+        const auto report = semismooth_newton(problem, x, {.tolerance = 1e-10});
+        EXPECT_TRUE(report.converged);
+        EXPECT_LE(report.iterations, 12);
+    }
+}
+
+// x + e^x - 2 + neighbours, sparse and by products alone.
+struct Chain {
+    Eigen::Index n;
+    bool matrix_free;
+    Eigen::SparseLU<Eigen::SparseMatrix<double>> lu{};
+
+    void residual(const Eigen::VectorXd& x, Eigen::VectorXd& f) const
+    {
+        f = 2.5 * x + 0.1 * x.cwiseMax(0.0);
+        f.head(n - 1) -= x.tail(n - 1);
+        f.tail(n - 1) -= x.head(n - 1);
+        f.array() -= 1;
+    }
+    [[nodiscard]] Eigen::VectorXd product(const Eigen::VectorXd& x, const Eigen::VectorXd& d) const
+    {
+        Eigen::VectorXd p = 2.5 * d;
+        p.array() += (x.array() > 0).select(0.1 * d.array(), 0.0);
+        p.head(n - 1) -= d.tail(n - 1);
+        p.tail(n - 1) -= d.head(n - 1);
+        return p;
+    }
+    [[nodiscard]] bool direction(const Eigen::VectorXd& x, const Eigen::VectorXd& f,
+                                 Eigen::VectorXd& d)
+    {
+        if (!matrix_free) {
+            Eigen::SparseMatrix<double> v(n, n);
+            std::vector<Eigen::Triplet<double>> entries;
+            for (Eigen::Index i = 0; i < n; ++i) {
+                entries.emplace_back(i, i, 2.5 + (x[i] > 0 ? 0.1 : 0.0));
+                if (i > 0)
+                    entries.emplace_back(i, i - 1, -1.0), entries.emplace_back(i - 1, i, -1.0);
+            }
+            v.setFromTriplets(entries.begin(), entries.end());
+            return sparse_direction(v, lu, f, d);
+        }
+        // Conjugate gradients: the matrix is symmetric and positive definite.
+        d.setZero(n);
+        Eigen::VectorXd r = -f;
+        Eigen::VectorXd p = r;
+        for (int i = 0; i < 500 && r.norm() > 1e-13 * f.norm(); ++i) {
+            const Eigen::VectorXd vp = product(x, p);
+            const double alpha = r.squaredNorm() / p.dot(vp);
+            d += alpha * p;
+            const double before = r.squaredNorm();
+            r -= alpha * vp;
+            p = r + (r.squaredNorm() / before) * p;
+        }
+        return true;
+    }
+};
+
+TEST(SemismoothNewton, TakesSparseAndMatrixFreeDirections)
+{
+    Eigen::VectorXd solutions[2];
+    for (const bool matrix_free : {false, true}) {
+        Chain chain{.n = 300, .matrix_free = matrix_free};
+        Eigen::VectorXd& x = solutions[matrix_free];
+        x = Eigen::VectorXd::Constant(300, -1);
+        const auto report = semismooth_newton(chain, x);
+        EXPECT_TRUE(report.converged);
+        EXPECT_LE(report.iterations, 4);
+    }
+    EXPECT_LT((solutions[0] - solutions[1]).norm(), 1e-10);
+}
+
+struct Rootless {
+    static void residual(const Eigen::VectorXd& x, Eigen::VectorXd& f)
+    {
+        f = x.array().square() + 1;
+    }
+    static bool direction(const Eigen::VectorXd& x, const Eigen::VectorXd& f, Eigen::VectorXd& d)
+    {
+        d = -f.array() / (2 * x.array());
+        return true;
+    }
+};
+
+TEST(SemismoothNewton, ReportsWhatHasNoSolution)
+{
+    Eigen::VectorXd x = Eigen::VectorXd::Constant(1, 0.7);
+    Rootless rootless;
+    const auto report = semismooth_newton(rootless, x);
+    EXPECT_FALSE(report.converged);
+    EXPECT_GE(report.residual, 1);
+    EXPECT_LE(report.iterations, 50);
+}
+
+// --- linear inequalities by cases ---
+
+template <int M>
+void check_random_inequalities(Confines confines)
+{
+    std::mt19937 random(M);
+    std::normal_distribution<double> normal;
+    using Problem = LinearInequality<M>;
+    for (int trial = 0; trial < 2000; ++trial) {
+        Problem p;
+        p.confines = confines;
+        const typename Problem::Matrix a =
+            Problem::Matrix::NullaryExpr([&] { return normal(random); });
+        p.w = a * a.transpose() + 0.1 * Problem::Matrix::Identity();
+        p.y0 = Problem::Vector::NullaryExpr([&] { return 3 * normal(random); });
+        p.lower = Problem::Vector::NullaryExpr([&] { return -std::abs(normal(random)); });
+        p.upper = Problem::Vector::NullaryExpr([&] { return std::abs(normal(random)); });
+        typename Problem::Branches branches;
+        branches.setConstant(Branch::inside);
+        typename Problem::Vector r, y;
+        ASSERT_TRUE(p.solve(r, y, branches));
+        EXPECT_LT((p.w * r + p.y0 - y).norm(), 1e-11 * (1 + p.y0.norm()) * (1 + p.w.norm()));
+        for (int i = 0; i < M; ++i) {
+            // The natural map of the law, of the confined variable.
+            const double confined = confines == Confines::reaction ? r[i] : y[i];
+            const double other = confines == Confines::reaction ? y[i] : r[i];
+            const double image = std::clamp(confined - other, p.lower[i], p.upper[i]);
+            EXPECT_NEAR(image, confined, 1e-11 * (1 + p.y0.norm()));
+        }
+    }
+}
+
+TEST(LinearInequality, CasesSolveRandomOnes)
+{
+    for (const Confines confines : {Confines::reaction, Confines::state}) {
+        check_random_inequalities<1>(confines);
+        check_random_inequalities<2>(confines);
+        check_random_inequalities<3>(confines);
+        check_random_inequalities<4>(confines);
+    }
+}
+
+// --- stages: all solvers agree ---
+
+template <class System>
+SetValuedState<System> step_with(const System& system, StageMethod method,
+                                 const SetValuedState<System>& from, double h, double tolerance,
+                                 int* iterations = nullptr)
+{
+    CompositeStep<System> step(system, {.stage = {.method = method, .tolerance = tolerance}});
+    SetValuedState<System> to = from;
+    const StageReport report = step.take(from, h, to);
+    EXPECT_TRUE(report.converged) << static_cast<int>(method) << " " << report.residual;
+    if (iterations) *iterations = report.iterations;
+    return to;
+}
+
+TEST(StageSolvers, AgreeOnTheCircuit)
+{
+    const double starts[][3] = {
+        {9.998, 1.98, -10.9}, {0.01, 0.5, 0.1}, {0, 0.5, 0.1}, {-0.02, 3, 1}};
+    for (const auto& w : starts) {
+        for (const double h : {1e-3, 0.02, 0.3}) {
+            const double r = w[0] > 0 ? -0.8 : w[0] < 0 ? 0.8 : -0.35;
+            const SetValuedState<DiodeCircuit> from{
+                0, {w[0], w[1], w[2]}, Eigen::Matrix<double, 1, 1>::Constant(r)};
+            int fixed = 0;
+            const auto a = step_with(DiodeCircuit(), StageMethod::cases, from, h, 1e-12);
+            const auto b = step_with(DiodeCircuit(), StageMethod::newton, from, h, 1e-12);
+            const auto c =
+                step_with(DiodeCircuit(), StageMethod::fixed_point, from, h, 1e-11, &fixed);
+            EXPECT_LT((a.w - b.w).norm(), 1e-10);
+            EXPECT_LT((a.w - c.w).norm(), 1e-9);
+            EXPECT_GT(fixed, 4);
+        }
+    }
+}
+
+TEST(StageSolvers, AgreeWhereTheBoundDependsOnTheState)
+{
+    const FrictionInclusion system({.belt_speed = 0.2, .friction = 1, .weakening = 3});
+    for (const double v : {-0.5, 0.1, 0.2, 0.7}) {
+        SetValuedMotion<FrictionInclusion> start(system, {0.4, v}, {.t_end = 1, .step = 0.1});
+        for (const double h : {0.01, 0.1}) {
+            const auto a = step_with(system, StageMethod::cases, start.state(), h, 1e-12);
+            const auto b = step_with(system, StageMethod::newton, start.state(), h, 1e-12);
+            EXPECT_LT((a.w - b.w).norm(), 1e-10) << v << " " << h;
+        }
+    }
+}
+
+// The same without the derivative of its bound.
+struct WithoutGradient {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 1;
+    FrictionInclusion inner{{.belt_speed = 0.2, .friction = 1, .weakening = 3}};
+    void smooth(double t, const Eigen::Vector2d& w, Eigen::Vector2d& f) const
+    {
+        inner.smooth(t, w, f);
+    }
+    void observe(Eigen::Matrix<double, 1, 2>& e) const { inner.observe(e); }
+    void offset(double t, FrictionInclusion::Scalar& s) const { inner.offset(t, s); }
+    [[nodiscard]] Interval reaction_set(double t, const Eigen::Vector2d& w) const
+    {
+        return inner.reaction_set(t, w);
+    }
+};
+
+TEST(StageSolvers, TheDerivativeOfTheBoundMakesNewtonQuadratic)
+{
+    const FrictionInclusion with({.belt_speed = 0.2, .friction = 1, .weakening = 3});
+    const WithoutGradient without;
+    SetValuedMotion<FrictionInclusion> start(with, {0.4, -0.3}, {.t_end = 1, .step = 0.1});
+    int fast = 0;
+    int slow = 0;
+    const auto a = step_with(with, StageMethod::newton, start.state(), 0.2, 1e-12, &fast);
+    const auto b = step_with(without, StageMethod::newton,
+                             {0, start.state().w, start.state().reaction}, 0.2, 1e-12, &slow);
+    EXPECT_LT((a.w - b.w).norm(), 1e-10);
+    EXPECT_LE(fast, 10);  // of two stages
+    EXPECT_GT(slow, fast);
+}
+
+TEST(StageSolvers, TheDerivativeOfTheBoundIsThatOfDifferences)
+{
+    for (const auto law : {FrictionLaw::constant, FrictionLaw::hyperbolic, FrictionLaw::exponential,
+                           FrictionLaw::humped}) {
+        const FrictionInclusion system(
+            {.belt_speed = 0.2, .friction = 1, .weakening = 2, .residual = 0.1, .law = law});
+        for (const double v : {-0.3, 0.1, 0.6}) {
+            Eigen::Vector2d g;
+            system.bound_gradient(0, {0.3, v}, 0, g);
+            const auto bound = [&](double at) { return system.reaction_set(0, {0.3, at}).upper(); };
+            EXPECT_NEAR(g[1], (bound(v + 1e-6) - bound(v - 1e-6)) / 2e-6, 1e-8);
+            EXPECT_EQ(g[0], 0);
+        }
+    }
+}
+
+struct Planar {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 2;
+    static void smooth(double, const Eigen::Vector2d&, Eigen::Vector2d& f) { f << 1, 0; }
+    static Ball<2> reaction_set(double, const Eigen::Vector2d&) { return Ball<2>(0.5); }
+};
+
+TEST(StageSolvers, CasesRefuseSetsThatAreNoBoxes)
+{
+    EXPECT_THROW(CompositeStep<Planar>({}, {.stage = {.method = StageMethod::cases}}),
+                 std::invalid_argument);
+    EXPECT_NO_THROW(CompositeStep<Planar>({}, {}));
+}
+
+// --- states that are sized at run time, stops, sets of one's own ---
+
+struct ManyRelays {
+    static constexpr int state_size = Eigen::Dynamic;
+    static constexpr int reaction_size = Eigen::Dynamic;
+    int n = 6;
+    [[nodiscard]] int size() const { return n; }
+    [[nodiscard]] int reactions() const { return n; }
+    void smooth(double t, const Eigen::VectorXd& w, Eigen::VectorXd& f) const
+    {
+        f.resize(n);
+        for (int i = 0; i < n; ++i) {
+            f[i] = std::sin(t + i) - 0.5 * w[i] + (i > 0 ? 0.3 * w[i - 1] : 0.0);
+        }
+    }
+    struct Relays {
+        std::size_t n;
+        [[nodiscard]] std::size_t dimension() const { return n; }
+        static double lower(std::size_t) { return -0.7; }
+        static double upper(std::size_t) { return 0.7; }
+        void project(std::span<const double> z, std::span<double> p) const
+        {
+            for (std::size_t i = 0; i < n; ++i) p[i] = std::clamp(z[i], -0.7, 0.7);
+        }
+        void derivative(std::span<const double> z, std::span<double> d) const
+        {
+            std::fill(d.begin(), d.end(), 0.0);
+            for (std::size_t i = 0; i < n; ++i) d[i * n + i] = std::abs(z[i]) < 0.7 ? 1 : 0;
+        }
+    };
+    [[nodiscard]] Relays reaction_set(double, const Eigen::VectorXd&) const
+    {
+        return {static_cast<std::size_t>(n)};
+    }
+};
+
+TEST(SetsOfOnesOwn, SixRelaysOfDynamicSizeMatchTheSameInCases)
+{
+    // Three relays by cases against the first three of six, which do not feel the others.
+    Eigen::VectorXd final[2];
+    for (const int n : {3, 6}) {
+        SetValuedMotion<ManyRelays> motion(ManyRelays{n}, Eigen::VectorXd::Constant(n, 0.4),
+                                           {.t_end = 3, .step = 0.01});
+        EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        final[n == 6] = motion.state().w.head(3);
+    }
+    EXPECT_LT((final[0] - final[1]).norm(), 1e-9);
+}
+
+struct Saturated {
+    static constexpr int state_size = 1;
+    static constexpr int reaction_size = 1;
+    static constexpr Confines confines = Confines::state;
+    using V = Eigen::Matrix<double, 1, 1>;
+    static void smooth(double t, const V&, V& f) { f[0] = 3 * std::cos(t); }
+    static Interval reaction_set(double, const V&) { return Interval(-1, 2); }
+};
+
+TEST(Stops, KeepTheStateInsideAndPushOnlyInwards)
+{
+    // 3 sin t up to 2, held there until the drive turns at pi / 2; then 2 + 3 (sin t - 1)
+    // down to -1 where sin t = 0, held until 3 pi / 2.
+    for (const auto method : {StageMethod::cases, StageMethod::newton, StageMethod::fixed_point}) {
+        SetValuedMotion<Saturated> motion(
+            Saturated(), Saturated::V::Zero(),
+            {.t_end = 5,
+             .step = 1e-3,
+             .scheme = {.stage = {.method = method, .tolerance = 1e-11}}});
+        double worst = 0;
+        EXPECT_EQ(motion.run([&](const auto& s) {
+            const double t = s.t;
+            const double pi = 3.14159265358979323846;
+            const double exact = t < pi / 2       ? std::min(2.0, 3 * std::sin(t))
+                                 : t < 3 * pi / 2 ? std::max(-1.0, 2 + 3 * (std::sin(t) - 1))
+                                                  : -1 + 3 * (std::sin(t) + 1);
+            worst = std::max(worst, std::abs(s.w[0] - exact));
+            EXPECT_GE(s.w[0], -1);
+            EXPECT_LE(s.w[0], 2);
+        }),
+                  SetValuedOutcome::reached_end);
+        // The step that meets the stop half uses its reaction: a step times the drive.
+        EXPECT_LT(worst, 3e-3);
+    }
+}
+
+}  // namespace
+}  // namespace ricochet
