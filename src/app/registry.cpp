@@ -27,7 +27,8 @@ const std::vector<SystemEntry>& systems()
         thermostat_entry(),         grow_decay_entry(),  impact_oscillator_entry(),
         coulomb_oscillator_entry(), stick_slip_entry(),  detest_f1_entry(),
         detest_f2_entry(),          detest_f3_entry(),   detest_f4_entry(),
-        detest_f5_entry(),
+        detest_f5_entry(),          cavern_entry(),      zones_entry(),
+        eigenvalue_entry(),         arm_entry(),
     };
     return all;
 }

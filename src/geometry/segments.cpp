@@ -219,9 +219,13 @@ struct Asked {
     explicit Asked(const Segment2& s) noexcept
         : a(s.a), b(s.b), d(s.b - s.a), inverse(dot(d, d) > 0 ? 1 / dot(d, d) : 0)
     {
+        normal = std::sqrt(inverse) * Point2{-d.y, d.x};
+        reach = {std::fabs(normal.x), std::fabs(normal.y)};
     }
     Point2 a, b, d;
     double inverse;
+    Point2 normal;  ///< of unit length, or 0
+    Point2 reach;   ///< magnitudes of its components
 };
 
 /// Squares of distances between a segment and several; 0 where they cross.
@@ -258,27 +262,32 @@ template <class T>
     return least;
 }
 
-/// Lower bounds from the boxes, and from the discs around them: a long oblique segment
-/// has a large box.
-std::array<double, 4> squared_bounds(const Asked& s, const FourBoxes<2>& boxes,
-                                     const std::array<double, 2>& lower,
-                                     const std::array<double, 2>& upper) noexcept
+/// Lower bounds from the boxes along the axes, and along the normal of the segment: a long
+/// oblique segment has a large box itself.
+[[gnu::always_inline]] inline std::array<double, 4> squared_bounds(
+    const Asked& s, const FourBoxes<2>& boxes, const std::array<double, 2>& lower,
+    const std::array<double, 2>& upper) noexcept
 {
+    using detail::Lanes;
     std::array<double, 4> out = squared_distances(boxes, lower, upper);
-    for (std::size_t i = 0; i < 4; ++i) {
-        const double sides[]{boxes.upper[0][i] - boxes.lower[0][i],
-                             boxes.upper[1][i] - boxes.lower[1][i]};
-        const Point2 centre{0.5 * (boxes.lower[0][i] + boxes.upper[0][i]),
-                            0.5 * (boxes.lower[1][i] + boxes.upper[1][i])};
-        const Point2 w = centre - s.a;
-        double t = dot(w, s.d) * s.inverse;
-        t = t > 0 ? t : 0;
-        t = t < 1 ? t : 1;
-        const Point2 e = w - t * s.d;
-        const double radius = 0.5 * std::sqrt(sides[0] * sides[0] + sides[1] * sides[1]);
-        const double gap = std::sqrt(dot(e, e)) * (1 - 1e-14) - radius * (1 + 1e-14);
-        const double square = gap > 0 ? gap * gap : 0;
-        out[i] = square > out[i] ? square : out[i];  // missing boxes: NaN, and out is kept
+    const Lanes zero{};
+    for (std::size_t i = 0; i < 4; i += detail::lanes) {
+        const auto load = [&](const double* column) {
+            return *reinterpret_cast<const Lanes*>(column + i);
+        };
+        const Lanes x0 = load(boxes.lower[0]) - s.a.x;
+        const Lanes y0 = load(boxes.lower[1]) - s.a.y;
+        const Lanes x1 = load(boxes.upper[0]) - s.a.x;
+        const Lanes y1 = load(boxes.upper[1]) - s.a.y;
+        // Twice the offset of the centre along the normal, less twice the reach of the box.
+        const Lanes offset = s.normal.x * (x0 + x1) + s.normal.y * (y0 + y1);
+        const Lanes reach = s.reach.x * (x1 - x0) + s.reach.y * (y1 - y0);
+        const Lanes twice = (offset > zero ? offset : -offset) * (1 - 1e-14) - reach * (1 + 1e-14);
+        const Lanes gap = twice > zero ? twice : zero;  // missing boxes: NaN becomes 0
+        const Lanes square = 0.25 * gap * gap;
+        for (std::size_t k = 0; k < detail::lanes; ++k) {
+            out[i + k] = square[k] > out[i + k] ? square[k] : out[i + k];
+        }
     }
     return out;
 }

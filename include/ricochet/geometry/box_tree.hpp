@@ -127,32 +127,35 @@ public:
     void search(double& best, const Bound& bound, const Open& open) const
     {
         if (levels_.empty()) return;
-        struct Waiting {
-            double bound;
-            std::uint32_t level, index;
-        };
-        // Each level leaves at most three waiting, and there are at most 16 levels.
-        std::array<Waiting, 64> waiting;
-        std::size_t count = 0;
-        waiting[count++] = {0, static_cast<std::uint32_t>(levels_.size()), 0};
+        // Each level leaves at most three waiting, and there are at most 16 levels. Numbers in
+        // columns of their own: what was written in parts is slow to read as a whole.
+        std::array<double, 64> bounds;
+        std::array<std::uint64_t, 64> nodes;  // level and place in it
+        constexpr std::uint64_t level_one = std::uint64_t{1} << 32U;
+        std::size_t count = 1;
+        bounds[0] = 0;
+        nodes[0] = level_one * levels_.size();
         while (count > 0) {
-            const Waiting next = waiting[--count];
-            if (next.bound > best) continue;
-            if (next.level == 0) {
-                const std::size_t first = std::size_t{4} * next.index;
-                open(first, std::min(first + 4, order_.size()));
+            --count;
+            if (bounds[count] > best) continue;
+            const std::uint64_t node = nodes[count];
+            const auto index = static_cast<std::size_t>(node % level_one);
+            if (node < level_one) {
+                open(4 * index, std::min(4 * index + 4, order_.size()));
                 continue;
             }
-            const std::array<double, 4> bounds = bound(levels_[next.level - 1][next.index]);
-            const std::size_t from = count;
-            for (std::uint32_t i = 0; i < 4; ++i) {
-                if (!(bounds[i] <= best)) continue;
-                waiting[count++] = {bounds[i], next.level - 1, 4 * next.index + i};
+            const std::array<double, 4> below = bound(levels_[node / level_one - 1][index]);
+            const std::uint64_t first = node - level_one + 3 * index;  // a level down, at 4 index
+            std::size_t nearest = count;
+            for (std::size_t i = 0; i < 4; ++i) {
+                bounds[count] = below[i];
+                nodes[count] = first + i;
+                nearest = below[i] < bounds[nearest] ? count : nearest;
+                count += below[i] <= best ? 1 : 0;
             }
-            for (std::size_t i = from + 1; i < count; ++i) {  // the nearest last
-                for (std::size_t j = i; j > from && waiting[j].bound > waiting[j - 1].bound; --j) {
-                    std::swap(waiting[j], waiting[j - 1]);
-                }
+            if (nearest + 1 < count) {  // is the next to be opened
+                std::swap(bounds[nearest], bounds[count - 1]);
+                std::swap(nodes[nearest], nodes[count - 1]);
             }
         }
     }

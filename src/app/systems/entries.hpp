@@ -21,5 +21,9 @@ namespace ricochet::app {
 [[nodiscard]] SystemEntry detest_f3_entry();
 [[nodiscard]] SystemEntry detest_f4_entry();
 [[nodiscard]] SystemEntry detest_f5_entry();
+[[nodiscard]] SystemEntry cavern_entry();
+[[nodiscard]] SystemEntry zones_entry();
+[[nodiscard]] SystemEntry eigenvalue_entry();
+[[nodiscard]] SystemEntry arm_entry();
 
 }  // namespace ricochet::app

@@ -1,0 +1,64 @@
+#include "../any_system.hpp"
+#include "entries.hpp"
+#include "ricochet/systems/least_eigenvalue.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+enum : std::size_t { level, amplitude, frequency, slow, seed };  // the order of parameters
+
+LeastEigenvalue system(const std::vector<double>& p)
+{
+    return LeastEigenvalue({.level = p[level],
+                            .amplitude = p[amplitude],
+                            .frequency = p[frequency],
+                            .slow = p[slow],
+                            .seed = static_cast<std::uint64_t>(p[seed])});
+}
+
+std::vector<double> start(const std::vector<double>& p)
+{
+    const LeastEigenvalue::State q = system(p).start();
+    return {q.begin(), q.end()};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
+                   repeats);
+}
+
+}  // namespace
+
+SystemEntry eigenvalue_entry()
+{
+    const LeastEigenvalue::Parameters d;
+    return {
+        .name = LeastEigenvalue::name,
+        .description = "The smallest eigenvalue of a stiffness under four loads meets a level.",
+        .parameters = {{"level", d.level, "1", {}, "of the eigenvalue"},
+                       {"amplitude", d.amplitude, "1", {.lower = 0}, "of the loads"},
+                       {"frequency", d.frequency, "rad/s", {.lower = 0}, "of the slowest load"},
+                       {"slow",
+                        d.slow,
+                        "s",
+                        {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
+                        "that a call of the guard takes longer"},
+                       {"seed",
+                        static_cast<double>(d.seed),
+                        "1",
+                        {.lower = 0, .lower_included = true},
+                        "of the matrices"}},
+        .state = {{"q0", "1", "load"},
+                  {"q1", "1", "load"},
+                  {"q2", "1", "load"},
+                  {"q3", "1", "load"}},
+        .guards = labels(LeastEigenvalue{}, {"level met"}),
+        .t_end = 40,
+        .start = start,
+        .run = run,
+    };
+}
+
+}  // namespace ricochet::app
