@@ -4,11 +4,13 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <new>
 
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/network.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/toms748.hpp"
@@ -93,6 +95,25 @@ TEST(Allocation, NoneWithANetwork)
     const Network network(load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"));
     const Options options{.t_end = 20.5, .step = 0.01, .record_events = false};
     expect_none<FixedStep<Rk4>>(options, network, Newton{});
+}
+
+TEST(Allocation, NoneInTheLoopWithAPlan)
+{
+    struct Bounded : BouncingBall {
+        double speed_bound(double, const std::array<double, 2>& x) const { return std::fabs(x[1]); }
+        double acceleration_bound(double, const std::array<double, 2>&) const { return 9.81; }
+    };
+    const Bounded ball;
+    const std::array<double, 2> start = {10.0, 0.0};
+    const Options options{.t_end = 20.5, .step = 0.001, .record_events = false};
+    // The starts of tentative steps are kept in room that is made once, with the simulation.
+    Simulation<Bounded, std::array<double, 2>, FixedStep<Rk4>, Planned<>> simulation(ball, start,
+                                                                                     options);
+    const long before = allocations;
+    const auto run = simulation.take();
+    EXPECT_EQ(allocations - before, 0);
+    EXPECT_EQ(run.statistics.events, 13u);
+    EXPECT_GT(run.statistics.rollbacks, 0u);
 }
 
 }  // namespace

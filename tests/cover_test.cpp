@@ -109,16 +109,20 @@ TEST(Cover, NoMotionWithinTheBoundsEscapesThem)
 
 TEST(Cover, TheForecastIsWhereTwoValuesJustCloseTheStretch)
 {
-    // A guard that goes on with its slope, at constant speed: closed at the forecast up to
-    // rounding, not beyond it.
+    // A guard that goes on with its slope and bends by A, at constant speed: closed at the
+    // forecast up to rounding, not beyond it.
     for (const double slope : {-0.9, -0.5, 0.0, 0.5}) {
-        const GuardBound at{.distance = 2, .speed = 1, .acceleration = 0.25};
+        const double a = 0.25;
+        const GuardBound at{.distance = 2, .speed = 1, .acceleration = a};
         const double tau = time_to_look(at, slope);
-        const auto after = [&](double time) {
-            return GuardBound{.distance = 2 + slope * time, .speed = 1, .acceleration = 0.25};
+        const auto closes = [&](double time) {
+            const double distance = 2 + slope * time - 0.5 * a * time * time;
+            // The path between equal speeds, v tau + A tau^2 / 4; a distance need not be
+            // positive for the forecast.
+            return 2 + distance > time + 0.25 * a * time * time;
         };
-        EXPECT_TRUE(stays_clear(at, after(tau * (1 - 1e-9)), tau * (1 - 1e-9), 0, 0)) << slope;
-        EXPECT_FALSE(stays_clear(at, after(tau * (1 + 1e-9)), tau * (1 + 1e-9), 0, 0)) << slope;
+        EXPECT_TRUE(closes(tau * (1 - 1e-9))) << slope;
+        EXPECT_FALSE(closes(tau * (1 + 1e-9))) << slope;
     }
     // Moving away as fast as the bound: for ever.
     EXPECT_EQ(time_to_look({.distance = 1, .speed = 1, .acceleration = 0}, 1), inf);

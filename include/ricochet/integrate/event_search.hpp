@@ -162,7 +162,7 @@ public:
             if (finding.touch) continue;
             if (!finding.hit) return;
             probe.watch(finding.side);
-            const Location where = find(probe, finding, record, locator, resolution);
+            const Location where = find(probe, finding, bank, i, locator, resolution);
             const Side side = opposite(finding.side);
             bool counted = true;
             if constexpr (has_predicate) {
@@ -317,15 +317,16 @@ private:
         return finding;
     }
 
-    [[nodiscard]] static Location find(Probe& probe, const Finding& finding,
-                                       const GuardRecord& record, const Locator& locator,
+    [[nodiscard]] static Location find(Probe& probe, const Finding& finding, const Bank& bank,
+                                       std::size_t i, const Locator& locator,
                                        const EventResolution& resolution)
     {
         if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
         probe.agree_on(finding.hi);
-        const double tolerance = resolution.tolerance(probe.step().time(finding.hi.s));
-        return record.info.boolean ? Bisection{}.locate(probe, finding.lo, finding.hi, tolerance)
-                                   : locator.locate(probe, finding.lo, finding.hi, tolerance);
+        const double tolerance = std::max(resolution.tolerance(probe.step().time(finding.hi.s)),
+                                          bank.unresolved(i, probe.step().h()));
+        return bank[i].info.boolean ? Bisection{}.locate(probe, finding.lo, finding.hi, tolerance)
+                                    : locator.locate(probe, finding.lo, finding.hi, tolerance);
     }
 
     [[gnu::noinline]] void touched(Bank& bank, std::size_t i, Side side, double s)
@@ -399,7 +400,7 @@ private:
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
         probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank[hit.guard], locator, resolution);
+        hit.where = find(probe, hit.finding, bank, hit.guard, locator, resolution);
         hit.located = true;
     }
 
@@ -417,7 +418,8 @@ private:
             Detector::leaves_plainly(sign_of(side), bank.start(i), bank.end(i, step.h()),
                                      bank.touch(i))) {
             probe.watch(side);
-            const double tolerance = resolution.tolerance(step.time(step.h()));
+            const double tolerance =
+                std::max(resolution.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
             const Location where =
                 locator.locate(probe, bank.start(i), bank.end(i, step.h()), tolerance);
             keep_only(i, side, where, probe.state_at(where));
@@ -443,7 +445,7 @@ private:
             if (!finding.hit) return false;
             late_ = finding.late;
             probe.watch(finding.side);
-            const Location where = find(probe, finding, bank[i], locator, resolution);
+            const Location where = find(probe, finding, bank, i, locator, resolution);
             keep_only(i, finding.side, where, finding.late ? step.x0() : probe.state_at(where));
             return true;
         }
@@ -487,7 +489,7 @@ private:
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
         probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank[hit.guard], locator, resolution);
+        hit.where = find(probe, hit.finding, bank, hit.guard, locator, resolution);
         at_ = hit.where.root;
         at_remainder_ = hit.where.root_remainder;
         assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));

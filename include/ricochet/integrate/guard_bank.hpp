@@ -65,6 +65,7 @@ struct GuardRecord {
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     double band = 0;            ///< |g| where it fired: it counts as being on its surface
+    bool estimated = false;     ///< the band is what location left, not a value of the guard
     double from = 0;            ///< [s] offset in the step up to which it has been looked at
     std::uint64_t events = 0;
     double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
@@ -162,8 +163,8 @@ public:
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
         const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
-        return sign_[i] != 0 && Detector::suspects(sign_[i], g0_[i] - band, rate0_[i],
-                                                   g1_[i] - band, rate1_[i], h);
+        return sign_[i] != 0 &&
+               Detector::suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
     }
 
     /// The first guard that is not a number at the end of the step, or `no_guard`.
@@ -207,6 +208,21 @@ public:
     {
         records_[i].side = side;
         sign_[i] = records_[i].enabled && !records_[i].asleep ? sign_of(side) : 0;
+    }
+
+    /// The width [s] below which a bracket in a step of length h is a matter of the guard's
+    /// rounding: that of a guard with declared bounds, which may be dear, is not narrowed
+    /// further. 0 for any other.
+    [[nodiscard]] double unresolved(std::size_t i, double h) const noexcept
+    {
+        if constexpr (Bounded<System, X> && Detector::uses_rates) {
+            const double size = std::fmax(sizes_[i], std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
+            const double rate = std::fmin(std::fabs(rate0_[i]), std::fabs(rate1_[i]));
+            const double width = 4 * std::numeric_limits<double>::epsilon() * size / rate;
+            return width <= 1e-10 * h ? width : 1e-10 * h;
+        } else {
+            return 0;
+        }
     }
 
     /// Guard i is not looked at until it is woken.

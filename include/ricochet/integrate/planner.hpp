@@ -146,6 +146,8 @@ public:
             looks_[i].first = failed;
             doubt = std::min(doubt, failed);
         }
+        // Beyond an event the flow is not the motion, and breaks no promise.
+        if (wrong_ && doubt != none && clock(wrong_->t) > place(doubt, step).time) wrong_.reset();
         judged_.clear();
         for (const std::size_t i : owing_) {
             LastLook& look = looks_[i];
@@ -430,6 +432,9 @@ private:
         Look end;
         if (bound_below(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
             detector_.sure(end.bound, band(bank, i, end.value, end.value)) >= h_next) {
+            if (detector_.checks_bounds() && ++lower_bounds_used_ % 8 == 0) {
+                (void)look_at(i, steps_.size(), step, bank, counts);
+            }
             note(i, known, end, bank);
             return none;
         }
@@ -545,6 +550,7 @@ private:
     double limit_ = -infinity;
     double hoped_ = infinity;
     double failing_value_ = 0;
+    std::uint64_t lower_bounds_used_ = 0;
     std::optional<WrongBound<X>> wrong_;
 };
 

@@ -431,8 +431,8 @@ private:
         const std::size_t steps = planner_.steps().size();
         const std::size_t doubt = planner_.close(step_, bank_, run_.statistics, h_next_);
         if (planner_.wrong()) {
-            run_.wrong_bound = planner_.wrong();
-            return end(Outcome::wrong_bound, planner_.wrong()->guard);
+            if (doubt != Planner::none && doubt + 1 < steps) take_back_to(doubt);
+            return name_wrong_bound();
         }
         if (doubt == Planner::none) {
             count_put_off(steps);
@@ -460,11 +460,14 @@ private:
             for (const std::size_t i : planner_.judged()) bank_.leave_plateau(i);
         }
         planner_.settle(step_, bank_);
-        if (planner_.wrong()) {
-            run_.wrong_bound = planner_.wrong();
-            return end(Outcome::wrong_bound, planner_.wrong()->guard);
-        }
+        if (planner_.wrong()) return name_wrong_bound();
         pass();
+    }
+
+    void name_wrong_bound()
+    {
+        run_.wrong_bound = planner_.wrong();
+        end(Outcome::wrong_bound, run_.wrong_bound->guard);
     }
 
     void count_put_off(std::size_t steps) noexcept
@@ -865,10 +868,8 @@ private:
         const double t = on_time ? time_event_ : time_of_set();
         for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
         note_crossings_to_set();
-        for (const std::size_t i : search_.members()) {
-            bank_[i].band =
-                std::fabs(bank_.view(i, step_.mode(), calls()).value(t, search_.before()));
-        }
+        mode_before_ = step_.mode();
+        for (const std::size_t i : search_.members()) find_band(i, t);
         ++run_.statistics.steps;
         emit_samples(s);
         record_step(s);
@@ -876,6 +877,24 @@ private:
         fire({.located = true, .on_time = on_time});
         if (on_time && !ended_) find_time_event();
         cascade();
+    }
+
+    /// How far from its surface a guard that has just fired may be. A guard with declared
+    /// bounds may be dear, and is not asked for what its location says as well.
+    void find_band(std::size_t i, double t)
+    {
+        detail::GuardRecord& record = bank_[i];
+        const Location& where = search_.where(i);
+        const double residue = 2 * std::fabs(where.slope) * where.error;
+        record.estimated = Bounded<System, X> && !record.info.boolean && std::isfinite(residue) &&
+                           search_.at() == where.root && !search_.late();
+        record.band = record.estimated ? std::max(residue, bank_.touch(i)) : residue_of(i, t);
+    }
+
+    /// |g| where the guard has fired, at the state before.
+    [[nodiscard]] double residue_of(std::size_t i, double t)
+    {
+        return std::fabs(bank_.view(i, mode_before_, calls()).value(t, search_.before()));
     }
 
     [[nodiscard]] double time_of_set() const noexcept
@@ -1029,6 +1048,10 @@ private:
             return false;
         }
         const Side before = record.side;
+        if (record.fired && record.estimated && std::fabs(g) > record.band) {
+            record.band = residue_of(i, step_.time(0));
+        }
+        record.estimated = false;
         const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
         const bool on_surface = std::fabs(g) <= band;
         const Side side = on_surface ? heading(i) : side_of(g);
@@ -1151,11 +1174,11 @@ private:
             if (has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
             const Side side = record.side;
             if (!with_set || side_of(last.value) != side) continue;
-            if (!record.acting && counts(side, record.info.crossing)) {
-                search_.note_at_set(bank_, i, side, at.rate);
-            } else {
+            if (!counts(side, record.info.crossing)) {
                 bank_.arm(i, opposite(side));
-            }
+            } else if (!record.acting) {
+                search_.note_at_set(bank_, i, side, at.rate);
+            }  // else its own event is still to come
         }
     }
 
@@ -1348,6 +1371,7 @@ private:
     X after_;
     X single_ = after_;
     Mode mode_after_ = 0;
+    Mode mode_before_ = 0;
     std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
     std::vector<std::size_t> writers_;
     std::size_t mode_writer_ = no_guard;

@@ -68,8 +68,9 @@ struct Newton {
             const double correction = -sample.value / sample.rate;
             const double distance = std::fabs(correction);
             // What a straight line neglects over that distance, as a shift in time.
-            const bool straight = distance <= width && distance * distance * curvature <=
-                                                           std::fabs(sample.rate) * finest / 2;
+            const bool straight =
+                distance <= width && distance * distance * curvature <=
+                                         std::fabs(sample.rate) * std::max(finest, tolerance) / 2;
             if (straight && close_in(probe, sample, correction, tolerance, lo, hi)) {
                 const TwoSum predicted = two_sum(sample.s, correction);
                 const TwoSum root = predicted.value < lo.s   ? two_sum(lo.s, 0)
