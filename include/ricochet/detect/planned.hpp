@@ -120,18 +120,11 @@ public:
         return time_covered(at);
     }
 
-    /// Time [s] after which a second look is hoped to close the stretch: part of the way from
-    /// what is covered to what is forecast, less of it where the guard approaches, since a
-    /// stretch that does not close costs looks for halving it. The parts were found by trial,
-    /// and half or twice as much changes the number of looks by a few per cent.
+    /// Time [s] after which a second look is hoped to close the stretch.
     [[nodiscard]] double hoped(GuardBound at, double slope, double band) const noexcept
     {
-        if (!options_.two_ended) return 0;
         at.distance -= band;
-        const double covered = time_covered(at);
-        const double forecast = time_to_look(at, slope);
-        const double part = slope < 0 ? 0.25 : 0.75;
-        return forecast > covered ? covered + part * (forecast - covered) : covered;
+        return options_.two_ended ? time_to_look(at, slope) : 0;
     }
 
     [[nodiscard]] bool closes(const GuardBound& from, const GuardBound& to, double tau,

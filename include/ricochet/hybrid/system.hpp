@@ -36,6 +36,9 @@
 //     previous_time_event(t)    the last before t, for runs backward in time
 //     time_reset(t, x)          or Mode time_reset(mode, t, x); optional
 //
+// How fast its guards can change, so that a detector may leave most of them unasked:
+// speed_bound and others, see hybrid/bounds.hpp.
+//
 // All functions are const and free of side effects; t is in seconds. Guards written
 // for any x that has `x[i]` are located without the rest of the state. A system
 // without a guard is integrated as a plain ordinary differential equation: none of

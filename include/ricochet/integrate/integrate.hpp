@@ -12,7 +12,8 @@ namespace ricochet {
 /// @param x0       start; its type is the state type of the run
 /// @param options  only `t_end` is required
 /// @param stepping `ErrorControlled<Method>` or `FixedStep<Method>`
-/// @param detector `Extremum`, `Ends`, a `Network`, or one that is `Verified`
+/// @param detector `Extremum`, `Ends`, `Bernstein`, a `Network`, one that is `Verified`, or one
+///                 of these exact ones that is `Planned`
 /// @param locator  `Newton`, `Bisection` or `Toms748`
 /// @throws std::invalid_argument for options, start or guards that make no sense.
 ///         What happens along the way is returned as `Run::outcome`.
