@@ -26,6 +26,7 @@
 #include "ricochet/locate/toms748.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
+#include "ricochet/systems/cave_body.hpp"
 #include "ricochet/systems/cavern.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/detest_f1.hpp"

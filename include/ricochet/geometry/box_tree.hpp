@@ -120,6 +120,14 @@ public:
     /// The box around everything.
     [[nodiscard]] const Box<Dim>& bounds() const noexcept { return bounds_; }
 
+    /// Levels of nodes: 0 holds the boxes of the blocks, the last is one node. A node holds
+    /// those with four times its place, and the three after them, on the level below.
+    [[nodiscard]] std::size_t levels() const noexcept { return levels_.size(); }
+    [[nodiscard]] const std::vector<FourBoxes<Dim>>& level(std::size_t i) const noexcept
+    {
+        return levels_[i];
+    }
+
     /// Opens whatever may hold something at a squared distance of at most `best`, nearer
     /// things first. `bound(four)` gives lower bounds for four boxes; `open(first, last)`
     /// looks at the places of a block, and lowers `best`. Finite `best` only.
