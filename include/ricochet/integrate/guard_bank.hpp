@@ -145,12 +145,8 @@ public:
     /// Whether any guard deserves a look.
     [[nodiscard]] bool suspicious(double h) const noexcept
     {
-        if (bands_) {
-            for (std::size_t i = 0; i < size(); ++i) {
-                if (suspicious(i, h)) return true;
-            }
-            return false;
-        }
+        if (bands_) [[unlikely]]
+            return suspicious_with_bands(h);
         double any = 0;  // a double, so that the loop is vectorised
         for (std::size_t i = 0; i < size(); ++i) {
             const bool suspected =
@@ -216,7 +212,8 @@ public:
     [[nodiscard]] double unresolved(std::size_t i, double h) const noexcept
     {
         if constexpr (Bounded<System, X> && Detector::uses_rates) {
-            const double size = std::fmax(sizes_[i], std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
+            const double size =
+                std::fmax(sizes_[i], std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
             const double rate = std::fmin(std::fabs(rate0_[i]), std::fabs(rate1_[i]));
             const double width = 4 * std::numeric_limits<double>::epsilon() * size / rate;
             return width <= 1e-10 * h ? width : 1e-10 * h;
@@ -343,6 +340,14 @@ public:
 
 private:
     using Doubles = PerGuard<double, fixed>;
+
+    [[gnu::noinline]] bool suspicious_with_bands(double h) const noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (suspicious(i, h)) return true;
+        }
+        return false;
+    }
 
     void note_size(std::size_t i, double g) noexcept
     {
