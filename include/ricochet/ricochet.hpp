@@ -24,6 +24,7 @@
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/newton.hpp"
 #include "ricochet/locate/toms748.hpp"
+#include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/cave_body.hpp"

@@ -1,0 +1,229 @@
+// Certification: a proof that where a network clears, the guard is above a margin.
+//
+// *Statement.* For every state x in the domain of the model
+//
+//     logit(x) < threshold  implies  guard(x) > margin,
+//
+// for the logit as it is computed at run time, and the guard as the system computes it.
+//
+// *Proof*, by branch and bound. A box with centre c and half-widths h is proved if its
+// logit is nowhere below the threshold (`NetworkBounds`), or if
+//
+//     guard(c) - guard_slack(h) > margin,
+//
+// and is cut in two where it is neither. Either bound, once it has shown that it can never
+// prove a part of a box, is not asked there again. A box that is too narrow to be cut is
+// unproved: it is listed in the record, and asked exactly at run time.
+//
+// What the proof takes as true is `guard_slack`. Every cut samples it, at the centres of a
+// box and its halves; one that is broken is named with both states.
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detect/features.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet {
+
+/// The first guard of the system does not depend on time, and changes between two states by
+/// no more than it says:
+///
+///     |guard(t, x) - guard(t, y)| <= guard_slack(h)   if |x_i - y_i| <= h_i for all i,
+///
+/// as computed, with the guard's own rounding included. h is a state of nonnegative
+/// half-widths; a larger h gives no smaller slack. Examples: hypot(h_0, h_1) for a
+/// distance in the plane of x_0 and x_1; sum of L_i h_i for a guard with a constant L_i for each
+/// component, as the reach of an arm beyond joint i; infinity says nothing.
+template <class System, class X>
+concept SlackedGuard = Guarded<System, X> && requires(const System& system, const X& half_widths)
+{
+    {
+        system.guard_slack(half_widths)
+        } -> std::convertible_to<double>;
+};
+
+}  // namespace ricochet
+
+namespace ricochet::learn {
+
+/// What has to be proved of a model, as functions of its raw features. Both are called from
+/// several threads at a time.
+struct GuardProblem {
+    std::function<double(const double* x)> guard;
+    std::function<double(const double* half_widths)> slack;  ///< see `SlackedGuard`
+};
+
+struct CertifyOptions {
+    double margin = 0;       ///< of the first level, in units of the guard
+    std::size_t levels = 1;  ///< 1 to 32
+    double ratio = 2;        ///< between margins; above 1, needs a positive margin
+    /// Look for the highest threshold that can be proved, and put it into the model. Otherwise
+    /// the stored threshold is proved as it is; further levels are always searched for.
+    bool search = true;
+    /// A search stops at this distance from the lowest logit that was found within the margin,
+    /// in units of the spread of the logits over the domain.
+    double closest = 1.0 / 64;
+    double smallest = 1.0 / 1024;    ///< edge that is not cut further, as a share of the domain's
+    std::size_t max_unproved = 256;  ///< boxes that a level may list
+    double limit = 300;              ///< [s] estimate for a level above which nothing is begun
+    double time_limit = std::numeric_limits<double>::infinity();  ///< [s] after which it stops
+    unsigned threads = 2;                ///< 1 to 64; the result does not depend on it
+    std::uint64_t seed = 1;              ///< of estimates and searches
+    std::filesystem::path checkpoint{};  ///< written every few seconds and on stopping; empty: none
+    bool resume = false;                 ///< continue from `checkpoint`
+};
+
+/// What a proof will take, by random descent: a path is followed to a leaf, and 2^depth
+/// is an estimate of the number of leaves without bias (Knuth, "Estimating the efficiency of
+/// backtrack programs", Math. Comp. 29, 1975). The top of the tree is counted, not estimated.
+struct Estimate {
+    double boxes = 0;
+    double seconds = 0;   ///< on all threads
+    double unproved = 0;  ///< boxes that will be too narrow to be cut
+    double error = 0;     ///< relative standard error of `boxes`
+};
+
+struct CertifyProgress {
+    std::size_t level = 0;  ///< from 0
+    std::size_t levels = 0;
+    double margin = 0;
+    double threshold = 0;
+    Estimate estimate;        ///< of this level
+    std::uint64_t boxes = 0;  ///< examined so far, at this level
+    double rate = 0;          ///< [1/s]
+    double seconds = 0;       ///< spent on this level, earlier parts included
+    double seconds_left = 0;
+    double share = 0;  ///< of the level that is done, in [0, 1]
+};
+
+/// Draws a bar, or returns false to stop. The first call of a level has `boxes` = 0 and tells the
+/// estimate before any of it is spent.
+using CertifyCallback = std::function<bool(const CertifyProgress&)>;
+
+enum class CertifyOutcome {
+    proved,         ///< all levels, without exception
+    partly_proved,  ///< all levels, but for unproved boxes that are listed
+    refuted,        ///< a state clears and has a guard within the margin
+    not_provable,   ///< too many boxes are too narrow to be cut
+    too_long,       ///< the estimate is above the limit; nothing was begun
+    out_of_time,    ///< what was done is kept in the checkpoint
+    out_of_memory,  ///< the same
+    interrupted,    ///< by the callback; the same
+};
+
+/// One sentence with the remedy.
+[[nodiscard]] std::string_view describe(CertifyOutcome outcome) noexcept;
+
+struct CertifyReport {
+    CertifyOutcome outcome = CertifyOutcome::proved;
+    std::vector<CertificateLevel> levels{};  ///< that were finished
+    std::vector<Estimate> estimates{};       ///< of these, and of the one that was not
+    std::vector<double> counterexample{};    ///< if refuted
+    double seconds = 0;                      ///< of everything, searches and estimates included
+};
+
+/// A model with its certificate, which has the levels that were finished; none: empty. The
+/// threshold is the proved one.
+struct CertifiedModel {
+    Model model;
+    CertifyReport report;
+
+    [[nodiscard]] bool proved() const noexcept
+    {
+        return report.outcome == CertifyOutcome::proved ||
+               report.outcome == CertifyOutcome::partly_proved;
+    }
+};
+
+/// Proves what the options ask for. The same model, problem and options give the same record, but
+/// for its times, however many threads run and however often it was stopped and resumed; a
+/// search is cut short by `limit`, which depends on the speed of the machine.
+///
+/// @throws std::invalid_argument if an option is outside its range, if the recipe of the model is
+///         not `state`, as `NetworkBounds`, or if the slack is found broken, with both states.
+/// @throws std::runtime_error if the checkpoint cannot be written or read, or belongs to another
+///         model or other options.
+[[nodiscard]] CertifiedModel certify(const Model& model, const GuardProblem& problem,
+                                     const CertifyOptions& options,
+                                     const CertifyCallback& progress = {});
+
+/// What the proof of one statement over the domain of the model will take.
+/// @throws as `certify`
+[[nodiscard]] Estimate estimate(const Model& model, const GuardProblem& problem, double margin,
+                                double threshold, const CertifyOptions& options);
+
+/// A state with a low logit where the guard is within the margin.
+struct LowestLogit {
+    double logit = std::numeric_limits<double>::infinity();  ///< inf: no such state was found
+    std::vector<double> x{};
+};
+
+/// Looks for the lowest logit among states with guard <= margin: half of `states` at random in the
+/// domain, the others by random steps from the best of them that shrink.
+[[nodiscard]] LowestLogit lowest_logit(const Model& model, const GuardProblem& problem,
+                                       double margin, std::size_t states, std::uint64_t seed);
+
+/// The problem of a system and a model of it.
+/// @param like  any state, for its size
+/// @throws std::invalid_argument naming what the model is for and what the system is: name,
+///         parameters, number of components; or if the recipe of the model is not `state`.
+template <class System, class X>
+[[nodiscard]] GuardProblem guard_problem(System system, const Model& model, const X& like);
+
+namespace detail {
+
+/// @throws std::invalid_argument
+void check_certifiable(const Model& model, std::string_view system, std::size_t components);
+void check_parameter(const std::string& name, double trained, std::optional<double> value);
+
+}  // namespace detail
+
+template <class System, class X>
+GuardProblem guard_problem(System system, const Model& model, const X& like)
+{
+    static_assert(
+        SlackedGuard<System, X>,
+        "ricochet: to certify a network the system must declare guard_slack(half_widths)");
+    const auto n = static_cast<std::size_t>(like.size());
+    if constexpr (requires { std::string_view(system.name); }) {
+        detail::check_certifiable(model, system.name, n);
+    } else {
+        detail::check_certifiable(model, {}, n);
+    }
+    for (const auto& [name, trained] : model.parameters) {
+        std::optional<double> value;
+        if constexpr (requires { system.parameter(std::string_view()); }) {
+            value = system.parameter(std::string_view(name));
+        }
+        detail::check_parameter(name, trained, value);
+    }
+    const auto state = [like, n](const double* from) {
+        X x = like;
+        for (std::size_t i = 0; i < n; ++i) x[i] = from[i];
+        return x;
+    };
+    return {
+        .guard =
+            [system, state](const double* x) {
+                return ricochet::detail::call_guard(system, 0, 0, 0.0, state(x));
+            },
+        .slack = [system, state](const double* h) { return double(system.guard_slack(state(h))); }};
+}
+
+}  // namespace ricochet::learn

@@ -1,0 +1,85 @@
+// What has been proved of a model, as it is kept in its file, and how it is used.
+//
+// A certificate says, for every state in a box and for each of its levels:
+//
+//     logit < threshold  implies  guard > margin,
+//
+// but for the boxes that a level lists as unproved. It is made by `learn/certify.hpp`. It is
+// void as soon as anything that it speaks of has changed: weights, threshold,
+// normalisation, domain, recipe, system or parameters, of which it carries a fingerprint. The
+// fingerprint guards against accidents, not against forgery.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/nn/classifier.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet {
+
+/// One statement of a certificate.
+struct CertificateLevel {
+    double margin = 0;                              ///< in units of the guard
+    double threshold = 0;                           ///< of the logit
+    std::uint64_t boxes = 0;                        ///< examined
+    double seconds = 0;                             ///< that it took
+    std::vector<std::vector<Interval>> unproved{};  ///< boxes, to be asked exactly
+};
+
+struct Certificate {
+    std::string tool;         ///< "ricochet 0.1.0"
+    std::string fingerprint;  ///< of the model
+    std::string system;
+    std::map<std::string, double> parameters;  ///< of the system
+    std::vector<Interval> box;                 ///< of raw features
+    /// Margins rise, thresholds do not; the first threshold is that of the model.
+    std::vector<CertificateLevel> levels;
+};
+
+/// Of all that a certificate depends on, 16 hexadecimal digits (FNV-1a, 64 bits).
+[[nodiscard]] std::string fingerprint(const Model& model);
+
+/// As it is stored in a model, one line of JSON; numbers keep their bits.
+[[nodiscard]] std::string to_text(const Certificate& certificate);
+
+/// @throws std::invalid_argument in one sentence if the text is no certificate.
+[[nodiscard]] Certificate parse_certificate(std::string_view text);
+
+/// Why the certificate of `model` does not hold for it, in words that follow "the certificate";
+/// empty if it holds.
+/// @throws std::invalid_argument as `parse_certificate`.
+[[nodiscard]] std::string why_void(const Model& model);
+
+/// A model whose certificate holds.
+///
+/// Immutable, so threads may share it; evaluation allocates nothing.
+class CertifiedClassifier {
+public:
+    /// @throws std::invalid_argument if the model has no certificate, or one that is void or
+    /// cannot be read; as `Classifier`.
+    explicit CertifiedClassifier(Model model);
+
+    [[nodiscard]] const Classifier& classifier() const noexcept { return classifier_; }
+    [[nodiscard]] const Certificate& certificate() const noexcept { return certificate_; }
+
+    /// Whether the guard is proved to be above the first margin at these features. Never outside
+    /// the box, nor in an unproved box, nor for NaN.
+    [[nodiscard]] bool clears(const double* features) const noexcept;
+
+    /// The largest margin that the guard is proved to be above; -inf if there is none.
+    [[nodiscard]] double lower_bound(const double* features) const noexcept;
+
+private:
+    [[nodiscard]] bool holds(const CertificateLevel& level, double logit,
+                             const double* features) const noexcept;
+
+    Certificate certificate_;
+    Classifier classifier_;
+};
+
+}  // namespace ricochet
