@@ -1,6 +1,7 @@
 // A ball in a closed cavern whose wall is a polygon of many segments.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -91,7 +92,7 @@ public:
     template <class X>
     void flow(double t, const X& x, X& dxdt) const noexcept
     {
-        const double resistance = p_.drag * std::hypot(x[2], x[3]);
+        const double resistance = p_.drag * speed(x);
         dxdt[0] = x[2];
         dxdt[1] = x[3];
         dxdt[2] = p_.gravity * std::sin(p_.turn * t) - resistance * x[2];
@@ -123,13 +124,13 @@ public:
     template <class X>
     [[nodiscard]] double speed_bound(double /*t*/, const X& x) const noexcept
     {
-        return std::hypot(x[2], x[3]);
+        return speed(x);
     }
 
     template <class X>
     [[nodiscard]] double acceleration_bound(double /*t*/, const X& x) const noexcept
     {
-        const double fastest = std::max(top_speed_, std::hypot(x[2], x[3]));
+        const double fastest = std::max(top_speed_, speed(x));
         return p_.gravity + p_.drag * fastest * fastest;
     }
 
@@ -146,6 +147,12 @@ public:
 
 private:
     struct Rock;
+
+    template <class X>
+    [[nodiscard]] static double speed(const X& x) noexcept
+    {
+        return std::sqrt(x[2] * x[2] + x[3] * x[3]);
+    }
 
     Cavern(const Parameters& parameters, std::shared_ptr<const Rock> rock);
 

@@ -20,7 +20,8 @@ namespace ricochet {
 /// w_1 ... w_n [rad/s]). The base is at the origin, all links are equally long.
 ///
 ///     flow    q_i' = w_i,
-///             w_i' = drive_i sin(f_i t + p_i) - spring_i sin(q_i - m_i) - damping w_i
+///             w_i' = drive_i sin(f_i t + p_i) - spring_i 2 y / (1 + y²) - damping w_i,  y = q_i -
+///             m_i
 ///     guard   least distance between the links and the obstacles, less the clearance; falling
 ///     reset   w⁺ = -restitution w⁻,  where the fastest joint then turns slower than
 ///             `least_rate`, all rates are enlarged until it does not
@@ -88,7 +89,8 @@ public:
                                       double w) const noexcept
     {
         const Joint& j = joints_[joint];
-        return j.drive * std::sin(j.frequency * t + j.phase) - j.spring * std::sin(q - j.middle) -
+        const double y = q - j.middle;
+        return j.drive * std::sin(j.frequency * t + j.phase) - j.spring * 2 * y / (1 + y * y) -
                p_.damping * w;
     }
 

@@ -96,7 +96,7 @@ public:
     template <class X>
     [[nodiscard]] double speed_bound(std::size_t which, double /*t*/, const X& x) const noexcept
     {
-        return std::hypot(x[2], x[3]) + (*zones_)[which].turning;
+        return std::sqrt(x[2] * x[2] + x[3] * x[3]) + (*zones_)[which].turning;
     }
 
     /// |v'| <= w1 times the largest speed that the energies allow; a tenth of a millionth more
