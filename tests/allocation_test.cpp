@@ -16,6 +16,11 @@
 #include "ricochet/locate/toms748.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
+#include "ricochet/systems/cave_body.hpp"
+#include "ricochet/systems/cavern.hpp"
+#include "ricochet/systems/least_eigenvalue.hpp"
+#include "ricochet/systems/planar_arm.hpp"
+#include "ricochet/systems/zones.hpp"
 
 namespace {
 std::atomic<long> allocations = 0;
@@ -114,6 +119,36 @@ TEST(Allocation, NoneInTheLoopWithAPlan)
     EXPECT_EQ(allocations - before, 0);
     EXPECT_EQ(run.statistics.events, 13u);
     EXPECT_GT(run.statistics.rollbacks, 0u);
+}
+
+/// Heap allocations of a guard, its rate and its bound, at a place that is new to them.
+template <class System>
+long allocations_of_guard(const System& system, typename System::State x)
+{
+    typename System::State dxdt{};
+    system.flow(0, x, dxdt);
+    x[0] += 1e-3;
+    const long before = allocations;
+    double sum = system.guard(0, x) + system.guard_rate(0, x, dxdt);
+    if constexpr (requires { system.lower_bound(0, x); }) sum += system.lower_bound(0, x);
+    EXPECT_FALSE(std::isnan(sum));
+    return allocations - before;
+}
+
+TEST(Allocation, DearGuardsNeedNone)
+{
+    const Cavern cavern({.segments = 100});
+    EXPECT_EQ(allocations_of_guard(cavern, cavern.start()), 0);
+    const LeastEigenvalue eigenvalue;
+    EXPECT_EQ(allocations_of_guard(eigenvalue, eigenvalue.start()), 0);
+    const PlanarArm<4> arm;
+    EXPECT_EQ(allocations_of_guard(arm, arm.start()), 0);
+    const CaveBody body({.cave_refinements = 1, .body_refinements = 1, .grid = 8});
+    EXPECT_EQ(allocations_of_guard(body, CaveBody::start()), 0);
+    const Zones zones;
+    const long before = allocations;
+    EXPECT_FALSE(std::isnan(zones.guard(3, 0.5, zones.start())));
+    EXPECT_EQ(allocations, before);
 }
 
 }  // namespace

@@ -194,6 +194,21 @@ TEST_F(App, AccumulatingImpactsNameTheGuardThatEndsTheRun)
     EXPECT_EQ(run["ended_by"], "wall");
 }
 
+TEST_F(App, ScenesWithDearGuardsMeetThem)
+{
+    for (const char* scene : {"cavern", "zones", "eigenvalue", "arm"}) {
+        SCOPED_TRACE(scene);
+        const nlohmann::json run = json({"simulate", scene, "--json"});
+        EXPECT_EQ(run["outcome"], "reached_end");
+        EXPECT_GT(run["events"].size(), 0U);
+    }
+    const nlohmann::json skimming = json(
+        {"simulate", "cavern", "--json", "--step", "0.001", "--set", "segments=200", "kick=0.5"});
+    EXPECT_GT(skimming["events"].size(), 20U);
+    expect_refused({"simulate", "cavern", "--set", "segments=5"}, {"segments", "[8", "5"});
+    expect_refused({"simulate", "cavern", "--set", "radius=50"}, {"does not fit"});
+}
+
 TEST_F(App, SystemsWithoutNetworksRefuseThem)
 {
     expect_refused({"simulate", "pendulum", "--detector", "network"},
