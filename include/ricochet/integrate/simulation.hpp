@@ -28,8 +28,10 @@
 #include "ricochet/integrate/event_search.hpp"
 #include "ricochet/integrate/explicit_step.hpp"
 #include "ricochet/integrate/guard_bank.hpp"
+#include "ricochet/integrate/initial_step.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/planner.hpp"
+#include "ricochet/integrate/reset_set.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/integrate/step_control.hpp"
@@ -108,11 +110,11 @@ public:
           bank_(system, backward_),
           search_(x0, bank_.size()),
           planner_(make_planner(x0)),
-          after_(x0)
+          resets_(x0)
     {
         h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
         if constexpr (error_controlled) {
-            if (options_.step == 0) h_next_ = initial_step();
+            if (options_.step == 0) h_next_ = detail::initial_step(step_, options_);
             h_next_ = std::min(h_next_, options_.h_max);
         }
         refuse_bad_modes();
@@ -579,36 +581,6 @@ private:
         return std::max(options_.h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
     }
 
-    /// A first step at which an Euler step and the change of the flow over it stay
-    /// well inside the tolerance (Hairer, Norsett and Wanner I, section II.4).
-    [[nodiscard]] double initial_step()
-    {
-        constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
-        const X& x = step_.x0();
-        const X& dxdt = step_.rate0();
-        const auto scale = [&](auto i) { return options_.atol + options_.rtol * std::fabs(x[i]); };
-        double size = 0;
-        double speed = 0;
-        detail::for_each_component(x, [&](auto i) {
-            size = std::max(size, std::fabs(x[i]) / scale(i));
-            speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
-        });
-        const double span = std::fabs(options_.t_end - options_.t_start);
-        const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : 1e-6 * span;
-        X moved = x;
-        X rate = dxdt;
-        detail::move(moved, x, euler, dxdt);
-        step_.flow(euler, moved, rate);
-        double bend = 0;
-        detail::for_each_component(
-            x, [&](auto i) { bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i)); });
-        const double fastest = std::max(speed, bend / euler);
-        const double h = fastest <= 1e-15 ? std::max(1e-6 * span, euler * 1e-3)
-                                          : std::pow(0.01 / fastest, 1.0 / order);
-        const double first = std::min(std::min(100 * euler, h), options_.h_max);
-        return std::isfinite(first) && first > 0 ? first : 1e-6 * span;
-    }
-
     /// A mode-less system at rest stays as it is, until a time event or the end.
     void hold(double remaining)
     {
@@ -757,91 +729,22 @@ private:
                std::fabs(t - record.last) <= resolution_.window(t);
     }
 
-    /// Computes what the resets of the members, all from the state before, make of it:
-    /// `after_`, `mode_after_`, or a conflict.
+    /// Computes what the resets of the members make of the state before.
     void transform(bool on_time)
     {
-        const X& before = search_.before();
-        const Mode mode = step_.mode();
         const double t = on_time ? time_event_ : time_of_set();
-        detail::assign(after_, before);
-        mode_after_ = mode;
-        conflict_ = {no_guard, no_guard};
-        if constexpr (detail::ResetsTogether<System, X>) {
-            std::size_t resetting = 0;
-            for (const std::size_t i : search_.members()) resetting += bank_[i].info.resets;
-            if (resetting > 0) {
-                mode_after_ = detail::call_reset_set(
-                    *system_, FiredGuards(search_.members().span(), on_time), mode, t, after_);
-                return;
-            }
-        } else if constexpr (resets) {
-            if (search_.members().size() == 1 && !on_time) {
-                const std::size_t i = search_.members()[0];
-                if (bank_[i].info.resets) {
-                    mode_after_ = detail::call_reset(*system_, i, mode, t, after_);
-                }
-                return;
-            }
-            mode_writer_ = no_guard;
-            writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
-            for (const std::size_t i : search_.members()) {
-                if (!bank_[i].info.resets) continue;
-                detail::assign(single_, before);
-                merge(i, detail::call_reset(*system_, i, mode, t, single_));
-            }
-        }
-        if constexpr (timed) {
-            if (on_time) {
-                if (search_.members().empty()) {
-                    mode_after_ = detail::call_time_reset(*system_, mode, t, after_);
-                } else {
-                    detail::assign(single_, before);
-                    merge(time_writer, detail::call_time_reset(*system_, mode, t, single_));
-                }
-            }
-        }
-    }
-
-    /// Adds to `after_` what one reset has made of the state before, in `single_`.
-    void merge(std::size_t writer, Mode mode)
-    {
-        const X& before = search_.before();
-        const auto claim = [&](std::size_t& owner, bool same) {
-            if (owner != no_guard && !same) conflict_ = {owner, writer};
-            owner = writer;
-        };
-        if (mode != step_.mode()) {
-            claim(mode_writer_, mode == mode_after_);
-            mode_after_ = mode;
-        }
-        if (single_.size() != before.size() || after_.size() != before.size()) {
-            conflict_ = {writers_.empty() ? writer : writers_[0], writer};
-            return;
-        }
-        detail::for_each_component(before, [&](auto c) {
-            if (single_[c] == before[c]) return;
-            claim(writers_[static_cast<std::size_t>(c)], single_[c] == after_[c]);
-            after_[c] = single_[c];
-        });
+        resets_.apply(*system_, bank_, search_.members().span(), on_time, step_.mode(), t,
+                      search_.before());
     }
 
     /// Whether the event leaves everything as it was, so that the step can stand.
     [[nodiscard]] bool changes_nothing()
     {
-        if (mode_after_ != step_.mode() || conflict_.first != no_guard) return false;
+        if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
         for (const std::size_t i : search_.members()) {
             if (bank_[i].info.unilateral || ends_run(i)) return false;
         }
-        return same(after_, search_.before());
-    }
-
-    [[nodiscard]] static bool same(const X& a, const X& b)
-    {
-        if (a.size() != b.size()) return false;
-        bool equal = true;
-        detail::for_each_component(a, [&](auto c) { equal = equal && a[c] == b[c]; });
-        return equal;
+        return detail::same_state(resets_.after(), search_.before());
     }
 
     /// Whether this event of the guard, not yet counted, ends the run.
@@ -907,7 +810,7 @@ private:
         bool on_time = false;  ///< with a time event
     };
 
-    /// The members fire: `search_.before()` becomes `after_`. Leaves who is flipped by
+    /// The members fire: `search_.before()` becomes `resets_.after()`. Leaves who is flipped by
     /// it as the new members.
     void fire(const Firing& how)
     {
@@ -920,7 +823,7 @@ private:
             step_.restart(s, remainder, search_.before(), step_.mode());
             return;
         }
-        step_.restart(s, remainder, after_, mode_after_);
+        step_.restart(s, remainder, resets_.after(), resets_.mode());
         if (how.on_time) step_.hold(t);
         if (stops_) return end(Outcome::stopped_by_event, first_member());
         if constexpr (guarded) {
@@ -938,12 +841,12 @@ private:
     [[nodiscard]] bool goes_on()
     {
         const std::size_t modes = mode_count_of(*system_);
-        if (conflict_.first != no_guard) {
-            run_.other_guard = conflict_.second;
-            end(Outcome::conflicting_resets, conflict_.first);
-        } else if (modes > 0 && mode_after_ >= modes) {
+        if (resets_.conflict().first != no_guard) {
+            run_.other_guard = resets_.conflict().second;
+            end(Outcome::conflicting_resets, resets_.conflict().first);
+        } else if (modes > 0 && resets_.mode() >= modes) {
             end(Outcome::unknown_mode, first_member());
-        } else if (!detail::all_finite(after_) || after_.size() == 0) {
+        } else if (!detail::all_finite(resets_.after()) || resets_.after().size() == 0) {
             end(Outcome::non_finite, first_member());
         }
         return !ended_;
@@ -1089,12 +992,14 @@ private:
         if (bank_[i].info.boolean) return side_of(bank_.g0(i));
         // The second derivative has the sign of the rate a little later.
         const double delta = 1e-6 * h_next_;
-        detail::assign(after_, step_.x0());
-        detail::assign(single_, step_.x0());
-        detail::move(after_, step_.x0(), delta, step_.rate0());
-        step_.flow(delta, after_, single_);
-        const Side side = side_of(
-            bank_.view(i, step_.mode(), calls()).rate(step_.time(delta), after_, single_, h_next_));
+        X& later = resets_.after();
+        X& rate_later = resets_.scratch();
+        detail::assign(later, step_.x0());
+        detail::assign(rate_later, step_.x0());
+        detail::move(later, step_.x0(), delta, step_.rate0());
+        step_.flow(delta, later, rate_later);
+        const Side side = side_of(bank_.view(i, step_.mode(), calls())
+                                      .rate(step_.time(delta), later, rate_later, h_next_));
         bank_.set_rate0(i, detail::sign_of(side) * std::numeric_limits<double>::min());
         return side;
     }
@@ -1134,7 +1039,8 @@ private:
     /// A unilateral guard on its surface that its reset does not turn back.
     [[nodiscard]] std::size_t stuck_member()
     {
-        if (mode_after_ != step_.mode() || !same(after_, step_.x0())) return no_guard;
+        if (resets_.mode() != step_.mode() || !detail::same_state(resets_.after(), step_.x0()))
+            return no_guard;
         for (const std::size_t i : search_.members()) {
             if (bank_[i].info.unilateral) return i;
         }
@@ -1212,9 +1118,9 @@ private:
                 .kind = EventKind::time,
                 .guard = no_guard,
                 .mode_before = step_.mode(),
-                .mode_after = mode_after_,
+                .mode_after = resets_.mode(),
                 .before = search_.before(),
-                .after = after_,
+                .after = resets_.after(),
                 .bracket = {t, t},
                 .slope = 0});
     }
@@ -1229,9 +1135,9 @@ private:
         record({.t = t,
                 .guard = i,
                 .mode_before = step_.mode(),
-                .mode_after = mode_after_,
+                .mode_after = resets_.mode(),
                 .before = search_.before(),
-                .after = after_,
+                .after = resets_.after(),
                 .bracket = {step_.time(where.lo), step_.time(where.hi)},
                 .slope = where.slope,
                 .error = where.error,
@@ -1345,7 +1251,6 @@ private:
     }
 
     static constexpr int most_levels = 100;
-    static constexpr std::size_t time_writer = static_cast<std::size_t>(-2);
     static constexpr ErrorRule rule_{};
 
     const System* system_;
@@ -1368,13 +1273,8 @@ private:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
-    X after_;
-    X single_ = after_;
-    Mode mode_after_ = 0;
+    detail::ResetSet<System, X> resets_;
     Mode mode_before_ = 0;
-    std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
-    std::vector<std::size_t> writers_;
-    std::size_t mode_writer_ = no_guard;
     std::size_t next_sample_ = 0;
     detail::StepStart<X> place_;
     Run<X> run_;
