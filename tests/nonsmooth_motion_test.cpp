@@ -435,8 +435,9 @@ TEST(Energy, GrowthPerStepWithFrictionIsBoundedAndVanishesWithTheStep)
     const double fine = largest_growth(0.1, FirstStage::averaged);
     RecordProperty("growth_at_the_natural_step", std::to_string(natural));
     RecordProperty("growth_at_a_tenth", std::to_string(fine));
-    EXPECT_LT(fine, 1.1);
-    EXPECT_LT(natural, 3);
+    // Up to 1.07 was found over many starts; a tenth of the step shows none beyond rounding.
+    EXPECT_LT(natural, 1.07);
+    EXPECT_LT(fine, 1 + 1e-6);
 }
 
 TEST(Energy, MotionStaysBoundedFarAboveTheNaturalStep)

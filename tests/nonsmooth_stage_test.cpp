@@ -2,14 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/IterativeLinearSolvers>
 #include <Eigen/Sparse>
 
 #include <random>
 
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/nonsmooth/sparse_direction.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
+#include "ricochet/systems/super_twisting.hpp"
 
 namespace ricochet {
 namespace {
@@ -401,6 +402,27 @@ TEST(Stops, KeepTheStateInsideAndPushOnlyInwards)
         // The step that meets the stop half uses its reaction: a step times the drive.
         EXPECT_LT(worst, 3e-3);
     }
+}
+
+// --- a relay two integrations away ---
+
+TEST(SuperTwistingMotion, ReachesZeroInFiniteTimeAndStays)
+{
+    const double step = 1e-3;
+    SetValuedMotion<SuperTwisting> motion(
+        SuperTwisting(), {1, 0.5},
+        {.t_end = 10, .step = step, .scheme = {.scheme = Scheme::backward_euler}});
+    double late = 0;
+    EXPECT_EQ(motion.run([&](const auto& state) {
+        if (state.t > 6) late = std::max(late, std::abs(state.w[0]));
+    }),
+              SetValuedOutcome::reached_end)
+        << motion.state().t << " " << motion.failure().residual;
+    // Implicitly discretised there is no chattering: x1 is zero to rounding, x2 = 0 with it,
+    // and the reaction is minus the rate of the disturbance.
+    EXPECT_LT(late, 1e-12);
+    EXPECT_NEAR(motion.state().w[1], 0, 1e-9);
+    EXPECT_NEAR(motion.state().reaction[0], -std::cos(10.0), 1e-6);
 }
 
 }  // namespace

@@ -149,8 +149,8 @@ public:
     using Action = Eigen::Matrix<double, N, M, N == 1 && M != 1 ? Eigen::RowMajor : Eigen::ColMajor>;
     using Delassus = Eigen::Matrix<double, M, M>;
 
-    /// @throws std::invalid_argument for a singular or non-finite A. In a debug build
-    /// also where the projection of the set at the start is none.
+    /// @throws std::invalid_argument for a singular or non-finite A, or E or G that are not
+    /// finite.
     explicit InclusionMatrices(const System& system) : system_(system)
     {
         const Eigen::Index n = size();

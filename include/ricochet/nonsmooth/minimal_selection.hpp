@@ -63,9 +63,6 @@ template <Inclusion System>
         detail::refuse_inclusion("the set must have the dimension of the reaction, not",
                                  static_cast<double>(set.dimension()));
     }
-#ifndef NDEBUG
-    check_projection(set);
-#endif
     StateOf<System> f = w;
     m.smooth(t, w, f);
     if (!f.allFinite()) detail::refuse_inclusion("f is not finite at the start");

@@ -3,14 +3,13 @@
 // The problem knows its own linear algebra: `residual(x, F)` writes F(x), and
 // `direction(x, F, d)` solves V d = -F for an element V of the generalised Jacobian at
 // x, dense, sparse or by products alone, and returns false if it cannot. `dense_direction`
-// and `sparse_direction` do so from a matrix.
+// does so from a matrix, as does `sparse_direction` of a header of its own.
 //
 // (L. Qi and J. Sun, A nonsmooth version of Newton's method, Mathematical Programming 58,
 // 1993.)
 #pragma once
 
 #include <Eigen/Dense>
-#include <Eigen/SparseLU>
 
 #include <cmath>
 #include <concepts>
@@ -95,17 +94,6 @@ template <class Matrix, class Vector>
     lu.compute(v);
     d = -lu.solve(f);
     return d.allFinite();
-}
-
-template <class Vector>
-[[nodiscard]] bool sparse_direction(const Eigen::SparseMatrix<double>& v,
-                                    Eigen::SparseLU<Eigen::SparseMatrix<double>>& lu,
-                                    const Vector& f, Vector& d)
-{
-    lu.compute(v);
-    if (lu.info() != Eigen::Success) return false;
-    d = -lu.solve(f);
-    return lu.info() == Eigen::Success;
 }
 
 }  // namespace ricochet

@@ -78,7 +78,7 @@ public:
     using State = SetValuedState<System>;
     using Branches = detail::BranchesOf<System>;
 
-    /// Starts with the minimal selection.
+    /// Starts with the minimal selection. Debug builds sample the projection of the first set.
     /// @throws std::invalid_argument for options, systems and initial states that cannot be
     /// right.
     SetValuedMotion(const System& system, const Vector& w0, const SetValuedOptions& options)
@@ -106,6 +106,9 @@ public:
         start_branches_.setConstant(now_.reaction.size(), Branch::inside);
         restart(options.t_start, w0);
         before_ = now_;
+#ifndef NDEBUG
+        check_projection(system.reaction_set(options.t_start, w0));
+#endif
     }
 
     /// Goes on from (t, w) as from a start: after a jump, or when an event-driven

@@ -1,0 +1,239 @@
+// Time stepping of mechanical systems with impacts and friction (Moreau and Jean).
+//
+//     M(q) dv = F(t, q, v) dt + H(q)' dp,    q' = v
+//
+// Impacts are not located: a step ends with the velocities that Newton's law of impact
+// and Coulomb's law of friction allow, for all contacts at once, whether one of them has
+// closed within it or a hundred. The order is 1, and positions may go behind their
+// constraints by a step times their velocity; but nothing can accumulate or be missed.
+//
+// A system is a value with
+//
+//     coordinates, contacts      static constexpr int
+//     tangents                   static constexpr int, 1 or 2 per contact
+//     mass(q, M)                 symmetric, positive definite
+//     force(t, q, v, F)
+//     gaps(q, g)                 one per contact; open where positive
+//     directions(q, H)           for each contact the row of its gap's rate, then those of
+//                                its tangential velocities
+//     restitution(c)             Newton's coefficient, in [0, 1]
+//     friction(c)                Coulomb's, zero or positive
+#pragma once
+
+#include <Eigen/Dense>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "ricochet/nonsmooth/contact_problem.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+
+namespace ricochet {
+
+struct TimeSteppingOptions {
+    double t_start = 0;
+    double t_end = std::numeric_limits<double>::quiet_NaN();
+    double step = 0;  ///< [s], positive
+    ContactOptions contacts{};
+};
+
+/// @throws std::invalid_argument naming the option.
+void validate(const TimeSteppingOptions& options);
+
+struct TimeSteppingStatistics {
+    std::uint64_t steps = 0;
+    std::uint64_t problems = 0;    ///< steps with a closed contact
+    std::uint64_t iterations = 0;  ///< of Newton's method in them
+    std::uint64_t sweeps = 0;
+    std::uint64_t unsolved = 0;  ///< steps that were tried again at half the length
+};
+
+/// Moreau's midpoint rule:
+///
+///     q_m = q + h/2 v,   contacts closed: g(q_m) <= 0
+///     v+ = v + M^-1 (h F(t_m, q_m, v) + H' p)
+///     0 <= p_n,  u_n+ + e u_n- >= 0, complementary;  friction on u_t+
+///     q+ = q_m + h/2 v+
+///
+/// (J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988;
+/// M. Jean, The non-smooth contact dynamics method, Computer Methods in Applied
+/// Mechanics and Engineering 177, 1999.)
+///
+/// Memory is allocated where the number of closed contacts changes.
+template <class System>
+class TimeStepping {
+public:
+    static constexpr int N = System::coordinates;
+    static constexpr int C = System::contacts;
+    static constexpr int D = 1 + System::tangents;
+    using Vector = Eigen::Matrix<double, N, 1>;
+    using Square = Eigen::Matrix<double, N, N>;
+    using Gaps = Eigen::Matrix<double, C, 1>;
+    using Directions = Eigen::Matrix<double, C * D, N>;
+    using Impulses = Eigen::Matrix<double, C * D, 1>;
+
+    struct State {
+        double t;
+        Vector q, v;
+        Impulses impulse;  ///< of the last step [N s], normal first; zero where open
+    };
+
+    /// @throws std::invalid_argument for options, a matrix that is not positive definite,
+    /// coefficients out of range, a start inside an obstacle by more than rounding.
+    TimeStepping(const System& system, const Vector& q, const Vector& v,
+                 const TimeSteppingOptions& options)
+        : system_(system), options_(options), solver_(options.contacts)
+    {
+        validate(options);
+        state_ = {options.t_start, q, v, Impulses::Zero()};
+        Gaps gaps;
+        system_.gaps(q, gaps);
+        for (int c = 0; c < C; ++c) {
+            if (!(system_.restitution(c) >= 0 && system_.restitution(c) <= 1)) {
+                detail::refuse_inclusion("restitution must lie in [0, 1], got",
+                                         system_.restitution(c));
+            }
+            if (!(system_.friction(c) >= 0)) {
+                detail::refuse_inclusion("friction must be zero or positive, got",
+                                         system_.friction(c));
+            }
+            if (!(gaps[c] >= -1e-12 * (1 + q.norm()))) {
+                detail::refuse_inclusion("the initial state is inside an obstacle: a gap is",
+                                         gaps[c]);
+            }
+        }
+        if (!v.allFinite()) detail::refuse_inclusion("the initial velocity is not finite");
+        system_.mass(q, mass_);
+        if (Eigen::LLT<Square>(mass_).info() != Eigen::Success) {
+            detail::refuse_inclusion("the mass matrix is not positive definite");
+        }
+        friction_.reserve(C);
+        closed_.reserve(C);
+    }
+
+    [[nodiscard]] const State& state() const noexcept { return state_; }
+    [[nodiscard]] const TimeSteppingStatistics& statistics() const noexcept { return statistics_; }
+    [[nodiscard]] SetValuedOutcome outcome() const noexcept { return outcome_; }
+    /// The contact problem that ended the run as `not_converged`.
+    [[nodiscard]] const ContactReport& failure() const noexcept { return failure_; }
+
+    SetValuedOutcome advance()
+    {
+        if (outcome_ != SetValuedOutcome::running) return outcome_;
+        const double left = options_.t_end - state_.t;
+        double h = options_.step;
+        bool last = left <= h * (1 + 1e-9);
+        if (last) h = left;
+        // Another length is another problem, which may be easier.
+        for (int attempt = 0; !take(h); ++attempt) {
+            if (attempt == 10) return outcome_ = SetValuedOutcome::not_converged;
+            ++statistics_.unsolved;
+            h /= 2;
+            last = false;
+        }
+        ++statistics_.steps;
+        if (last) {
+            state_.t = options_.t_end;
+            outcome_ = SetValuedOutcome::reached_end;
+        }
+        return outcome_;
+    }
+
+    template <class Observer>
+    SetValuedOutcome run(const Observer& observer)
+    {
+        observer(std::as_const(state_));
+        while (advance() == SetValuedOutcome::running) observer(std::as_const(state_));
+        if (outcome_ == SetValuedOutcome::reached_end) observer(std::as_const(state_));
+        return outcome_;
+    }
+    SetValuedOutcome run()
+    {
+        return run([](const State&) {});
+    }
+
+private:
+    bool take(double h)
+    {
+        middle_ = state_.q + (h / 2) * state_.v;
+        system_.mass(middle_, mass_);
+        system_.force(state_.t + h / 2, middle_, state_.v, force_);
+        system_.gaps(middle_, gaps_);
+        factor_.compute(mass_);
+        velocity_ = state_.v + h * factor_.solve(force_);
+        closed_.clear();
+        for (int c = 0; c < C; ++c) {
+            if (gaps_[c] <= 0) closed_.push_back(c);
+        }
+        impulse_.setZero();
+        if (!closed_.empty() && !collide()) return false;
+        if (!velocity_.allFinite() || factor_.info() != Eigen::Success) return false;
+        state_.v = velocity_;
+        state_.q = middle_ + (h / 2) * velocity_;
+        state_.t += h;
+        state_.impulse = impulse_;
+        return true;
+    }
+
+    bool collide()
+    {
+        ++statistics_.problems;
+        system_.directions(middle_, directions_);
+        const auto n = static_cast<Eigen::Index>(closed_.size()) * D;
+        h_.resize(n, N);
+        friction_.clear();
+        for (std::size_t k = 0; k < closed_.size(); ++k) {
+            const int c = closed_[k];
+            h_.middleRows(static_cast<Eigen::Index>(k) * D, D) = directions_.middleRows(c * D, D);
+            friction_.push_back(system_.friction(c));
+        }
+        inverse_ = factor_.solve(h_.transpose());
+        w_.noalias() = h_ * inverse_;
+        q_.noalias() = h_ * velocity_;
+        p_.setZero(n);
+        for (std::size_t k = 0; k < closed_.size(); ++k) {
+            const auto row = static_cast<Eigen::Index>(k) * D;
+            q_[row] += system_.restitution(closed_[k]) * h_.row(row).dot(state_.v);
+            p_.segment(row, D) = state_.impulse.segment(closed_[k] * D, D);
+        }
+        const ContactReport report = solver_.solve(w_, q_, friction_, D, p_);
+        statistics_.iterations += static_cast<std::uint64_t>(report.iterations);
+        statistics_.sweeps += static_cast<std::uint64_t>(report.sweeps);
+        if (!report.converged) {
+            failure_ = report;
+            if (report.contact >= 0)
+                failure_.contact = closed_[static_cast<std::size_t>(report.contact)];
+            return false;
+        }
+        velocity_.noalias() += inverse_ * p_;
+        for (std::size_t k = 0; k < closed_.size(); ++k) {
+            impulse_.segment(closed_[k] * D, D) = p_.segment(static_cast<Eigen::Index>(k) * D, D);
+        }
+        return true;
+    }
+
+    System system_;
+    TimeSteppingOptions options_;
+    ContactSolver solver_;
+    State state_;
+    Vector middle_, force_, velocity_;
+    Square mass_;
+    Eigen::LLT<Square> factor_;
+    Gaps gaps_;
+    Directions directions_;
+    Impulses impulse_;
+    Eigen::Matrix<double, Eigen::Dynamic, N> h_;
+    Eigen::Matrix<double, N, Eigen::Dynamic> inverse_;
+    Eigen::MatrixXd w_;
+    Eigen::VectorXd q_, p_;
+    std::vector<int> closed_;
+    std::vector<double> friction_;
+    TimeSteppingStatistics statistics_;
+    ContactReport failure_;
+    SetValuedOutcome outcome_ = SetValuedOutcome::running;
+};
+
+}  // namespace ricochet

@@ -1,0 +1,183 @@
+// Time stepping with impacts and friction; friction in the plane.
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "ricochet/nonsmooth/time_stepping.hpp"
+#include "ricochet/systems/incline_block.hpp"
+#include "ricochet/systems/two_contact_block.hpp"
+#include "ricochet/systems/woodpecker.hpp"
+
+namespace ricochet {
+namespace {
+
+// --- friction in the plane ---
+
+TEST(InclineBlockMotion, KeepsItsInvariantToOrderTwoWhileItTurns)
+{
+    const InclineBlock block({.slope = 0.3, .friction = 0.2});
+    double drift[2];
+    for (int k = 0; k < 2; ++k) {
+        SetValuedMotion<InclineBlock> motion(block, {-1, 2, 0, 0},
+                                             {.t_end = 0.6, .step = 0.01 / (1 << k)});
+        const double start = block.invariant(motion.state().w);
+        EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        drift[k] = block.invariant(motion.state().w) - start;
+        EXPECT_LT(std::abs(drift[k]), 1e-2 * start);
+    }
+    EXPECT_NEAR(drift[0] / drift[1], 4, 0.4);
+}
+
+TEST(InclineBlockMotion, ComesToRestWhereFrictionHoldsIt)
+{
+    // Straight down: 2 m/s against g (0.5 cos 0.3 - sin 0.3).
+    const InclineBlock block;
+    const double braking = 9.81 * (0.5 * std::cos(0.3) - std::sin(0.3));
+    SetValuedMotion<InclineBlock> motion(block, {2, 0, 0, 0}, {.t_end = 2, .step = 1e-3});
+    EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+    EXPECT_NEAR(motion.state().w[0], 0, 1e-10);
+    EXPECT_NEAR(motion.state().w[1], 0, 1e-10);
+    EXPECT_NEAR(motion.state().w[2], 2 * 2 / (2 * braking), 2e-3);  // a step at 2 m/s
+    // At rest friction is the weight's component along the slope.
+    EXPECT_NEAR(motion.state().reaction[0], -9.81 * std::sin(0.3), 1e-6);
+    EXPECT_NEAR(motion.state().reaction[1], 0, 1e-6);
+}
+
+TEST(InclineBlockMotion, StartsWithTheFrictionOfItsDirection)
+{
+    const InclineBlock block;
+    const InclusionMatrices<InclineBlock> m(block);
+    const double bound = 0.5 * 9.81 * std::cos(0.3);
+    const auto sliding = minimal_selection(m, 0, {3, -4, 0, 0});
+    EXPECT_NEAR(sliding[0], -0.6 * bound, 1e-7);
+    EXPECT_NEAR(sliding[1], 0.8 * bound, 1e-7);
+    const auto resting = minimal_selection(m, 0, {0, 0, 0, 0});
+    EXPECT_NEAR(resting[0], -9.81 * std::sin(0.3), 1e-10);
+    EXPECT_NEAR(resting[1], 0, 1e-10);
+}
+
+// --- impacts ---
+
+struct Ball1d {
+    static constexpr int coordinates = 1;
+    static constexpr int contacts = 1;
+    static constexpr int tangents = 1;
+    using V = Eigen::Matrix<double, 1, 1>;
+    double e = 0.5;
+    static void mass(const V&, V& m) { m << 1; }
+    static void force(double, const V&, const V&, V& f) { f << -9.81; }
+    static void gaps(const V& q, V& g) { g = q; }
+    static void directions(const V&, Eigen::Matrix<double, 2, 1>& h) { h << 1, 0; }
+    [[nodiscard]] double restitution(int) const { return e; }
+    static double friction(int) { return 0; }
+};
+
+TEST(TimeStepping, PassesTheAccumulationOfABouncingBallAndRests)
+{
+    // From 1 m with e = 0.5 the impacts end at sqrt(2 / g) (1 + e) / (1 - e) = 1.3546 s.
+    TimeStepping<Ball1d> motion({}, Ball1d::V(1.0), Ball1d::V(0.0), {.t_end = 2, .step = 1e-3});
+    EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+    EXPECT_EQ(motion.state().t, 2);
+    EXPECT_NEAR(motion.state().v[0], 0, 1e-9);
+    EXPECT_NEAR(motion.state().q[0], 0, 5e-3);
+    EXPECT_NEAR(motion.state().impulse[0], 9.81e-3, 1e-9);  // the weight over a step
+}
+
+TEST(TimeStepping, IsOfOrderOneAcrossAnImpact)
+{
+    // After one bounce, at t = 0.8: thrown up at e sqrt(2 g) at t1 = sqrt(2 / g).
+    const double t1 = std::sqrt(2 / 9.81);
+    const double s = 0.8 - t1;
+    const double exact = 0.5 * std::sqrt(2 * 9.81) * s - 9.81 / 2 * s * s;
+    const auto mean_error = [&](int steps) {
+        double sum = 0;
+        for (int k = 0; k < 20; ++k) {
+            TimeStepping<Ball1d> motion({}, Ball1d::V(1.0), Ball1d::V(0.0),
+                                        {.t_end = 0.8, .step = 0.8 / (steps + 3 * k)});
+            EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+            sum += std::abs(motion.state().q[0] - exact);
+        }
+        return sum / 20;
+    };
+    const double order = std::log2(mean_error(200) / mean_error(3200)) / 4;
+    EXPECT_GT(order, 0.8);
+    EXPECT_LT(order, 1.3);
+}
+
+TEST(TimeStepping, EnergyOfAnElasticBallNeverGrowsAtAnImpact)
+{
+    TimeStepping<Ball1d> motion({.e = 1}, Ball1d::V(1.0), Ball1d::V(0.0),
+                                {.t_end = 5, .step = 1e-3});
+    // The midpoint rule keeps the energy of flight; an impact at depth below the floor
+    // exchanges velocities exactly.
+    EXPECT_EQ(motion.run([](const auto& state) {
+        const double energy = 9.81 * state.q[0] + state.v[0] * state.v[0] / 2;
+        EXPECT_NEAR(energy, 9.81, 0.15) << state.t;
+    }),
+              SetValuedOutcome::reached_end);
+}
+
+TEST(TimeStepping, ABlockOnTwoCornersSlidesToRestAndLeansForward)
+{
+    const TwoContactBlock block;
+    const double stop = 3 / (0.4 * 9.81);
+    const double h = 1e-4;
+    TimeStepping<TwoContactBlock> motion(block, {0, 0, 0}, {3, 0, 0}, {.t_end = 1, .step = h});
+    // The share of the front corner while it slides: 1/2 + 0.4 * 0.25 / (2 * 0.5) = 0.6.
+    const double weight = block.mass_of_block * block.gravity * h;
+    EXPECT_EQ(motion.run([&](const auto& state) {
+        if (state.t < 0.01 || state.t > stop - 0.01) return;
+        EXPECT_NEAR(state.impulse[2], 0.6 * weight, 1e-6 * weight) << state.t;
+        EXPECT_NEAR(state.impulse[0], 0.4 * weight, 1e-6 * weight) << state.t;
+        EXPECT_NEAR(state.impulse[3], -0.4 * 0.6 * weight, 1e-6 * weight);
+    }),
+              SetValuedOutcome::reached_end);
+    EXPECT_NEAR(motion.state().q[0], 3 * 3 / (2 * 0.4 * 9.81), 3 * h);
+    EXPECT_NEAR(motion.state().v.norm(), 0, 1e-9);
+    // A corner that rounding has opened falls for one step: g h^2.
+    EXPECT_NEAR(motion.state().q[2], 0, 2 * 9.81 * h * h);
+}
+
+TEST(TimeStepping, TheWoodpeckerClimbsDownInACycle)
+{
+    const Woodpecker toy;
+    TimeStepping<Woodpecker> motion(toy, Woodpecker::start(), Woodpecker::start_velocity(),
+                                    {.t_end = 2, .step = 2e-5});
+    std::vector<double> beak;     // times of the beak's impacts
+    std::vector<double> heights;  // there
+    EXPECT_EQ(motion.run([&](const auto& state) {
+        if (state.impulse[0] > 0 && (beak.empty() || state.t - beak.back() > 0.02)) {
+            beak.push_back(state.t);
+            heights.push_back(state.q[0]);
+        }
+    }),
+              SetValuedOutcome::reached_end);
+    ASSERT_GT(beak.size(), 8U);
+    // The last cycles are alike, and each brings it down.
+    const std::size_t n = beak.size();
+    const double period = beak[n - 1] - beak[n - 2];
+    RecordProperty("period", std::to_string(period));
+    EXPECT_NEAR(beak[n - 2] - beak[n - 3], period, 2e-3);
+    EXPECT_GT(period, 0.12);
+    EXPECT_LT(period, 0.17);
+    EXPECT_LT(heights[n - 1], heights[n - 2] - 1e-3);
+}
+
+TEST(TimeStepping, RefusesAStartInsideAnObstacleAndWrongCoefficients)
+{
+    const auto start = [](double height, double e) {
+        return [=] {
+            TimeStepping<Ball1d>({.e = e}, Ball1d::V(height), Ball1d::V(0.0),
+                                 {.t_end = 1, .step = 0.1});
+        };
+    };
+    EXPECT_NO_THROW(start(0, 1)());
+    EXPECT_THROW(start(-0.1, 1)(), std::invalid_argument);
+    EXPECT_THROW(start(1, 1.1)(), std::invalid_argument);
+    EXPECT_THROW((TimeStepping<Ball1d>({}, Ball1d::V(1.0), Ball1d::V(0.0), {.t_end = 1})),
+                 std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ricochet
