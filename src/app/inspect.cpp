@@ -15,6 +15,7 @@
 #include "model_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
+#include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/classifier.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
@@ -132,6 +133,46 @@ std::string numbers(const std::vector<double>& values)
     return fmt::format("({})", fmt::join(values, ", "));
 }
 
+/// Why the certificate does not hold; empty if it does.
+std::string objection(const Model& model)
+{
+    try {
+        return why_void(model);
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+}
+
+/// One line for the certificate and one for each of its levels.
+std::vector<std::string> certificate_lines(const Model& model)
+{
+    if (model.certificate.empty()) return {"none"};
+    if (const std::string why = objection(model); !why.empty()) {
+        constexpr std::size_t most = 200;  // it may be long, and it may be anything
+        return {fmt::format("void: it {}", printable(why)),
+                printable(model.certificate.substr(0, most))};
+    }
+    const Certificate certificate = parse_certificate(model.certificate);
+    std::vector<std::string> out{fmt::format("holds, by {}, of {}", printable(certificate.tool),
+                                             printable(certificate.fingerprint))};
+    for (const CertificateLevel& level : certificate.levels) {
+        out.push_back(fmt::format(
+            "guard > {} where the logit is below {}; {} boxes in {}, {} unproved", level.margin,
+            level.threshold, level.boxes, duration(level.seconds), level.unproved.size()));
+    }
+    return out;
+}
+
+Json certificate_json(const Model& model)
+{
+    if (model.certificate.empty()) return {};
+    const std::string why = objection(model);
+    Json out{{"holds", why.empty()}, {"why_void", why.empty() ? Json() : Json(why)}};
+    out["record"] = Json::parse(model.certificate, nullptr, false);
+    if (out["record"].is_discarded()) out["record"] = model.certificate;
+    return out;
+}
+
 std::string to_text(const Inspection& found)
 {
     const Model& model = found.model;
@@ -175,7 +216,10 @@ std::string to_text(const Inspection& found)
     line("self-test",
          fmt::format("reproduced: {} gives {}, recorded {}", numbers(model.self_test.input),
                      numbers(found.outputs), numbers(model.self_test.output)));
-    line("certificate", model.certificate.empty() ? "none" : printable(model.certificate));
+    const std::vector<std::string> certificate = certificate_lines(model);
+    for (std::size_t k = 0; k < certificate.size(); ++k) {
+        line(k == 0 ? "certificate" : "", certificate[k]);
+    }
     line("cost",
          fmt::format("{} an inference (spread {}), {} kernels", duration(found.inference.median),
                      spread(found.inference), name(best_instruction_set())));
@@ -220,7 +264,7 @@ std::string to_json(const Inspection& found)
                         {"input", model.self_test.input},
                         {"recorded", model.self_test.output},
                         {"output", found.outputs}}},
-                      {"certificate", model.certificate.empty() ? Json() : Json(model.certificate)},
+                      {"certificate", certificate_json(model)},
                       {"cost",
                        {{"nanoseconds",
                          {{"median", cost.median * 1e9},

@@ -15,6 +15,7 @@
 
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/run.hpp"
+#include "ricochet/learn/certify.hpp"
 #include "ricochet/learn/classifier.hpp"
 #include "settings.hpp"
 
@@ -131,6 +132,10 @@ struct SystemEntry {
     double comparison_step = 0;  ///< [s] of the fixed steps in a comparison
 
     std::optional<Training> training{};
+
+    /// What a certificate of a model has to prove; null where nothing bounds the guard.
+    /// @throws std::invalid_argument if the model does not fit
+    learn::GuardProblem (*guard_problem)(const Model& model) = nullptr;
 };
 
 [[nodiscard]] const std::vector<SystemEntry>& systems();

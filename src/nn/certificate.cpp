@@ -43,7 +43,7 @@ private:
 
 [[noreturn]] void refuse(const std::string& what)
 {
-    throw std::invalid_argument("the certificate cannot be read: " + what);
+    throw std::invalid_argument("cannot be read: " + what);
 }
 
 Json json(const std::vector<Interval>& box)

@@ -86,6 +86,14 @@ learn::Trained train(const TrainingRequest& request, const learn::ProgressCallba
     return learn::train_bouncing_ball(kind, training, progress);
 }
 
+/// The height is a component of the state; no parameter has a part in it.
+learn::GuardProblem guard_problem(const Model& model)
+{
+    learn::detail::check_certifiable(model, "bouncing-ball", 2);
+    return {.guard = [](const double* x) { return x[0]; },
+            .slack = [](const double* half_widths) { return half_widths[0]; }};
+}
+
 }  // namespace
 
 SystemEntry bouncing_ball_entry()
@@ -138,6 +146,7 @@ SystemEntry bouncing_ball_entry()
                                 .other_name = "dimensionless",
                                 .meaning = "for every gravity, restitution, height and step"}},
                      .train = train},
+        .guard_problem = guard_problem,
     };
 }
 

@@ -1,0 +1,229 @@
+#include "certify.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <stdexcept>
+#include <system_error>
+
+#include "files.hpp"
+#include "input.hpp"
+#include "interrupt.hpp"
+#include "json_text.hpp"
+#include "model_lookup.hpp"
+#include "registry.hpp"
+#include "report.hpp"
+#include "ricochet/learn/certify.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "timing.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text(const learn::Estimate& e)
+{
+    return fmt::format("about {:.2g} boxes and {}", e.boxes, duration(e.seconds));
+}
+
+/// The estimate of each level, then a bar on a terminal; elsewhere a line every tenth.
+class Bar {
+public:
+    void show(const learn::CertifyProgress& now)
+    {
+        if (now.boxes == 0) {
+            clear();
+            fmt::print(stderr, "certifying level {} of {}, guard > {} below {:.6g}: {}\n",
+                       now.level + 1, now.levels, now.margin, now.threshold, text(now.estimate));
+            tenth_ = 0;
+            return;
+        }
+        const auto percent = static_cast<int>(100 * now.share);
+        const std::string figures =
+            fmt::format("{:>3} %  {} boxes  {:.0f} boxes/s  {} left", percent, now.boxes, now.rate,
+                        duration(now.seconds_left));
+        if (terminal_) {
+            const auto full = static_cast<std::size_t>(percent / 5);
+            fmt::print(stderr, "\r[{}{}] {}\x1b[K", std::string(full, '#'),
+                       std::string(20 - full, '.'), figures);
+            std::fflush(stderr);
+            drawn_ = true;
+        } else if (percent / 10 != tenth_) {
+            tenth_ = percent / 10;
+            fmt::print(stderr, "certifying: {}\n", figures);
+        }
+    }
+
+    /// The line is free again for something else.
+    void clear()
+    {
+        if (drawn_) fmt::print(stderr, "\n");
+        drawn_ = false;
+    }
+
+private:
+    bool terminal_ = isatty(STDERR_FILENO) == 1;
+    bool drawn_ = false;
+    int tenth_ = 0;
+};
+
+learn::CertifyOptions options_of(const CertifyRequest& request)
+{
+    learn::CertifyOptions o;
+    o.margin = request.margin.value_or(o.margin);
+    o.levels = request.levels.value_or(o.levels);
+    o.ratio = request.ratio.value_or(o.ratio);
+    o.search = !request.keep_threshold;
+    o.smallest = request.smallest.value_or(o.smallest);
+    o.max_unproved = request.max_unproved.value_or(o.max_unproved);
+    o.limit = request.limit.value_or(o.limit);
+    o.time_limit = request.time_limit.value_or(o.time_limit);
+    o.threads = static_cast<unsigned>(request.threads.value_or(o.threads));
+    o.resume = request.resume;
+    return o;
+}
+
+learn::GuardProblem problem_of(const Model& model, const fs::path& file)
+{
+    const auto refuse = [&](const std::string& why) -> BadInput {
+        return BadInput(fmt::format("model '{}' {}", file.string(), why));
+    };
+    std::vector<std::string_view> known;
+    for (const SystemEntry& system : systems()) {
+        if (system.guard_problem != nullptr && system.name == model.system) {
+            return system.guard_problem(model);
+        }
+        if (system.guard_problem != nullptr) known.push_back(system.name);
+    }
+    throw refuse(
+        fmt::format("is for the system '{}'; those that bound how much their guard can "
+                    "change are {}",
+                    model.system, fmt::join(known, ", ")));
+}
+
+std::string to_text(const learn::CertifyReport& report)
+{
+    std::string out;
+    for (const CertificateLevel& level : report.levels) {
+        out += fmt::format("guard > {} where the logit is below {}: {} boxes in {}, {} unproved\n",
+                           level.margin, level.threshold, level.boxes, duration(level.seconds),
+                           level.unproved.size());
+    }
+    if (!report.counterexample.empty()) {
+        out += fmt::format("counterexample: ({})\n", fmt::join(report.counterexample, ", "));
+    }
+    return out + fmt::format("{}\n", learn::describe(report.outcome));
+}
+
+std::string_view name(learn::CertifyOutcome outcome)
+{
+    switch (outcome) {
+        case learn::CertifyOutcome::proved: return "proved";
+        case learn::CertifyOutcome::partly_proved: return "partly_proved";
+        case learn::CertifyOutcome::refuted: return "refuted";
+        case learn::CertifyOutcome::not_provable: return "not_provable";
+        case learn::CertifyOutcome::too_long: return "too_long";
+        case learn::CertifyOutcome::out_of_time: return "out_of_time";
+        case learn::CertifyOutcome::out_of_memory: return "out_of_memory";
+        case learn::CertifyOutcome::interrupted: return "interrupted";
+    }
+    return "";
+}
+
+std::string to_json(const learn::CertifyReport& report, const fs::path& out, bool written)
+{
+    Json levels = Json::array();
+    for (const CertificateLevel& level : report.levels) {
+        levels.push_back({{"margin", level.margin},
+                          {"threshold", level.threshold},
+                          {"boxes", level.boxes},
+                          {"seconds", level.seconds},
+                          {"unproved", level.unproved.size()}});
+    }
+    Json estimates = Json::array();
+    for (const learn::Estimate& e : report.estimates) {
+        estimates.push_back({{"boxes", e.boxes}, {"seconds", e.seconds}});
+    }
+    return json_text(
+        {{"outcome", name(report.outcome)},
+         {"levels", levels},
+         {"estimates", estimates},
+         {"counterexample", report.counterexample.empty() ? Json() : Json(report.counterexample)},
+         {"seconds", report.seconds},
+         {"model", written ? Json(out.string()) : Json()}});
+}
+
+bool stopped(learn::CertifyOutcome outcome)
+{
+    return outcome == learn::CertifyOutcome::interrupted ||
+           outcome == learn::CertifyOutcome::out_of_time ||
+           outcome == learn::CertifyOutcome::out_of_memory;
+}
+
+/// @throws BadInput if the checkpoint to resume is not there or of another proof.
+learn::CertifiedModel run(const Model& model, const learn::GuardProblem& problem,
+                          const learn::CertifyOptions& options,
+                          const learn::CertifyCallback& progress)
+{
+    bool started = false;
+    try {
+        return learn::certify(model, problem, options, [&](const learn::CertifyProgress& now) {
+            started = true;
+            return progress(now);
+        });
+    } catch (const std::runtime_error& error) {
+        if (options.resume && !started) throw BadInput(error.what());
+        throw;
+    }
+}
+
+}  // namespace
+
+int certify(const CertifyRequest& request)
+{
+    const fs::path file = find_model(request.model);
+    const Model model = load_model(file);
+    const learn::GuardProblem problem = problem_of(model, file);
+    const fs::path out = request.out.empty() ? file : request.out;
+    check_writable("--out", out);
+    learn::CertifyOptions options = options_of(request);
+    options.checkpoint =
+        request.checkpoint.empty() ? fs::path(file.string() + ".checkpoint") : request.checkpoint;
+    check_writable("--checkpoint", options.checkpoint);
+
+    Bar bar;
+    const Interrupts watch;
+    const learn::CertifiedModel certified =
+        run(model, problem, options, [&](const learn::CertifyProgress& now) {
+            bar.show(now);
+            return !Interrupts::any();
+        });
+    bar.clear();
+
+    const learn::CertifyReport& report = certified.report;
+    const bool goes_on = stopped(report.outcome);
+    if (!goes_on && request.checkpoint.empty()) {
+        std::error_code ignored;
+        fs::remove(options.checkpoint, ignored);
+    }
+    if (report.outcome == learn::CertifyOutcome::too_long && report.levels.empty()) {
+        throw BadInput(fmt::format("the proof takes {}, above the limit of {}; --limit raises it",
+                                   text(report.estimates.back()), duration(options.limit)));
+    }
+    // A checkpoint speaks of the model as it was: while one is left the file is not touched.
+    const bool write = !report.levels.empty() && !(goes_on && out == file);
+    if (write) save_model(certified.model, out);
+    print(request.json ? to_json(report, out, write) : to_text(report));
+    if (write) fmt::print(stderr, "ricochet: the model is in '{}'\n", out.string());
+    if (goes_on) {
+        fmt::print(stderr, "ricochet: the same command with --resume goes on from '{}'\n",
+                   options.checkpoint.string());
+    }
+    return certified.proved() ? 0 : 1;
+}
+
+}  // namespace ricochet::app

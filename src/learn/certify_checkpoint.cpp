@@ -1,0 +1,174 @@
+#include "certify_checkpoint.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+
+namespace ricochet::learn {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json(const std::vector<std::vector<Interval>>& boxes)
+{
+    Json out = Json::array();
+    for (const auto& box : boxes) {
+        Json one = Json::array();
+        for (const Interval& range : box) one.push_back({range.lower, range.upper});
+        out.push_back(one);
+    }
+    return out;
+}
+
+std::vector<std::vector<Interval>> boxes_of(const Json& from)
+{
+    std::vector<std::vector<Interval>> out;
+    for (const Json& box : from) {
+        out.emplace_back();
+        for (const Json& range : box) {
+            out.back().push_back({range.at(0).get<double>(), range.at(1).get<double>()});
+        }
+    }
+    return out;
+}
+
+Json json(const Estimate& e)
+{
+    return Json::array({e.boxes, e.seconds, e.unproved, e.error});
+}
+
+Estimate estimate_of(const Json& from)
+{
+    return {.boxes = from.at(0).get<double>(),
+            .seconds = from.at(1).get<double>(),
+            .unproved = from.at(2).get<double>(),
+            .error = from.at(3).get<double>()};
+}
+
+Json json(const Attempt& a)
+{
+    return Json::array({a.number, a.highest, a.spread, a.closest});
+}
+
+Attempt attempt_of(const Json& from)
+{
+    return {.number = from.at(0).get<int>(),
+            .highest = from.at(1).get<double>(),
+            .spread = from.at(2).get<double>(),
+            .closest = from.at(3).get<double>()};
+}
+
+/// Parts with a counterexample are left out, to be found again.
+Json json(const Begun& begun)
+{
+    Json done = Json::array();
+    for (std::size_t i = 0; i < begun.done.size(); ++i) {
+        if (!begun.done[i] || !begun.done[i]->counterexample.empty()) continue;
+        const Tally& tally = *begun.done[i];
+        done.push_back(
+            Json::array({i, tally.boxes, tally.unproved.empty() ? Json() : Json(tally.lowest),
+                         json(tally.unproved)}));
+    }
+    return {{"threshold", begun.threshold},     {"lowering", begun.lowering},
+            {"estimate", json(begun.estimate)}, {"seconds", begun.seconds},
+            {"parts", begun.done.size()},       {"done", done}};
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& file, std::string_view what)
+{
+    throw std::runtime_error(fmt::format("checkpoint '{}' {}", file.string(), what));
+}
+
+constexpr std::string_view checkpoint_format = "ricochet certification 1";
+
+Begun begun_of(const Json& from)
+{
+    Begun out{.threshold = from.at("threshold").get<double>(),
+              .lowering = from.at("lowering").get<double>(),
+              .estimate = estimate_of(from.at("estimate")),
+              .seconds = from.at("seconds").get<double>()};
+    out.done.resize(std::min<std::size_t>(from.at("parts").get<std::size_t>(), 2 * frontier_boxes));
+    for (const Json& part : from.at("done")) {
+        Tally tally;
+        tally.boxes = part.at(1).get<std::uint64_t>();
+        tally.unproved = boxes_of(part.at(3));
+        constexpr double inf = std::numeric_limits<double>::infinity();
+        if (!tally.unproved.empty()) {  // JSON has no infinity: without a bound it is null
+            tally.lowest = part.at(2).is_null() ? -inf : part.at(2).get<double>();
+        }
+        out.done.at(part.at(0).get<std::size_t>()) = std::move(tally);
+    }
+    return out;
+}
+
+}  // namespace
+
+void save(const Progressed& all, const std::string& key, const std::filesystem::path& file)
+{
+    Json levels = Json::array();
+    for (const CertificateLevel& level : all.levels) {
+        levels.push_back({{"margin", level.margin},
+                          {"threshold", level.threshold},
+                          {"boxes", level.boxes},
+                          {"seconds", level.seconds},
+                          {"unproved", json(level.unproved)}});
+    }
+    Json estimates = Json::array();
+    for (const Estimate& e : all.estimates) estimates.push_back(json(e));
+    const Json out{{"format", checkpoint_format},
+                   {"key", key},
+                   {"levels", levels},
+                   {"estimates", estimates},
+                   {"attempt", all.attempt ? json(*all.attempt) : Json()},
+                   {"current", all.current ? json(*all.current) : Json()}};
+    const std::filesystem::path fresh = file.string() + ".part";
+    {
+        std::ofstream stream(fresh, std::ios::binary | std::ios::trunc);
+        stream << out.dump() << '\n';
+        stream.close();
+        if (!stream) refuse(file, "cannot be written");
+    }
+    std::error_code error;
+    std::filesystem::rename(fresh, file, error);
+    if (error) refuse(file, "cannot be written: " + error.message());
+}
+
+Progressed load(const std::string& key, const std::filesystem::path& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    if (!in) refuse(file, "cannot be read");
+    try {
+        const Json from = Json::parse(in);
+        if (from.at("format") != checkpoint_format) {
+            refuse(file, "is not a certification of this version");
+        }
+        if (from.at("key") != key) {
+            refuse(file, "belongs to another model, another guard or other options");
+        }
+        Progressed out;
+        for (const Json& level : from.at("levels")) {
+            out.levels.push_back({.margin = level.at("margin").get<double>(),
+                                  .threshold = level.at("threshold").get<double>(),
+                                  .boxes = level.at("boxes").get<std::uint64_t>(),
+                                  .seconds = level.at("seconds").get<double>(),
+                                  .unproved = boxes_of(level.at("unproved"))});
+        }
+        for (const Json& e : from.at("estimates")) out.estimates.push_back(estimate_of(e));
+        if (!from.at("attempt").is_null()) out.attempt = attempt_of(from.at("attempt"));
+        if (!from.at("current").is_null()) out.current = begun_of(from.at("current"));
+        return out;
+    } catch (const Json::exception&) {
+        refuse(file, "is cut short or has been altered");
+    } catch (const std::out_of_range&) {
+        refuse(file, "is cut short or has been altered");
+    }
+}
+
+}  // namespace ricochet::learn
