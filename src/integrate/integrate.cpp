@@ -33,6 +33,12 @@ void throw_unknown_mode(std::size_t mode, std::size_t modes)
         "integrate: mode must be below the system's mode_count = {}, got {}", modes, mode));
 }
 
+void throw_forward_only()
+{
+    throw std::invalid_argument(
+        "integrate: t_end lies before t_start, and the system runs forward in time only");
+}
+
 void throw_no_previous_time_event()
 {
     throw std::invalid_argument(

@@ -90,8 +90,13 @@ struct Extremum {
         if (side == Side::plateau) return Finding::clear(Evidence::checked);
 
         const detail::GuardCubic cubic(sign, watch.start, watch.end);
-        const bool left = has_left(side, watch.end.value) && !touches_at_end(cubic, watch.touch);
+        const bool on_surface = std::fabs(cubic.v1) <= watch.touch;
+        const bool returns = on_surface && turns_back(probe, watch, cubic);
+        const bool left = has_left(side, watch.end.value) && !returns;
         const bool known = std::isfinite(cubic.r0) && std::isfinite(cubic.r1);
+        if (returns && cubic.r0 < 0 && cubic.r1 == 0 && counts(side, probe.guard().crossing())) {
+            return Finding::touching(side, watch.end);
+        }
         if (left) {
             watch.side_after = opposite(side);
             if (known && cubic.v0 + cubic.r0 / 3 < 0 && cubic.v1 - cubic.r1 / 3 > 0) {
@@ -107,13 +112,21 @@ struct Extremum {
     }
 
 private:
-    /// The end is on the surface, and the guard is about to turn back there: whether it
-    /// crosses or touches will be seen in the next step.
-    [[nodiscard]] static bool touches_at_end(const detail::GuardCubic& cubic, double touch) noexcept
+    /// Whether a guard that is on its surface at the end is about to turn back there. What
+    /// it does a little beyond the step says so, unless that is within a declared band,
+    /// where its cubic has to; a guard that stays where it is has arrived. If it is still
+    /// falling, the next step will see where it turns.
+    template <class Probe>
+    [[nodiscard, gnu::noinline]] static bool turns_back(Probe& probe, const Watch& watch,
+                                                        const detail::GuardCubic& cubic)
     {
-        if (!(std::fabs(cubic.v1) <= touch)) return false;
+        const double sign = watch.side == Side::above ? 1 : -1;
+        const double little = (watch.end.s - watch.start.s) / 64;
+        const double beyond = sign * probe.value(watch.end.s + little).value;
+        if (std::fabs(beyond) > watch.touch) return beyond > 0;
+        if (beyond == cubic.v1) return false;
         const double curvature = 6 * (cubic.v0 - cubic.v1) + 2 * cubic.r0 + 4 * cubic.r1;
-        return curvature > 0 && cubic.v1 - cubic.r1 * cubic.r1 / (2 * curvature) >= -touch;
+        return curvature > 0 && cubic.v1 - cubic.r1 * cubic.r1 / (2 * curvature) >= -watch.touch;
     }
 
     /// The guard has left its side at the end, but its cubic says that it may have left
@@ -144,6 +157,9 @@ private:
     {
         GuardSample lo = watch.start;
         GuardSample hi = watch.end;
+        if (cubic.r0 == 0 && std::fabs(cubic.v0) <= watch.touch) {
+            return Finding::clear(Evidence::checked);  // the step before has seen it turn
+        }
         if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {
             // No turn between the ends; a dip in a slope, if anything.
             if (cubic.v0 + cubic.r0 / 3 > 0 && cubic.v1 - cubic.r1 / 3 > 0) {

@@ -99,6 +99,7 @@ class Filippov : public detail::FilippovState<Fields> {
     using Surfaces = detail::Surfaces;
 
 public:
+    static constexpr bool forward_only = true;  ///< runs backward in time are refused
     static constexpr std::size_t surface_count = Fields::surface_count;
     static constexpr std::size_t guards_per_surface = 4;
     static constexpr std::size_t guard_count = guards_per_surface * surface_count;

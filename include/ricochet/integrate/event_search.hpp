@@ -40,12 +40,14 @@ public:
         return absolute_ + relative_ * std::fabs(t);
     }
 
-    /// Events no further apart [s] happen together.
-    [[nodiscard]] double window(double t) const noexcept
+    /// Events no further apart [s] cannot be told apart.
+    [[nodiscard]] double blur(double t) const noexcept
     {
-        const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
-        return std::max(std::max(tolerance(t), window_), ulps);
+        return std::max(tolerance(t), 4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
     }
+
+    /// Events no further apart [s] happen together.
+    [[nodiscard]] double window(double t) const noexcept { return std::max(blur(t), window_); }
 
 private:
     double absolute_, relative_, window_;
@@ -197,6 +199,23 @@ public:
         }
     }
 
+    /// A guard that leaves its plateau in the step, away from the side on which it is
+    /// awaited, is armed on that side from there on.
+    void end_plateau(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
+    {
+        const Side awaited = bank[i].awaited;
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        double on = 0;
+        double off = step.h();
+        while (off - on > finest_bracket(off, step.h())) {
+            const double middle = on + (off - on) / 2;
+            if (!(middle > on && middle < off)) break;
+            (side_of(probe.value(middle).value) == opposite(awaited) ? off : on) = middle;
+        }
+        bank.go_on_from(i, awaited, away(awaited, on));
+    }
+
     /// The value and rate of a guard where the set happens.
     [[nodiscard]] GuardSample sample_at_set(const CurrentStep& step, Bank& bank, std::size_t i,
                                             std::uint64_t& calls)
@@ -219,7 +238,7 @@ public:
     {
         // The rounding of a step of length s moves an event by a few ulp(s).
         const double rounding = 64 * std::numeric_limits<double>::epsilon() * sample.s;
-        const double reach = std::max(resolution.window(step.time(sample.s)), rounding);
+        const double reach = std::max(resolution.blur(step.time(sample.s)), rounding);
         // A guard that acts must be located in the set; one that only notifies may be as far
         // from its surface as the rounding of its largest values.
         const double band = bank[i].acting ? 0 : bank.touch(i);
@@ -256,7 +275,7 @@ public:
     std::uint64_t disabled = 0;
 
 private:
-    static constexpr int most_rounds = 1000;
+    static constexpr int most_rounds = 1'000'000;
     static constexpr bool has_predicate =
         requires(const System& system, std::size_t i, double t, const X& x)
     {
@@ -299,7 +318,7 @@ private:
             return true;
         }
         if (is_plateau(probe, watch)) {
-            record.next = Side::plateau;
+            record.next = record.awaited = Side::plateau;
             return true;
         }
         return false;

@@ -59,9 +59,10 @@ struct GuardRecord {
     bool enabled = true;
     bool newly_enabled = false;
     bool fired = false;
-    bool rested = false;  ///< its events have accumulated
-    bool acting = false;  ///< resets, or may end the run; else a notification
-    bool asleep = false;  ///< its check is put off: nothing in the bank is of this step
+    bool rested = false;           ///< its events have accumulated
+    Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
+    bool acting = false;           ///< resets, or may end the run; else a notification
+    bool asleep = false;           ///< its check is put off: nothing in the bank is of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     double band = 0;            ///< |g| where it fired: it counts as being on its surface
@@ -145,6 +146,7 @@ public:
     /// Whether any guard deserves a look.
     [[nodiscard]] bool suspicious(double h) const noexcept
     {
+        if (waiting_ && leaves_plateau()) return true;
         if (bands_) [[unlikely]]
             return suspicious_with_bands(h);
         double any = 0;  // a double, so that the loop is vectorised
@@ -167,7 +169,8 @@ public:
     [[nodiscard]] std::size_t first_nan(double h) const noexcept
     {
         for (std::size_t i = 0; i < size(); ++i) {
-            if (suspicious(i, h) && std::isnan(g1_[i])) return i;
+            const bool idle = !records_[i].enabled || records_[i].asleep;
+            if (!idle && std::isnan(g1_[i]) && (sign_[i] == 0 || suspicious(i, h))) return i;
         }
         return no_guard;
     }
@@ -315,6 +318,8 @@ public:
     }
 
     [[nodiscard]] double g0(std::size_t i) const noexcept { return g0_[i]; }
+    /// The largest |g| that was looked at for its size; 0 if none was.
+    [[nodiscard]] double size_of(std::size_t i) const noexcept { return sizes_[i]; }
     [[nodiscard]] double rate0(std::size_t i) const noexcept { return rate0_[i]; }
     void set_rate0(std::size_t i, double rate) noexcept { rate0_[i] = rate; }
 
@@ -333,12 +338,43 @@ public:
             visit(record.events);
             visit(record.last);
             visit(record.last_side);
+            visit(record.band);
+            visit(record.rested);
+            visit(record.awaited);
             if constexpr (puts_off) visit(record.asleep);
             record.intervals.visit(visit);
         }
+        visit(waiting_);
+    }
+
+    /// Guard i is on a plateau; if it leaves that away from `side`, it has its event.
+    void await(std::size_t i, Side side) noexcept
+    {
+        records_[i].awaited = side;
+        waiting_ = true;
+    }
+    void await_nobody() noexcept { waiting_ = false; }
+    [[nodiscard]] bool waiting() const noexcept { return waiting_; }
+
+    /// Whether guard i, on a plateau, has its event in the step, or is no number at its end.
+    [[nodiscard]] bool leaves_plateau(std::size_t i) const noexcept
+    {
+        const GuardRecord& record = records_[i];
+        if (record.side != Side::plateau || !record.enabled || record.asleep) return false;
+        if (std::isnan(g1_[i])) return true;
+        return record.awaited != Side::plateau && side_of(g1_[i]) == opposite(record.awaited) &&
+               counts(record.awaited, record.info.crossing);
     }
 
 private:
+    [[gnu::noinline]] bool leaves_plateau() const noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (leaves_plateau(i)) return true;
+        }
+        return false;
+    }
+
     using Doubles = PerGuard<double, fixed>;
 
     [[gnu::noinline]] bool suspicious_with_bands(double h) const noexcept
@@ -412,7 +448,8 @@ private:
     const System* system_;
     bool backward_;
     std::size_t count_;
-    bool bands_ = false;  ///< whether any guard declares one
+    bool waiting_ = false;  ///< whether any guard may be on a plateau
+    bool bands_ = false;    ///< whether any guard declares one
     Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{}, sizes_{};
     X there_{};
     PerGuard<GuardRecord, fixed> records_{};

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/instant.hpp"
 
 namespace ricochet::detail {
@@ -16,10 +17,11 @@ namespace ricochet::detail {
 /// remainder that is worth resolving.
 class ShrinkingIntervals {
 public:
-    /// Takes note of an event at `t`; true after a hundred in a row that time cannot
-    /// tell apart.
-    [[nodiscard]] bool stalls(const Instant& t) noexcept
+    /// Takes note of an event at `t`, where a step would be of length `step` [s]; true
+    /// after a hundred in a row that time cannot tell apart.
+    [[nodiscard]] bool stalls(const Instant& t, double step) noexcept
     {
+        step_ = step;
         const double interval =
             std::fabs((t.value - last_.value) + (t.remainder - last_.remainder));
         stalled_ = interval < std::max(resolution(), std::numeric_limits<double>::min()) / 4
@@ -32,7 +34,9 @@ public:
             return false;
         }
         shrinking_ = seen_ >= 2 && interval < interval_ ? shrinking_ + 1 : 0;
-        ratio_ = shrinking_ > 0 ? interval / interval_ : 1;
+        const double ratio = shrinking_ > 0 ? interval / interval_ : 1;
+        geometric_ = interval + 4 * resolution() >= interval_ * ratio_ / 16;
+        ratio_ = ratio;
         last_ = t;
         interval_ = interval;
         seen_ = std::min(seen_ + 1, 2u);
@@ -40,10 +44,11 @@ public:
     }
 
     /// Whether what is left after the event just noted is below `tolerance` [s] or
-    /// the resolution of its time.
+    /// the resolution of its time. An interval that is far shorter than the ones before
+    /// made expect is the gap between two events, not the end of a series.
     [[nodiscard]] bool accumulate(double tolerance) const noexcept
     {
-        return shrinking_ >= 3 && remainder() < std::max(tolerance, resolution());
+        return shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution());
     }
 
     /// Extrapolated time [s] from the last event to the limit of all.
@@ -60,17 +65,21 @@ public:
         visit(seen_);
         visit(shrinking_);
         visit(stalled_);
+        visit(step_);
+        visit(geometric_);
     }
 
 private:
     [[nodiscard]] double resolution() const noexcept
     {
-        return 16 * std::numeric_limits<double>::epsilon() * std::fabs(last_.value);
+        return 16 * finest_bracket(last_.value, step_);
     }
 
     Instant last_;
     double interval_ = 0;
     double ratio_ = 1;
+    double step_ = 0;
+    bool geometric_ = true;
     std::uint32_t seen_ = 0;
     std::uint32_t shrinking_ = 0;
     std::uint32_t stalled_ = 0;

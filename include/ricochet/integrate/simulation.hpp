@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <stdexcept>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -31,7 +32,7 @@
 #include "ricochet/integrate/initial_step.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/planner.hpp"
-#include "ricochet/integrate/reset_set.hpp"
+#include "ricochet/integrate/merged_resets.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/integrate/step_control.hpp"
@@ -55,6 +56,8 @@ namespace detail {
 [[noreturn]] void throw_start_guard_not_finite(std::size_t which, double t, double guard);
 /// @throws std::invalid_argument: the start mode is none of the system's.
 [[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
+/// @throws std::invalid_argument: a run backward in time of a system that has none.
+[[noreturn]] void throw_forward_only();
 /// @throws std::invalid_argument: no previous_time_event for a run backward in time.
 [[noreturn]] void throw_no_previous_time_event();
 
@@ -119,6 +122,9 @@ public:
         }
         refuse_bad_modes();
         if constexpr (guarded) refuse_bad_guards();
+        if constexpr (requires { requires System::forward_only; }) {
+            if (backward_) detail::throw_forward_only();
+        }
         if constexpr (timed) {
             if (backward_ && !requires_previous()) detail::throw_no_previous_time_event();
             find_time_event();
@@ -133,9 +139,18 @@ public:
     Simulation(System&&, const X&, const Options&, const Stepping& = {}, const Detector& = {},
                const Locator& = {}) = delete;
 
-    [[nodiscard]] double t() const noexcept { return step_.start().value; }  ///< [s]
-    [[nodiscard]] const X& x() const noexcept { return step_.x0(); }
-    [[nodiscard]] Mode mode() const noexcept { return step_.mode(); }
+    [[nodiscard]] double t() const noexcept  ///< [s]
+    {
+        return showing_sample_ ? run_.trajectory.t[shown_samples_ - 1] : step_.start().value;
+    }
+    [[nodiscard]] const X& x() const noexcept
+    {
+        return showing_sample_ ? run_.trajectory.x[shown_samples_ - 1] : step_.x0();
+    }
+    [[nodiscard]] Mode mode() const noexcept
+    {
+        return showing_sample_ ? sample_mode_ : step_.mode();
+    }
     [[nodiscard]] bool ended() const noexcept { return ended_; }
     /// What has been computed so far; its time and state are brought up to date by
     /// `finish`.
@@ -145,21 +160,30 @@ public:
     /// that puts off checks does not look ahead here, since every step is final.
     bool step()
     {
+        show_all();
         if (!ended_) advance_one({.look_ahead = false});
         return !ended_;
     }
 
-    /// Takes steps until one of them holds an event or a sample time. False: the run has
-    /// ended.
+    /// Goes on to the next sample time, or to the end of the next step that holds events;
+    /// `t`, `x` and `mode` are those there, after the events. False: the run has ended, and
+    /// nothing has happened in it that was not shown.
     bool advance()
     {
-        const std::uint64_t events = run_.statistics.events;
-        const std::size_t samples = next_sample_;
-        while (!ended_ &&
-               (is_tentative() || (run_.statistics.events == events && next_sample_ == samples))) {
-            advance_one({.to_next_sample = true});
+        for (;;) {
+            showing_sample_ = shown_samples_ < run_.trajectory.t.size();
+            if (showing_sample_) {
+                ++shown_samples_;
+                return true;
+            }
+            if (std::exchange(shown_events_, run_.statistics.events) != run_.statistics.events) {
+                return true;
+            }
+            if (ended_) return false;
+            do {
+                advance_one({.to_next_sample = true});
+            } while (!ended_ && is_tentative());
         }
-        return !ended_;
     }
 
     /// Goes on to the end, and calls `observe(event)` for every event recorded on the
@@ -170,6 +194,7 @@ public:
     {
         constexpr bool watches_steps = requires { observe(std::as_const(*this)); };
         std::size_t seen = run_.events.size();
+        show_all();
         while (!ended_) {
             advance_one({.look_ahead = !watches_steps});
             if constexpr (requires { observe(run_.events[0]); }) {
@@ -179,6 +204,7 @@ public:
                 observe(std::as_const(*this));
             }
         }
+        show_all();
     }
 
     /// Goes on to the end and hands over all that was computed.
@@ -212,18 +238,35 @@ public:
         return snapshot;
     }
 
-    /// @throws std::invalid_argument if the snapshot is of another kind of simulation.
+    /// @throws std::invalid_argument if the snapshot is of another kind of simulation, or
+    /// no state of one; then nothing has changed.
     void restore(const Snapshot& snapshot)
     {
-        detail::SnapshotReader reader(snapshot);
-        visit_state(reader);
-        reader.finish();
+        const Snapshot old = save();
+        try {
+            detail::SnapshotReader reader(snapshot);
+            visit_state(reader);
+            reader.finish();
+            refuse_bad_place();
+        } catch (const std::invalid_argument&) {
+            visit_state(detail::SnapshotReader(old));
+            throw;
+        }
         step_.restart(place_);
+        show_all();
         if constexpr (guarded) search_.begin(step_.x0());
         if constexpr (puts_off) planner_.restore(bank_);
     }
 
 private:
+    /// `advance` shows only what happens from here on.
+    void show_all() noexcept
+    {
+        shown_samples_ = run_.trajectory.t.size();
+        shown_events_ = run_.statistics.events;
+        showing_sample_ = false;
+    }
+
     // --- set-up ---
 
     static const Options& checked(const Options& options, const X& x0)
@@ -238,6 +281,19 @@ private:
             }
         });
         return options;
+    }
+
+    void refuse_bad_place() const
+    {
+        const std::size_t modes = mode_count_of(*system_);
+        const bool sizes = place_.x.size() > 0 && place_.remainder.size() == place_.x.size() &&
+                           place_.rate.size() == place_.x.size();
+        const bool finite = std::isfinite(place_.t.value) && std::isfinite(h_next_) &&
+                            h_next_ > 0 && (ended_ || detail::all_finite(place_.x));
+        if (!sizes || !finite || (modes > 0 && place_.mode >= modes) ||
+            lies_before(options_.t_end, place_.t.value)) {
+            detail::throw_snapshot_does_not_fit();
+        }
     }
 
     [[nodiscard]] Planner make_planner([[maybe_unused]] const X& x0) const
@@ -287,15 +343,36 @@ private:
             if (!std::isfinite(g)) {
                 detail::throw_start_guard_not_finite(i, options_.t_start, g);
             }
-            if (record.info.unilateral && g < 0) {
+            const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && is_rounding(i, g));
+            if (record.info.unilateral && g < 0 && !on_surface) {
                 detail::throw_start_outside_mode(i, options_.t_start, g);
             }
-            bank_.arm(i, g != 0 ? side_of(g) : heading(i));
-            if (record.info.unilateral && record.side != Side::above) {
+            bank_.arm(i, on_surface ? heading(i) : side_of(g));
+            if (record.side == Side::plateau) {
+                bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
+            }
+            if (record.info.unilateral && record.side == Side::below) {
                 search_.members().push_back(i);
             }
         }
         cascade();
+    }
+
+    /// Whether the value of a guard at the start is no more than what rounding of the state
+    /// makes of a zero: 8 units in the last place of each component.
+    [[nodiscard]] bool is_rounding(std::size_t i, double g)
+    {
+        constexpr double nudge = 1e-8;
+        const auto guard = bank_.view(i, step_.mode(), calls());
+        X near = step_.x0();
+        double sensitivity = 0;
+        detail::for_each_component(near, [&](auto c) {
+            const double kept = near[c];
+            near[c] = kept * (1 + nudge);
+            sensitivity += std::fabs(guard.value(options_.t_start, near) - g) / nudge;
+            near[c] = kept;
+        });
+        return std::fabs(g) <= 8 * std::numeric_limits<double>::epsilon() * sensitivity;
     }
 
     // --- steps ---
@@ -594,7 +671,6 @@ private:
         step_.hold(until);
         if constexpr (timed) {
             if (time_event_due_) {
-                resting_ = false;
                 step_.refresh();
                 return apply_time_event();
             }
@@ -631,6 +707,8 @@ private:
         search_.members().clear();
         detail::assign(search_.before(), step_.x0());
         transform(true);
+        resting_ = resting_ && resets_.mode() == step_.mode() &&
+                   detail::same_state(resets_.after(), step_.x0());
         fire({.located = false, .on_time = true});
         if (!ended_) find_time_event();
         if constexpr (guarded) cascade();
@@ -673,6 +751,7 @@ private:
         }
         search_.begin(step_.x0());
         bank_.begin_search();
+        if (bank_.waiting()) end_plateaus();
         while (search_.find_set(step_, bank_, detector_, locator_, resolution_, time_event_due_,
                                 calls())) {
             if (predicts && (cleared || search_.late())) ++run_.statistics.missed_events;
@@ -697,6 +776,22 @@ private:
         }
         bank_.pass_on_after_events();
         return ended_;
+    }
+
+    [[gnu::noinline]] void end_plateaus()
+    {
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            if (bank_.leaves_plateau(i)) search_.end_plateau(step_, bank_, i, calls());
+        }
+    }
+
+    /// Whether guard i counts at the start of the step; it is about to fire there.
+    [[nodiscard]] bool counts_here(std::size_t i)
+    {
+        const bool enabled =
+            detail::call_enabled_at(*system_, i, step_.mode(), step_.time(0), step_.x0());
+        run_.statistics.disabled += !enabled;
+        return enabled;
     }
 
     /// Members whose crossing is no event go on without one: those that `enabled`
@@ -827,7 +922,7 @@ private:
         if (how.on_time) step_.hold(t);
         if (stops_) return end(Outcome::stopped_by_event, first_member());
         if constexpr (guarded) {
-            if (accumulates()) return;
+            if (resting_ || accumulates()) return;
             arm_all();
         }
     }
@@ -859,7 +954,7 @@ private:
         bool rested = false;
         for (const std::size_t i : search_.members()) {
             detail::GuardRecord& record = bank_[i];
-            const bool stalls = record.intervals.stalls(step_.start());
+            const bool stalls = record.intervals.stalls(step_.start(), h_next_);
             const double tolerance = resolution_.tolerance(step_.start().value);
             const bool resetting = resets && record.info.resets;
             if (stalls || (resetting && record.intervals.accumulate(tolerance))) {
@@ -878,6 +973,9 @@ private:
             if (resting_ || ended_) return;
             const X before = step_.x0();
             const Mode mode = step_.mode();
+            const double error = ahead;
+            ahead = std::min(ahead, step_.until(options_.t_end));
+            if constexpr (timed) ahead = std::min(ahead, step_.until(time_event_));
             const double t = step_.time(ahead);
             X after = before;
             const Mode mode_after = detail::call_rest(*system_, i, mode, t, after);
@@ -891,13 +989,13 @@ private:
                     .after = after,
                     .bracket = {step_.time(0), t},
                     .slope = 0,
-                    .error = ahead});
+                    .error = error});
             if (!detail::all_finite(after)) return end(Outcome::non_finite, i);
             step_.restart(ahead, 0, after, mode_after);
             bank_[i].intervals = {};
             bank_[i].band = 0;
             bank_[i].rested = true;
-            resting_ = fixed == 1 && !Moded<System, X>;
+            resting_ = bank_.size() == 1 && !Moded<System, X>;
         } else {
             end(Outcome::zeno, i);
         }
@@ -929,6 +1027,7 @@ private:
         }
         search_.members().clear();
         if constexpr (Moded<System, X>) enable_guards();
+        bank_.await_nobody();
         newly_armed_ = true;
         last_h_ = h_next_;
         bank_.sample_start(step_, calls(), h_next_);
@@ -950,7 +1049,7 @@ private:
             end(Outcome::non_finite, i);
             return false;
         }
-        const Side before = record.side;
+        const Side before = record.side != Side::plateau ? record.side : record.awaited;
         if (record.fired && record.estimated && std::fabs(g) > record.band) {
             record.band = residue_of(i, step_.time(0));
         }
@@ -961,17 +1060,19 @@ private:
         bank_.arm(i, side);
         record.from = 0;
         if (side == Side::above) record.rested = false;
-        const bool lies = record.rested && side == Side::plateau;
-        const bool kept_out = record.info.unilateral && side != Side::above && !lies;
-        if (record.fired) {
-            if (kept_out && on_surface) search_.members().push_back(i);
-        } else if (record.newly_enabled) {
-            const bool at_once = on_surface && counts(opposite(side), record.info.crossing);
-            if (record.acting && (at_once || (kept_out && on_surface))) {
-                search_.members().push_back(i);
-            }
-        } else if (side != Side::plateau && side == opposite(before) &&
-                   counts(before, record.info.crossing)) {
+        if (side == Side::plateau) {
+            const Side from = record.info.unilateral ? Side::above : before;
+            bank_.await(i, record.fired && !record.info.unilateral ? Side::plateau : from);
+        }
+        const bool kept_out = record.info.unilateral && side == Side::below;
+        const bool flipped = side != Side::plateau && side == opposite(before) &&
+                             counts(before, record.info.crossing);
+        const bool pressed = kept_out && on_surface;
+        const bool arrived = on_surface && counts(opposite(side), record.info.crossing);
+        const bool fires = record.fired          ? pressed
+                           : record.newly_enabled ? record.acting && (arrived || pressed)
+                                                  : flipped;
+        if (fires && counts_here(i)) {
             if (record.acting) {
                 search_.members().push_back(i);
             } else {
@@ -988,9 +1089,12 @@ private:
     [[nodiscard]] Side heading(std::size_t i)
     {
         const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
-        if (rate != 0) return side_of(rate);
-        if (bank_[i].info.boolean) return side_of(bank_.g0(i));
-        // The second derivative has the sign of the rate a little later.
+        if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
+        const double size = bank_.size_of(i);
+        const bool plain = size > 0 && std::fabs(rate) * h_next_ > 1e-6 * size;
+        if (rate != 0 && (bank_[i].fired || plain)) return side_of(rate);
+        // The second derivative has the sign of the rate a little later. A rate that it
+        // undoes within rounding of the time is none.
         const double delta = 1e-6 * h_next_;
         X& later = resets_.after();
         X& rate_later = resets_.scratch();
@@ -998,8 +1102,12 @@ private:
         detail::assign(rate_later, step_.x0());
         detail::move(later, step_.x0(), delta, step_.rate0());
         step_.flow(delta, later, rate_later);
-        const Side side = side_of(bank_.view(i, step_.mode(), calls())
-                                      .rate(step_.time(delta), later, rate_later, h_next_));
+        const double next = bank_.view(i, step_.mode(), calls())
+                                .rate(step_.time(delta), later, rate_later, h_next_);
+        const double moment =
+            64 * std::numeric_limits<double>::epsilon() * (std::fabs(step_.time(0)) + h_next_);
+        if (std::fabs(rate) * delta > std::fabs(next - rate) * moment) return side_of(rate);
+        const Side side = side_of(next);
         bank_.set_rate0(i, detail::sign_of(side) * std::numeric_limits<double>::min());
         return side;
     }
@@ -1016,6 +1124,9 @@ private:
             search_.stay_at_start();
             transform(false);
             const std::size_t stuck = stuck_member();
+            if (stuck != no_guard && bank_.g0(stuck) < -bank_[stuck].band) {
+                return end(Outcome::outside_mode, stuck);
+            }
             if (stuck != no_guard) {
                 come_to_rest(stuck, 0);
                 if (!ended_ && !resting_) {
@@ -1083,9 +1194,21 @@ private:
             if (!counts(side, record.info.crossing)) {
                 bank_.arm(i, opposite(side));
             } else if (!record.acting) {
-                search_.note_at_set(bank_, i, side, at.rate);
+                if (counts_at_set(i)) {
+                    search_.note_at_set(bank_, i, side, at.rate);
+                } else {
+                    bank_.arm(i, opposite(side));
+                }
             }  // else its own event is still to come
         }
+    }
+
+    [[nodiscard]] bool counts_at_set(std::size_t i)
+    {
+        const bool enabled = detail::call_enabled_at(*system_, i, step_.mode(),
+                                                     step_.time(search_.at()), search_.before());
+        run_.statistics.disabled += !enabled;
+        return enabled;
     }
 
     [[nodiscard]] bool is_member(std::size_t i) noexcept
@@ -1223,6 +1346,7 @@ private:
     {
         run_.trajectory.t.push_back(options_.sample_times[next_sample_]);
         run_.trajectory.x.push_back(std::move(x));
+        sample_mode_ = step_.mode();
         ++next_sample_;
     }
 
@@ -1273,9 +1397,13 @@ private:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
-    detail::ResetSet<System, X> resets_;
+    detail::MergedResets<System, X> resets_;
     Mode mode_before_ = 0;
     std::size_t next_sample_ = 0;
+    std::size_t shown_samples_ = 0;  ///< by `advance`
+    std::uint64_t shown_events_ = 0;
+    bool showing_sample_ = false;
+    Mode sample_mode_ = 0;
     detail::StepStart<X> place_;
     Run<X> run_;
 };

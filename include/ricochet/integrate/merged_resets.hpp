@@ -27,9 +27,9 @@ template <class X>
 }
 
 template <class System, class X>
-class ResetSet {
+class MergedResets {
 public:
-    explicit ResetSet(const X& like) : after_(like), single_(like) {}
+    explicit MergedResets(const X& like) : after_(like), single_(like) {}
 
     /// Computes what the resets of `members`, all from the state `before`, make of it; with
     /// that of a time event if the set happens on time. `bank` says which of them reset.
@@ -40,6 +40,10 @@ public:
         assign(after_, before);
         mode_ = mode;
         conflict_ = {no_guard, no_guard};
+        if (members.size() > 1 || on_time) {
+            mode_writer_ = resizer_ = no_guard;
+            writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
+        }
         if constexpr (ResetsTogether<System, X>) {
             std::size_t resetting = 0;
             for (const std::size_t i : members) resetting += bank[i].info.resets;
@@ -53,8 +57,6 @@ public:
                 if (bank[i].info.resets) mode_ = call_reset(system, i, mode, t, after_);
                 return;
             }
-            mode_writer_ = no_guard;
-            writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
             for (const std::size_t i : members) {
                 if (!bank[i].info.resets) continue;
                 assign(single_, before);
@@ -97,9 +99,8 @@ private:
             claim(mode_writer_, mode_after == mode_);
             mode_ = mode_after;
         }
-        if (single_.size() != before.size() || after_.size() != before.size()) {
-            conflict_ = {writers_.empty() ? writer : writers_[0], writer};
-            return;
+        if (resizer_ != no_guard || single_.size() != before.size()) {
+            return merge_resized(writer, before);
         }
         for_each_component(before, [&](auto c) {
             if (single_[c] == before[c]) return;
@@ -108,12 +109,26 @@ private:
         });
     }
 
+    /// One reset that gives the state another dimension writes all of it: in conflict with
+    /// any other that writes, unless they agree.
+    void merge_resized(std::size_t writer, const X& before)
+    {
+        if (same_state(single_, before)) return;
+        for (const std::size_t owner : writers_) {
+            if (owner != no_guard) conflict_ = {owner, writer};
+        }
+        if (resizer_ != no_guard && !same_state(single_, after_)) conflict_ = {resizer_, writer};
+        resizer_ = writer;
+        assign(after_, single_);
+    }
+
     X after_;
     X single_;
     Mode mode_ = 0;
     std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
     std::vector<std::size_t> writers_;
     std::size_t mode_writer_ = no_guard;
+    std::size_t resizer_ = no_guard;
 };
 
 }  // namespace ricochet::detail
