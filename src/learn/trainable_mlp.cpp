@@ -38,12 +38,12 @@ constexpr std::size_t piece = 256;
 }  // namespace
 
 TrainableMlp::TrainableMlp(std::size_t inputs, std::span<const std::size_t> hidden,
-                           Activation activation, Random& random)
+                           Activation activation, Random& random, std::size_t outputs)
     : activation_(activation)
 {
     std::vector<std::size_t> widths{inputs};
     widths.insert(widths.end(), hidden.begin(), hidden.end());
-    widths.push_back(1);
+    widths.push_back(outputs);
     if (std::find(widths.begin(), widths.end(), 0U) != widths.end()) {
         throw std::invalid_argument("TrainableMlp: a layer of width 0");
     }
@@ -160,12 +160,15 @@ void TrainableMlp::backward(std::span<double> gradient)
 
 void TrainableMlp::evaluate(std::span<const double> states, std::span<double> logits)
 {
-    for (std::size_t done = 0; done < logits.size(); done += piece) {
-        const std::size_t n = std::min(piece, logits.size() - done);
+    const std::size_t all = logits.size() / outputs();
+    for (std::size_t done = 0; done < all; done += piece) {
+        const std::size_t n = std::min(piece, all - done);
         load(states.subspan(done * inputs(), n * inputs()), n);
         forward();
-        std::copy_n(activations_.back().begin(), n,
-                    logits.begin() + static_cast<std::ptrdiff_t>(done));
+        for (std::size_t o = 0; o < outputs(); ++o) {
+            const double* const row = activations_.back().data() + o * lanes_;
+            for (std::size_t s = 0; s < n; ++s) logits[(done + s) * outputs() + o] = row[s];
+        }
     }
 }
 
@@ -186,6 +189,29 @@ double TrainableMlp::loss_and_gradient(std::span<const double> states,
     }
     backward(gradient);
     return loss / static_cast<double>(n);
+}
+
+double TrainableMlp::loss_and_gradient(std::span<const double> states, std::size_t n,
+                                       const Loss& loss, std::span<double> gradient)
+{
+    load(states, n);
+    forward();
+    const std::size_t width = outputs();
+    const std::vector<double>& logits = activations_.back();
+    std::vector<double>& slopes = slopes_.back();
+    std::fill(slopes.begin(), slopes.end(), 0.0);
+    logits_.resize(width);
+    logit_slopes_.resize(width);
+    double sum = 0;
+    for (std::size_t s = 0; s < n; ++s) {
+        for (std::size_t o = 0; o < width; ++o) logits_[o] = logits[o * lanes_ + s];
+        sum += loss(s, logits_.data(), logit_slopes_.data());
+        for (std::size_t o = 0; o < width; ++o) {
+            slopes[o * lanes_ + s] = logit_slopes_[o] / static_cast<double>(n);
+        }
+    }
+    backward(gradient);
+    return sum / static_cast<double>(n);
 }
 
 std::vector<DenseLayer> TrainableMlp::layers() const

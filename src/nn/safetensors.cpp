@@ -27,7 +27,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view format_version = "1";
-constexpr std::array<std::string_view, 1> known_kinds{"event-classifier"};
+constexpr std::array<std::string_view, 3> known_kinds{"event-classifier", "gate-horizon",
+                                                       "gate-level"};
 
 constexpr std::size_t length_bytes = 8;
 constexpr std::size_t max_header = std::size_t{1} << 20;
@@ -376,6 +377,8 @@ public:
         return found->second;
     }
 
+    [[nodiscard]] bool has(std::string_view key) const { return header_.metadata.contains(key); }
+
     [[nodiscard]] double number(std::string_view key) const { return numbers(key, 1).front(); }
 
     [[nodiscard]] std::vector<double> numbers(std::string_view key, std::size_t count) const
@@ -393,6 +396,12 @@ public:
     [[nodiscard]] std::uint64_t integer(std::string_view key) const
     {
         return parse<std::uint64_t>(key, text(key));
+    }
+
+    /// As many as there are.
+    [[nodiscard]] std::vector<double> numbers(std::string_view key) const
+    {
+        return numbers(key, words(key).size());
     }
 
     [[nodiscard]] std::map<std::string, double> named_numbers(std::string_view key) const
@@ -440,6 +449,48 @@ private:
     const Refusal& refuse_;
 };
 
+/// The levels of a gate and what was seen of it.
+void read_gate(const Metadata& metadata, const Refusal& refuse, Model& model)
+{
+    const std::string levels = "metadata \"levels\"";
+    const std::vector<double> values = metadata.numbers("levels");
+    const std::size_t outputs = model.layers.back().outputs;
+    const std::size_t wanted = model.kind == "gate-horizon" ? outputs : values.size() / 2;
+    if (wanted == 0 || values.size() != 2 * wanted) {
+        refuse(levels, "a value and a threshold for each of " + std::to_string(wanted) + " levels",
+               std::to_string(values.size()) + " numbers");
+    }
+    if (model.kind == "gate-level" && outputs != 1) {
+        refuse("tensor of the last layer", "1 output", std::to_string(outputs));
+    }
+    for (std::size_t k = 0; k < wanted; ++k) {
+        const GateLevel level{.value = values[2 * k], .threshold = values[2 * k + 1]};
+        const double before = k == 0 ? 0 : model.levels.back().value;
+        if (!(level.value > before && std::isfinite(level.value))) {
+            refuse(levels, "values that are positive and rise", decimal(level.value));
+        }
+        if (std::isnan(level.threshold)) refuse(levels, "thresholds that are numbers", "nan");
+        model.levels.push_back(level);
+    }
+    if (!metadata.has("calibration")) return;
+    const std::vector<double> counts = metadata.numbers("calibration", 5);
+    for (const double count : counts) {
+        if (!(count >= 0 && count < 0x1p53)) {
+            refuse("metadata \"calibration\"", "numbers from 0 to 2^53", decimal(count));
+        }
+    }
+    const auto whole = [&](std::size_t i) { return static_cast<std::uint64_t>(counts[i]); };
+    model.calibration = {.events = whole(0),
+                         .misses = whole(1),
+                         .miss_bound = counts[2],
+                         .steps = whole(3),
+                         .seed = whole(4)};
+    if (!(model.calibration.misses <= model.calibration.events && counts[2] <= 1)) {
+        refuse("metadata \"calibration\"", "no more misses than events, and a share",
+               decimal(counts[1]) + " of " + decimal(counts[0]) + ", " + decimal(counts[2]));
+    }
+}
+
 void read_metadata(const Header& header, const Refusal& refuse, Model& model)
 {
     const Metadata metadata(header, refuse);
@@ -448,7 +499,10 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
 
     model.kind = metadata.text("kind");
     if (std::ranges::find(known_kinds, model.kind) == known_kinds.end()) {
-        refuse("metadata \"kind\"", in_quotes(known_kinds.front()), in_quotes(model.kind));
+        refuse("metadata \"kind\"",
+               in_quotes(known_kinds[0]) + ", " + in_quotes(known_kinds[1]) + " or " +
+                   in_quotes(known_kinds[2]),
+               in_quotes(model.kind));
     }
     const std::string& activation = metadata.text("activation");
     if (activation != "relu" && activation != "tanh") {
@@ -501,6 +555,7 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
     }
     model.self_test.output = metadata.numbers("self_test_output", outputs);
     if (header.metadata.contains("certificate")) model.certificate = metadata.text("certificate");
+    if (model.kind != "event-classifier") read_gate(metadata, refuse, model);
 }
 
 // Self-test ------------------------------------------------------------------
@@ -616,6 +671,16 @@ std::string join(const std::vector<double>& values)
     return text;
 }
 
+std::vector<double> pairs(const std::vector<GateLevel>& levels)
+{
+    std::vector<double> values;
+    for (const GateLevel& level : levels) {
+        values.push_back(level.value);
+        values.push_back(level.threshold);
+    }
+    return values;
+}
+
 json metadata_of(const Model& model, const SelfTest& self_test, const Refusal& refuse)
 {
     std::string parameters;
@@ -648,6 +713,12 @@ json metadata_of(const Model& model, const SelfTest& self_test, const Refusal& r
         {"self_test_output", join(self_test.output)},
     };
     if (!model.certificate.empty()) metadata["certificate"] = model.certificate;
+    if (!model.levels.empty()) metadata["levels"] = join(pairs(model.levels));
+    if (const Calibration& c = model.calibration; c.events > 0) {
+        metadata["calibration"] = std::to_string(c.events) + ' ' + std::to_string(c.misses) + ' ' +
+                                  decimal(c.miss_bound) + ' ' + std::to_string(c.steps) + ' ' +
+                                  std::to_string(c.seed);
+    }
     return metadata;
 }
 

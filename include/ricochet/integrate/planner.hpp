@@ -40,6 +40,7 @@ struct LastLook {
     double hoped = 0;  ///< [s] when a look is hoped to close the stretch; never before `sure`
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< of the distance, from two looks
     bool judge = false;     ///< the next step is one for the exact detector
+    bool unclear = false;   ///< a gate clears nothing, so that the next step is, too
     std::size_t first = 0;  ///< of the tentative steps, the first beyond `sure`
     double later_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] of another look
     double later_value = 0;
@@ -54,6 +55,7 @@ struct LastLook {
         }
         visit(exact);
         visit(judge);
+        visit(unclear);
     }
 };
 
@@ -62,6 +64,9 @@ class Planner {
     static constexpr std::size_t fixed = fixed_guard_count<System, X>();
     static constexpr bool bounded = Detector::needs_bounds;
     static constexpr double infinity = std::numeric_limits<double>::infinity();
+    /// Puts off nothing but what a gate clears.
+    static constexpr bool gated = !bounded && requires(const Detector& d, const System& s,
+                                                       const X& x) { d.horizon(s, Mode{}, 0.0, x); };
     using Bank = GuardBank<System, X, Detector>;
     using Steps = TentativeSteps<X>;
 
@@ -210,13 +215,21 @@ public:
             Look end{.time = clock(t), .value = look.later_value, .t = t, .x = &step.x1()};
             end.bound = bound(i, end, step.mode(), bank[i].side);
             check_change(i, last_look(i), end, bank);
-            note(i, look, end, bank);
+            note(i, look, end, step.mode(), bank);
             look.rate = rate;
             schedule(i);
             bank.put_to_sleep(i);
         }
         judged_.clear();
         find_limit();
+    }
+
+    /// Adds what gates were asked since the last time.
+    void add_counts(Statistics& counts) noexcept
+    {
+        counts.network_calls += asked_;
+        counts.outside_domain += outside_;
+        asked_ = outside_ = 0;
     }
 
     /// A bound that a guard has broken.
@@ -317,10 +330,23 @@ private:
         LastLook& look = looks_[i];
         Look now = at;
         now.bound = bound(i, at, mode, bank[i].side);
-        note(i, look, now, bank);
+        note(i, look, now, mode, bank);
     }
 
-    void note(std::size_t i, LastLook& look, const Look& at, const Bank& bank)
+    /// Time [s] without a look that a gate gives from here; 0 without a gate.
+    [[nodiscard]] double horizon([[maybe_unused]] const Look& at, [[maybe_unused]] Mode mode)
+    {
+        if constexpr (requires { detector_.horizon(*system_, mode, at.t, *at.x); }) {
+            const auto answer = detector_.horizon(*system_, mode, at.t, *at.x);
+            ++asked_;
+            outside_ += answer.outside ? 1 : 0;
+            return answer.cleared;
+        } else {
+            return 0;
+        }
+    }
+
+    void note(std::size_t i, LastLook& look, const Look& at, Mode mode, const Bank& bank)
     {
         const double passed = at.time - look.time;
         if (passed > 0) {
@@ -341,7 +367,11 @@ private:
         // Rounding of the time must not lengthen what is covered.
         const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(at.time);
         look.sure = at.time + detector_.sure(at.bound, reach) - ulps;
-        look.hoped = std::max(look.sure, at.time + detector_.hoped(at.bound, look.slope, reach));
+        const double cleared = horizon(at, mode);
+        look.unclear = gated && !(cleared > 0);
+        if (look.unclear) look.judge = true;
+        const double ahead = std::max(detector_.hoped(at.bound, look.slope, reach), cleared);
+        look.hoped = std::max(look.sure, at.time + ahead);
     }
 
     [[nodiscard]] static bool never_sleeps(const GuardRecord& record) noexcept
@@ -399,14 +429,24 @@ private:
     /// What a lower bound says there; false: nothing.
     template <class Step>
     [[nodiscard]] bool bound_below(std::size_t i, std::size_t k, const Step& step, const Bank& bank,
-                                   Statistics& counts, Look& look) const
+                                   Statistics& counts, Look& look)
     {
-        if constexpr (bounded && HasLowerBound<System, X>) {
+        constexpr bool levelled = requires { detector_.level(*system_, Mode{}, 0.0, *look.x); };
+        if constexpr (bounded && (HasLowerBound<System, X> || levelled)) {
             if (bank[i].side != Side::above) return false;
             look = place(k, step);
             look.exact = false;
-            ++counts.bound_calls;
-            look.value = call_lower_bound(*system_, i, step.mode(), look.t, *look.x);
+            look.value = 0;
+            if constexpr (HasLowerBound<System, X>) {
+                ++counts.bound_calls;
+                look.value = call_lower_bound(*system_, i, step.mode(), look.t, *look.x);
+            }
+            if constexpr (levelled) {
+                const auto answer = detector_.level(*system_, step.mode(), look.t, *look.x);
+                ++asked_;
+                outside_ += answer.outside ? 1 : 0;
+                look.value = std::max(look.value, answer.cleared);
+            }
             look.bound = bound(i, look, step.mode(), Side::above);
             return look.value > 0;
         } else {
@@ -427,7 +467,7 @@ private:
                                         Statistics& counts, double h_next)
     {
         LastLook& known = looks_[i];
-        if (never_sleeps(bank[i])) return steps_.size() - 1;
+        if (never_sleeps(bank[i]) || known.unclear) return steps_.size() - 1;
         Look from = last_look(i);
         Look end;
         if (bound_below(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
@@ -435,7 +475,7 @@ private:
             if (detector_.checks_bounds() && ++lower_bounds_used_ % 8 == 0) {
                 (void)look_at(i, steps_.size(), step, bank, counts);
             }
-            note(i, known, end, bank);
+            note(i, known, end, step.mode(), bank);
             return none;
         }
         end = look_at(i, steps_.size(), step, bank, counts);
@@ -444,7 +484,7 @@ private:
         const bool moved = from.time != known.time || failed == none;
         const double rate = known.rate;
         if (failed != none) remember(known, place(failed + 1, step).time, failing_value_);
-        if (moved) note(i, known, failed == none ? end : from, bank);
+        if (moved) note(i, known, failed == none ? end : from, step.mode(), bank);
         if (!moved) known.rate = rate;
         return failed;
     }
@@ -551,6 +591,8 @@ private:
     double hoped_ = infinity;
     double failing_value_ = 0;
     std::uint64_t lower_bounds_used_ = 0;
+    std::uint64_t asked_ = 0;    ///< calls of a gate
+    std::uint64_t outside_ = 0;  ///< of its domain
     std::optional<WrongBound<X>> wrong_;
 };
 

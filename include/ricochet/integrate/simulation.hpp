@@ -91,6 +91,8 @@ class Simulation {
         requires(const Detector& detector, const CurrentStep& step, const Guard& guard) {
             detector.clears(guard, step);
         };
+    static constexpr bool asks = requires(const Detector& detector, const System& system,
+                                          const X& x) { detector.check(system, x, 0.0, 0.0); };
     static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -129,7 +131,7 @@ public:
             if (backward_ && !requires_previous()) detail::throw_no_previous_time_event();
             find_time_event();
         }
-        if constexpr (predicts) {
+        if constexpr (asks) {
             const double smallest = error_controlled ? options_.h_min : options_.step;
             const double largest = error_controlled ? options_.h_max : options_.step;
             detector_.check(system, x0, smallest, largest);
@@ -222,6 +224,7 @@ public:
         run_.mode = step_.mode();
         run_.statistics.flow_calls = step_.flow_calls();
         run_.statistics.resteps = step_.resteps();
+        if constexpr (puts_off) planner_.add_counts(run_.statistics);
         run_.statistics.disabled += search_.disabled;
         emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
         ended_ = true;
@@ -554,6 +557,8 @@ private:
         run_.statistics.checks_put_off += steps;
         if constexpr (Detector::put_off == Evidence::proved) {
             run_.statistics.evidence.proved += steps;
+        } else if constexpr (Detector::put_off == Evidence::gated) {
+            run_.statistics.evidence.gated += steps;
         } else {
             run_.statistics.evidence.assumed += steps;
         }

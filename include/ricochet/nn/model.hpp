@@ -38,13 +38,33 @@ struct SelfTest {
     std::vector<double> output;  ///< logits
 };
 
+/// One decision of a gate.
+///
+///     horizon   output k below `threshold`: no event within `value` [s]
+///     level     the one output below `threshold`: the guard is above `value`
+///
+/// Values rise; the thresholds of a level gate do not.
+struct GateLevel {
+    double value = 0;
+    double threshold = 0;
+};
+
+/// What a gate was seen to do on runs that it was not made from.
+struct Calibration {
+    std::uint64_t events = 0;  ///< of the runs; 0: none were made
+    std::uint64_t misses = 0;  ///< of these, events that a gated run did not find
+    double miss_bound = 1;     ///< of the share that is missed, at 95 % confidence
+    std::uint64_t steps = 0;   ///< of the runs
+    std::uint64_t seed = 0;    ///< of the runs
+};
+
 /// A multilayer perceptron and its provenance.
 ///
 ///     y = mlp((features - offset) * scale)
 ///
 /// with `features` computed from (t, x, h) by the recipe of that name.
 struct Model {
-    std::string kind = "event-classifier";
+    std::string kind = "event-classifier";     ///< or "gate-horizon", "gate-level"
     std::string system;                        ///< e.g. "bouncing-ball"
     std::map<std::string, double> parameters;  ///< of the system, those the model depends on
     std::string recipe;                        ///< e.g. "state"
@@ -60,6 +80,8 @@ struct Model {
     std::vector<DenseLayer> layers;
     SelfTest self_test;
     std::string certificate;  ///< empty: none
+    std::vector<GateLevel> levels{};  ///< of a gate
+    Calibration calibration{};        ///< of a gate
 };
 
 }  // namespace ricochet

@@ -7,7 +7,7 @@
 //     layers.<k>.bias     outputs
 //     __metadata__        strings; numbers in decimal, lists separated by spaces
 //         ricochet           "1", the version of this list
-//         kind               "event-classifier"
+//         kind               "event-classifier", "gate-horizon" or "gate-level"
 //         system             name
 //         parameters         name=value ...
 //         recipe             name of what is computed from (t, x, h)
@@ -20,6 +20,8 @@
 //         self_test_input    raw features
 //         self_test_output   what the model makes of them
 //         certificate        optional
+//         levels             of a gate: value and threshold of each
+//         calibration        of a gate, optional: events, misses, bound, steps, seed
 //
 // A file is untrusted: whatever does not fit is refused, in one sentence.
 #pragma once

@@ -1,0 +1,89 @@
+// A trained gate: what a network says of the guards of a system, for more than one step.
+//
+//     horizon gate   one output for each horizon: no guard has its event within so many seconds
+//     level gate     one output, lower bounds of one guard in its own units
+//
+// Nothing is proved by it. How it is used, and how often it was wrong, see `Calibrated` and
+// `Calibration`.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "ricochet/detect/gate_features.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/nn/classifier.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet {
+
+/// Immutable, shared by threads and copies; asking it allocates nothing.
+class Gate {
+public:
+    /// @throws std::invalid_argument if the model is no gate, its levels do not fit its outputs or
+    /// do not rise, it has no domain, or its recipe is unknown.
+    explicit Gate(Model model);
+
+    [[nodiscard]] const Model& model() const noexcept { return classifier_->model(); }
+    [[nodiscard]] const GateRecipe& recipe() const noexcept { return recipe_; }
+    [[nodiscard]] bool is_horizon() const noexcept { return horizon_; }
+
+    /// The largest value that is cleared: a horizon [s], all shorter ones being cleared as well,
+    /// or a level. 0: none. NaN is never cleared.
+    [[nodiscard]] double cleared(const double* features) const noexcept;
+
+    [[nodiscard]] bool in_domain(const double* features) const noexcept
+    {
+        return classifier_->in_domain(features);
+    }
+
+    /// What the gate says of a state.
+    struct Answer {
+        double cleared = 0;
+        bool outside = false;  ///< of the domain; nothing is cleared
+    };
+
+    template <class System, class X>
+    [[nodiscard]] Answer ask(const System& system, Mode mode, double t, const X& x) const
+    {
+        std::array<double, GateRecipe::most> features;
+        gate_features(recipe_, system, mode, t, x, features.data());
+        if (!in_domain(features.data())) return {.outside = true};
+        return {.cleared = cleared(features.data())};
+    }
+
+    /// Whether the gate can be asked about `system`, in steps between `smallest` and `largest`
+    /// [s], at least in some of them. A system without a name is taken as the right one;
+    /// parameters are compared where it declares them.
+    ///
+    /// @throws std::invalid_argument naming what the model is for and what it would have to be.
+    template <class System, class X>
+    void check(const System& system, const X& x, double smallest, double largest) const
+    {
+        if constexpr (requires { std::string_view(system.name); }) {
+            check_system(system.name);
+        }
+        if constexpr (requires { system.parameter(std::string_view()); }) {
+            for (const auto& [parameter, trained] : model().parameters) {
+                check_parameter(parameter, trained, system.parameter(std::string_view(parameter)));
+            }
+        }
+        check_layout(feature_count(recipe_, system, x), mode_count_of(system));
+        check_step(smallest, largest);
+    }
+
+private:
+    void check_system(std::string_view name) const;
+    void check_parameter(std::string_view name, double trained, std::optional<double> value) const;
+    void check_layout(std::size_t features, std::size_t modes) const;
+    void check_step(double smallest, double largest) const;
+
+    std::shared_ptr<const Classifier> classifier_;
+    GateRecipe recipe_;
+    bool horizon_;
+};
+
+}  // namespace ricochet

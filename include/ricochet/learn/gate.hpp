@@ -1,0 +1,169 @@
+// Gates for a user's system: training, thresholds, and what they miss.
+//
+// A *horizon* gate is for guards of which nothing is known but the value or the sign. States
+// come from runs; each is labelled with the time to the next event. Since a gated run looks at
+// the guard at the end of every horizon, it finds an event that was cleared, unless the guard,
+// followed without its reset, has come back by then. Such states are *fatal*. The threshold of
+// each horizon lies below the logit of every fatal state that was seen, and below what makes
+// ways back dearer than the checks that they save.
+//
+// A *level* gate is for a guard with a bound and a value: a regression from below of the guard,
+// with a threshold for each level below the logit of every state whose guard is not above it.
+//
+// `learn/train_gate.hpp` makes the samples, and puts all together.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/detect/gate.hpp"
+#include "ricochet/learn/adam.hpp"
+#include "ricochet/learn/classifier.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet::learn {
+
+enum class GateKind { horizon, level };
+
+/// "gate-horizon" or "gate-level", as a model spells it.
+[[nodiscard]] std::string_view name(GateKind kind) noexcept;
+
+/// What a gate is trained for, and how.
+struct GateTraining {
+    GateKind kind = GateKind::horizon;
+    GateRecipe recipe{};
+    /// Horizons [s], or levels in units of the guard; positive, rising. A horizon of k steps
+    /// saves k - 1 checks.
+    std::vector<double> levels{};
+
+    /// Fixed steps [s] are drawn from this range, run by run; ignored with error control.
+    double step_min = 0;
+    double step_max = 0;
+    double run_length = 10;  ///< [s] of a run; the next one starts somewhere else
+
+    std::size_t events = 3000;             ///< of the training runs
+    std::size_t states = 200'000;          ///< kept for training, at most
+    std::size_t validation_events = 1000;  ///< choose weights and thresholds
+    std::size_t fresh_events = 30'000;     ///< for the miss rate; 0: it is not measured
+    std::size_t most_steps = 100'000'000;  ///< of each of these sets of runs
+
+    std::vector<std::size_t> hidden{16, 16};
+    std::size_t iterations = 4000;  ///< of a round
+    std::size_t rounds = 2;         ///< after all but the last, hard states are added
+    std::size_t hard_events = 0;    ///< of the runs in which they are sought; 0: as `events`
+    std::size_t neighbours = 2;     ///< states sampled near each hard one
+    std::size_t batch = 256;
+    double rate = 3e-3;  ///< learning rate at the start of a round
+    double final_rate = 3e-5;
+    std::size_t evaluate_every = 250;
+    std::size_t patience = 8;    ///< evaluations of a round without gain before it ends
+    double fatal_weight = 4;     ///< of a fatal state in the loss
+    double quantile = 0.98;      ///< of a level gate: the share of states that it stays below
+    double logit_margin = 0.25;  ///< of the threshold below the lowest fatal logit
+    std::uint64_t seed = 1;
+};
+
+/// States of runs, and what became of them.
+struct GateSamples {
+    std::size_t width = 0;         ///< features of a state
+    std::vector<double> features;  ///< row by row
+    std::vector<double> event;     ///< [s] to the next event; infinite: beyond all horizons
+    std::vector<double> back;      ///< [s] until the guard is seen on its side again, without reset
+    std::vector<double> value;     ///< of the guard, on the side on which it is armed
+    std::vector<double> weight;    ///< how many states of the runs it stands for; 0: none
+    std::uint64_t events = 0;      ///< of the runs
+    std::uint64_t steps = 0;
+    std::vector<Interval> box;  ///< that the runs stayed in
+
+    [[nodiscard]] std::size_t size() const noexcept { return event.size(); }
+    [[nodiscard]] std::span<const double> row(std::size_t i) const noexcept
+    {
+        return {features.data() + i * width, width};
+    }
+    void append(std::span<const double> row, double event, double back, double value,
+                double weight);
+    /// All states of `other`, which are of as many features.
+    void append(const GateSamples& other);
+    /// Widens the box.
+    void visit(std::span<const double> row);
+};
+
+/// A gate in runs, side by side with the exact detector.
+struct GateTrial {
+    std::uint64_t events = 0;         ///< of the exact runs
+    std::uint64_t misses = 0;         ///< of these, not found, or not at the same time
+    std::uint64_t steps = 0;          ///< of the exact runs
+    std::uint64_t exact_calls = 0;    ///< of the guard, with a look at every step
+    std::uint64_t gated_calls = 0;    ///< of the guard, with the gate
+    std::uint64_t network_calls = 0;  ///< of the gate
+    std::uint64_t outside = 0;        ///< of its box
+    std::uint64_t repeated = 0;       ///< steps taken again
+    double seconds = 0;               ///< of processor time, both
+
+    [[nodiscard]] double miss_bound() const;  ///< at 95 % confidence
+    /// Guard calls saved: of every step over gated.
+    [[nodiscard]] double gain() const noexcept
+    {
+        return static_cast<double>(exact_calls) /
+               static_cast<double>(gated_calls > 0 ? gated_calls : 1);
+    }
+};
+
+struct GateReport {
+    TrainingOutcome outcome = TrainingOutcome::finished;
+    std::size_t iterations = 0;
+    double seconds = 0;               ///< of training and sampling, without the trial
+    std::size_t training_states = 0;  ///< with those of the rounds
+    std::size_t fatal_states = 0;     ///< of these
+    std::uint64_t events = 0;         ///< in all runs before the trial
+    double looks = 1;                 ///< exact looks per step, as expected from the validation set
+    GateTrial trial;
+};
+
+struct TrainedGate {
+    Model model;
+    GateReport report;
+};
+
+/// The report as a JSON object.
+[[nodiscard]] std::string to_json(const GateReport& report);
+
+/// The training of one gate on states that are handed to it.
+///
+/// Everything follows from the seed, to the bit on one machine.
+class GateTrainer {
+public:
+    /// @throws std::invalid_argument if an option is outside its range, or the samples hold no
+    /// event (or guard near its surface), or nothing else.
+    GateTrainer(const GateTraining& options, GateSamples training, GateSamples validation);
+    ~GateTrainer();
+    GateTrainer(const GateTrainer&) = delete;
+    GateTrainer& operator=(const GateTrainer&) = delete;
+
+    /// One round. False: it was stopped by the callback.
+    [[nodiscard]] bool run(std::size_t round, const ProgressCallback& progress);
+
+    /// More states, for the rounds to come and for the thresholds.
+    void add(const GateSamples& samples);
+
+    /// The best so far. System, parameters and step range are left to the caller.
+    [[nodiscard]] Model model() const;
+
+    [[nodiscard]] GateReport report() const;
+
+private:
+    class State;
+    std::unique_ptr<State> state_;
+};
+
+/// @throws std::invalid_argument naming the option.
+void check(const GateTraining& training, bool fixed_step);
+
+}  // namespace ricochet::learn

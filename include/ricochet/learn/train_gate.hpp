@@ -1,0 +1,521 @@
+// Training of a gate for any system, from its own runs.
+//
+//     GateTraining training;
+//     training.recipe = gate_recipe("state");
+//     training.levels = learn::horizons(0.001, {2, 4, 8, 16});
+//     training.step_min = training.step_max = 0.001;
+//     const TrainedGate gate = learn::train_gate(
+//         system, learn::from_box<State>(lower, upper), FixedStep<Rk4>{}, {}, training);
+//     integrate(system, x0, options, FixedStep<Rk4>{}, Calibrated(Gate(gate.model)));
+//
+// Runs with the exact detector give the states; a system whose guard is dear is best trained on
+// while its guard is cheap, as where a waiting time is a parameter. The same seed gives the
+// same gate, to the bit on one machine.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/integrate/simulation.hpp"
+#include "ricochet/learn/gate.hpp"
+#include "ricochet/learn/random.hpp"
+
+namespace ricochet::learn {
+
+/// Where a run starts.
+template <class X>
+struct RunStart {
+    double t = 0;  ///< [s]
+    X x{};
+    Mode mode = 0;
+};
+
+/// Deals out starts. One that the system refuses (behind a unilateral guard) is drawn again.
+template <class X>
+using Starts = std::function<RunStart<X>(Random&)>;
+
+/// Starts that are uniform in a box of states, and in time.
+/// @throws std::invalid_argument if a side of the box is negative or not finite.
+template <class X>
+[[nodiscard]] Starts<X> from_box(const X& lower, const X& upper, double t_lower = 0,
+                                 double t_upper = 0, Mode mode = 0)
+{
+    const auto n = static_cast<std::size_t>(lower.size());
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!(lower[i] <= upper[i]) || !std::isfinite(upper[i] - lower[i])) {
+            throw std::invalid_argument("from_box: component " + std::to_string(i) +
+                                        " of the box runs from " + std::to_string(lower[i]) +
+                                        " to " + std::to_string(upper[i]));
+        }
+    }
+    return [=](Random& random) {
+        RunStart<X> start{.t = random.uniform(t_lower, t_upper), .x = lower, .mode = mode};
+        for (std::size_t i = 0; i < n; ++i) start.x[i] = random.uniform(lower[i], upper[i]);
+        return start;
+    };
+}
+
+/// Horizons [s] of so many steps.
+[[nodiscard]] inline std::vector<double> horizons(double step,
+                                                  std::initializer_list<std::size_t> steps)
+{
+    std::vector<double> out;
+    for (const std::size_t n : steps) out.push_back(static_cast<double>(n) * step);
+    return out;
+}
+
+namespace detail {
+
+/// The flow of a system in one mode, without its guards.
+template <class System, class X>
+struct FlowOnly {
+    const System* system;
+    Mode mode;
+    void flow(double t, const X& x, X& dxdt) const
+    {
+        ricochet::detail::call_flow(*system, mode, t, x, dxdt);
+    }
+};
+
+/// @throws std::invalid_argument: no run can be started.
+[[noreturn]] void throw_no_start(const std::string& why);
+/// @throws std::invalid_argument: the recipe makes nothing of these states.
+[[noreturn]] void throw_no_features(const std::string& recipe, std::size_t components);
+/// @throws std::invalid_argument: the runs hold fewer events than were asked for.
+[[noreturn]] void throw_no_events(std::uint64_t steps);
+
+/// @throws std::invalid_argument: a level gate of a system without bounds.
+[[noreturn]] void throw_no_bounds();
+
+/// Processor time of this thread's process [s].
+[[nodiscard]] double processor_seconds() noexcept;
+
+}  // namespace detail
+
+/// Runs of a system, and what is sampled from them.
+template <class System, class X, class Stepping>
+class GateRuns {
+    using Exact = Simulation<System, X, Stepping>;
+    static constexpr double infinity = std::numeric_limits<double>::infinity();
+    static constexpr bool fixed_step =
+        !std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>;
+
+public:
+    /// Keeps a reference to the system. `options`: tolerances and event settings; times, step
+    /// and recording are set here.
+    GateRuns(const System& system, Starts<X> starts, const Options& options,
+             const GateTraining& training)
+        : system_(&system), starts_(std::move(starts)), options_(options), training_(training)
+    {
+        check(training, fixed_step);
+        options_.sample_times.clear();
+        options_.record_steps = false;
+        options_.record_events = true;
+        options_.stop_at_event = false;
+    }
+
+    /// States of runs with so many events in all. Of states without an event within reach about
+    /// as many are kept as make `states` in all, each with its weight.
+    [[nodiscard]] GateSamples sample(std::size_t events, std::size_t states, std::uint64_t seed)
+    {
+        Random random(seed);
+        GateSamples out;
+        double share = 1;
+        // A level gate learns from any state.
+        const std::size_t most = training_.kind == GateKind::horizon
+                                     ? training_.most_steps
+                                     : std::min(training_.most_steps, 10 * states);
+        near_.clear();
+        while (out.events < events && out.steps < most) {
+            Exact run = start(random);
+            follow(run, out, share, random);
+            if (out.events == 0 && out.steps > 2'000'000) break;  // there are none
+            // As many clear states are kept as there is room for.
+            const double expected =
+                static_cast<double>(out.steps) *
+                std::max(1.0, static_cast<double>(events) / static_cast<double>(out.events + 1));
+            share = std::clamp(static_cast<double>(states) / expected, 1e-4, 1.0);
+        }
+        if (out.events == 0 && training_.kind == GateKind::horizon) {
+            detail::throw_no_events(out.steps);
+        }
+        return out;
+    }
+
+    /// New states on which the gate is wrong or nearly so, and states near them.
+    [[nodiscard]] GateSamples hard(const Gate& gate, std::size_t events, std::uint64_t seed)
+    {
+        const GateSamples fresh = sample(events, training_.states / 4, seed);
+        Random random(seed ^ 0x9e3779b9U);
+        GateSamples out;
+        out.box = fresh.box;
+        out.events = fresh.events;
+        out.steps = fresh.steps;
+        out.width = fresh.width;
+        std::size_t k = 0;
+        for (std::size_t i = 0; i < fresh.size(); ++i) {
+            const double said = gate.cleared(fresh.row(i).data());
+            const bool horizon = training_.kind == GateKind::horizon;
+            const double truth = horizon ? fresh.back[i] : fresh.value[i];
+            const bool critical = truth <= training_.levels.back();
+            if (!critical && !(said >= (horizon ? fresh.event[i] : truth))) continue;
+            out.append(fresh.row(i), fresh.event[i], fresh.back[i], fresh.value[i], 0);
+            if (++k > training_.states / 4) break;
+        }
+        add_neighbours(out, random);
+        return out;
+    }
+
+    /// Runs the exact detector and the gated one side by side, until `events` events.
+    template <class Detector>
+    [[nodiscard]] GateTrial compare(const Detector& detector, std::size_t events,
+                                    std::uint64_t seed)
+    {
+        using Gated = Simulation<System, X, Stepping, Detector>;
+        Random random(seed);
+        GateTrial trial;
+        const double before = detail::processor_seconds();
+        while (trial.events < events && trial.steps < training_.most_steps) {
+            std::optional<Exact> exact(start(random));
+            Options options = options_used_;
+            std::optional<Gated> gated(std::in_place, *system_, exact->x(), options, Stepping{},
+                                       detector);
+            for (;;) {
+                const bool same = next_event_is_same(*exact, *gated);
+                const bool ended = exact->ended();
+                const double t = exact->t();
+                const X x = exact->x();
+                const Mode mode = exact->mode();
+                if (same && !ended) continue;
+                finish(*exact, *gated, trial);
+                trial.misses += same ? 0 : 1;
+                if (ended || trial.events >= events || !(options.t_end > t)) break;
+                options.t_start = t;
+                options.mode = mode;
+                if (!restart(exact, gated, x, options, detector)) break;
+            }
+        }
+        trial.seconds = detail::processor_seconds() - before;
+        return trial;
+    }
+
+private:
+    /// A state on the way, until its future is known.
+    struct Pending {
+        double t;
+        X x;
+        Mode mode;
+        std::array<double, GateRecipe::most> features;
+        double value;
+        double weight;
+    };
+
+    [[nodiscard]] Exact start(Random& random)
+    {
+        std::string why = "no start was dealt out";
+        for (int attempt = 0; attempt < 1000; ++attempt) {
+            const RunStart<X> from = starts_(random);
+            options_used_ = options_;
+            options_used_.t_start = from.t;
+            options_used_.t_end = from.t + training_.run_length;
+            options_used_.mode = from.mode;
+            if (fixed_step)
+                options_used_.step = random.log_uniform(training_.step_min, training_.step_max);
+            try {
+                width_ = feature_count(training_.recipe, *system_, from.x);
+                if (width_ == 0 || width_ > GateRecipe::most) {
+                    detail::throw_no_features(to_string(training_.recipe),
+                                              static_cast<std::size_t>(from.x.size()));
+                }
+                return Exact(*system_, from.x, options_used_);
+            } catch (const std::invalid_argument& error) {
+                why = error.what();
+            }
+        }
+        detail::throw_no_start(why);
+    }
+
+    [[nodiscard]] double reach() const noexcept
+    {
+        return training_.kind == GateKind::horizon ? training_.levels.back() : 0;
+    }
+
+    /// Goes through a run and keeps its states.
+    void follow(Exact& run, GateSamples& out, double share, Random& random)
+    {
+        out.width = width_;
+        pending_.clear();
+        std::size_t seen = run.run().events.size();
+        while (!run.ended()) {
+            remember(run, out);
+            if (!run.step()) break;
+            ++out.steps;
+            const auto& events = run.run().events;
+            for (; seen < events.size(); ++seen) {
+                if (events[seen].kind == EventKind::touch || events[seen].kind == EventKind::time) {
+                    continue;
+                }
+                ++out.events;
+                settle(events[seen], out, share, random);
+            }
+            while (!pending_.empty() && run.t() - pending_.front().t > reach()) {
+                keep(pending_.front(), infinity, infinity, out, share, random);
+                pending_.pop_front();
+            }
+        }
+        pending_.clear();
+    }
+
+    void remember(const Exact& run, GateSamples& out)
+    {
+        Pending state{.t = run.t(),
+                      .x = run.x(),
+                      .mode = run.mode(),
+                      .features = {},
+                      .value = 0,
+                      .weight = 1};
+        gate_features(training_.recipe, *system_, state.mode, state.t, state.x,
+                      state.features.data());
+        out.visit({state.features.data(), width_});
+        if (training_.kind == GateKind::level) {
+            state.value = ricochet::detail::call_guard(*system_, 0, state.mode, state.t, state.x);
+        }
+        pending_.push_back(std::move(state));
+    }
+
+    /// What led to an event is labelled with it.
+    template <class E>
+    void settle(const E& event, GateSamples& out, double share, Random& random)
+    {
+        if (pending_.empty()) return;
+        const double back = training_.kind == GateKind::horizon ? time_of_return(event) : infinity;
+        const bool fatal = back - event.t <= reach();
+        for (const Pending& state : pending_) {
+            if (state.t > event.t) break;
+            const bool chosen = random.chance(fatal ? 0.25 : 0.005);
+            if (chosen && near_.size() < training_.states) {
+                near_.push_back({.t = state.t, .x = state.x, .mode = state.mode});
+            }
+            keep(state, event.t - state.t, back - state.t, out, share, random);
+        }
+        pending_.clear();
+    }
+
+    void keep(const Pending& state, double event, double back, GateSamples& out, double share,
+              Random& random)
+    {
+        const bool near = training_.kind == GateKind::horizon
+                              ? event <= 2 * reach()
+                              : state.value <= training_.levels.back();
+        const double kept = near ? std::max(share, std::min(1.0, 4 * share)) : share;
+        const bool fatal = back <= reach();
+        if (!fatal && !random.chance(kept)) return;
+        out.append({state.features.data(), width_}, event, back, state.value, fatal ? 1 : 1 / kept);
+    }
+
+    /// When [s] a guard that has had its event is seen on its side again, at the end of a step,
+    /// if the flow goes on without the reset. Infinite: not within the longest horizon.
+    template <class E>
+    [[nodiscard]] double time_of_return(const E& event)
+    {
+        if (event.guard == no_guard) return infinity;
+        const Pending& from = pending_.back();
+        const auto side = [&](double t, const X& x) {
+            return ricochet::detail::call_guard(*system_, event.guard, event.mode_before, t, x);
+        };
+        const GuardInfo info = guard_info_of<X>(*system_, event.guard);
+        const double armed = info.crossing == Crossing::falling ? 1
+                             : info.crossing == Crossing::rising
+                                 ? -1
+                                 : std::copysign(1.0, side(from.t, from.x));
+        Options options = options_used_;
+        options.t_start = from.t;
+        options.t_end = event.t + reach() + options.step;
+        options.mode = 0;
+        const detail::FlowOnly<System, X> flow{system_, event.mode_before};
+        Simulation<detail::FlowOnly<System, X>, X, Stepping> on(flow, from.x, options);
+        while (on.step()) {
+            if (on.t() > event.t && armed * side(on.t(), on.x()) > 0) return on.t();
+            if (on.t() > event.t + reach()) break;
+        }
+        return infinity;
+    }
+
+    /// Short runs from states that differ a little from those in `out`: the gate is to be right
+    /// beyond what the runs happen to meet.
+    void add_neighbours(GateSamples& out, Random& random)
+    {
+        if (near_.empty() || training_.neighbours == 0) return;
+        const std::size_t wanted = std::min(near_.size(), training_.states / 8);
+        for (std::size_t n = 0; n < wanted * training_.neighbours; ++n) {
+            const RunStart<X>& from = near_[random.below(near_.size())];
+            RunStart<X> moved = from;
+            const double size = random.log_uniform(1e-4, 3e-2);
+            for (std::size_t i = 0; i < static_cast<std::size_t>(moved.x.size()); ++i) {
+                moved.x[i] += size * (1 + std::fabs(moved.x[i])) * random.uniform(-1, 1);
+            }
+            follow_shortly(moved, out, random);
+        }
+    }
+
+    void follow_shortly(const RunStart<X>& from, GateSamples& out, Random& random)
+    {
+        Options options = options_;
+        options.t_start = from.t;
+        options.mode = from.mode;
+        if (fixed_step) options.step = random.log_uniform(training_.step_min, training_.step_max);
+        options.t_end = from.t + 2 * reach() + 2 * options.step;
+        options_used_ = options;
+        try {
+            Exact run(*system_, from.x, options);
+            pending_.clear();
+            remember_only(run);
+            while (run.run().events.empty() && run.step()) {
+            }
+            if (run.run().events.empty()) return;
+            const auto& event = run.run().events.front();
+            if (event.kind != EventKind::crossing || !(event.t > from.t)) return;
+            const double back = time_of_return(event);
+            const Pending& state = pending_.front();
+            out.append({state.features.data(), width_}, event.t - state.t, back - state.t,
+                       state.value, 0);
+        } catch (const std::invalid_argument&) {
+            // It starts where it may not.
+        }
+    }
+
+    void remember_only(const Exact& run)
+    {
+        GateSamples nowhere;
+        remember(run, nowhere);
+    }
+
+    /// Takes both to their next event; whether it is the same.
+    template <class Gated>
+    [[nodiscard]] static bool next_event_is_same(Exact& exact, Gated& gated)
+    {
+        const std::size_t before = exact.run().events.size();
+        while (exact.run().events.size() == before && exact.advance()) {
+        }
+        while (gated.run().events.size() == before && gated.advance()) {
+        }
+        const auto& a = exact.run().events;
+        const auto& b = gated.run().events;
+        if (a.size() != b.size()) return false;
+        return a.size() == before || (a.back().t == b.back().t && a.back().guard == b.back().guard);
+    }
+
+    template <class Gated>
+    static void finish(Exact& exact, Gated& gated, GateTrial& trial)
+    {
+        const Statistics a = exact.finish().statistics;
+        const Statistics b = gated.finish().statistics;
+        trial.events += a.events;
+        trial.steps += a.steps;
+        trial.exact_calls += a.guard_calls;
+        trial.gated_calls += b.guard_calls;
+        trial.network_calls += b.network_calls;
+        trial.outside += b.outside_domain;
+        trial.repeated += b.repeated_steps;
+    }
+
+    /// After a miss both go on from the exact run's state. False: they cannot.
+    template <class Gated, class Detector>
+    [[nodiscard]] bool restart(std::optional<Exact>& exact, std::optional<Gated>& gated, const X& x,
+                               const Options& options, const Detector& detector) const
+    {
+        try {
+            exact.emplace(*system_, x, options);
+            gated.emplace(*system_, x, options, Stepping{}, detector);
+            return true;
+        } catch (const std::invalid_argument&) {
+            return false;
+        }
+    }
+
+    const System* system_;
+    Starts<X> starts_;
+    Options options_;
+    Options options_used_;
+    GateTraining training_;
+    std::size_t width_ = 0;
+    std::deque<Pending> pending_;
+    std::vector<RunStart<X>> near_;  ///< states shortly before fatal events
+};
+
+/// Trains a gate on runs of `system`, and measures what it misses on fresh ones.
+///
+/// @param options  tolerances of the runs; times and steps come from `training`
+/// @throws std::invalid_argument if an option is outside its range, the recipe does not fit the
+///         states, the runs hold no event (no guard near its surface), or nothing else.
+template <class System, class X, class Stepping>
+[[nodiscard]] TrainedGate train_gate(const System& system, const Starts<X>& starts,
+                                     const Stepping& /*stepping*/, const Options& options,
+                                     const GateTraining& training,
+                                     const ProgressCallback& progress = {})
+{
+    const auto begin = std::chrono::steady_clock::now();
+    GateRuns<System, X, Stepping> runs(system, starts, options, training);
+    GateSamples first = runs.sample(training.events, training.states, training.seed);
+    GateSamples second =
+        runs.sample(training.validation_events, training.states / 4, training.seed + 1'000'003);
+    GateTrainer trainer(training, std::move(first), std::move(second));
+    const auto complete = [&] {
+        Model model = trainer.model();
+        if constexpr (requires { std::string_view(system.name); }) model.system = system.name;
+        constexpr bool fixed =
+            !std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>;
+        model.step_min = fixed ? training.step_min : 0;
+        model.step_max = fixed ? training.step_max : std::numeric_limits<double>::max();
+        return model;
+    };
+    for (std::size_t round = 0; round < training.rounds; ++round) {
+        if (!trainer.run(round, progress)) break;
+        if (round + 1 == training.rounds) break;
+        const std::size_t events =
+            training.hard_events > 0 ? training.hard_events : training.events;
+        trainer.add(runs.hard(Gate(complete()), events, training.seed + 2'000'003 * (round + 2)));
+    }
+    TrainedGate trained{.model = complete(), .report = trainer.report()};
+    trained.report.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (training.fresh_events == 0) return trained;
+    const std::uint64_t fresh = training.seed + 7'000'003;
+    GateTrial& trial = trained.report.trial;
+    const Gate gate(trained.model);
+    if (training.kind == GateKind::horizon) {
+        trial = runs.compare(Calibrated(gate), training.fresh_events, fresh);
+    } else if constexpr (Bounded<System, X>) {
+        trial = runs.compare(CalibratedBounds(gate), training.fresh_events, fresh);
+    } else {
+        detail::throw_no_bounds();
+    }
+    if (trial.events > 0) {
+        trained.model.calibration = {.events = trial.events,
+                                     .misses = trial.misses,
+                                     .miss_bound = trial.miss_bound(),
+                                     .steps = trial.steps,
+                                     .seed = fresh};
+    }
+    if (trial.misses > 0 && trained.report.outcome == TrainingOutcome::finished) {
+        trained.report.outcome = TrainingOutcome::misses_remain;
+    }
+    return trained;
+}
+
+}  // namespace ricochet::learn

@@ -1,0 +1,581 @@
+#include "ricochet/learn/gate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include "ricochet/learn/assessment.hpp"
+#include "ricochet/learn/random.hpp"
+#include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/trainable_mlp.hpp"
+
+namespace ricochet::learn {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+[[noreturn]] void refuse(const std::string& what)
+{
+    throw std::invalid_argument("train_gate: " + what);
+}
+
+void require_positive(double value, const char* name)
+{
+    if (!(value > 0 && std::isfinite(value))) {
+        refuse(fmt::format("{} must be positive and finite, got {}", name, value));
+    }
+}
+
+/// What the network is to say of a state: the higher, the nearer.
+double target_of(double value, double unit)
+{
+    return -std::asinh(value / unit);
+}
+
+}  // namespace
+
+std::string_view name(GateKind kind) noexcept
+{
+    return kind == GateKind::horizon ? "gate-horizon" : "gate-level";
+}
+
+void check(const GateTraining& training, bool fixed_step)
+{
+    if (training.levels.empty() || training.levels.size() > 32) {
+        refuse(fmt::format("expected 1 to 32 levels, got {}", training.levels.size()));
+    }
+    double before = 0;
+    for (const double level : training.levels) {
+        if (!(level > before && std::isfinite(level))) {
+            refuse(fmt::format("levels must be positive and rise, got {} after {}", level, before));
+        }
+        before = level;
+    }
+    if (fixed_step) {
+        require_positive(training.step_min, "step_min");
+        require_positive(training.step_max, "step_max");
+        if (training.step_min > training.step_max) {
+            refuse(fmt::format("step_min {} is above step_max {}", training.step_min,
+                               training.step_max));
+        }
+    }
+    require_positive(training.run_length, "run_length");
+    require_positive(training.rate, "rate");
+    require_positive(training.final_rate, "final_rate");
+    for (const auto& [value, what] : {std::pair{training.events, "events"},
+                                      {training.states, "states"},
+                                      {training.validation_events, "validation_events"},
+                                      {training.iterations, "iterations"},
+                                      {training.rounds, "rounds"},
+                                      {training.batch, "batch"},
+                                      {training.evaluate_every, "evaluate_every"},
+                                      {training.patience, "patience"},
+                                      {training.most_steps, "most_steps"}}) {
+        if (value == 0) refuse(fmt::format("{} must be positive, got 0", what));
+    }
+    if (!(training.quantile > 0 && training.quantile < 1)) {
+        refuse(fmt::format("quantile must lie in (0, 1), got {}", training.quantile));
+    }
+    if (!(training.logit_margin >= 0 && training.fatal_weight >= 0)) {
+        refuse("logit_margin and fatal_weight must not be negative");
+    }
+}
+
+void GateSamples::append(std::span<const double> row, double event_in, double back_in,
+                         double value_now, double stands_for)
+{
+    features.insert(features.end(), row.begin(), row.end());
+    event.push_back(event_in);
+    back.push_back(back_in);
+    value.push_back(value_now);
+    weight.push_back(stands_for);
+}
+
+void GateSamples::append(const GateSamples& other)
+{
+    width = other.width;
+    const auto add = [](std::vector<double>& to, const std::vector<double>& from) {
+        to.insert(to.end(), from.begin(), from.end());
+    };
+    add(features, other.features);
+    add(event, other.event);
+    add(back, other.back);
+    add(value, other.value);
+    add(weight, other.weight);
+    events += other.events;
+    steps += other.steps;
+}
+
+void GateSamples::visit(std::span<const double> row)
+{
+    if (box.empty()) box.assign(row.size(), {.lower = infinity, .upper = -infinity});
+    for (std::size_t i = 0; i < row.size(); ++i) {
+        box[i].lower = std::min(box[i].lower, row[i]);
+        box[i].upper = std::max(box[i].upper, row[i]);
+    }
+}
+
+double GateTrial::miss_bound() const
+{
+    return learn::miss_bound(misses, events);
+}
+
+std::string to_json(const GateReport& report)
+{
+    const GateTrial& t = report.trial;
+    nlohmann::ordered_json out{{"outcome", describe(report.outcome)},
+                               {"iterations", report.iterations},
+                               {"seconds", report.seconds},
+                               {"training_states", report.training_states},
+                               {"fatal_states", report.fatal_states},
+                               {"events", report.events},
+                               {"expected_looks_per_step", report.looks},
+                               {"trial",
+                                {{"events", t.events},
+                                 {"misses", t.misses},
+                                 {"miss_bound", t.miss_bound()},
+                                 {"steps", t.steps},
+                                 {"exact_calls", t.exact_calls},
+                                 {"gated_calls", t.gated_calls},
+                                 {"gain", t.gain()},
+                                 {"network_calls", t.network_calls},
+                                 {"outside", t.outside},
+                                 {"repeated_steps", t.repeated}}}};
+    return out.dump(2);
+}
+
+/// States as the network sees them, and the weights on their way.
+class GateTrainer::State {
+public:
+    State(const GateTraining& options, GateSamples training, GateSamples validation)
+        : options_(options),
+          random_(options.seed),
+          training_(std::move(training)),
+          validation_(std::move(validation)),
+          network_((check_samples(), training_.width), options.hidden, Activation::relu, random_,
+                   horizon() ? options.levels.size() : 1),
+          gradient_(network_.parameters().size())
+    {
+        normalise();
+        prepare(validation_, validation_states_);
+        prepare(training_, training_states_);
+        sort_out();
+    }
+
+    bool run(std::size_t round, const ProgressCallback& progress)
+    {
+        const auto start = std::chrono::steady_clock::now();
+        const double before = seconds_;
+        Adam adam(network_.parameters().size(), {});
+        best_cost_ = infinity;  // more states may have made what was best too bold
+        std::size_t since_best = 0;
+        for (std::size_t i = 0;; ++i) {
+            const bool last = i == options_.iterations;
+            if (last || (i > 0 && i % options_.evaluate_every == 0)) {
+                const double loss = evaluate(since_best);
+                const std::chrono::duration<double> spent =
+                    std::chrono::steady_clock::now() - start;
+                seconds_ = before + spent.count();
+                if (!std::isfinite(loss)) {
+                    outcome_ = TrainingOutcome::diverged;
+                    return false;
+                }
+                if (progress && !progress({.iteration = round * options_.iterations + i,
+                                           .total = options_.rounds * options_.iterations,
+                                           .loss = loss,
+                                           .misses = 0,
+                                           .seconds = seconds_})) {
+                    outcome_ = TrainingOutcome::stopped;
+                    return false;
+                }
+            }
+            if (last || since_best >= options_.patience) return true;
+            const double done = static_cast<double>(i) / static_cast<double>(options_.iterations);
+            const double rate = options_.final_rate + (options_.rate - options_.final_rate) * 0.5 *
+                                                          (1 + std::cos(std::numbers::pi * done));
+            step(adam, rate);
+        }
+    }
+
+    void add(const GateSamples& samples)
+    {
+        for (std::size_t i = 0; i < samples.box.size(); ++i) {
+            training_.box[i].lower = std::min(training_.box[i].lower, samples.box[i].lower);
+            training_.box[i].upper = std::max(training_.box[i].upper, samples.box[i].upper);
+        }
+        training_.append(samples);
+        prepare(samples, training_states_);
+        sort_out();
+        if (!best_.empty()) judge_again();
+    }
+
+    [[nodiscard]] Model model() const
+    {
+        Model model;
+        model.kind = name(options_.kind);
+        model.recipe = to_string(options_.recipe);
+        model.offset = offset_;
+        model.scale = scale_;
+        model.domain = box();
+        model.activation = Activation::relu;
+        model.precision = Precision::f32;
+        model.seed = options_.seed;
+        TrainableMlp copy = network_;
+        if (!best_.empty()) std::copy(best_.begin(), best_.end(), copy.parameters().begin());
+        for (double& p : copy.parameters()) p = static_cast<float>(p);
+        model.layers = copy.layers();
+        for (std::size_t k = 0; k < options_.levels.size(); ++k) {
+            const double threshold = k < thresholds_.size() ? thresholds_[k] : -infinity;
+            // Stored thresholds are finite: no logit of a sound network is below this one.
+            model.levels.push_back(
+                {.value = options_.levels[k], .threshold = std::max(threshold, -never)});
+        }
+        model.threshold = model.levels.front().threshold;
+        return model;
+    }
+
+    [[nodiscard]] GateReport report() const
+    {
+        GateReport report;
+        report.outcome = outcome_;
+        report.iterations = iterations_;
+        report.seconds = seconds_;
+        report.training_states = training_.size();
+        report.fatal_states = horizon() ? fatal_.size() : near_.size();
+        report.events = training_.events + validation_.events;
+        report.looks = best_cost_;
+        return report;
+    }
+
+private:
+    static constexpr double never = 1e30;
+
+    [[nodiscard]] bool horizon() const noexcept { return options_.kind == GateKind::horizon; }
+    [[nodiscard]] double largest() const noexcept { return options_.levels.back(); }
+    [[nodiscard]] std::size_t outputs() const noexcept { return network_.outputs(); }
+
+    void check_samples() const
+    {
+        for (const GateSamples* set : {&training_, &validation_}) {
+            std::size_t near = 0;
+            for (std::size_t i = 0; i < set->size(); ++i) {
+                near += (horizon() ? set->event[i] : set->value[i]) <= largest() ? 1 : 0;
+            }
+            const std::string_view what =
+                horizon() ? "with an event within the longest horizon" : "below the highest level";
+            if (near == 0) {
+                refuse(
+                    fmt::format("of {} states of runs there is none {}; sample elsewhere, or "
+                                "longer",
+                                set->size(), what));
+            }
+            if (near == set->size()) {
+                refuse(
+                    fmt::format("all {} states of runs are {}: nothing is ever clear; take "
+                                "shorter horizons or lower levels",
+                                set->size(), what));
+            }
+        }
+    }
+
+    /// Mean and deviation of the states of the runs.
+    void normalise()
+    {
+        const std::size_t width = training_.width;
+        const auto n = static_cast<double>(training_.size());
+        offset_.assign(width, 0);
+        scale_.assign(width, 0);
+        for (std::size_t i = 0; i < training_.features.size(); ++i) {
+            offset_[i % width] += training_.features[i] / n;
+        }
+        for (std::size_t i = 0; i < training_.features.size(); ++i) {
+            const double away = training_.features[i] - offset_[i % width];
+            scale_[i % width] += away * away / n;
+        }
+        for (double& s : scale_) s = s > 1e-24 ? 1 / std::sqrt(s) : 1;
+    }
+
+    void prepare(const GateSamples& samples, std::vector<double>& states) const
+    {
+        for (std::size_t i = 0; i < samples.features.size(); ++i) {
+            const std::size_t c = i % samples.width;
+            states.push_back(static_cast<float>((samples.features[i] - offset_[c]) * scale_[c]));
+        }
+    }
+
+    /// Into the classes of which batches are made.
+    void sort_out()
+    {
+        fatal_.clear();
+        near_.clear();
+        clear_.clear();
+        for (std::size_t i = 0; i < training_.size(); ++i) {
+            if (horizon() && training_.back[i] <= largest()) fatal_.push_back(i);
+            const double distance = horizon() ? training_.event[i] : training_.value[i];
+            (distance <= largest() ? near_ : clear_).push_back(i);
+        }
+        critical_states_.clear();
+        for (const std::size_t i : critical()) {
+            const auto row =
+                training_states_.begin() + static_cast<std::ptrdiff_t>(i * training_.width);
+            critical_states_.insert(critical_states_.end(), row,
+                                    row + static_cast<std::ptrdiff_t>(training_.width));
+        }
+    }
+
+    /// The training states that a threshold must not clear, at one level or another.
+    [[nodiscard]] const std::vector<std::size_t>& critical() const noexcept
+    {
+        return horizon() ? fatal_ : near_;
+    }
+
+    [[nodiscard]] std::size_t draw()
+    {
+        const double u = random_.uniform();
+        const std::vector<std::size_t>& pool = u < 0.2 && !fatal_.empty() ? fatal_
+                                               : u < 0.6                  ? near_
+                                                                          : clear_;
+        return pool[random_.below(pool.size())];
+    }
+
+    void step(Adam& adam, double rate)
+    {
+        const std::size_t width = network_.inputs();
+        batch_.resize(options_.batch * width);
+        drawn_.resize(options_.batch);
+        for (std::size_t s = 0; s < options_.batch; ++s) {
+            drawn_[s] = draw();
+            std::copy_n(training_states_.begin() + static_cast<std::ptrdiff_t>(drawn_[s] * width),
+                        width, batch_.begin() + static_cast<std::ptrdiff_t>(s * width));
+        }
+        network_.loss_and_gradient(
+            batch_, options_.batch,
+            [this](std::size_t s, const double* logits, double* slopes) {
+                return loss(training_, drawn_[s], logits, slopes);
+            },
+            gradient_);
+        adam.step(network_.parameters(), gradient_, rate);
+        ++iterations_;
+    }
+
+    double loss(const GateSamples& set, std::size_t i, const double* logits, double* slopes) const
+    {
+        if (horizon()) {
+            double sum = 0;
+            for (std::size_t k = 0; k < options_.levels.size(); ++k) {
+                const bool event = set.event[i] <= options_.levels[k];
+                const bool fatal = set.back[i] <= options_.levels[k];
+                const double weight = fatal ? options_.fatal_weight : 1;
+                sum += weight * cross_entropy(logits[k], event);
+                slopes[k] = weight * (1 / (1 + std::exp(-logits[k])) - (event ? 1 : 0));
+            }
+            return sum;
+        }
+        // Pinball loss: the logit is to be above the target for `quantile` of the states.
+        const double above = target_of(set.value[i], options_.levels.front()) - logits[0];
+        const double q = options_.quantile;
+        slopes[0] = above > 0 ? -q : 1 - q;
+        return above > 0 ? q * above : (q - 1) * above;
+    }
+
+    /// Judges the present weights, as they would be stored, and keeps them if they are the best.
+    double evaluate(std::size_t& since_best)
+    {
+        const std::vector<double> exact(network_.parameters().begin(), network_.parameters().end());
+        for (double& p : network_.parameters()) p = static_cast<float>(p);
+        double loss_sum = 0;
+        std::vector<double> slopes(outputs());
+        logits_.resize(validation_.size() * outputs());
+        network_.evaluate(validation_states_, logits_);
+        for (std::size_t i = 0; i < validation_.size(); ++i) {
+            loss_sum += loss(validation_, i, logits_.data() + i * outputs(), slopes.data());
+        }
+        const double mean = loss_sum / static_cast<double>(validation_.size());
+        if (std::isfinite(mean)) {
+            const Choice choice = choose();
+            ++since_best;
+            if (choice.cost < best_cost_) {
+                best_.assign(network_.parameters().begin(), network_.parameters().end());
+                thresholds_ = choice.thresholds;
+                best_cost_ = choice.cost;
+                since_best = 0;
+            }
+        }
+        std::copy(exact.begin(), exact.end(), network_.parameters().begin());
+        return mean;
+    }
+
+    /// The thresholds of the best weights, after more states have come.
+    void judge_again()
+    {
+        const std::vector<double> exact(network_.parameters().begin(), network_.parameters().end());
+        std::copy(best_.begin(), best_.end(), network_.parameters().begin());
+        logits_.resize(validation_.size() * outputs());
+        network_.evaluate(validation_states_, logits_);
+        const Choice choice = choose();
+        thresholds_ = choice.thresholds;
+        best_cost_ = choice.cost;
+        std::copy(exact.begin(), exact.end(), network_.parameters().begin());
+    }
+
+    struct Choice {
+        std::vector<double> thresholds;
+        double cost = infinity;
+    };
+
+    /// Thresholds that clear no fatal state, and of those that are left the cheapest. The logits
+    /// of the validation set are in `logits_`.
+    [[nodiscard]] Choice choose()
+    {
+        std::vector<double> lowest(options_.levels.size(), infinity);
+        for (std::size_t i = 0; i < validation_.size(); ++i) {
+            lower(validation_, i, logits_.data() + i * outputs(), lowest);
+        }
+        critical_logits_.resize(critical().size() * outputs());
+        network_.evaluate(critical_states_, critical_logits_);
+        for (std::size_t c = 0; c < critical().size(); ++c) {
+            lower(training_, critical()[c], critical_logits_.data() + c * outputs(), lowest);
+        }
+        for (double& threshold : lowest) threshold -= options_.logit_margin;
+        if (!horizon()) return {.thresholds = lowest, .cost = cost(lowest)};
+        Choice best;
+        for (const double cap : {-6.0, -5.0, -4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0}) {
+            Choice choice;
+            for (const double threshold : lowest) {
+                choice.thresholds.push_back(std::min(threshold, cap));
+            }
+            choice.cost = cost(choice.thresholds);
+            if (choice.cost < best.cost) best = std::move(choice);
+        }
+        return best;
+    }
+
+    /// Lowers the lowest logit of states that must not be cleared, for each level, by state i.
+    void lower(const GateSamples& set, std::size_t i, const double* logits,
+               std::vector<double>& lowest) const
+    {
+        const double until = horizon() ? set.back[i] : set.value[i];
+        for (std::size_t k = options_.levels.size(); k-- > 0;) {
+            if (!(until <= options_.levels[k])) break;
+            lowest[k] = std::min(lowest[k], logits[horizon() ? k : 0]);
+        }
+    }
+
+    /// Looks per step (or per time in which the guard can change by half the first level).
+    [[nodiscard]] double cost(const std::vector<double>& thresholds) const
+    {
+        double sum = 0;
+        double states = 0;
+        const double unit = 0.5 * options_.levels.front();
+        for (std::size_t i = 0; i < validation_.size(); ++i) {
+            double cleared = unit;
+            for (std::size_t k = 0; k < thresholds.size(); ++k) {
+                if (!(logits_[i * outputs() + (horizon() ? k : 0)] < thresholds[k])) break;
+                cleared = options_.levels[k];
+            }
+            const double steps = cleared / unit;
+            double looks = 1 / steps;
+            if (horizon() && validation_.event[i] <= cleared) {
+                looks *= 1 + std::log2(steps);  // the stretch is halved until the event is found
+            }
+            sum += validation_.weight[i] * looks;
+            states += validation_.weight[i];
+        }
+        return states > 0 ? sum / states : 1;
+    }
+
+    [[nodiscard]] std::vector<Interval> box() const
+    {
+        std::vector<Interval> box = training_.box;
+        for (std::size_t i = 0; i < box.size(); ++i) {
+            box[i].lower = std::min(box[i].lower, validation_.box[i].lower);
+            box[i].upper = std::max(box[i].upper, validation_.box[i].upper);
+        }
+        return box;
+    }
+
+    GateTraining options_;
+    Random random_;
+    GateSamples training_;
+    GateSamples validation_;
+    TrainableMlp network_;
+    std::vector<double> gradient_;
+    std::vector<double> offset_, scale_;
+    std::vector<double> training_states_, validation_states_;
+    std::vector<std::size_t> fatal_, near_, clear_;
+    std::vector<double> batch_, logits_, critical_states_, critical_logits_;
+    std::vector<std::size_t> drawn_;
+    std::vector<double> best_, thresholds_;
+    double best_cost_ = infinity;
+    std::size_t iterations_ = 0;
+    double seconds_ = 0;
+    TrainingOutcome outcome_ = TrainingOutcome::finished;
+};
+
+GateTrainer::GateTrainer(const GateTraining& options, GateSamples training, GateSamples validation)
+    : state_(std::make_unique<State>(options, std::move(training), std::move(validation)))
+{
+}
+
+GateTrainer::~GateTrainer() = default;
+
+bool GateTrainer::run(std::size_t round, const ProgressCallback& progress)
+{
+    return state_->run(round, progress);
+}
+
+void GateTrainer::add(const GateSamples& samples)
+{
+    state_->add(samples);
+}
+
+Model GateTrainer::model() const
+{
+    return state_->model();
+}
+
+GateReport GateTrainer::report() const
+{
+    return state_->report();
+}
+
+namespace detail {
+
+void throw_no_start(const std::string& why)
+{
+    refuse("none of 1000 starts can be run: " + why);
+}
+
+void throw_no_features(const std::string& recipe, std::size_t components)
+{
+    refuse(fmt::format("the recipe '{}' cannot be computed from a state of {} components", recipe,
+                       components));
+}
+
+void throw_no_events(std::uint64_t steps)
+{
+    refuse(fmt::format("{} steps of runs hold no event; start elsewhere, or make the runs longer",
+                       steps));
+}
+
+void throw_no_bounds()
+{
+    refuse("a level gate is for a system that declares a speed_bound, and this one does not");
+}
+
+double processor_seconds() noexcept
+{
+    return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+}  // namespace detail
+
+}  // namespace ricochet::learn

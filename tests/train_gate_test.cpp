@@ -1,0 +1,270 @@
+// Gates trained for a user's system.
+#include "ricochet/learn/train_gate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/nn/safetensors.hpp"
+
+namespace ricochet::learn {
+namespace {
+
+using Fixed = FixedStep<Rk4>;
+using X = std::array<double, 4>;
+
+/// A ball on a round table under a force that turns; only whether it is on the table is known.
+struct Table {
+    using State = X;
+    static constexpr std::string_view name = "table";
+    template <class V>
+    void flow(double t, const V& x, V& dxdt) const
+    {
+        dxdt[0] = x[2];
+        dxdt[1] = x[3];
+        dxdt[2] = std::cos(0.3 * t) - 0.2 * x[2];
+        dxdt[3] = std::sin(0.3 * t) - 0.2 * x[3];
+    }
+    template <class V>
+    bool guard(double, const V& x) const
+    {
+        return x[0] * x[0] + x[1] * x[1] < 1;
+    }
+    template <class V>
+    void reset(double, V& x) const
+    {
+        // Reflected, and half a per mille inward, so that it starts on the table.
+        const double r2 = x[0] * x[0] + x[1] * x[1];
+        const double along = (x[0] * x[2] + x[1] * x[3]) / r2;
+        if (along > 0) {
+            x[2] -= 2 * along * x[0];
+            x[3] -= 2 * along * x[1];
+        }
+        const double factor = 0.9995 / std::sqrt(r2);
+        x[0] *= factor;
+        x[1] *= factor;
+    }
+};
+
+/// The same with its distance.
+struct MeasuredTable : Table {
+    static constexpr std::string_view name = "measured-table";
+    template <class V>
+    double guard(double, const V& x) const
+    {
+        return 1 - std::sqrt(x[0] * x[0] + x[1] * x[1]);
+    }
+    template <class V>
+    double speed_bound(double, const V& x) const
+    {
+        return std::sqrt(x[2] * x[2] + x[3] * x[3]);
+    }
+    template <class V>
+    double acceleration_bound(double, const V& x) const
+    {
+        return 1.001 + 0.2 * (5 + std::sqrt(x[2] * x[2] + x[3] * x[3]));
+    }
+};
+
+Starts<X> on_the_table()
+{
+    return from_box(X{-0.5, -0.5, -1, -1}, X{0.5, 0.5, 1, 1}, 0, 100);
+}
+
+GateTraining quick()
+{
+    GateTraining training;
+    training.recipe = gate_recipe("state");
+    training.levels = horizons(0.005, {2, 4, 8, 16, 32});
+    training.step_min = training.step_max = 0.005;
+    training.run_length = 20;
+    training.events = 300;
+    training.validation_events = 150;
+    training.fresh_events = 300;
+    training.states = 20'000;
+    training.iterations = 600;
+    training.evaluate_every = 200;
+    training.seed = 3;
+    return training;
+}
+
+std::string refusal(const std::function<void()>& act)
+{
+    try {
+        act();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "nothing was refused";
+}
+
+TEST(TrainGate, SavesMostChecksOfABlackBoxAndKeepsItsEvents)
+{
+    const TrainedGate trained = train_gate(Table{}, on_the_table(), Fixed{}, {}, quick());
+    const GateTrial& trial = trained.report.trial;
+    EXPECT_EQ(trained.report.outcome, TrainingOutcome::finished) << to_json(trained.report);
+    EXPECT_GE(trial.events, 300U);
+    EXPECT_EQ(trial.misses, 0U);
+    // Some 50 calls of 200 steps locate an event; the looks of the others are to go.
+    EXPECT_GT(trial.gain(), 2) << to_json(trained.report);
+    EXPECT_EQ(trained.model.calibration.events, trial.events);
+    EXPECT_NEAR(trained.model.calibration.miss_bound, 3.0 / static_cast<double>(trial.events),
+                1e-15);
+    EXPECT_EQ(trained.model.system, "table");
+
+    const Options options{.t_end = 50, .step = 0.005};
+    const X start{0.1, 0.2, 0.5, 0.3};
+    const auto exact = integrate(Table{}, start, options, Fixed{});
+    const auto gated = integrate(Table{}, start, options, Fixed{}, Calibrated(Gate(trained.model)));
+    ASSERT_EQ(exact.events.size(), gated.events.size());
+    EXPECT_EQ(exact.x, gated.x);
+    EXPECT_GT(exact.statistics.guard_calls, 2 * gated.statistics.guard_calls);
+}
+
+TEST(TrainGate, GivesTheSameBytesFromTheSameSeed)
+{
+    GateTraining training = quick();
+    training.events = 60;
+    training.validation_events = 40;
+    training.fresh_events = 40;
+    training.iterations = 200;
+    const auto bytes = [&] {
+        return to_safetensors(train_gate(Table{}, on_the_table(), Fixed{}, {}, training).model);
+    };
+    const auto first = bytes();
+    EXPECT_EQ(first, bytes());
+    training.seed = 4;
+    EXPECT_NE(first, bytes());
+}
+
+TEST(TrainGate, LearnsUnderErrorControl)
+{
+    GateTraining training = quick();
+    training.step_min = training.step_max = 0;
+    training.levels = {0.05, 0.1, 0.2, 0.4};
+    const Options tolerances{.rtol = 1e-9, .atol = 1e-12, .h_max = 0.02};
+    const TrainedGate trained =
+        train_gate(Table{}, on_the_table(), ErrorControlled<Dopri5>{}, tolerances, training);
+    EXPECT_EQ(trained.report.trial.misses, 0U);
+    EXPECT_GT(trained.report.trial.gain(), 1) << to_json(trained.report);
+}
+
+TEST(TrainGate, LearnsLevelsFromBelow)
+{
+    GateTraining training = quick();
+    training.kind = GateKind::level;
+    training.levels = {0.05, 0.1, 0.2, 0.4};
+    training.most_steps = 100'000;
+    training.iterations = 3000;
+    training.evaluate_every = 500;
+    const TrainedGate trained = train_gate(MeasuredTable{}, on_the_table(), Fixed{}, {}, training);
+    const auto& levels = trained.model.levels;
+    ASSERT_EQ(levels.size(), 4U);
+    for (std::size_t k = 1; k < levels.size(); ++k) {
+        EXPECT_LE(levels[k].threshold, levels[k - 1].threshold);
+    }
+    // In a run of its own what is cleared is not more than the guard.
+    const Gate gate(trained.model);
+    const auto run = integrate(MeasuredTable{}, X{0, 0.3, 0.4, 0.1},
+                               {.t_end = 30,
+                                .step = 0.005,
+                                .sample_times =
+                                    [] {
+                                        std::vector<double> times;
+                                        for (int i = 0; i < 3000; ++i) times.push_back(0.01 * i);
+                                        return times;
+                                    }()},
+                               Fixed{});
+    std::size_t cleared = 0;
+    std::size_t far = 0;
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < run.trajectory.x.size(); ++i) {
+        const X& x = run.trajectory.x[i];
+        const double guard = MeasuredTable{}.guard(0, x);
+        const double said = gate.ask(MeasuredTable{}, 0, 0, x).cleared;
+        far += guard > 0.2 ? 1 : 0;
+        cleared += guard > 0.2 && said > 0 ? 1 : 0;
+        wrong += said >= guard && said > 0 ? 1 : 0;
+    }
+    EXPECT_LE(wrong, 3U);  // of 3000: nothing is proved
+    EXPECT_GT(10 * cleared, 9 * far) << cleared << " of " << far;
+}
+
+TEST(TrainGate, StopsWhenItIsToldAndKeepsTheBest)
+{
+    GateTraining training = quick();
+    training.events = 60;
+    training.validation_events = 40;
+    training.fresh_events = 0;
+    std::size_t calls = 0;
+    const TrainedGate trained = train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
+                                           [&](const Progress&) { return ++calls < 2; });
+    EXPECT_EQ(trained.report.outcome, TrainingOutcome::stopped);
+    EXPECT_EQ(calls, 2U);
+    EXPECT_EQ(trained.report.iterations, 400U);
+    EXPECT_EQ(trained.model.calibration.events, 0U);
+    EXPECT_NO_THROW(Gate gate(trained.model));
+}
+
+TEST(TrainGate, RefusesRunsWithoutEventsAndRunsOfNothingButEvents)
+{
+    /// At rest in the middle of the table.
+    struct Calm : Table {
+        void flow(double, const X&, X& dxdt) const { dxdt = {}; }
+    };
+    GateTraining training = quick();
+    training.events = 20;
+    EXPECT_NE(refusal([&] {
+                  (void)train_gate(Calm{}, on_the_table(), Fixed{}, {}, [&] {
+                      GateTraining few = training;
+                      few.most_steps = 50'000;
+                      return few;
+                  }());
+              }).find("hold no event"),
+              std::string::npos);
+    training.levels = {1000};  // of horizons that every run ends before
+    training.validation_events = 20;
+    EXPECT_NE(refusal([&] {
+                  (void)train_gate(Table{}, on_the_table(), Fixed{}, {}, training);
+              }).find("nothing is ever clear"),
+              std::string::npos);
+    const Starts<X> beyond = [](Random&) { return RunStart<X>{.x = {std::nan(""), 0, 0, 0}}; };
+    EXPECT_NE(refusal([&] {
+                  (void)train_gate(Table{}, beyond, Fixed{}, {}, quick());
+              }).find("none of 1000 starts can be run"),
+              std::string::npos);
+}
+
+TEST(TrainGate, RefusesOptionsThatMakeNoSense)
+{
+    const auto with = [](const std::function<void(GateTraining&)>& change) {
+        GateTraining training = quick();
+        change(training);
+        return refusal([&] { (void)train_gate(Table{}, on_the_table(), Fixed{}, {}, training); });
+    };
+    EXPECT_NE(with([](GateTraining& t) { t.levels.clear(); }).find("1 to 32 levels"),
+              std::string::npos);
+    EXPECT_NE(with([](GateTraining& t) {
+                  t.levels = {0.2, 0.1};
+              }).find("must be positive and rise"),
+              std::string::npos);
+    EXPECT_NE(with([](GateTraining& t) { t.step_min = 0; }).find("step_min"), std::string::npos);
+    EXPECT_NE(with([](GateTraining& t) { t.batch = 0; }).find("batch must be positive"),
+              std::string::npos);
+    EXPECT_NE(
+        with([](GateTraining& t) { t.recipe = gate_recipe("own"); }).find("cannot be computed"),
+        std::string::npos);
+    EXPECT_NE(refusal([] {
+                  (void)from_box(X{1, 0, 0, 0}, X{0, 0, 0, 0});
+              }).find("from_box"),
+              std::string::npos);
+}
+
+}  // namespace
+}  // namespace ricochet::learn
