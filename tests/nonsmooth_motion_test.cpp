@@ -42,7 +42,7 @@ struct Spiral {
     {
         j << -decay, -frequency, frequency, -decay;
     }
-    static Interval reaction_set(double, const Eigen::Vector2d&) { return Interval(0, 0); }
+    static IntervalSet reaction_set(double, const Eigen::Vector2d&) { return IntervalSet(0, 0); }
 };
 
 // What one step multiplies exp(z t / h) by.
@@ -247,9 +247,9 @@ struct SlipWeakening {
         f << -w[1], w[0], std::abs(w[0]);
     }
     static double bound(double slid) { return 0.5 + 0.4 * std::exp(-slid); }
-    static Interval reaction_set(double, const Eigen::Vector3d& w)
+    static IntervalSet reaction_set(double, const Eigen::Vector3d& w)
     {
-        return Interval::symmetric(bound(w[2]));
+        return IntervalSet::symmetric(bound(w[2]));
     }
     static void bound_gradient(double, const Eigen::Vector3d& w, int, Eigen::Vector3d& g)
     {
@@ -585,16 +585,16 @@ struct Singular : SlidingMode {
 };
 
 struct Empty : SlidingMode {
-    static Interval reaction_set(double, const One&) { return Interval(1, -1); }
+    static IntervalSet reaction_set(double, const One&) { return IntervalSet(1, -1); }
 };
 
 struct Obstacle : SlidingMode {
-    static Interval reaction_set(double, const One&) { return Interval::half_line(); }
+    static IntervalSet reaction_set(double, const One&) { return IntervalSet::half_line(); }
 };
 
 struct Stops : SlidingMode {
     static constexpr Confines confines = Confines::state;
-    static Interval reaction_set(double, const One&) { return Interval(-1, 1); }
+    static IntervalSet reaction_set(double, const One&) { return IntervalSet(-1, 1); }
 };
 
 template <class System>
@@ -639,7 +639,7 @@ struct Escaping {
     static constexpr int state_size = 1;
     static constexpr int reaction_size = 1;
     static void smooth(double t, const One&, One& f) { f[0] = 1 / std::sqrt(1 - t); }
-    static Interval reaction_set(double, const One&) { return Interval::symmetric(0.1); }
+    static IntervalSet reaction_set(double, const One&) { return IntervalSet::symmetric(0.1); }
 };
 
 TEST(Failure, EndsTheRunWithTimeAndResidual)
@@ -656,7 +656,7 @@ TEST(Failure, EndsTheRunWithTimeAndResidual)
 
 // The bound turns negative at t = 0.5: the set is empty from there on.
 struct Vanishing : SlidingMode {
-    static Interval reaction_set(double t, const One&) { return Interval::symmetric(0.5 - t); }
+    static IntervalSet reaction_set(double t, const One&) { return IntervalSet::symmetric(0.5 - t); }
 };
 
 TEST(Failure, NamesTheSetThatFailed)

@@ -29,7 +29,7 @@ using Values = std::vector<double>;
 
 TEST(ConvexSets, AnIntervalClampsAndItsSlopeIsOneHalfOnABound)
 {
-    const Interval sign = Interval::symmetric(1);
+    const IntervalSet sign = IntervalSet::symmetric(1);
     EXPECT_EQ(projected(sign, {3}), Values{1});
     EXPECT_EQ(projected(sign, {-3}), Values{-1});
     EXPECT_EQ(projected(sign, {0.25}), Values{0.25});
@@ -38,8 +38,8 @@ TEST(ConvexSets, AnIntervalClampsAndItsSlopeIsOneHalfOnABound)
     EXPECT_EQ(derivative(sign, {1}), Values{0.5});
     EXPECT_EQ(derivative(sign, {-1}), Values{0.5});
     // A bound of zero is the point zero, whose projection does not vary.
-    EXPECT_EQ(derivative(Interval::symmetric(0), {0}), Values{0});
-    EXPECT_EQ(projected(Interval::symmetric(0), {0.3}), Values{0});
+    EXPECT_EQ(derivative(IntervalSet::symmetric(0), {0}), Values{0});
+    EXPECT_EQ(projected(IntervalSet::symmetric(0), {0.3}), Values{0});
 }
 
 TEST(ConvexSets, ABallKeepsDirections)
@@ -72,7 +72,7 @@ TEST(ConvexSets, AFrictionConeHasAnInsideAPolarAndASide)
 
 TEST(ConvexSets, AProductTreatsItsFactorsApart)
 {
-    const Product product(Interval(0, 1), Ball<2>(1), Interval::half_line());
+    const Product product(IntervalSet(0, 1), Ball<2>(1), IntervalSet::half_line());
     EXPECT_EQ(product.dimension(), 4U);
     EXPECT_EQ(projected(product, {2, 0, 3, -1}), (Values{1, 0, 1, 0}));
     const Values d = derivative(product, {0.5, 4, 0, 2});
@@ -81,7 +81,7 @@ TEST(ConvexSets, AProductTreatsItsFactorsApart)
     expected[2 * 4 + 2] = 0.25;  // across the ray at distance 4 from a unit ball
     expected[3 * 4 + 3] = 1;     // inside the half line
     EXPECT_EQ(d, expected);
-    const Product box(Interval(0, 1), Interval(-2, 3));
+    const Product box(IntervalSet(0, 1), IntervalSet(-2, 3));
     static_assert(BoxSet<decltype(box)>);
     static_assert(!BoxSet<decltype(product)>);
     EXPECT_EQ(box.lower(1), -2);
@@ -90,14 +90,14 @@ TEST(ConvexSets, AProductTreatsItsFactorsApart)
 
 TEST(ConvexSets, AllPassTheirOwnCheck)
 {
-    EXPECT_NO_THROW(check_projection(Interval(-0.5, 2)));
-    EXPECT_NO_THROW(check_projection(Interval::half_line()));
+    EXPECT_NO_THROW(check_projection(IntervalSet(-0.5, 2)));
+    EXPECT_NO_THROW(check_projection(IntervalSet::half_line()));
     EXPECT_NO_THROW(check_projection(Box<3>({-1, 0, 2}, {1, 0, 3})));
     EXPECT_NO_THROW(check_projection(Orthant<4>()));
     EXPECT_NO_THROW(check_projection(Ball<3>(0.7)));
     EXPECT_NO_THROW(check_projection(FrictionCone<2>(0.3)));
     EXPECT_NO_THROW(check_projection(FrictionCone<3>(2)));
-    EXPECT_NO_THROW(check_projection(Product(Ball<2>(1), FrictionCone<3>(0.5), Interval(-1, 1))));
+    EXPECT_NO_THROW(check_projection(Product(Ball<2>(1), FrictionCone<3>(0.5), IntervalSet(-1, 1))));
 }
 
 // The nearer of two points: idempotent, but no convex set.
@@ -131,8 +131,8 @@ struct Slanted {
     }
 };
 
-struct WrongSlope : Interval {
-    WrongSlope() : Interval(-1, 1) {}
+struct WrongSlope : IntervalSet {
+    WrongSlope() : IntervalSet(-1, 1) {}
     static void derivative(std::span<const double>, std::span<double> d) { d[0] = 0.5; }
 };
 
@@ -146,13 +146,13 @@ TEST(ConvexSets, WhatIsNoProjectionIsRefused)
 
 TEST(ConvexSets, EmptySetsSaySo)
 {
-    EXPECT_FALSE(Interval(1, -1).fault().empty());
-    EXPECT_FALSE(Interval::symmetric(-0.1).fault().empty());
-    EXPECT_FALSE(Interval(std::nan(""), 1).fault().empty());
+    EXPECT_FALSE(IntervalSet(1, -1).fault().empty());
+    EXPECT_FALSE(IntervalSet::symmetric(-0.1).fault().empty());
+    EXPECT_FALSE(IntervalSet(std::nan(""), 1).fault().empty());
     EXPECT_FALSE(Ball<2>(-1).fault().empty());
     EXPECT_FALSE(FrictionCone<3>(-1).fault().empty());
-    EXPECT_FALSE(Product(Interval(0, 1), Ball<2>(-1)).fault().empty());
-    EXPECT_TRUE(Product(Interval(0, 1), Ball<2>(1)).fault().empty());
+    EXPECT_FALSE(Product(IntervalSet(0, 1), Ball<2>(-1)).fault().empty());
+    EXPECT_TRUE(Product(IntervalSet(0, 1), Ball<2>(1)).fault().empty());
     EXPECT_TRUE(fault_of(TwoPoints{}).empty());  // does not say
 }
 

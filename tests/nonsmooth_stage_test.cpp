@@ -268,7 +268,7 @@ struct WithoutGradient {
     }
     void observe(Eigen::Matrix<double, 1, 2>& e) const { inner.observe(e); }
     void offset(double t, FrictionInclusion::Scalar& s) const { inner.offset(t, s); }
-    [[nodiscard]] Interval reaction_set(double t, const Eigen::Vector2d& w) const
+    [[nodiscard]] IntervalSet reaction_set(double t, const Eigen::Vector2d& w) const
     {
         return inner.reaction_set(t, w);
     }
@@ -374,7 +374,7 @@ struct Saturated {
     static constexpr Confines confines = Confines::state;
     using V = Eigen::Matrix<double, 1, 1>;
     static void smooth(double t, const V&, V& f) { f[0] = 3 * std::cos(t); }
-    static Interval reaction_set(double, const V&) { return Interval(-1, 2); }
+    static IntervalSet reaction_set(double, const V&) { return IntervalSet(-1, 2); }
 };
 
 TEST(Stops, KeepTheStateInsideAndPushOnlyInwards)

@@ -71,18 +71,18 @@ void clamp_derivative(const Box& box, std::span<const double> z, std::span<doubl
 
 /// [lower, upper], either of which may be infinite. As a set of reactions: a relay
 /// (sign), Coulomb friction of one direction. As a set of states: stops, a saturation.
-class Interval {
+class IntervalSet {
 public:
-    constexpr Interval(double lower, double upper) noexcept : lower_(lower), upper_(upper) {}
+    constexpr IntervalSet(double lower, double upper) noexcept : lower_(lower), upper_(upper) {}
 
     /// [-bound, bound]: friction in one direction. A negative bound is a fault.
-    [[nodiscard]] static constexpr Interval symmetric(double bound) noexcept
+    [[nodiscard]] static constexpr IntervalSet symmetric(double bound) noexcept
     {
         return {-bound, bound};
     }
 
     /// [0, infinity): a diode's current, the force of a contact.
-    [[nodiscard]] static constexpr Interval half_line() noexcept
+    [[nodiscard]] static constexpr IntervalSet half_line() noexcept
     {
         return {0, std::numeric_limits<double>::infinity()};
     }

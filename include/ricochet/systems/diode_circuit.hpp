@@ -59,9 +59,9 @@ public:
         a.setZero();
         a.diagonal() << p_.capacitance_1, p_.capacitance_2, p_.inductance;
     }
-    [[nodiscard]] Interval reaction_set(double /*t*/, const Vector& /*w*/) const
+    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
     {
-        return Interval::symmetric(p_.current);
+        return IntervalSet::symmetric(p_.current);
     }
 
     [[nodiscard]] static Vector start() { return {9.998048, 1.980972, -10.908448}; }

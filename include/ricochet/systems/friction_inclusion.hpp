@@ -65,9 +65,9 @@ public:
     void mass(Eigen::Matrix2d& a) const { a << 1, 0, 0, p_.mass; }
     void observe(Eigen::Matrix<double, 1, 2>& e) const { e << 0, 1; }
     void offset(double /*t*/, Scalar& s) const { s[0] = p_.belt_speed; }
-    [[nodiscard]] Interval reaction_set(double /*t*/, const Vector& w) const
+    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& w) const
     {
-        return Interval::symmetric(friction(std::abs(w[1] - p_.belt_speed)));
+        return IntervalSet::symmetric(friction(std::abs(w[1] - p_.belt_speed)));
     }
     /// dF/dw.
     void bound_gradient(double t, const Vector& w, int which, Vector& gradient) const;

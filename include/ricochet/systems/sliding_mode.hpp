@@ -47,9 +47,9 @@ public:
     {
         j(0, 0) = 0;
     }
-    [[nodiscard]] Interval reaction_set(double /*t*/, const Vector& /*w*/) const
+    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
     {
-        return Interval::symmetric(p_.gain);
+        return IntervalSet::symmetric(p_.gain);
     }
 
     /// w(t) from w(0) = `from` > 0, for gain > amplitude.
