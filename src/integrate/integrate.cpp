@@ -3,28 +3,39 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
+#include <string>
+#include <string_view>
 
 namespace ricochet::detail {
+
+namespace {
+
+/// "guard 0 (floor)", or without the name where it has none.
+std::string guard_called(std::size_t which, std::string_view name)
+{
+    return name.empty() ? fmt::format("guard {}", which)
+                        : fmt::format("guard {} ({})", which, name);
+}
+
+}  // namespace
 
 void throw_start_empty()
 {
     throw std::invalid_argument("integrate: the start must have components, got none");
 }
 
-void throw_no_reset(std::size_t which)
+void throw_no_reset(std::size_t which, std::string_view name)
 {
     throw std::invalid_argument(fmt::format(
-        "integrate: guard {} is unilateral and needs a reset: nothing says how the motion goes on "
-        "there",
-        which));
+        "integrate: {} is unilateral and needs a reset: nothing says how the motion goes on there",
+        guard_called(which, name)));
 }
 
-void throw_unilateral_not_falling(std::size_t which)
+void throw_unilateral_not_falling(std::size_t which, std::string_view name)
 {
     throw std::invalid_argument(fmt::format(
-        "integrate: guard {} is unilateral, so its crossing must be falling: g >= 0 bounds the "
-        "motion",
-        which));
+        "integrate: {} is unilateral, so its crossing must be falling: g >= 0 bounds the motion",
+        guard_called(which, name)));
 }
 
 void throw_unknown_mode(std::size_t mode, std::size_t modes)
@@ -46,24 +57,34 @@ void throw_no_previous_time_event()
         "previous_time_event");
 }
 
+void throw_time_event_not_ahead(bool backward, double t, double found)
+{
+    throw std::invalid_argument(fmt::format(
+        "integrate: {} must return a time {} t, t excluded, or {}infinity; at the start t = {} it "
+        "returned {}",
+        backward ? "previous_time_event(t)" : "next_time_event(t)", backward ? "before" : "after",
+        backward ? "-" : "", t, found));
+}
+
 void throw_start_not_finite(std::size_t component, double value)
 {
     throw std::invalid_argument(fmt::format(
         "integrate: the start must be finite, got {} in component {}", value, component));
 }
 
-void throw_start_outside_mode(std::size_t which, double t, double guard)
+void throw_start_outside_mode(std::size_t which, std::string_view name, double t, double guard)
 {
     throw std::invalid_argument(
-        fmt::format("integrate: the start lies behind guard {}, which bounds the motion: "
+        fmt::format("integrate: the start lies behind {}, which bounds the motion: "
                     "expected guard >= 0 at t = {}, got {}",
-                    which, t, guard));
+                    guard_called(which, name), t, guard));
 }
 
-void throw_start_guard_not_finite(std::size_t which, double t, double guard)
+void throw_start_guard_not_finite(std::size_t which, std::string_view name, double t, double guard)
 {
-    throw std::invalid_argument(fmt::format(
-        "integrate: guard {} must be finite at the start, got {} at t = {}", which, guard, t));
+    throw std::invalid_argument(
+        fmt::format("integrate: {} must be finite at the start, got {} at t = {}",
+                    guard_called(which, name), guard, t));
 }
 
 }  // namespace ricochet::detail

@@ -17,6 +17,7 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::non_finite: return "non_finite";
         case Outcome::cancelled: return "cancelled";
         case Outcome::wrong_bound: return "wrong_bound";
+        case Outcome::time_event_not_ahead: return "time_event_not_ahead";
     }
     return "unknown";
 }
@@ -27,9 +28,8 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::reached_end: return "the end time was reached";
         case Outcome::stopped_by_event: return "an event ended the run, as asked";
         case Outcome::zeno:
-            return "the system comes to rest on its guard, at once or after infinitely many "
-                   "events, "
-                   "and does not say how it rests; end the run earlier";
+            return "the motion presses on its guard, or its events accumulate there, and nothing "
+                   "stops it; declare a rest that leaves it at rest, or end the run earlier";
         case Outcome::outside_mode:
             return "a reset left the state behind a guard that bounds the motion; "
                    "let the reset put it on the surface or in front of it";
@@ -52,6 +52,10 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::wrong_bound:
             return "a guard changed faster than its declared bounds allow, or lies below its lower "
                    "bound; correct speed_bound, acceleration_bound, lipschitz or lower_bound";
+        case Outcome::time_event_not_ahead:
+            return "asked for the time event after the one that has just happened, the system "
+                   "returned a time that is not ahead; let next_time_event(t) exclude t, also "
+                   "where t is rounded, and return infinity where there is none";
     }
     return "unknown outcome";
 }

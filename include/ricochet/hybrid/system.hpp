@@ -8,6 +8,7 @@
 //     rest(t, x)                where infinitely many events end   optional
 //     crossing                  which sign change counts           default: falling
 //     unilateral                g >= 0 bounds the motion           default: false
+//     guard_info()              both and more, as a GuardInfo      instead of these two
 //     name, parameter(name)     what it is                         for networks
 //     State                     state type when none is given      optional
 //
@@ -32,14 +33,16 @@
 // A reset may also change the dimension of a state that is sized at run time.
 // Events at known times:
 //
-//     next_time_event(t)        the first after t, or infinity
+//     next_time_event(t)        the first after t, t excluded, or infinity
 //     previous_time_event(t)    the last before t, for runs backward in time
 //     time_reset(t, x)          or Mode time_reset(mode, t, x); optional
 //
 // How fast its guards can change, so that a detector may leave most of them unasked:
 // speed_bound and others, see hybrid/bounds.hpp.
 //
-// All functions are const and free of side effects; t is in seconds. Guards written
+// All functions are const and free of side effects; t is in seconds. A function of one
+// of these names that fits none of the forms is refused by the compiler, see
+// hybrid/declarations.hpp. Guards written
 // for any x that has `x[i]` are located without the rest of the state. A system
 // without a guard is integrated as a plain ordinary differential equation: none of
 // the machinery of events is compiled in.
@@ -263,6 +266,43 @@ concept PlainSingleRest = !CountsGuards<System> && requires(const System& system
     system.rest(t, x);
 };
 
+// --- what is said of guards ---
+
+template <class System>
+concept InfoOf = requires(const System& system, std::size_t which) {
+    { system.guard_info(which) } -> std::convertible_to<GuardInfo>;
+};
+
+template <class System>
+concept SingleInfo = !CountsGuards<System> && requires(const System& system) {
+    { system.guard_info() } -> std::convertible_to<GuardInfo>;
+};
+
+/// Whether a guard is looked at depends on the mode.
+template <class System>
+concept EnabledIn =
+    (CountsGuards<System> && requires(const System& system, std::size_t which, Mode mode) { { system.enabled(which, mode) } -> std::convertible_to<bool>; }) ||
+    (!CountsGuards<System> && requires(const System& system, Mode mode) { { system.enabled(mode) } -> std::convertible_to<bool>; });
+
+/// Whether a crossing is an event depends on where it is.
+template <class System, class X>
+concept EnabledAt =
+    (CountsGuards<System> && (requires(const System& system, std::size_t which, Mode mode, double t, const X& x) { { system.enabled(which, mode, t, x) } -> std::convertible_to<bool>; } ||
+                              requires(const System& system, std::size_t which, double t, const X& x) { { system.enabled(which, t, x) } -> std::convertible_to<bool>; })) ||
+    (!CountsGuards<System> && (requires(const System& system, Mode mode, double t, const X& x) { { system.enabled(mode, t, x) } -> std::convertible_to<bool>; } ||
+                               requires(const System& system, double t, const X& x) { { system.enabled(t, x) } -> std::convertible_to<bool>; }));
+
+// --- times ---
+
+template <class System>
+concept TimedBackward = requires(const System& system, double t) {
+    { system.previous_time_event(t) } -> std::convertible_to<double>;
+};
+
+template <class System, class X>
+concept TimeResetting = requires(const System& system, Mode mode, double t, X& x) { { system.time_reset(mode, t, x) } -> std::convertible_to<Mode>; } ||
+    requires(const System& system, double t, X& x) { system.time_reset(t, x); };
+
 }  // namespace detail
 
 /// x' = f(t, x): `flow` writes every component of `dxdt`.
@@ -329,8 +369,10 @@ template <class X, class System>
 [[nodiscard]] constexpr GuardInfo guard_info_of(const System& system, std::size_t which)
 {
     GuardInfo info;
-    if constexpr (requires { { system.guard_info(which) } -> std::convertible_to<GuardInfo>; }) {
+    if constexpr (detail::InfoOf<System>) {
         info = system.guard_info(which);
+    } else if constexpr (detail::SingleInfo<System>) {
+        info = system.guard_info();
     } else {
         if constexpr (requires { { system.crossing } -> std::convertible_to<Crossing>; }) {
             info.crossing = system.crossing;
@@ -504,7 +546,7 @@ template <class System>
 template <class System, class X>
 [[nodiscard]] bool call_enabled_at(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x)
 {
-    if constexpr (requires { { system.enabled(which, mode, t, x) } -> std::convertible_to<bool>; }) {
+    if constexpr (CountsGuards<System> && requires { { system.enabled(which, mode, t, x) } -> std::convertible_to<bool>; }) {
         return system.enabled(which, mode, t, x);
     } else if constexpr (CountsGuards<System> && requires { { system.enabled(which, t, x) } -> std::convertible_to<bool>; }) {
         return system.enabled(which, t, x);
@@ -514,54 +556,6 @@ template <class System, class X>
         return system.enabled(t, x);
     } else {
         return true;
-    }
-}
-
-/// A member that is there but does not fit would be passed over in silence: a guard
-/// that is not const, a reset that takes its state by value. These say so instead.
-/// (Members that are templates or overloaded have no address and are not looked at.)
-template <class System, class X>
-constexpr void check_declarations()
-{
-    if constexpr (requires { &System::guard; }) {
-        static_assert(GuardAlone<System, X>,
-                      "ricochet: guard must be callable as guard([which,] [mode,] double t, const "
-                      "State& x) on a const system and return a number; `which` comes with guard_count");
-    }
-    if constexpr (requires { &System::guards; }) {
-        static_assert(GuardsTogether<System, X>,
-                      "ricochet: guards must be callable as guards([mode,] double t, const State& x, "
-                      "std::span<double> g) on a const system, and needs guard_count");
-    }
-    if constexpr (requires { &System::guard_rate; }) {
-        static_assert(RateAlone<System, X>,
-                      "ricochet: guard_rate must be callable as guard_rate([which,] [mode,] double t, "
-                      "const State& x, const State& dxdt) on a const system and return a number");
-    }
-    if constexpr (requires { &System::reset; }) {
-        static_assert(Resetting<System, X>,
-                      "ricochet: reset must be callable as reset([which,] double t, State& x), or as "
-                      "reset([which,] Mode, double t, State& x) returning a Mode, on a const system, "
-                      "and needs a guard");
-    }
-    if constexpr (requires { &System::rest; }) {
-        static_assert(Resting<System, X>,
-                      "ricochet: rest must be callable as rest([which,] double t, State& x), or as "
-                      "rest([which,] Mode, double t, State& x) returning a Mode, on a const system");
-    }
-    if constexpr (requires { &System::next_time_event; }) {
-        static_assert(Timed<System>, "ricochet: next_time_event must be callable as next_time_event(double t) on a const system");
-    }
-    if constexpr (CountsGuards<System>) {
-        static_assert(Guarded<System, X>, "ricochet: guard_count is declared, but neither guard(which, t, x) nor guards(t, x, g) fits");
-    }
-    if constexpr (PlainSingleReset<System, X>) {
-        static_assert(!requires(const System& system, double t) { system.reset(t, X{}); },
-                      "ricochet: reset changes the state in place, so it must take it by reference");
-    }
-    if constexpr (PlainResetOf<System, X>) {
-        static_assert(!requires(const System& system, std::size_t which, double t) { system.reset(which, t, X{}); },
-                      "ricochet: reset changes the state in place, so it must take it by reference");
     }
 }
 

@@ -29,4 +29,22 @@ requires Flowing<System, X> && StateVector<X>
         .take();
 }
 
+/// What cannot be integrated is refused with a sentence instead of a list of concepts.
+template <class System, class X = typename System::State, class... Choices>
+requires(!(Flowing<System, X> && StateVector<X>)) Run<X> integrate(const System&, const X&,
+                                                                   const Options&,
+                                                                   const Choices&...)
+{
+    static_assert(StateVector<X>,
+                  "ricochet: found a start that is no state; expected std::array, std::vector or a "
+                  "vector of Eigen, of double");
+    if constexpr (StateVector<X>) {
+        detail::check_declarations<System, X>();
+        static_assert(detail::flow_declaration<System, X>() != detail::Declaration::absent,
+                      "ricochet: found no flow that fits the state; expected void flow([Mode,] "
+                      "double t, const State& x, State& dxdt) const");
+    }
+    return {};
+}
+
 }  // namespace ricochet

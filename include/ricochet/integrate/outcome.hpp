@@ -8,16 +8,17 @@ namespace ricochet {
 enum class Outcome {
     reached_end,
     stopped_by_event,
-    zeno,                ///< event times accumulate and the system has no rest rule
-    outside_mode,        ///< a reset left the state behind a unilateral guard
-    endless_cascade,     ///< resets kept triggering each other at one instant
-    conflicting_resets,  ///< two resets of one set wrote one component differently
-    unknown_mode,        ///< a reset returned a mode that the system does not have
-    step_underflow,      ///< no step above h_min met the tolerance
-    step_limit,          ///< `Options::max_steps` steps were taken
-    non_finite,          ///< the flow, a guard or a reset returned NaN or infinity
-    cancelled,           ///< `Options::cancelled` was set
-    wrong_bound,         ///< a guard broke a bound that the system declares for it
+    zeno,  ///< events accumulate, or a motion presses on its guard, and no rest rule stops it
+    outside_mode,          ///< a reset left the state behind a unilateral guard
+    endless_cascade,       ///< resets kept triggering each other at one instant
+    conflicting_resets,    ///< two resets of one set wrote one component differently
+    unknown_mode,          ///< a reset returned a mode that the system does not have
+    step_underflow,        ///< no step above h_min met the tolerance
+    step_limit,            ///< `Options::max_steps` steps were taken
+    non_finite,            ///< the flow, a guard or a reset returned NaN or infinity
+    cancelled,             ///< `Options::cancelled` was set
+    wrong_bound,           ///< a guard broke a bound that the system declares for it
+    time_event_not_ahead,  ///< `next_time_event(t)` returned a time that is not after t
 };
 
 /// The enumerator's name, e.g. "reached_end".

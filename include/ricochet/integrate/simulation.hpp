@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -25,6 +26,7 @@
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/bounds.hpp"
+#include "ricochet/hybrid/declarations.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/event_search.hpp"
 #include "ricochet/integrate/explicit_step.hpp"
@@ -47,19 +49,23 @@ namespace detail {
 /// @throws std::invalid_argument: the start is not finite.
 [[noreturn]] void throw_start_not_finite(std::size_t component, double value);
 /// @throws std::invalid_argument: the start is behind a unilateral guard.
-[[noreturn]] void throw_start_outside_mode(std::size_t which, double t, double guard);
+[[noreturn]] void throw_start_outside_mode(std::size_t which, std::string_view name, double t,
+                                           double guard);
 /// @throws std::invalid_argument: a unilateral guard without a reset.
-[[noreturn]] void throw_no_reset(std::size_t which);
+[[noreturn]] void throw_no_reset(std::size_t which, std::string_view name);
 /// @throws std::invalid_argument: a unilateral guard that does not fall.
-[[noreturn]] void throw_unilateral_not_falling(std::size_t which);
+[[noreturn]] void throw_unilateral_not_falling(std::size_t which, std::string_view name);
 /// @throws std::invalid_argument: a guard is not finite at the start.
-[[noreturn]] void throw_start_guard_not_finite(std::size_t which, double t, double guard);
+[[noreturn]] void throw_start_guard_not_finite(std::size_t which, std::string_view name, double t,
+                                               double guard);
 /// @throws std::invalid_argument: the start mode is none of the system's.
 [[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
 /// @throws std::invalid_argument: a run backward in time of a system that has none.
 [[noreturn]] void throw_forward_only();
 /// @throws std::invalid_argument: no previous_time_event for a run backward in time.
 [[noreturn]] void throw_no_previous_time_event();
+/// @throws std::invalid_argument: the first time event is not ahead of the start.
+[[noreturn]] void throw_time_event_not_ahead(bool backward, double t, double found);
 
 }  // namespace detail
 
@@ -129,7 +135,7 @@ public:
         }
         if constexpr (timed) {
             if (backward_ && !requires_previous()) detail::throw_no_previous_time_event();
-            find_time_event();
+            find_time_event(true);
         }
         if constexpr (asks) {
             const double smallest = error_controlled ? options_.h_min : options_.step;
@@ -321,9 +327,11 @@ private:
             const GuardInfo& info = record.info;
             record.acting =
                 (resets && info.resets) || info.stop_after > 0 || options_.stop_at_event;
-            if (info.unilateral && !(resets && info.resets)) detail::throw_no_reset(i);
+            if (info.unilateral && !(resets && info.resets)) {
+                detail::throw_no_reset(i, info.name);
+            }
             if (info.unilateral && info.crossing != Crossing::falling) {
-                detail::throw_unilateral_not_falling(i);
+                detail::throw_unilateral_not_falling(i, info.name);
             }
         }
     }
@@ -344,11 +352,11 @@ private:
             const double g = bank_.g0(i);
             if (!record.enabled) continue;
             if (!std::isfinite(g)) {
-                detail::throw_start_guard_not_finite(i, options_.t_start, g);
+                detail::throw_start_guard_not_finite(i, record.info.name, options_.t_start, g);
             }
             const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && is_rounding(i, g));
             if (record.info.unilateral && g < 0 && !on_surface) {
-                detail::throw_start_outside_mode(i, options_.t_start, g);
+                detail::throw_start_outside_mode(i, record.info.name, options_.t_start, g);
             }
             bank_.arm(i, on_surface ? heading(i) : side_of(g));
             if (record.side == Side::plateau) {
@@ -684,7 +692,8 @@ private:
 
     // --- time events ---
 
-    void find_time_event()
+    /// One that is not ahead would be lost, with all that follow it.
+    void find_time_event([[maybe_unused]] bool at_start = false)
     {
         if constexpr (timed) {
             const double t = step_.start().value;
@@ -693,7 +702,9 @@ private:
             } else if constexpr (requires { system_->previous_time_event(t); }) {
                 time_event_ = system_->previous_time_event(t);
             }
-            if (!(step_.until(time_event_) > 0)) time_event_ = backward_ ? -infinity : infinity;
+            if (step_.until(time_event_) > 0) return;
+            if (at_start) detail::throw_time_event_not_ahead(backward_, t, time_event_);
+            end(Outcome::time_event_not_ahead);
         }
     }
 
