@@ -30,7 +30,9 @@ struct Bracket {
 
 /// One event. `t` lies in `bracket`, at the root of the guard as exactly as it is
 /// known, and `before` is the state there: on its surface up to rounding, on either
-/// side.
+/// side. The members of a set happen at one time, that of the set: for all but the
+/// first, `t` may lie outside their own `bracket`, by no more than the window, and
+/// `before` as far from their surface.
 template <class State>
 struct Event {
     double t = 0;  ///< [s]

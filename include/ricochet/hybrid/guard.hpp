@@ -4,6 +4,10 @@
 // side it is on is remembered as the side on which it was *armed*, not as its
 // value at the start of a step: a ball that leaves the floor and is below it at
 // the end of the step has bounced, although the guard was zero at the start.
+//
+// Guards are edge-triggered: one that lies beyond its surface already, at the start or
+// when a mode begins, does not fire before it has come back. Only a `unilateral` guard,
+// which bounds the motion, makes a demand on where the state is.
 #pragma once
 
 #include <cstddef>

@@ -10,7 +10,8 @@
 
 namespace ricochet {
 
-/// Options of `integrate`. Times in seconds. Only `t_end` has no default.
+/// Options of `integrate`. Times in seconds. Only `t_end` has no default. A run backward
+/// in time applies resets as they are, not inverted.
 struct Options {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();  ///< before t_start: backward in time
