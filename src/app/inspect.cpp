@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <stdexcept>
 #include <string_view>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "model_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
+#include "ricochet/detect/gate_features.hpp"
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/classifier.hpp"
 #include "ricochet/nn/mlp.hpp"
@@ -67,6 +69,14 @@ std::vector<std::string> feature_names(const Model& model)
 
 bool recipe_known(const Model& model)
 {
+    if (model.kind != "event-classifier") {
+        try {
+            (void)gate_recipe(model.recipe);
+            return true;
+        } catch (const std::invalid_argument&) {
+            return false;
+        }
+    }
     return model.recipe == name(Recipe::state) || model.recipe == name(Recipe::ballistic);
 }
 
@@ -173,6 +183,16 @@ Json certificate_json(const Model& model)
     return out;
 }
 
+std::string calibration(const Calibration& c)
+{
+    if (c.events == 0) return "no: how often events are missed was not measured";
+    return fmt::format(
+        "{} of {} events of fresh runs missed, at most {:.1e} of them at 95 % confidence; {} "
+        "steps, "
+        "seed {}",
+        c.misses, c.events, c.miss_bound, c.steps, c.seed);
+}
+
 std::string to_text(const Inspection& found)
 {
     const Model& model = found.model;
@@ -211,7 +231,19 @@ std::string to_text(const Inspection& found)
         line(k == 0 ? "layers" : "", fmt::format("{}: weight {} x {}, bias {}", k, layer.outputs,
                                                  layer.inputs, layer.outputs));
     }
-    line("decision", fmt::format("event where the logit is at least {}", model.threshold));
+    if (model.levels.empty()) {
+        line("decision", fmt::format("event where the logit is at least {}", model.threshold));
+    }
+    for (std::size_t k = 0; k < model.levels.size(); ++k) {
+        const GateLevel& level = model.levels[k];
+        const bool horizon = model.kind == "gate-horizon";
+        line(k == 0 ? "decision" : "",
+             fmt::format("{} where {} is below {:.6g}",
+                         horizon ? fmt::format("no event within {:.6g} s", level.value)
+                                 : fmt::format("guard above {:.6g}", level.value),
+                         horizon ? fmt::format("logit {}", k) : "the logit", level.threshold));
+    }
+    if (!model.levels.empty()) line("calibrated", calibration(model.calibration));
     line("seed", fmt::format("{}", model.seed));
     line("self-test",
          fmt::format("reproduced: {} gives {}, recorded {}", numbers(model.self_test.input),
@@ -244,6 +276,17 @@ std::string to_json(const Inspection& found)
     for (const DenseLayer& layer : model.layers) {
         layers.push_back({{"inputs", layer.inputs}, {"outputs", layer.outputs}});
     }
+    Json levels = Json::array();
+    for (const GateLevel& level : model.levels) {
+        levels.push_back({{"value", level.value}, {"threshold", level.threshold}});
+    }
+    const Calibration& c = model.calibration;
+    Json calibrated = c.events == 0 ? Json()
+                                    : Json{{"events", c.events},
+                                           {"misses", c.misses},
+                                           {"miss_bound", c.miss_bound},
+                                           {"steps", c.steps},
+                                           {"seed", c.seed}};
     const Timing& cost = found.inference;
     return json_text({{"file", found.file.string()},
                       {"bytes", found.bytes},
@@ -258,6 +301,8 @@ std::string to_json(const Inspection& found)
                       {"precision", precision(model)},
                       {"weights", number_of_weights(model)},
                       {"threshold", model.threshold},
+                      {"levels", levels},
+                      {"calibration", calibrated},
                       {"seed", model.seed},
                       {"self_test",
                        {{"reproduced", true},  // or it would not have been loaded

@@ -136,12 +136,13 @@ void add_train(CLI::App& app, int& status)
         ->type_name("FILE");
     command
         .add_option("--kind", training.kind,
-                    "fixed-step (default; as in the paper, for one step) or any-step "
-                    "(dimensionless, for all)")
+                    "of the ball: fixed-step (default; as in the paper, for one step) or any-step "
+                    "(dimensionless, for all); of other systems: gate (default; fixed steps) or "
+                    "gate-adaptive (error control)")
         ->type_name("NAME");
-    command.add_option("--set", training.set, "gravity or height of a fixed-step network")
+    command.add_option("--set", training.set, "parameters that the network is for")
         ->type_name("name=value ...");
-    add_number(command, "--step", training.step, "H", "step [s] of a fixed-step network");
+    add_number(command, "--step", training.step, "H", "step [s] of a network for fixed steps");
     add_whole_number(command, "--seed", training.seed, 0, std::numeric_limits<std::uint64_t>::max(),
                      "of sampling and training");
     add_whole_number(command, "--iterations", training.iterations, 1, 1'000'000'000,

@@ -35,6 +35,9 @@ fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates
 /// Why what `model` computes is not an event of `system`; empty if it may be.
 std::string objection_to_shape(const SystemEntry& system, const Model& model)
 {
+    if (model.kind != "event-classifier") {
+        return fmt::format("is a {}, expected an event-classifier", model.kind);
+    }
     Recipe recipe{};
     try {
         recipe = recipe_named(model.recipe);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "files.hpp"
+#include "gates.hpp"
 #include "input.hpp"
 #include "json_text.hpp"
 #include "report.hpp"
@@ -188,11 +189,71 @@ std::string why_not_written(const learn::Report& report)
                      "all the same");
 }
 
+std::string text(const learn::GateReport& report)
+{
+    const learn::GateTrial& t = report.trial;
+    std::string out = fmt::format(
+        "{} iterations in {} on {} states, {} of them fatal, from runs with {} events\n",
+        report.iterations, duration(report.seconds), report.training_states, report.fatal_states,
+        report.events);
+    out += fmt::format(
+        "fresh runs: {} steps, {} events, {} missed: at most {:.1e} of them at 95 % confidence\n"
+        "guard calls: {} instead of {}, {:.1f} times fewer; the network was asked {} times, {} of "
+        "them outside of its box\n",
+        t.steps, t.events, t.misses, t.miss_bound(), t.gated_calls, t.exact_calls, t.gain(),
+        t.network_calls, t.outside);
+    return out + fmt::format("{}\n", describe(report.outcome));
+}
+
+/// As `train`, of a gate.
+int train_gate(const SystemEntry& system, const TrainRequest& request)
+{
+    TrainingRequest training = request.training;
+    const std::vector<std::string_view> kinds = gate_kinds(system.name);
+    if (training.kind.empty()) training.kind = kinds.front();
+    if (std::find(kinds.begin(), kinds.end(), training.kind) == kinds.end()) {
+        throw unknown(fmt::format("kind of network for {}", system.name), training.kind, kinds);
+    }
+    check_writable("--out", request.out);
+    ProgressBar bar;
+    const InterruptWatch watch;
+    const learn::TrainedGate trained =
+        train_system_gate(system, training, [&](const learn::Progress& progress) {
+            bar.show(progress);
+            return interrupted == 0;
+        });
+    bar.finish();
+
+    const learn::GateReport& report = trained.report;
+    const bool sound =
+        report.trial.misses == 0 && report.outcome != learn::TrainingOutcome::diverged;
+    const bool write = sound || request.allow_misses;
+    if (write) save_model(trained.model, request.out);
+    if (request.json) {
+        auto object = Json::parse(learn::to_json(report));
+        object["model"] = write ? Json(request.out.string()) : Json();
+        print(json_text(object));
+    } else {
+        print(text(report));
+    }
+    if (write) {
+        fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
+    } else {
+        fmt::print(
+            stderr,
+            "ricochet: events are missed and no model was written; --allow-misses writes the "
+            "model all the same, with its miss rate\n");
+    }
+    const bool finished = report.outcome != learn::TrainingOutcome::stopped;
+    return write && finished ? 0 : 1;
+}
+
 }  // namespace
 
 int train(const TrainRequest& request)
 {
     const SystemEntry& system = find_system(request.system);
+    if (!system.training && !gate_kinds(system.name).empty()) return train_gate(system, request);
     if (!system.training) {
         throw BadInput(fmt::format("there is no training for the system {}", system.name));
     }

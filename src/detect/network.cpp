@@ -67,6 +67,11 @@ Network::Network(Model model)
     : classifier_(std::make_shared<const Classifier>(std::move(model))),
       recipe_(recipe_named(classifier_->model().recipe))
 {
+    if (this->model().kind != "event-classifier") {
+        throw std::invalid_argument(
+            fmt::format("Network: the model for {} is a {}, expected an event-classifier",
+                        this->model().system, this->model().kind));
+    }
     if (classifier_->inputs() > max_features) {
         throw std::invalid_argument(
             fmt::format("Network: expected at most {} features, the model for {} has {}",

@@ -135,11 +135,11 @@ public:
     {
         Random random(seed);
         GateSamples out;
-        double share = 1;
+        double share = training_.kind == GateKind::level ? 0.5 : 1;
         // A level gate learns from any state.
         const std::size_t most = training_.kind == GateKind::horizon
                                      ? training_.most_steps
-                                     : std::min(training_.most_steps, 10 * states);
+                                     : std::min(training_.most_steps, 2 * states);
         near_.clear();
         while (out.events < events && out.steps < most) {
             Exact run = start(random);
@@ -147,8 +147,11 @@ public:
             if (out.events == 0 && out.steps > 2'000'000) break;  // there are none
             // As many clear states are kept as there is room for.
             const double expected =
-                static_cast<double>(out.steps) *
-                std::max(1.0, static_cast<double>(events) / static_cast<double>(out.events + 1));
+                training_.kind == GateKind::level
+                    ? static_cast<double>(most)
+                    : static_cast<double>(out.steps) *
+                          std::max(1.0, static_cast<double>(events) /
+                                            static_cast<double>(out.events + 1));
             share = std::clamp(static_cast<double>(states) / expected, 1e-4, 1.0);
         }
         if (out.events == 0 && training_.kind == GateKind::horizon) {

@@ -1,0 +1,26 @@
+// What trained gates save, and what they miss.
+#pragma once
+
+#include <cstddef>
+
+#include "measure.hpp"
+
+namespace ricochet::bench {
+
+/// A boolean black box on an arm of 4 joints among 8 obstacles, in calls of the guard: a horizon
+/// gate, trained here, against a look at every step and against `EveryK`, over at least
+/// `events` fresh events each.
+[[nodiscard]] Measured gate_black_box_4(std::size_t events = 30'000);
+
+/// The same with 6 joints among 40 obstacles. Reported, no target.
+[[nodiscard]] Measured gate_black_box_6(std::size_t events = 30'000);
+
+/// A smallest eigenvalue: a level gate in the planner, calibrated, against the planner alone, in
+/// calls of the guard over `seconds` of the motion.
+[[nodiscard]] Measured gate_eigenvalue(double level, double seconds = 300);
+
+/// A valued guard of which no bound is known, on the arm of 4 joints: `SlopeSkip`, `EveryK` and a
+/// horizon gate, with what each misses.
+[[nodiscard]] Measured gate_without_bounds(std::size_t events = 30'000);
+
+}  // namespace ricochet::bench
