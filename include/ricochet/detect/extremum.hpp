@@ -112,19 +112,21 @@ struct Extremum {
     }
 
 private:
-    /// Whether a guard that is on its surface at the end is about to turn back there. What
-    /// it does a little beyond the step says so, unless that is within a declared band,
-    /// where its cubic has to; a guard that stays where it is has arrived. If it is still
-    /// falling, the next step will see where it turns.
+    /// Whether a guard that is on its surface at the end is about to turn back there. Where
+    /// it leaves the band beyond the step says so; a guard that stays where it is has
+    /// arrived, and in a wide band its cubic has to tell. If it is still falling, the next
+    /// step will see where it turns.
     template <class Probe>
     [[nodiscard, gnu::noinline]] static bool turns_back(Probe& probe, const Watch& watch,
                                                         const detail::GuardCubic& cubic)
     {
         const double sign = watch.side == Side::above ? 1 : -1;
-        const double little = (watch.end.s - watch.start.s) / 64;
-        const double beyond = sign * probe.value(watch.end.s + little).value;
-        if (std::fabs(beyond) > watch.touch) return beyond > 0;
-        if (beyond == cubic.v1) return false;
+        const double width = watch.end.s - watch.start.s;
+        for (const double part : {1.0 / 64, 1.0 / 8, 1.0}) {
+            const double beyond = sign * probe.value(watch.end.s + part * width).value;
+            if (std::fabs(beyond) > watch.touch) return beyond > 0;
+            if (beyond == cubic.v1) return false;
+        }
         const double curvature = 6 * (cubic.v0 - cubic.v1) + 2 * cubic.r0 + 4 * cubic.r1;
         return curvature > 0 && cubic.v1 - cubic.r1 * cubic.r1 / (2 * curvature) >= -watch.touch;
     }
@@ -142,7 +144,12 @@ private:
         const double s2 = watch.start.s + width * cubic.critical(false);
         const GuardSample lowest = probe.value_and_rate(s1);
         const GuardSample highest = probe.value_and_rate(s2);
-        const bool pair = s1 < s2 && has_left(side, lowest.value) && !has_left(side, highest.value);
+        if (s1 < s2 && leaving_counts && std::fabs(lowest.value) <= watch.touch &&
+            std::fabs(cubic.v0) > watch.touch && !has_left(side, highest.value)) {
+            return Finding::touching(side, lowest);
+        }
+        const bool pair = s1 < s2 && has_left(side, lowest.value) &&
+                          std::fabs(lowest.value) > watch.touch && !has_left(side, highest.value);
         if (leaving_counts) {
             return Finding::leaving(side, watch.start, pair ? lowest : watch.end);
         }
@@ -167,11 +174,14 @@ private:
             }
             const double width = hi.s - lo.s;
             const GuardSample dip = probe.value_and_rate(lo.s + width * cubic.critical(true));
-            // A start in the band is on its way out of a touch.
-            const bool in_band = std::max(std::fabs(cubic.v0), std::fabs(dip.value)) <= watch.touch;
-            if (in_band || !has_left(watch.side, dip.value)) {
-                return Finding::clear(Evidence::checked);
+            if (std::fabs(dip.value) <= watch.touch) {
+                // In the band at an end, it is there that the guard touches.
+                const double nearest = std::min(std::fabs(cubic.v0), std::fabs(cubic.v1));
+                return nearest <= watch.touch || !counts(watch.side, probe.guard().crossing())
+                           ? Finding::clear(Evidence::checked)
+                           : Finding::touching(watch.side, dip);
             }
+            if (!has_left(watch.side, dip.value)) return Finding::clear(Evidence::checked);
             return pair(probe, watch, dip);
         }
         const double sign = watch.side == Side::above ? 1 : -1;

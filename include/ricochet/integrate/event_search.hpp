@@ -157,6 +157,7 @@ public:
         GuardRecord& record = bank[i];
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_, record.info.boolean ? Path::restep : Path::dense);
+        int stalled = 0;
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch{
                 .side = record.side, .start = bank.start(i), .end = end, .touch = bank.touch(i)};
@@ -178,7 +179,12 @@ public:
                                   .side = finding.side,
                                   .where = where});
             }
+            const bool stays = record.from > 0 && !(where.root > record.from);
             pass(bank, i, side, where, probe);
+            if (stays && ++stalled > 8) {  // noise around a flat root
+                record.next = side_of(end.value);
+                return;
+            }
         }
     }
 

@@ -318,8 +318,6 @@ public:
     }
 
     [[nodiscard]] double g0(std::size_t i) const noexcept { return g0_[i]; }
-    /// The largest |g| that was looked at for its size; 0 if none was.
-    [[nodiscard]] double size_of(std::size_t i) const noexcept { return sizes_[i]; }
     [[nodiscard]] double rate0(std::size_t i) const noexcept { return rate0_[i]; }
     void set_rate0(std::size_t i, double rate) noexcept { rate0_[i] = rate; }
 

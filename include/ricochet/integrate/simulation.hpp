@@ -354,10 +354,11 @@ private:
             if (!std::isfinite(g)) {
                 detail::throw_start_guard_not_finite(i, record.info.name, options_.t_start, g);
             }
-            const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && is_rounding(i, g));
+            const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
             if (record.info.unilateral && g < 0 && !on_surface) {
                 detail::throw_start_outside_mode(i, record.info.name, options_.t_start, g);
             }
+            if (on_surface) bank_[i].band = std::fabs(g);
             bank_.arm(i, on_surface ? heading(i) : side_of(g));
             if (record.side == Side::plateau) {
                 bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
@@ -369,21 +370,22 @@ private:
         cascade();
     }
 
-    /// Whether the value of a guard at the start is no more than what rounding of the state
-    /// makes of a zero: 8 units in the last place of each component.
-    [[nodiscard]] bool is_rounding(std::size_t i, double g)
+    /// What rounding of the state, 8 units in the last place of each component, may make of
+    /// guard i at the start of the step.
+    [[nodiscard]] double rounding_of(std::size_t i)
     {
         constexpr double nudge = 1e-8;
         const auto guard = bank_.view(i, step_.mode(), calls());
+        const double g = guard.value(step_.time(0), step_.x0());
         X near = step_.x0();
         double sensitivity = 0;
         detail::for_each_component(near, [&](auto c) {
             const double kept = near[c];
             near[c] = kept * (1 + nudge);
-            sensitivity += std::fabs(guard.value(options_.t_start, near) - g) / nudge;
+            sensitivity += std::fabs(guard.value(step_.time(0), near) - g) / nudge;
             near[c] = kept;
         });
-        return std::fabs(g) <= 8 * std::numeric_limits<double>::epsilon() * sensitivity;
+        return 8 * std::numeric_limits<double>::epsilon() * sensitivity;
     }
 
     // --- steps ---
@@ -1106,11 +1108,9 @@ private:
     {
         const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
         if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
-        const double size = bank_.size_of(i);
-        const bool plain = size > 0 && std::fabs(rate) * h_next_ > 1e-6 * size;
-        if (rate != 0 && (bank_[i].fired || plain)) return side_of(rate);
+        if (rate != 0 && bank_[i].fired) return side_of(rate);
         // The second derivative has the sign of the rate a little later. A rate that it
-        // undoes within rounding of the time is none.
+        // undoes within rounding of the time is none; nor is one that is all rounding.
         const double delta = 1e-6 * h_next_;
         X& later = resets_.after();
         X& rate_later = resets_.scratch();
@@ -1122,8 +1122,12 @@ private:
                                 .rate(step_.time(delta), later, rate_later, h_next_);
         const double moment =
             64 * std::numeric_limits<double>::epsilon() * (std::fabs(step_.time(0)) + h_next_);
-        if (std::fabs(rate) * delta > std::fabs(next - rate) * moment) return side_of(rate);
-        const Side side = side_of(next);
+        double noise = std::fabs(next - rate) * std::min(moment / delta, 0.5);
+        if constexpr (!RatedGuard<System, X>) {
+            if (!bank_[i].fired) noise = std::max(noise, rounding_of(i) / (1e-5 * h_next_));
+        }
+        if (std::fabs(rate) > noise) return side_of(rate);
+        const Side side = std::fabs(next) > noise ? side_of(next) : Side::plateau;
         bank_.set_rate0(i, detail::sign_of(side) * std::numeric_limits<double>::min());
         return side;
     }
