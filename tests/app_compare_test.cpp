@@ -11,15 +11,17 @@ namespace {
 TEST_F(App, CompareFindsAllImpactsByEveryDetector)
 {
     const nlohmann::json table = json({"compare", "bouncing-ball", "--json"});
-    ASSERT_EQ(table["closed_form"].size(), 13U);
+    ASSERT_EQ(table["reference"].size(), 13U);
+    EXPECT_EQ(table["reference_kind"], "closed form");
     Words labels;
     for (const nlohmann::json& method : table["methods"]) {
         labels.push_back(method["label"].get<std::string>() + ' ' +
                          method["stepper"].get<std::string>());
     }
     EXPECT_EQ(labels, (Words{"network fixed-step rk4", "network any-step rk4", "line rk4",
-                             "verified rk4", "ends rk4", "extremum rk4", "network any-step dopri5",
-                             "line dopri5", "verified dopri5", "ends dopri5", "extremum dopri5"}));
+                             "verified rk4", "ends rk4", "extremum rk4", "bernstein rk4",
+                             "network any-step dopri5", "line dopri5", "verified dopri5",
+                             "ends dopri5", "extremum dopri5", "bernstein dopri5"}));
     for (const nlohmann::json& method : table["methods"]) {
         SCOPED_TRACE(method["label"].get<std::string>() +
                      (method["step"].is_null() ? "" : " fixed"));
@@ -28,7 +30,8 @@ TEST_F(App, CompareFindsAllImpactsByEveryDetector)
         EXPECT_EQ(method["times"].size(), 13U);
         // Where error control makes a flight one step, its rounding is larger: see
         // integrate_test.cpp.
-        EXPECT_LE(method["largest_error"].get<double>(), method["step"].is_null() ? 1.7e-13 : 2e-14);
+        EXPECT_LE(method["largest_error"].get<double>(),
+                  method["step"].is_null() ? 1.7e-13 : 2e-14);
         EXPECT_GT(method["seconds"]["median"].get<double>(), 0);
     }
     for (const nlohmann::json& method : table["methods"]) {
@@ -68,6 +71,37 @@ TEST_F(App, CompareSaysWhatTheNetworkCostsAndWritesTheTimes)
     const std::string csv = content(work() / "table.csv");
     EXPECT_TRUE(csv.starts_with("event,closed form [s],"));
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 14);
+}
+
+TEST_F(App, CompareTakesParameters)
+{
+    const nlohmann::json table =
+        json({"compare", "bouncing-ball", "--json", "--set", "height=12"});
+    EXPECT_NEAR(table["reference"][0].get<double>(), std::sqrt(2 * 12 / 9.81), 1e-15);
+    EXPECT_TRUE(table["published"].empty());  // of the defaults
+    for (const nlohmann::json& method : table["methods"]) {
+        EXPECT_NE(method["label"], "network fixed-step");  // so is this network
+    }
+    const nlohmann::json thermostat = json({"compare", "thermostat", "--json", "--set", "low=19"});
+    // From 20 to 19 degrees at 0.1 per second, towards 0.
+    EXPECT_NEAR(thermostat["reference"][0].get<double>(), 10 * std::log(20.0 / 19.0), 1e-14);
+}
+
+TEST_F(App, CompareSaysWhatItsReferenceIs)
+{
+    const Result result = run({"compare", "henon-heiles", "--json", "--csv", "hh.csv"});
+    ASSERT_TRUE(result.err.empty()) << result.err;
+    const nlohmann::json table = nlohmann::json::parse(result.out);
+    EXPECT_EQ(table["reference_kind"], "numerical");
+    EXPECT_TRUE(content(work() / "hh.csv").starts_with("event,reference [s],"));
+}
+
+TEST_F(App, CompareRefusesParametersOfWhichNothingIsKnown)
+{
+    expect_refused({"compare", "three-body", "--set", "vx=0.1"}, {"three-body", "default"});
+    expect_refused({"compare", "pendulum", "--set", "rate=1"}, {"pendulum", "rate = 0"});
+    expect_refused({"compare", "coulomb-oscillator", "--set", "friction=0"}, {"friction > 0"});
+    expect_refused({"compare", "thermostat", "--set", "tempo=1"}, {"tempo", "low"});
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "systems/run_system.hpp"
@@ -17,6 +18,8 @@ TimedRun run_any(const AnySystem& system, const std::vector<double>& x0,
                 return run_with(system, x0, settings, repeats, stepping, Ends{});
             case DetectorKind::extremum:
                 return run_with(system, x0, settings, repeats, stepping, Extremum{});
+            case DetectorKind::bernstein:
+                return run_with(system, x0, settings, repeats, stepping, Bernstein{});
             default: throw std::logic_error("the system has no network and no line");
         }
     });

@@ -161,7 +161,7 @@ private:
 };
 
 /// Runs `system` from x0 `repeats` times and returns the last run. Only the detectors
-/// `ends` and `extremum` are served.
+/// `ends`, `extremum` and `bernstein` are served.
 [[nodiscard]] TimedRun run_any(const AnySystem& system, const std::vector<double>& x0,
                                const RunSettings& settings, int repeats);
 

@@ -21,7 +21,7 @@ namespace {
 
 /// Event times beside the exact ones.
 struct Accuracy {
-    std::vector<double> found;  ///< [s] one per exact event; NaN: missed
+    std::vector<double> found;  ///< [s] one per known event; NaN: missed
     double largest_error = 0;   ///< [s]
     std::size_t missed = 0;
     std::size_t spurious = 0;
@@ -62,11 +62,14 @@ struct Method {
 /// Every detector in fixed steps and under error control.
 class MethodList {
 public:
-    explicit MethodList(const SystemEntry& system) : system_(system) {}
+    MethodList(const SystemEntry& system, const std::vector<std::string>& set)
+        : system_(system), set_(set)
+    {
+    }
 
     void add(DetectorKind detector, bool fixed_step, bool in_table, const OwnModel* model = nullptr)
     {
-        RunRequest request{.detector = std::string(name(detector))};
+        RunRequest request{.set = set_, .detector = std::string(name(detector))};
         if (fixed_step) request.step = system_.comparison_step;
         if (model != nullptr) request.model = find_model(*model).string();
         RunSettings settings = resolve(system_, request);
@@ -85,23 +88,26 @@ public:
 
 private:
     const SystemEntry& system_;
+    const std::vector<std::string>& set_;
     std::vector<Method> methods_;
 };
 
 /// The paper's columns are in the table of times, and beside them what is ours. The
 /// methods that are left out of it differ in the last digits at most.
-std::vector<Method> methods(const SystemEntry& system)
+std::vector<Method> methods(const SystemEntry& system, const std::vector<std::string>& set)
 {
-    MethodList list(system);
+    MethodList list(system, set);
     for (const bool fixed : {true, false}) {
         for (const OwnModel& model : system.models) {
             if (!fixed && !model.any_step) continue;
+            if (!set.empty() && !model.any_step) continue;  // it is for the defaults
             list.add(DetectorKind::network, fixed, fixed != model.any_step, &model);
         }
         if (!system.line.empty()) list.add(DetectorKind::line, fixed, false);
         if (!system.models.empty()) list.add(DetectorKind::verified, fixed, !fixed);
         list.add(DetectorKind::ends, fixed, fixed);
         list.add(DetectorKind::extremum, fixed, fixed);
+        list.add(DetectorKind::bernstein, fixed, false);
     }
     return list.take();
 }
@@ -207,10 +213,17 @@ std::vector<std::string> verdict(const std::vector<Method>& methods)
     return sentences;
 }
 
-std::string times_table(const std::vector<double>& exact, const std::vector<Method>& methods)
+/// What the known times are.
+std::string_view reference(const SystemEntry& system)
+{
+    return system.numerical_reference ? "reference" : "closed form";
+}
+
+std::string times_table(const SystemEntry& system, const std::vector<double>& exact,
+                        const std::vector<Method>& methods)
 {
     constexpr int wide = 19;
-    std::string labels = fmt::format("{:>3}{:>{}}", "", "closed form", wide);
+    std::string labels = fmt::format("{:>3}{:>{}}", "", reference(system), wide);
     std::string steppings = fmt::format("{:>3}{:>{}}", "", "t [s]", wide);
     for (const Method& method : methods) {
         if (!method.in_table) continue;
@@ -264,7 +277,7 @@ std::string to_text(const SystemEntry& system, const std::vector<double>& exact,
     const RunSettings& settings = methods.front().settings;
     std::string out =
         fmt::format("{}, to t = {} s\n\n", title(system, settings), settings.options.t_end);
-    out += times_table(exact, methods) + '\n' + cost_table(system, exact, methods) + '\n';
+    out += times_table(system, exact, methods) + '\n' + cost_table(system, exact, methods) + '\n';
     const Options& controlled = find(methods, DetectorKind::extremum, false)->settings.options;
     out += fmt::format("Where no step h is given the error is controlled, rtol {}, atol {}.\n",
                        controlled.rtol, controlled.atol);
@@ -325,7 +338,8 @@ std::string to_json(const SystemEntry& system, const std::vector<double>& exact,
     }
     return json_text({{"system", system.name},
                       {"t_end", methods.front().settings.options.t_end},
-                      {"closed_form", exact},
+                      {"reference", exact},
+                      {"reference_kind", system.numerical_reference ? "numerical" : "closed form"},
                       {"methods", rows},
                       {"published", published},
                       {"verdict", verdict(methods)}});
@@ -334,7 +348,7 @@ std::string to_json(const SystemEntry& system, const std::vector<double>& exact,
 std::string to_csv(const SystemEntry& system, const std::vector<double>& exact,
                    const std::vector<Method>& methods)
 {
-    std::string out = "event,closed form [s]";
+    std::string out = fmt::format("event,{} [s]", reference(system));
     for (const Method& method : methods) {
         out += fmt::format(",{} {} [s]", method.label, method.stepping);
     }
@@ -358,13 +372,21 @@ std::string to_csv(const SystemEntry& system, const std::vector<double>& exact,
 
 int compare(const CompareRequest& request)
 {
-    const SystemEntry& system = find_system(request.system);
+    SystemEntry system = find_system(request.system);
     if (system.exact_events == nullptr) {
         throw BadInput(
-            fmt::format("the system {} has no exact event times to compare with", system.name));
+            fmt::format("the system {} has no known event times to compare with", system.name));
+    }
+    if (!request.set.empty()) {
+        if (!system.any_parameters) {
+            throw BadInput(fmt::format(
+                "the event times of {} are known of its default parameters only, got --set {}",
+                system.name, fmt::join(request.set, " ")));
+        }
+        system.published.clear();  // of the defaults
     }
     if (request.csv) check_writable("--csv", *request.csv);
-    std::vector<Method> all = methods(system);
+    std::vector<Method> all = methods(system, request.set);
     const RunSettings& settings = all.front().settings;
     const std::vector<double> exact =
         system.exact_events(settings.parameters, settings.options.t_end);

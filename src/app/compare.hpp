@@ -4,11 +4,13 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace ricochet::app {
 
 struct CompareRequest {
     std::string system{};
+    std::vector<std::string> set{};  ///< name=value
     bool json = false;
     std::optional<std::filesystem::path> csv{};
 };

@@ -95,9 +95,13 @@ void add_simulate(CLI::App& app, int& status)
         ->type_name("name=value ...");
     add_number(command, "--t-start", run.t_start, "T",
                "time at the start [s], default: the system's");
-    add_number(command, "--t-end", run.t_end, "T", "time at the end [s], default: the system's");
+    add_number(command, "--t-end", run.t_end, "T",
+               "time at the end [s], default: the system's; before the start: backward in time");
+    add_text(command, "--mode", run.mode, "NAME",
+             "mode at the start, where the system has modes; default: the system's");
     add_text(command, "--detector", run.detector, "NAME",
-             "ends, extremum (default), network (default with --model), verified or line");
+             "ends, extremum (default), bernstein, network (default with --model), verified or "
+             "line");
     add_text(command, "--model", run.model, "FILE",
              "network to use, by path or name; default: one that suits");
     add_text(command, "--locator", run.locator, "NAME", "newton (default), bisection or toms748");
@@ -121,7 +125,14 @@ void add_simulate(CLI::App& app, int& status)
     command.footer(
         "Examples:\n"
         "  ricochet simulate bouncing-ball --set restitution=0.8 --plot ball.svg\n"
-        "  ricochet simulate bouncing-ball --detector network --step 0.01 --json");
+        "  ricochet simulate bouncing-ball --detector network --step 0.01 --json\n"
+        "  ricochet simulate thermostat --mode on --t-end 5\n\n"
+        "Why a step is taken to hold no event:\n"
+        "  proved    a bound, or the polynomial of the step (bernstein), excludes it\n"
+        "  checked   the ends and the turning points of the guard were looked at (extremum)\n"
+        "  gated     a calibrated network skipped the check, within its miss rate\n"
+        "  assumed   only the ends were looked at (ends), or a network was believed\n"
+        "A late event was found at a step after the one that held it.");
     command.callback([&status, request] { status = simulate(*request); });
 }
 
@@ -214,12 +225,17 @@ void add_certify(CLI::App& app, int& status)
 void add_compare(CLI::App& app, int& status)
 {
     CLI::App& command =
-        *app.add_subcommand("compare", "Compare the detectors with the exact event times");
+        *app.add_subcommand("compare", "Compare the detectors with known event times");
     auto request = std::make_shared<CompareRequest>();
     add_system(command, request->system);
+    command.add_option("--set", request->set, "a parameter of the system; may be repeated")
+        ->type_name("name=value ...");
     command.add_flag("--json", request->json, "print JSON");
     add_text(command, "--csv", request->csv, "FILE", "write the event times");
-    command.footer("Example:\n  ricochet compare bouncing-ball");
+    command.footer(
+        "Examples:\n"
+        "  ricochet compare bouncing-ball\n"
+        "  ricochet compare thermostat --set low=19");
     command.callback([&status, request] { status = compare(*request); });
 }
 

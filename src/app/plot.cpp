@@ -107,8 +107,9 @@ std::string script(const SystemEntry& system, const RunSettings& settings, const
         "set key outside top right horizontal Left reverse samplen 2.5\n"
         "set offsets graph 0, graph 0, graph 0.06, graph 0.06\n",
         panels, single_quoted(title(system, settings)));
-    if (run.t > settings.options.t_start) {
-        out += fmt::format("set xrange [{}:{}]\n", settings.options.t_start, run.t);
+    if (run.t != settings.options.t_start) {
+        const auto [left, right] = std::minmax(settings.options.t_start, run.t);
+        out += fmt::format("set xrange [{}:{}]\n", left, right);
     }
     for (std::size_t i = 0; i < panels; ++i) {
         const Component& component = system.state[i];

@@ -125,9 +125,12 @@ struct SystemEntry {
     /// words. The detector `line` evaluates it. Empty elsewhere.
     std::string_view line{};
 
-    /// Exact event times [s] up to a time, for comparison; none known: null.
+    /// Known event times [s] up to a time, for comparison; none known: null.
+    /// @throws BadInput where none are known of these parameters.
     std::vector<double> (*exact_events)(const std::vector<double>& parameters,
                                         double t_end) = nullptr;
+    bool numerical_reference = false;  ///< they were computed numerically; else in closed form,
+    bool any_parameters = true;        ///< and for any parameters; else for the defaults
     std::vector<Published> published{};
     double comparison_step = 0;  ///< [s] of the fixed steps in a comparison
 

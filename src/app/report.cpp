@@ -68,9 +68,16 @@ Json json(const Statistics& s)
               {"assumed", s.evidence.assumed}}}};
 }
 
+/// Zero has no sign for people.
+double unsigned_zero(double value)
+{
+    return value == 0 ? 0 : value;
+}
+
 std::string with_unit(double value, std::string_view unit)
 {
-    return unit == "1" ? fmt::format("{}", value) : fmt::format("{} {}", value, unit);
+    const double shown = unsigned_zero(value);
+    return unit == "1" ? fmt::format("{}", shown) : fmt::format("{} {}", shown, unit);
 }
 
 /// "u [m]"
@@ -99,28 +106,41 @@ std::string title(const SystemEntry& system, const PlainEvent& event)
     return out;
 }
 
+bool changed(const PlainEvent& event)
+{
+    return event.before != event.after;
+}
+
+/// The state after an event is left out where it is the one before.
 std::string events_table(const SystemEntry& system, const PlainRun& run)
 {
     constexpr int wide = 24;
+    const bool any_changed = std::any_of(run.events.begin(), run.events.end(), changed);
     const bool any_late = run.statistics.late_events > 0;
     std::size_t first = 8;
     for (const PlainEvent& event : run.events) {
         first = std::max(first, title(system, event).size() + 1);
     }
     std::string out = fmt::format("{:>4}  {:<{}}{:>{}}", "", "guard", first, "t [s]", wide - 2);
-    for (const char* side : {"before", "after"}) {
+    const auto head = [&](std::string_view side) {
         for (const Component& component : system.state) {
-            out += fmt::format("{:>{}}", fmt::format("{} {}", label(component), side), wide);
+            out += fmt::format("{:>{}}", label(component) + std::string(side), wide);
         }
-    }
+    };
+    head(any_changed ? " before" : "");
+    if (any_changed) head(" after");
     out += '\n';
     for (std::size_t i = 0; i < run.events.size(); ++i) {
         const auto& event = run.events[i];
         out += fmt::format("{:>4}  {:<{}}{:>{}}", i + 1, title(system, event), first, event.t,
                            wide - 2);
-        for (const auto* x : {&event.before, &event.after}) {
-            for (const double value : *x) out += fmt::format("{:>{}}", value, wide);
-        }
+        const auto show = [&](const std::vector<double>& x) {
+            for (const double value : x) {
+                out += fmt::format("{:>{}}", unsigned_zero(value), wide);
+            }
+        };
+        show(event.before);
+        if (changed(event)) show(event.after);
         out += any_late && event.late ? "  late\n" : "\n";
     }
     return out;
@@ -132,8 +152,13 @@ std::vector<Row> rows(const SystemEntry& system, const PlainRun& run)
 {
     std::vector<Row> out;
     std::size_t sample = 0;
+    const double first = !run.trajectory.t.empty() ? run.trajectory.t.front()
+                         : !run.events.empty()     ? run.events.front().t
+                                                   : run.t;
+    const double sense = first > run.t ? -1 : 1;  // of time
     const auto samples_before = [&](double t) {
-        for (; sample < run.trajectory.t.size() && run.trajectory.t[sample] < t; ++sample) {
+        for (; sample < run.trajectory.t.size() && sense * (t - run.trajectory.t[sample]) > 0;
+             ++sample) {
             out.push_back({.t = run.trajectory.t[sample], .x = run.trajectory.x[sample]});
         }
     };
@@ -143,8 +168,8 @@ std::vector<Row> rows(const SystemEntry& system, const PlainRun& run)
         out.push_back({event.t, event.before, fmt::format("before {}", what)});
         out.push_back({event.t, event.after, fmt::format("after {}", what)});
     }
-    samples_before(std::numeric_limits<double>::infinity());
-    if (out.empty() || out.back().t < run.t) out.push_back({.t = run.t, .x = run.x});
+    samples_before(sense * std::numeric_limits<double>::infinity());
+    if (out.empty() || sense * (run.t - out.back().t) > 0) out.push_back({.t = run.t, .x = run.x});
     return out;
 }
 
@@ -215,7 +240,10 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     out += fmt::format("{} at t = {} s, {}\n", ricochet::name(run.outcome), run.t,
                        fmt::join(state, ", "));
     if (run.outcome != Outcome::reached_end) {
-        out += fmt::format("  {}\n", describe(run.outcome));
+        const std::string guard = run.guard == no_guard
+                                      ? ""
+                                      : fmt::format("guard {}: ", system.guards.at(run.guard).name);
+        out += fmt::format("  {}{}\n", guard, describe(run.outcome));
     }
     out +=
         fmt::format("{} event{}, {} steps ({} rejected), {} flow calls, {} guard calls", s.events,
@@ -235,8 +263,9 @@ std::string to_csv(const SystemEntry& system, const PlainRun& run)
     std::string out = "t [s]";
     for (const Component& component : system.state) out += ',' + label(component);
     out += ",event\n";
-    for (const Row& row : rows(system, run)) {
-        out += fmt::format("{},{},{}\n", row.t, fmt::join(row.x, ","), row.event);
+    for (Row& row : rows(system, run)) {
+        for (double& value : row.x) value = unsigned_zero(value);
+        out += fmt::format("{},{},{}\n", unsigned_zero(row.t), fmt::join(row.x, ","), row.event);
     }
     return out;
 }

@@ -20,8 +20,9 @@ constexpr std::uint64_t default_max_steps = 10'000'000;
 template <class Kind, std::size_t n>
 using Names = std::array<std::pair<std::string_view, Kind>, n>;
 
-constexpr Names<DetectorKind, 5> detectors{{{"ends", DetectorKind::ends},
+constexpr Names<DetectorKind, 6> detectors{{{"ends", DetectorKind::ends},
                                             {"extremum", DetectorKind::extremum},
+                                            {"bernstein", DetectorKind::bernstein},
                                             {"network", DetectorKind::network},
                                             {"verified", DetectorKind::verified},
                                             {"line", DetectorKind::line}}};
@@ -99,6 +100,19 @@ void choose_stepping(const RunRequest& request, RunSettings& settings)
     }
 }
 
+Mode mode_named(const SystemEntry& system, std::string_view given)
+{
+    if (system.modes.empty()) {
+        throw BadInput(fmt::format("--mode is for systems with modes, and {} has none, got '{}'",
+                                   system.name, given));
+    }
+    const auto found = std::find(system.modes.begin(), system.modes.end(), given);
+    if (found == system.modes.end()) {
+        throw unknown(fmt::format("mode of {}", system.name), given, system.modes);
+    }
+    return static_cast<Mode>(found - system.modes.begin());
+}
+
 void choose_detector(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
 {
     if (request.detector) {
@@ -124,7 +138,7 @@ void choose_detector(const SystemEntry& system, const RunRequest& request, RunSe
     if (system.models.empty()) {
         throw BadInput(
             fmt::format("the detector {} needs a network, and none can be used with {}; expected "
-                        "ends or extremum",
+                        "ends, extremum or bernstein",
                         name(settings.detector), system.name));
     }
     FoundModel found = request.model ? named_model(system, settings, *request.model)
@@ -187,11 +201,8 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     Options& options = settings.options;
     options.t_start = request.t_start.value_or(system.t_start);
     options.t_end = request.t_end.value_or(system.t_end);
-    if (options.t_end < options.t_start) {
-        throw BadInput(fmt::format("--t-end must not lie before the start at {} s, got {}",
-                                   options.t_start, options.t_end));
-    }
     if (system.start_mode != nullptr) options.mode = system.start_mode(settings.parameters);
+    if (request.mode) options.mode = mode_named(system, *request.mode);
     options.event_tolerance = request.event_tolerance.value_or(0);
     require_not_negative("--event-tolerance", options.event_tolerance);
     options.max_steps = request.max_steps.value_or(default_max_steps);

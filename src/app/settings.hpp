@@ -15,7 +15,7 @@ namespace ricochet::app {
 
 struct SystemEntry;
 
-enum class DetectorKind { ends, extremum, network, verified, line };
+enum class DetectorKind { ends, extremum, bernstein, network, verified, line };
 enum class LocatorKind { newton, bisection, toms748 };
 enum class StepperKind { rk4, dopri5, fehlberg78, cash_karp54, euler };
 
@@ -39,6 +39,7 @@ struct RunSettings {
 struct RunRequest {
     std::vector<std::string> set{};  ///< name=value
     std::optional<double> t_start{}, t_end{};
+    std::optional<std::string> mode{};  ///< at the start, by name
     std::optional<std::string> detector{}, locator{}, stepper{}, model{};
     std::optional<double> step{}, rtol{}, atol{}, event_tolerance{};
     std::optional<std::uint64_t> max_steps{};

@@ -13,13 +13,14 @@ namespace {
 
 constexpr std::size_t default_samples = 1001;
 
-/// `n` >= 2 times from start to end, both included.
+/// `n` >= 2 times from start to end, both included; the end may lie before the start.
 std::vector<double> evenly(double start, double end, std::size_t n)
 {
     std::vector<double> times(n);
     for (std::size_t i = 0; i + 1 < n; ++i) {
         const double share = static_cast<double>(i) / static_cast<double>(n - 1);
-        times[i] = std::min(start + share * (end - start), end);
+        const double t = start + share * (end - start);
+        times[i] = end < start ? std::max(t, end) : std::min(t, end);
     }
     times.back() = end;
     return times;

@@ -1,6 +1,7 @@
 #include "ricochet/systems/coulomb_oscillator.hpp"
 
 #include "../any_system.hpp"
+#include "../input.hpp"
 #include "entries.hpp"
 
 namespace ricochet::app {
@@ -45,7 +46,11 @@ std::vector<double> exact_events(const std::vector<double>& p, double t_end)
 {
     const CoulombOscillator oscillator = system(p);
     std::vector<double> times;
-    if (p[velocity] != 0 || !(p[position] > 0) || p[friction] == 0) return times;
+    if (p[velocity] != 0 || !(p[position] > 0) || p[friction] == 0) {
+        throw BadInput(
+            "the event times of coulomb-oscillator are known with friction and from rest, expected "
+            "velocity = 0, position > 0 and friction > 0");
+    }
     for (int n = 1; n <= oscillator.stops(p[position]) && oscillator.turning_time(n) <= t_end;
          ++n) {
         times.push_back(oscillator.turning_time(n));

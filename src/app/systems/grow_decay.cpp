@@ -41,6 +41,7 @@ SystemEntry grow_decay_entry()
         .start = start,
         .run = run,
         .exact_events = exact_events,
+        .any_parameters = false,
         .comparison_step = 0.1,
     };
 }

@@ -64,6 +64,8 @@ SystemEntry henon_heiles_entry()
         .start = start,
         .run = run,
         .exact_events = exact_events,
+        .numerical_reference = true,
+        .any_parameters = false,
         .comparison_step = 0.01,
     };
 }

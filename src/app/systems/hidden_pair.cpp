@@ -43,6 +43,7 @@ SystemEntry hidden_pair_entry()
         .start = start,
         .run = run,
         .exact_events = exact_events,
+        .any_parameters = false,
         .comparison_step = 0.1,
     };
 }

@@ -36,7 +36,9 @@ SystemEntry near_tangent_entry()
 {
     return {
         .name = NearTangent::name,
-        .description = "A cosine barely passes a level, touches it or misses it.",
+        .description =
+            "A cosine barely passes a level, touches it or misses it; with depth=0, set "
+            "touch above the errors of the run (1e-6) to have its touches found.",
         .parameters =
             {{.name = "depth",
               .initial = 1e-4,

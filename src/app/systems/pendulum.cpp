@@ -1,6 +1,7 @@
 #include "ricochet/systems/pendulum.hpp"
 
 #include "../any_system.hpp"
+#include "../input.hpp"
 #include "entries.hpp"
 
 namespace ricochet::app {
@@ -29,7 +30,9 @@ TimedRun run(const RunSettings& settings, int repeats)
 std::vector<double> exact_events(const std::vector<double>& p, double t_end)
 {
     std::vector<double> times;
-    if (p[rate] != 0) return times;
+    if (p[rate] != 0) {
+        throw BadInput("the event times of pendulum are known from rest, expected rate = 0");
+    }
     const double half_period = system(p).half_period(p[angle]);
     for (int n = 1; n * half_period <= t_end; ++n) times.push_back(n * half_period);
     return times;

@@ -11,6 +11,7 @@
 
 #include "../registry.hpp"
 #include "ricochet/detect/ballistic_line.hpp"
+#include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/features.hpp"
@@ -68,6 +69,7 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
 {
     switch (settings.detector) {
         case DetectorKind::ends: return use(Ends{});
+        case DetectorKind::bernstein: return use(Bernstein{});
         case DetectorKind::network: return use(settings.network.value());
         case DetectorKind::verified: return use(Verified<Extremum>(settings.network.value()));
         case DetectorKind::line:

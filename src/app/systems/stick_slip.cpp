@@ -104,6 +104,7 @@ SystemEntry stick_slip_entry()
         .run = run,
         .start_mode = start_mode,
         .exact_events = exact_events,
+        .any_parameters = false,
         .comparison_step = 0.01,
     };
 }

@@ -67,6 +67,8 @@ SystemEntry three_body_entry()
         .start = start,
         .run = run,
         .exact_events = exact_events,
+        .numerical_reference = true,
+        .any_parameters = false,
         .comparison_step = 0.0005,
     };
 }
