@@ -35,6 +35,7 @@ struct Answer {
     std::array<std::uint32_t, most> edges{};  ///< nearest to each link: hints
 };
 using Last = detail::LastAnswer<Question, Answer>;
+using LastTorques = detail::LastAnswer<double, std::array<double, most>>;
 
 /// The ends of the links; the first is the base.
 std::array<Point2, most + 1> ends(const double* angles, std::size_t n, double length) noexcept
@@ -195,6 +196,20 @@ void ArmScene::place(const std::vector<std::vector<Point2>>& obstacles)
     place_ = std::move(place);
 }
 
+const double* ArmScene::torques(double t) const noexcept
+{
+    LastTorques& last = LastTorques::of(place_->number);
+    if (last.owner != place_->number || last.question != t) {
+        for (std::size_t i = 0; i < n_; ++i) {
+            const Joint& j = joints_[i];
+            last.answer[i] = j.drive * std::sin(j.frequency * t + j.phase);
+        }
+        last.owner = place_->number;
+        last.question = t;
+    }
+    return last.answer.data();
+}
+
 std::size_t ArmScene::obstacle_edges() const noexcept
 {
     return place_->edges.size();
@@ -220,6 +235,7 @@ ArmScene::Contact ArmScene::contact(Search search, const double* angles) const n
         std::uint32_t& hint = last.answer.edges[link];
         // A little beyond the nearest so far, so that of links as near the first wins.
         const double limit = best.distance * (1 + 1e-15);
+        if (search == Search::tree && k > 0 && lower_bound_of(s) > limit) continue;
         const NearestPair found = search == Search::tree ? place_->edges.nearest(s, limit, hint)
                                                          : place_->edges.nearest_brute(s, limit);
         if (std::isnan(found.distance)) {
@@ -291,18 +307,25 @@ double ArmScene::largest_acceleration(const double* rates) const noexcept
 
 double ArmScene::lower_bound(const double* angles) const noexcept
 {
-    if (!place_->table) return -infinity;
     const auto joints = ends(angles, n_, link_);
-    const auto discs = static_cast<double>(p_.discs);
     double least = infinity;
     for (std::size_t i = 0; i < n_; ++i) {
-        const Point2 d = joints[i + 1] - joints[i];
-        for (std::size_t k = 0; k < p_.discs; ++k) {
-            const Point2 c = joints[i] + ((static_cast<double>(k) + 0.5) / discs) * d;
-            least = std::min(least, place_->table->lower_bound_of_cell({c.x, c.y}));
-        }
+        least = std::min(least, lower_bound_of({joints[i], joints[i + 1]}));
     }
-    return least - 0.5 * link_ / discs - p_.clearance - 1e-14 * p_.reach;
+    return least - p_.clearance;
+}
+
+double ArmScene::lower_bound_of(const Segment2& link) const noexcept
+{
+    if (!place_->table) return -infinity;
+    const auto discs = static_cast<double>(p_.discs);
+    const Point2 d = link.b - link.a;
+    double least = infinity;
+    for (std::size_t k = 0; k < p_.discs; ++k) {
+        const Point2 c = link.a + ((static_cast<double>(k) + 0.5) / discs) * d;
+        least = std::min(least, place_->table->lower_bound_of_cell({c.x, c.y}));
+    }
+    return least - 0.5 * link_ / discs - 1e-14 * p_.reach;
 }
 
 double ArmScene::reversal(const double* rates) const noexcept

@@ -85,13 +85,17 @@ public:
         return joints_[joint].middle;
     }
 
-    [[nodiscard]] double acceleration(std::size_t joint, double t, double q,
+    /// Of every joint, drive sin(f t + p) [rad/s²]. Valid until this thread asks for another
+    /// time: the stages of a step share two.
+    [[nodiscard]] const double* torques(double t) const noexcept;
+
+    /// `torque`: that of the joint at this time.
+    [[nodiscard]] double acceleration(std::size_t joint, double torque, double q,
                                       double w) const noexcept
     {
         const Joint& j = joints_[joint];
         const double y = q - j.middle;
-        return j.drive * std::sin(j.frequency * t + j.phase) - j.spring * 2 * y / (1 + y * y) -
-               p_.damping * w;
+        return torque - j.spring * 2 * y / (1 + y * y) - p_.damping * w;
     }
 
     /// What the arm and the nearest obstacle touch with.
@@ -125,6 +129,9 @@ private:
         double middle, drive, spring, frequency, phase;
     };
     struct Place;
+
+    /// A lower bound of the distance of a link to the obstacles, from the table.
+    [[nodiscard]] double lower_bound_of(const geometry::Segment2& link) const noexcept;
 
     void check() const;
     void choose_joints();
@@ -176,9 +183,10 @@ public:
     template <class X>
     void flow(double t, const X& x, X& dxdt) const noexcept
     {
+        const double* torques = scene_.torques(t);
         for (std::size_t i = 0; i < N; ++i) {
             dxdt[i] = x[N + i];
-            dxdt[N + i] = scene_.acceleration(i, t, x[i], x[N + i]);
+            dxdt[N + i] = scene_.acceleration(i, torques[i], x[i], x[N + i]);
         }
     }
 
