@@ -29,6 +29,10 @@ struct GuardCubic {
     {
     }
 
+    /// Second derivatives at the ends, per unit of u squared.
+    [[nodiscard]] double curvature0() const noexcept { return 6 * (v1 - v0) - 4 * r0 - 2 * r1; }
+    [[nodiscard]] double curvature1() const noexcept { return 6 * (v0 - v1) + 2 * r0 + 4 * r1; }
+
     /// Where the cubic has its minimum (or maximum), if inside (0, 1); else 0.5.
     [[nodiscard]] double critical(bool minimum) const noexcept
     {
@@ -94,7 +98,8 @@ struct Extremum {
         const bool returns = on_surface && turns_back(probe, watch, cubic);
         const bool left = has_left(side, watch.end.value) && !returns;
         const bool known = std::isfinite(cubic.r0) && std::isfinite(cubic.r1);
-        if (returns && cubic.r0 < 0 && cubic.r1 == 0 && counts(side, probe.guard().crossing())) {
+        if (returns && cubic.r0 < 0 && turns_now(cubic.r1, cubic.curvature1()) &&
+            counts(side, probe.guard().crossing())) {
             return Finding::touching(side, watch.end);
         }
         if (left) {
@@ -112,6 +117,12 @@ struct Extremum {
     }
 
 private:
+    /// Whether a guard falling at this rate will turn at once: within the rounding of a rate.
+    [[nodiscard]] static bool turns_now(double rate, double curvature) noexcept
+    {
+        return rate == 0 || (rate < 0 && -rate <= 1e-9 * curvature);
+    }
+
     /// Whether a guard that is on its surface at the end is about to turn back there. Where
     /// it leaves the band beyond the step says so; a guard that stays where it is has
     /// arrived, and in a wide band its cubic has to tell. If it is still falling, the next
@@ -127,7 +138,7 @@ private:
             if (std::fabs(beyond) > watch.touch) return beyond > 0;
             if (beyond == cubic.v1) return false;
         }
-        const double curvature = 6 * (cubic.v0 - cubic.v1) + 2 * cubic.r0 + 4 * cubic.r1;
+        const double curvature = cubic.curvature1();
         return curvature > 0 && cubic.v1 - cubic.r1 * cubic.r1 / (2 * curvature) >= -watch.touch;
     }
 
@@ -164,7 +175,7 @@ private:
     {
         GuardSample lo = watch.start;
         GuardSample hi = watch.end;
-        if (cubic.r0 == 0 && std::fabs(cubic.v0) <= watch.touch) {
+        if (std::fabs(cubic.v0) <= watch.touch && turns_now(cubic.r0, cubic.curvature0())) {
             return Finding::clear(Evidence::checked);  // the step before has seen it turn
         }
         if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {

@@ -1,0 +1,479 @@
+// Events where loops like ours have lost or doubled them: plateaus, touches of any order,
+// rest that is disturbed, coincidences, starts on a surface.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/hybrid/filippov.hpp"
+#include "ricochet/integrate/integrate.hpp"
+
+namespace ricochet {
+namespace {
+
+using X1 = std::array<double, 1>;
+using X = std::array<double, 2>;
+using X3 = std::array<double, 3>;
+
+// --- plateaus ---
+
+/// Falls to zero at t = 1 and stays there, until t = 2 or for ever.
+struct Arriving {
+    double leaves = std::numeric_limits<double>::infinity();
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+    [[nodiscard]] double guard(double, const X1& x) const
+    {
+        return x[0] < 1 ? 1 - x[0] : x[0] < leaves ? 0 : leaves - x[0];
+    }
+};
+
+TEST(HardEvents, AGuardThatArrivesAndStaysHasItsEventWhereverTheStepsFall)
+{
+    // Zero is across the surface, so the event is at the first zero, to rounding.
+    for (int i = 0; i < 90; ++i) {
+        const Options options{.t_end = 4, .h_max = 0.05 + 0.005 * i};
+        for (const Arriving& system : {Arriving{}, Arriving{2}}) {
+            for (const auto& run :
+                 {integrate(system, X1{0}, options),
+                  integrate(system, X1{0}, options, ErrorControlled<Dopri5>{}, Bernstein{}),
+                  integrate(system, X1{0}, options, ErrorControlled<Dopri5>{}, Ends{})}) {
+                ASSERT_EQ(run.events.size(), 1u) << options.h_max;
+                EXPECT_EQ(run.events[0].kind, EventKind::crossing);
+                EXPECT_NEAR(run.events[0].t, 1, 1e-12);
+            }
+        }
+    }
+}
+
+/// Guard 0 puts the second component on the surface of guard 1, where it stays until the
+/// first reaches 2. State (clock, height, events of guard 1).
+struct SetDown {
+    std::size_t guard_count = 2;
+    bool acts = true;
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.resets = which == 0 || acts};
+    }
+    void flow(double, const X3& x, X3& dxdt) const { dxdt = {1, x[0] > 2 ? -1.0 : 0.0, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const X3& x) const
+    {
+        return which == 0 ? 1 - x[0] : x[1];
+    }
+    void reset(std::size_t which, double, X3& x) const
+    {
+        x[1] = 0;
+        if (which == 1) ++x[2];
+    }
+};
+
+TEST(HardEvents, AGuardSetDownOnItsSurfaceHasItsEventWhenItLeaves)
+{
+    for (const bool acts : {true, false}) {
+        const auto run = integrate(SetDown{.acts = acts}, X3{0, 1, 0}, {.t_end = 4});
+        ASSERT_EQ(run.events.size(), 2u) << acts;
+        EXPECT_EQ(run.events[1].guard, 1u);
+        // The flow jumps at 2: an error-controlled step finds that to about its tolerance.
+        EXPECT_NEAR(run.events[1].t, 2, 1e-6);
+        EXPECT_EQ(run.x[2], acts ? 1 : 0);
+    }
+}
+
+// --- rest ---
+
+/// A floor on which nothing presses until t = 1, then something does.
+struct Pressed {
+    std::size_t guard_count = 1;
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
+    void flow(double t, const X& x, X& dxdt) const { dxdt = {x[1], t < 1 ? 0.0 : -1.0}; }
+    [[nodiscard]] double guard(std::size_t, double, const X& x) const { return x[0]; }
+    void reset(std::size_t, double, X& x) const
+    {
+        x[0] = 0;
+        x[1] *= -0.5;
+    }
+    void rest(std::size_t, double, X& x) const { x = {0, 0}; }
+};
+
+TEST(HardEvents, AFloorHoldsWhatIsPressedOntoItLater)
+{
+    const auto run = integrate(Pressed{}, X{0, 0}, {.t_end = 3});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.x[0], 0);
+    EXPECT_EQ(run.x[1], 0);
+}
+
+/// The same floor, from which a force lifts.
+struct Lifted : Pressed {
+    void flow(double t, const X& x, X& dxdt) const { dxdt = {x[1], t}; }
+};
+
+TEST(HardEvents, WhatAForceLiftsIsNotHeld)
+{
+    const auto run = integrate(Lifted{}, X{0, 0}, {.t_end = 3, .rtol = 1e-10, .atol = 1e-10});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_TRUE(run.events.empty());
+    EXPECT_NEAR(run.x[0], 4.5, 1e-8);  // t^3 / 6
+}
+
+/// A ball that comes to rest in mode 1 and is thrown at t = 20.
+struct Kicked {
+    using State = X;
+    double speed;
+    static constexpr std::size_t guard_count = 1;
+    static constexpr std::size_t mode_count = 2;
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
+    void flow(Mode mode, double, const X& x, X& dxdt) const
+    {
+        dxdt = {mode == 0 ? x[1] : 0.0, mode == 0 ? -1.0 : 0.0};
+    }
+    [[nodiscard]] double guard(std::size_t, double, const X& x) const { return x[0]; }
+    [[nodiscard]] Mode reset(std::size_t, Mode mode, double, X& x) const
+    {
+        x[0] = 0;
+        x[1] *= -0.5;
+        return mode;
+    }
+    [[nodiscard]] Mode rest(std::size_t, Mode, double, X& x) const
+    {
+        x = {0, 0};
+        return 1;
+    }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        return t < 20 ? 20 : std::numeric_limits<double>::infinity();
+    }
+    [[nodiscard]] Mode time_reset(Mode, double, X& x) const
+    {
+        x[1] = speed;
+        return 0;
+    }
+};
+
+TEST(HardEvents, AnythingKickedIntoItsFloorBouncesOrRests)
+{
+    for (const double speed : {-1.0, 0.0, 1.0}) {
+        const auto run = integrate(Kicked{speed}, X{1, 0}, {.t_end = 40});
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << speed;
+        EXPECT_EQ(run.mode, 1u) << speed;
+        EXPECT_EQ(run.x[0], 0) << speed;
+    }
+}
+
+// --- touches ---
+
+/// (x - 1/2)^power, which touches where the power is even.
+struct Flat {
+    int power;
+    Crossing crossing = Crossing::either;
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+    [[nodiscard]] double guard(double, const X1& x) const { return std::pow(x[0] - 0.5, power); }
+    void reset(double, X1&) const {}
+};
+
+TEST(HardEvents, FlatTouchesAreTouchesWhereverTheStepsFall)
+{
+    for (const int power : {2, 4, 6}) {
+        for (const double step : {0.5, 0.25, 0.125, 0.1, 0.07, 0.3}) {
+            const auto run =
+                integrate(Flat{power}, X1{0}, {.t_end = 1, .step = step}, FixedStep<Rk4>{});
+            for (const auto& event : run.events) {
+                EXPECT_EQ(event.kind, EventKind::touch) << power << ' ' << step;
+            }
+            EXPECT_LE(run.events.size(), 1u) << power << ' ' << step;
+        }
+    }
+}
+
+TEST(HardEvents, AStartOnATouchIsNoEvent)
+{
+    for (const int power : {2, 4}) {
+        for (const Crossing crossing : {Crossing::falling, Crossing::rising, Crossing::either}) {
+            for (const double t : {0.0, 1.0}) {
+                const Options options{
+                    .t_start = t, .t_end = t + 1, .step = 0.125, .max_steps = 1000};
+                const auto run =
+                    integrate(Flat{power, crossing}, X1{0.5}, options, FixedStep<Rk4>{});
+                EXPECT_EQ(run.outcome, Outcome::reached_end);
+                EXPECT_TRUE(run.events.empty()) << power << ' ' << t;
+            }
+        }
+    }
+}
+
+/// (x - 1/2)^2 with a time event at the touch.
+struct TouchOnTime {
+    Crossing crossing = Crossing::either;
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+    [[nodiscard]] double guard(double, const X1& x) const { return (x[0] - 0.5) * (x[0] - 0.5); }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        return t < 0.5 ? 0.5 : std::numeric_limits<double>::infinity();
+    }
+};
+
+TEST(HardEvents, ATouchAtATimeEventOrAtTheEndIsSeenOnce)
+{
+    for (const double t_end : {1.0, 0.5}) {
+        const auto run =
+            integrate(TouchOnTime{}, X1{0}, {.t_end = t_end, .step = 0.125}, FixedStep<Rk4>{});
+        int touches = 0;
+        int crossings = 0;
+        for (const auto& event : run.events) {
+            touches += event.kind == EventKind::touch;
+            crossings += event.kind == EventKind::crossing;
+        }
+        EXPECT_EQ(touches, 1) << t_end;
+        EXPECT_EQ(crossings, 0) << t_end;
+    }
+}
+
+// --- starts ---
+
+/// A straight line outside the unit disk.
+struct Disk {
+    using State = std::array<double, 4>;
+    std::size_t guard_count = 1;
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[2], x[3], 0, 0}; }
+    [[nodiscard]] double guard(std::size_t, double, const State& x) const
+    {
+        return std::sqrt(x[0] * x[0] + x[1] * x[1]) - 1;
+    }
+    void reset(std::size_t, double, State& x) const { x[2] = -x[2], x[3] = -x[3]; }
+};
+
+TEST(HardEvents, ATangentStartOnARoundedSurfaceIsNoEvent)
+{
+    for (int i = 0; i < 200; ++i) {
+        const double a = 0.0314 * i;
+        const Disk::State start{std::cos(a), std::sin(a), -std::sin(a), std::cos(a)};
+        const auto run = integrate(Disk{}, start, {.t_end = 1});
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << a;
+        EXPECT_TRUE(run.events.empty()) << a;
+    }
+}
+
+// --- coincidences ---
+
+/// Guard 0 adds a component to the state; guard 1 counts, on the same surface.
+struct Growing {
+    using State = std::vector<double>;
+    std::size_t guard_count = 2;
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.resets = which == 0, .stop_after = which == 0 ? 0u : 5u};
+    }
+    void flow(double, const State&, State& dxdt) const
+    {
+        for (double& rate : dxdt) rate = 1;
+    }
+    [[nodiscard]] double guard(std::size_t, double, const State& x) const { return 1 - x[0]; }
+    void reset(std::size_t, double, State& x) const { x = {0, 0}; }
+};
+
+TEST(HardEvents, AResetOfTheDimensionSurvivesACoincidence)
+{
+    const auto run = integrate(Growing{}, Growing::State{0}, {.t_end = 1.5});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.x.size(), 2u);
+    EXPECT_NEAR(run.x[1], 0.5, 1e-12);
+}
+
+/// Counts how often the clock passes each threshold.
+struct Thresholds {
+    using State = std::array<double, 4>;
+    std::array<double, 3> at;
+    std::size_t guard_count = 3;
+    void flow(double, const State&, State& dxdt) const { dxdt = {1, 0, 0, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const State& x) const
+    {
+        return at[which] - x[0];
+    }
+    void reset(std::size_t which, double, State& x) const { ++x[which + 1]; }
+};
+
+TEST(HardEvents, AGuardAfterTheWindowOfASetKeepsItsOwnTime)
+{
+    for (const double third : {1.12, 1.1499, 1.1501, 1.3}) {
+        const auto run = integrate(Thresholds{{1, 1.05, third}}, Thresholds::State{},
+                                   {.t_end = 2, .event_window = 0.1});
+        ASSERT_EQ(run.events.size(), 3u) << third;
+        EXPECT_EQ(run.events[0].t, run.events[1].t);
+        EXPECT_NEAR(run.events[2].t, third, 1e-14);
+        EXPECT_EQ(run.x[3], 1);
+    }
+}
+
+/// Passes given times, each an event of the same guard.
+struct Train {
+    std::vector<double> times;
+    Crossing crossing = Crossing::falling;
+    void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(double, const X& x) const
+    {
+        const auto next = static_cast<std::size_t>(x[1]);
+        return (next < times.size() ? times[next] : 1e9) - x[0];
+    }
+    void reset(double, X& x) const { ++x[1]; }
+    void rest(double, X&) const {}
+};
+
+TEST(HardEvents, AShortGapAfterShrinkingOnesIsNoAccumulation)
+{
+    for (const double gap : {1e-3, 1e-7, 1e-10, 1e-13}) {
+        const Train train{{1, 4, 6, 7, 7 + gap, 8, 9, 10}};
+        const auto run = integrate(train, X{0, 0}, {.t_end = 12});
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << gap;
+        ASSERT_EQ(run.events.size(), train.times.size()) << gap;
+        for (const auto& event : run.events) EXPECT_EQ(event.kind, EventKind::crossing);
+    }
+}
+
+/// A bouncing ball with a time event just before its bounces accumulate.
+struct Interrupted {
+    double time;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
+    void reset(double, X& x) const
+    {
+        x[0] = 0;
+        x[1] *= -0.5;
+    }
+    void rest(double, X& x) const { x = {0, 0}; }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        return t < time ? time : std::numeric_limits<double>::infinity();
+    }
+};
+
+TEST(HardEvents, AnAccumulationDoesNotOvertakeATimeEvent)
+{
+    // The bounces from 1 m accumulate at 3 sqrt 2 = 4.24264...
+    for (const double time : {4.242, 4.2424, 4.2426, 4.2426406871192848}) {
+        const auto run =
+            integrate(Interrupted{time}, X{1, 0}, {.t_end = 4.5, .event_tolerance = 1e-3});
+        double last = 0;
+        for (const auto& event : run.events) {
+            EXPECT_GE(event.t, last);
+            last = event.t;
+        }
+        EXPECT_EQ(run.t, 4.5);
+    }
+}
+
+// --- predicates, snapshots, numbers ---
+
+/// Guard 1 is carried across its surface by the reset of guard 0, but does not count.
+struct Ruled {
+    std::size_t guard_count = 2;
+    void flow(double, const X3&, X3& dxdt) const { dxdt = {1, 0, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const X3& x) const
+    {
+        return which == 0 ? 1 - x[0] : x[1];
+    }
+    [[nodiscard]] bool enabled(std::size_t which, double, const X3&) const { return which == 0; }
+    void reset(std::size_t which, double, X3& x) const
+    {
+        x[1] = -1;
+        if (which == 1) x[2] = 1;
+    }
+};
+
+TEST(HardEvents, APredicateHoldsForGuardsThatAResetFlips)
+{
+    const auto run = integrate(Ruled{}, X3{0, 1, 0}, {.t_end = 2});
+    EXPECT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.x[2], 0);
+    EXPECT_GE(run.statistics.disabled, 1u);
+}
+
+TEST(HardEvents, AGuardThatIsNoNumberEndsTheRunOnAPlateauToo)
+{
+    struct Broken {
+        void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+        [[nodiscard]] double guard(double, const X1& x) const
+        {
+            return x[0] < 0.5 ? 0 : std::numeric_limits<double>::quiet_NaN();
+        }
+    };
+    EXPECT_EQ(integrate(Broken{}, X1{0}, {.t_end = 4, .h_max = 0.1}).outcome, Outcome::non_finite);
+}
+
+TEST(HardEvents, ASpoiltSnapshotIsRefusedAndChangesNothing)
+{
+    const Pressed system;
+    Simulation<Pressed, X> simulation(system, X{1, 0}, {.t_end = 3});
+    simulation.step();
+    const Snapshot good = simulation.save();
+    for (std::size_t i = 0; i < good.numbers.size(); ++i) {
+        Snapshot bad = good;
+        bad.numbers[i] = std::numeric_limits<double>::quiet_NaN();
+        try {
+            simulation.restore(bad);
+        } catch (const std::invalid_argument&) {
+            EXPECT_EQ(to_text(simulation.save()), to_text(good)) << i;
+        }
+        simulation.restore(good);
+    }
+    Snapshot bad = good;
+    bad.numbers[0] = std::numeric_limits<double>::infinity();  // the time
+    EXPECT_THROW(simulation.restore(bad), std::invalid_argument);
+    bad = good;
+    bad.numbers.pop_back();
+    EXPECT_THROW(simulation.restore(bad), std::invalid_argument);
+    EXPECT_EQ(to_text(simulation.save()), to_text(good));
+}
+
+// --- driving ---
+
+TEST(HardEvents, AdvanceStopsAtSamplesAndShowsTheLastEvent)
+{
+    struct Clock {
+        void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+        [[nodiscard]] double guard(double, const X1& x) const { return 1.2 - x[0]; }
+    };
+    const Clock clock;
+    Simulation<Clock, X1> simulation(
+        clock, X1{0}, {.t_end = 3, .stop_at_event = true, .sample_times = {0.5, 1.0, 2.0}});
+    std::vector<double> shown;
+    while (simulation.advance()) {
+        shown.push_back(simulation.t());
+        EXPECT_NEAR(simulation.x()[0], simulation.t(), 1e-12);
+    }
+    ASSERT_EQ(shown.size(), 3u);
+    EXPECT_EQ(shown[0], 0.5);
+    EXPECT_EQ(shown[1], 1.0);
+    EXPECT_NEAR(shown[2], 1.2, 1e-12);
+}
+
+struct Relay {
+    static constexpr std::size_t surface_count = 1;
+    template <class V>
+    [[nodiscard]] double surface(std::size_t, double, const V& x) const
+    {
+        return x[0];
+    }
+    template <class V>
+    void field(std::size_t region, double, const V&, V& dxdt) const
+    {
+        dxdt[0] = (region & 1) != 0 ? -1 : 1;
+    }
+};
+
+TEST(HardEvents, SlidingMotionIsNotRunBackward)
+{
+    const Filippov<Relay> system{Relay{}};
+    EXPECT_THROW(static_cast<void>(integrate(system, X1{1}, {.t_start = 1, .t_end = 0})),
+                 std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ricochet
