@@ -25,6 +25,9 @@ std::string_view name(EventKind kind)
         case EventKind::touch: return "touch";
         case EventKind::time: return "time";
         case EventKind::accumulation: return "accumulation";
+        case EventKind::mode: return "mode";
+        case EventKind::stick: return "stick";
+        case EventKind::slip: return "slip";
     }
     return "crossing";
 }

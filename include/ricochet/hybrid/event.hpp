@@ -14,6 +14,9 @@ enum class EventKind : std::uint8_t {
     touch,         ///< the guard reached its surface and turned back
     time,          ///< a time event
     accumulation,  ///< the limit of infinitely many events
+    mode,          ///< a reaction went from one of its bounds to the other
+    stick,         ///< a reaction at a bound began to hold
+    slip,          ///< a reaction that held met a bound
 };
 
 /// `Event::guard` of an event that no guard made.

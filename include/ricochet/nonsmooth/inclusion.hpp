@@ -27,6 +27,9 @@
 //     observe(E)                       E; selects the first components
 //     act(G)                           G; the transpose of E
 //     offset(t, s)                     s(t), the motion of what y is relative to; zero
+//     offset_rate(t, s)                its rate; a difference without it
+//     branch_bound(t, w, i, branch)    a bound that goes on smoothly beyond y = 0, see
+//                                      branch_modes.hpp
 //     bound_gradient(t, w, i, g)       d upper_i / dw of a BoxSet of symmetric intervals
 //                                      that depend on the state
 //
@@ -226,6 +229,9 @@ public:
         offset(t, y);
         y = observe_ * w - y;
     }
+
+    /// The component that row i of E selects, or -1 where it is not just one.
+    [[nodiscard]] Eigen::Index selected(Eigen::Index i) const { return selected_[i]; }
 
     /// Writes y_i exactly into w where row i of E selects one component.
     void hold(Eigen::Index i, double y, double s, State& w) const

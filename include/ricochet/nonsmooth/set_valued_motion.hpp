@@ -145,6 +145,13 @@ public:
     [[nodiscard]] CompositeStep<System>& stepper() noexcept { return step_; }
     /// The branches of the state, kept where switches are located.
     [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
+    /// The change that was located last.
+    struct Switch {
+        std::size_t reaction = 0;
+        Branch before = Branch::inside;
+        Branch after = Branch::inside;
+    };
+    [[nodiscard]] const Switch& last_switch() const noexcept { return last_switch_; }
 
     /// The next accepted step. `running`, or how the run ended.
     SetValuedOutcome advance()
@@ -405,12 +412,14 @@ private:
             const bool up = now_.reaction[which] - set.lower(k) > set.upper(k) - now_.reaction[which];
             start_branches_[which] = up ? Branch::upper : Branch::lower;
             now_.reaction[which] = up ? set.upper(k) : set.lower(k);
+            last_switch_ = {k, from, start_branches_[which]};
             return;
         }
         // Sliding has come to a stop: it sticks, or goes on across.
         zero_observed(which);
         now_.reaction = minimal_selection(step_.matrices(), now_.t, now_.w);
         step_.branches_of(now_, start_branches_);
+        last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
     }
 
     void zero_observed(Eigen::Index which)
@@ -427,6 +436,7 @@ private:
     State now_, before_, trial_, half_;
     Vector error_;
     Branches start_branches_;
+    Switch last_switch_;
     SetValuedStatistics statistics_;
     StageReport failure_;
     SetValuedOutcome outcome_ = SetValuedOutcome::running;

@@ -1,10 +1,11 @@
 // A mass on a spring that rubs on a belt, as a differential inclusion.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <string_view>
 
-#include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 #include "ricochet/systems/friction_oscillator.hpp"
 
 namespace ricochet {
@@ -69,16 +70,23 @@ public:
     {
         return IntervalSet::symmetric(friction(std::abs(w[1] - p_.belt_speed)));
     }
+    /// F on one side of y = 0, smooth beyond it.
+    [[nodiscard]] double branch_bound(double /*t*/, const Vector& w, int /*which*/,
+                                      Branch branch) const
+    {
+        const double y = w[1] - p_.belt_speed;
+        return branch == Branch::upper ? friction(-y) : -friction(y);
+    }
     /// dF/dw.
     void bound_gradient(double t, const Vector& w, int which, Vector& gradient) const;
 
-    /// F(s) [N] at the sliding speed s >= 0 [m/s].
+    /// F(s) [N] at the sliding speed s >= 0 [m/s]; a little below zero it goes on smoothly.
     [[nodiscard]] double friction(double speed) const noexcept
     {
         const double x = p_.weakening * speed;
         switch (p_.law) {
             case FrictionLaw::constant: return p_.friction;
-            case FrictionLaw::hyperbolic: return p_.friction / (1 + x);
+            case FrictionLaw::hyperbolic: return p_.friction / std::max(1 + x, 0.5);
             case FrictionLaw::exponential:
                 return p_.residual + (p_.friction - p_.residual) * std::exp(-x);
             case FrictionLaw::humped: break;

@@ -1,0 +1,471 @@
+// One run of an inclusion by two integrators, each where it is at its best.
+//
+//     event-driven   while every reaction is at a bound or held: an ordinary differential
+//                    equation (branch_modes.hpp), any explicit stepper, changes located to the
+//                    step map
+//     set-valued     where that ends: changes that coincide, reactions that y' = 0 does not
+//                    determine, switching that accumulates; and sets that have no such
+//                    branches at all. Bathe's steps, until the branches are plain again
+//
+// The reaction with which a phase starts is the minimal selection. Who declares no inclusion
+// includes nothing of this.
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/integrate/simulation.hpp"
+#include "ricochet/nonsmooth/branch_modes.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+
+namespace ricochet {
+
+enum class HandOverOutcome {
+    reached_end,
+    not_converged,   ///< a set-valued stage could not be solved however short the step
+    step_underflow,  ///< no step above h_min met the tolerance
+    step_limit,      ///< `HandOverOptions::max_steps` steps were taken
+    non_finite,      ///< the motion is no longer finite
+    cancelled,       ///< `HandOverOptions::cancelled` was set
+};
+
+[[nodiscard]] std::string_view name(HandOverOutcome outcome) noexcept;
+/// One sentence with the remedy.
+[[nodiscard]] std::string_view describe(HandOverOutcome outcome) noexcept;
+
+/// Why a phase began.
+enum class PhaseCause {
+    start,
+    no_modes,      ///< the set is no box, or has more than four reactions
+    no_flow,       ///< y' = 0 does not determine the held reactions
+    several,       ///< changes coincide, and rates do not tell what follows
+    accumulation,  ///< infinitely many switchings in finite time
+    chattering,    ///< more switchings in a short time than can be worth locating
+    stuck,         ///< the event-driven loop could not go on
+    released,      ///< event-driven again: every branch is plain
+};
+
+[[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
+
+struct Phase {
+    double from = 0;  ///< [s]
+    bool set_valued = false;
+    PhaseCause cause = PhaseCause::start;
+};
+
+struct HandOverOptions {
+    double t_start = 0;
+    double t_end = std::numeric_limits<double>::quiet_NaN();
+
+    /// Of the event-driven phases, as in `Options`.
+    double rtol = 1e-10;
+    double atol = 1e-12;
+    double h_max = std::numeric_limits<double>::infinity();
+    double event_tolerance = 0;
+
+    /// Of the set-valued phases; their times are those of the run. A step of zero is a
+    /// thousandth of the run. Changes are located where the set is a box.
+    SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
+
+    std::vector<double> sample_times{};  ///< ascending
+    std::uint64_t max_steps = 100'000'000;
+    const std::atomic<bool>* cancelled = nullptr;
+};
+
+struct HandOverStatistics {
+    Statistics event_driven;
+    SetValuedStatistics set_valued;
+    std::uint64_t to_set_valued = 0;  ///< hand-overs, a start there included
+    std::uint64_t to_events = 0;
+    double set_valued_time = 0;  ///< [s] of the motion
+};
+
+/// `Event::guard` is the reaction that changed; modes are those of `BranchModes`.
+template <Inclusion System>
+struct HandOverRun {
+    using Vector = StateOf<System>;
+
+    HandOverOutcome outcome = HandOverOutcome::reached_end;
+    SetValuedState<System> state;  ///< at the time reached, with its reaction
+    Mode mode = 0;                 ///< in a set-valued phase `BranchModes::several`
+    std::vector<Event<Vector>> events;
+    std::vector<Phase> phases;
+    Trajectory<Vector> trajectory;  ///< at the sample times
+    HandOverStatistics statistics;
+    StageReport failure;  ///< with `not_converged`: the residual, and whose law failed
+};
+
+namespace detail {
+
+/// The options as they will be used.
+/// @throws std::invalid_argument naming the option.
+[[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
+
+void add(Statistics& sum, const Statistics& more) noexcept;
+
+/// What an event-driven phase ended with, as a reason for a set-valued one; nothing if the
+/// run is over.
+[[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
+[[nodiscard]] HandOverOutcome in_hand_over(Outcome outcome) noexcept;
+[[nodiscard]] HandOverOutcome in_hand_over(SetValuedOutcome outcome) noexcept;
+
+/// Of an inclusion without branches: nothing.
+template <class System>
+struct ModesOf {
+    struct type {
+        explicit type(const System& /*system*/) {}
+    };
+};
+template <Branching System>
+struct ModesOf<System> {
+    using type = BranchModes<System>;
+};
+
+}  // namespace detail
+
+/// `Stepping` of the event-driven phases: `ErrorControlled<Method>`, or `FixedStep<Method>` with
+/// `set_valued.step`.
+template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
+class HandOver {
+    static constexpr bool branching = Branching<System>;
+
+public:
+    using Vector = StateOf<System>;
+    using Reaction = ReactionOf<System>;
+    using State = SetValuedState<System>;
+
+    /// @throws std::invalid_argument for options, systems and initial states that cannot be
+    /// right.
+    HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
+        : options_(detail::completed(options, branching)),
+          modes_(system),
+          motion_(system, w0, options_.set_valued),
+          sample_(motion_.state())
+    {
+        run_.state = motion_.state();
+    }
+
+    /// Goes on from the state of an earlier run, with its reaction.
+    /// @throws std::invalid_argument also where the reaction is outside the set.
+    HandOver(const System& system, const State& start, const HandOverOptions& options)
+        : HandOver(system, start.w, at_time(options, start.t))
+    {
+        motion_.restart(start);
+        run_.state = start;
+        keeps_reaction_ = true;
+    }
+    HandOver(const HandOver&) = delete;
+    HandOver& operator=(const HandOver&) = delete;
+
+    /// To the end; whatever the outcome, what was computed is there.
+    [[nodiscard]] HandOverRun<System> take()
+    {
+        begin();
+        while (!ended_) {
+            if constexpr (branching) {
+                if (!set_valued_) {
+                    follow_events();
+                    continue;
+                }
+            }
+            follow_inclusion();
+        }
+        run_.statistics.set_valued = motion_.statistics();
+        return std::move(run_);
+    }
+
+private:
+    using Modes = typename detail::ModesOf<System>::type;
+
+    [[nodiscard]] static HandOverOptions at_time(HandOverOptions options, double t)
+    {
+        options.t_start = t;
+        return options;
+    }
+
+    void begin()
+    {
+        if constexpr (branching) {
+            const Mode mode = modes_.mode_at(run_.state.t, run_.state.w);
+            if (mode < Modes::branch_modes) return go_by_events(mode, PhaseCause::start);
+            return go_by_steps(cause_of(mode));
+        } else {
+            go_by_steps(PhaseCause::no_modes);
+        }
+    }
+
+    [[nodiscard]] static PhaseCause cause_of(Mode mode) noexcept
+        requires branching
+    {
+        return mode == Modes::several ? PhaseCause::several : PhaseCause::no_flow;
+    }
+
+    void end_with(HandOverOutcome outcome)
+    {
+        run_.outcome = outcome;
+        ended_ = true;
+    }
+
+    // --- event-driven ---
+
+    void go_by_events(Mode mode, PhaseCause cause)
+    {
+        run_.mode = mode;
+        set_valued_ = false;
+        if (cause == PhaseCause::released) ++run_.statistics.to_events;
+        run_.phases.push_back({.from = run_.state.t, .set_valued = false, .cause = cause});
+    }
+
+    void follow_events()
+        requires branching
+    {
+        using X = typename Modes::State;
+        X x;
+        Eigen::Map<Vector>(x.data()) = run_.state.w;
+        std::optional<Simulation<Modes, X, Stepping>> simulation;
+        try {
+            simulation.emplace(modes_, x, event_options());
+        } catch (const std::invalid_argument&) {
+            return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
+        }
+        bool chatters = false;
+        std::uint64_t mark = 0;
+        double marked = run_.state.t;
+        while (simulation->step() && simulation->mode() < Modes::branch_modes) {
+            const std::uint64_t events = simulation->run().statistics.events;
+            if (events < mark + most_events) continue;
+            chatters = simulation->t() - marked < options_.set_valued.step / 100;
+            if (chatters) break;
+            mark = events;
+            marked = simulation->t();
+        }
+        finish_events(simulation->finish(), chatters);
+    }
+
+    [[nodiscard]] Options event_options() const
+    {
+        Options options{.t_start = run_.state.t,
+                        .t_end = options_.t_end,
+                        .mode = run_.mode,
+                        .rtol = options_.rtol,
+                        .atol = options_.atol,
+                        .h_max = options_.h_max,
+                        .event_tolerance = options_.event_tolerance};
+        if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
+            options.step = options_.set_valued.step;
+        }
+        options.sample_times.assign(options_.sample_times.begin() + next_sample(),
+                                    options_.sample_times.end());
+        options.max_steps = options_.max_steps - run_.statistics.event_driven.steps;
+        options.cancelled = options_.cancelled;
+        return options;
+    }
+
+    template <class X>
+    void finish_events(Run<X>&& done, bool chatters)
+    {
+        if (run_.events.empty()) run_.events.reserve(done.events.size());
+        for (const Event<X>& event : done.events) run_.events.push_back(converted(event));
+        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
+            run_.trajectory.t.push_back(done.trajectory.t[i]);
+            run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
+        }
+        detail::add(run_.statistics.event_driven, done.statistics);
+        Vector& w = run_.state.w;
+        run_.state.t = done.t;
+        w = Modes::vector(done.x);
+        if (done.mode >= Modes::branch_modes) {
+            return go_by_steps(cause_of(done.mode));
+        }
+        if (chatters) return go_by_steps(PhaseCause::chattering);
+        if (const auto cause = detail::cause_after(done.outcome)) {
+            if (*cause == PhaseCause::accumulation && done.guard != no_guard) {
+                auto branches = Modes::branches_of(done.mode);
+                branches[static_cast<Eigen::Index>(done.guard / 4)] = Branch::inside;
+                modes_.hold(branches, done.t, w);
+            }
+            return go_by_steps(*cause);
+        }
+        run_.mode = done.mode;
+        if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
+        end_with(detail::in_hand_over(done.outcome));
+    }
+
+    template <class X>
+    [[nodiscard]] static Event<Vector> converted(const Event<X>& from)
+    {
+        Event<Vector> event;
+        event.t = from.t;
+        event.guard = from.guard / 4;
+        event.mode_before = from.mode_before;
+        event.mode_after = from.mode_after;
+        event.before = Modes::vector(from.before);
+        event.after = Modes::vector(from.after);
+        event.bracket = from.bracket;
+        event.slope = from.slope;
+        event.error = from.error;
+        const bool held = from.guard % 4 >= 2;
+        const bool holds = from.mode_after >= Modes::branch_modes ||
+                           Modes::branch(event.guard, from.mode_after) == Branch::inside;
+        event.kind = kind_of(held, holds);
+        return event;
+    }
+
+    [[nodiscard]] static EventKind kind_of(bool held, bool holds) noexcept
+    {
+        return held ? EventKind::slip : holds ? EventKind::stick : EventKind::mode;
+    }
+
+    // --- set-valued ---
+
+    void go_by_steps(PhaseCause cause)
+    {
+        if constexpr (branching) {
+            // Who is back at once stays longer.
+            const double lasted = run_.phases.empty() ? std::numeric_limits<double>::infinity()
+                                                      : run_.state.t - run_.phases.back().from;
+            const bool at_once = lasted < 10 * options_.set_valued.step;
+            patience_ = at_once ? std::min(2 * patience_, std::uint64_t{1} << 20) : 1;
+            run_.mode = Modes::several;
+        }
+        set_valued_ = true;
+        ++run_.statistics.to_set_valued;
+        run_.phases.push_back({.from = run_.state.t, .set_valued = true, .cause = cause});
+        if (std::exchange(keeps_reaction_, false)) return;
+        try {
+            motion_.restart(run_.state.t, run_.state.w);
+        } catch (const std::invalid_argument&) {
+            end_with(run_.state.w.allFinite() ? HandOverOutcome::not_converged
+                                              : HandOverOutcome::non_finite);
+        }
+    }
+
+    void follow_inclusion()
+    {
+        const double from = motion_.state().t;
+        emit_samples(true);
+        for (std::uint64_t steps = 1; !ended_; ++steps) {
+            const std::uint64_t switches = motion_.statistics().switches;
+            const SetValuedOutcome outcome = motion_.advance();
+            const bool switched = motion_.statistics().switches != switches;
+            emit_samples(false);
+            if (switched) record_switch();
+            if (outcome != SetValuedOutcome::running) {
+                if (outcome == SetValuedOutcome::not_converged) run_.failure = motion_.failure();
+                end_with(detail::in_hand_over(outcome));
+            } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+                end_with(HandOverOutcome::cancelled);
+            }
+            if constexpr (branching) {
+                if (!ended_ && steps >= patience_ && is_plain(switched)) {
+                    release();
+                    break;
+                }
+            }
+        }
+        run_.statistics.set_valued_time += motion_.state().t - from;
+        if (set_valued_) run_.state = motion_.state();
+    }
+
+    /// Whether the branches are those of a mode that flows, and no y so near to zero that its
+    /// sign is an accident.
+    [[nodiscard]] bool is_plain(bool switched)
+        requires branching
+    {
+        const auto& branches = motion_.branches();
+        if (!modes_.flows(Modes::mode_of(branches))) return false;
+        const State& now = motion_.state();
+        const Reaction y = modes_.observed(now.t, now.w);
+        const double size = now.w.template lpNorm<Eigen::Infinity>();
+        const double least = 1e3 * (options_.atol + options_.rtol * size);
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            if (branches[i] != Branch::inside && !switched && std::abs(y[i]) < least) return false;
+        }
+        return true;
+    }
+
+    void release()
+        requires branching
+    {
+        run_.state = motion_.state();
+        auto branches = motion_.branches();
+        const Mode mode = Modes::mode_of(branches);
+        const Reaction y = modes_.observed(run_.state.t, run_.state.w);
+        // A y that has just been left is zero; which way it goes, its branch says.
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            const bool wrong = branches[i] == Branch::lower ? y[i] < 0 : y[i] > 0;
+            if (wrong) branches[i] = Branch::inside;
+        }
+        modes_.hold(branches, run_.state.t, run_.state.w);
+        go_by_events(mode, PhaseCause::released);
+    }
+
+    void record_switch()
+    {
+        const State& now = motion_.state();
+        const auto& change = motion_.last_switch();
+        Event<Vector> event;
+        event.t = now.t;
+        event.kind = kind_of(change.before == Branch::inside, change.after == Branch::inside);
+        event.guard = change.reaction;
+        event.before = event.after = now.w;
+        event.bracket = {now.t, now.t};
+        event.slope = std::numeric_limits<double>::quiet_NaN();
+        if constexpr (branching) {
+            event.mode_after = Modes::mode_of(motion_.branches());
+            auto before = motion_.branches();
+            before[static_cast<Eigen::Index>(change.reaction)] = change.before;
+            event.mode_before = Modes::mode_of(before);
+        }
+        run_.events.push_back(std::move(event));
+    }
+
+    // --- samples ---
+
+    [[nodiscard]] std::ptrdiff_t next_sample() const noexcept
+    {
+        return static_cast<std::ptrdiff_t>(run_.trajectory.t.size());
+    }
+
+    /// Within the last step, or at its start: by steps of their own.
+    void emit_samples(bool at_start)
+    {
+        const State& now = motion_.state();
+        while (run_.trajectory.t.size() < options_.sample_times.size()) {
+            const double t = options_.sample_times[run_.trajectory.t.size()];
+            if (t > now.t) return;
+            const State& before = motion_.before();
+            const bool inside = !at_start && t > before.t && t < now.t &&
+                                motion_.stepper().take(before, t - before.t, sample_).converged;
+            run_.trajectory.t.push_back(t);
+            run_.trajectory.x.push_back(inside ? sample_.w : now.w);
+        }
+    }
+
+    static constexpr std::uint64_t most_events = 200;  ///< in a hundredth of a set-valued step
+
+    HandOverOptions options_;
+    Modes modes_;
+    SetValuedMotion<System> motion_;
+    State sample_;
+    HandOverRun<System> run_;
+    std::uint64_t patience_ = 1;
+    bool set_valued_ = false;
+    bool keeps_reaction_ = false;
+    bool ended_ = false;
+};
+
+/// A whole run in one call.
+template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
+[[nodiscard]] HandOverRun<System> hand_over(const System& system, const StateOf<System>& w0,
+                                            const HandOverOptions& options,
+                                            const Stepping& /*stepping*/ = {})
+{
+    return HandOver<System, Stepping>(system, w0, options).take();
+}
+
+}  // namespace ricochet

@@ -1,0 +1,139 @@
+#include "ricochet/nonsmooth/hand_over.hpp"
+
+#include <fmt/format.h>
+
+namespace ricochet {
+
+std::string_view name(HandOverOutcome outcome) noexcept
+{
+    switch (outcome) {
+        case HandOverOutcome::reached_end: return "reached_end";
+        case HandOverOutcome::not_converged: return "not_converged";
+        case HandOverOutcome::step_underflow: return "step_underflow";
+        case HandOverOutcome::step_limit: return "step_limit";
+        case HandOverOutcome::non_finite: return "non_finite";
+        case HandOverOutcome::cancelled: return "cancelled";
+    }
+    return "unknown";
+}
+
+std::string_view describe(HandOverOutcome outcome) noexcept
+{
+    switch (outcome) {
+        case HandOverOutcome::reached_end: return "the run reached its end";
+        case HandOverOutcome::not_converged:
+            return "a set-valued stage has no solution that the solver could find; try another "
+                   "stage method or a looser tolerance";
+        case HandOverOutcome::step_underflow: return "step fell below h_min; loosen rtol";
+        case HandOverOutcome::step_limit: return "max_steps steps were taken; allow more";
+        case HandOverOutcome::non_finite:
+            return "the flow, a guard or the state is no longer finite; look at the system there";
+        case HandOverOutcome::cancelled: return "the run was cancelled";
+    }
+    return "unknown outcome";
+}
+
+std::string_view name(PhaseCause cause) noexcept
+{
+    switch (cause) {
+        case PhaseCause::start: return "start";
+        case PhaseCause::no_modes: return "no_modes";
+        case PhaseCause::no_flow: return "no_flow";
+        case PhaseCause::several: return "several";
+        case PhaseCause::accumulation: return "accumulation";
+        case PhaseCause::chattering: return "chattering";
+        case PhaseCause::stuck: return "stuck";
+        case PhaseCause::released: return "released";
+    }
+    return "unknown";
+}
+
+namespace detail {
+
+HandOverOptions completed(HandOverOptions options, bool locate)
+{
+    const auto require = [](bool holds, std::string_view what, double given) {
+        if (!holds) {
+            throw std::invalid_argument(fmt::format("HandOverOptions: {}, got {}", what, given));
+        }
+    };
+    require(std::isfinite(options.t_start), "t_start must be finite", options.t_start);
+    require(std::isfinite(options.t_end) && options.t_end >= options.t_start,
+            "t_end must be finite and no earlier than t_start", options.t_end);
+    require(options.rtol >= 0 && options.rtol < 1, "rtol must lie in [0, 1)", options.rtol);
+    require(options.atol >= 0 && std::isfinite(options.atol), "atol must be zero or positive",
+            options.atol);
+    require(options.atol + options.rtol > 0, "one of atol and rtol must be positive",
+            options.atol + options.rtol);
+    require(options.h_max > 0, "h_max must be positive", options.h_max);
+    require(options.event_tolerance >= 0, "event_tolerance must be zero or positive",
+            options.event_tolerance);
+    require(options.set_valued.step >= 0, "set_valued.step must be zero or positive",
+            options.set_valued.step);
+    double last = options.t_start;
+    for (const double t : options.sample_times) {
+        require(t >= last && t <= options.t_end, "sample_times must ascend from t_start to t_end",
+                t);
+        last = t;
+    }
+    const double span = options.t_end - options.t_start;
+    options.set_valued.t_start = options.t_start;
+    options.set_valued.t_end = options.t_end;
+    if (options.set_valued.step == 0) options.set_valued.step = span > 0 ? 1e-3 * span : 1;
+    options.set_valued.max_attempts = std::min(options.set_valued.max_attempts, options.max_steps);
+    if (locate) options.set_valued.switches = Switches::located;
+    return options;
+}
+
+void add(Statistics& sum, const Statistics& more) noexcept
+{
+    sum.steps += more.steps;
+    sum.rejected += more.rejected;
+    sum.resteps += more.resteps;
+    sum.flow_calls += more.flow_calls;
+    sum.guard_calls += more.guard_calls;
+    sum.events += more.events;
+    sum.suppressed += more.suppressed;
+    sum.disabled += more.disabled;
+    sum.evidence.proved += more.evidence.proved;
+    sum.evidence.checked += more.evidence.checked;
+    sum.evidence.gated += more.evidence.gated;
+    sum.evidence.assumed += more.evidence.assumed;
+}
+
+std::optional<PhaseCause> cause_after(Outcome outcome) noexcept
+{
+    switch (outcome) {
+        case Outcome::zeno: return PhaseCause::accumulation;
+        case Outcome::outside_mode:
+        case Outcome::endless_cascade:
+        case Outcome::conflicting_resets:
+        case Outcome::step_underflow: return PhaseCause::stuck;
+        default: return std::nullopt;
+    }
+}
+
+HandOverOutcome in_hand_over(Outcome outcome) noexcept
+{
+    switch (outcome) {
+        case Outcome::reached_end: return HandOverOutcome::reached_end;
+        case Outcome::step_limit: return HandOverOutcome::step_limit;
+        case Outcome::cancelled: return HandOverOutcome::cancelled;
+        case Outcome::step_underflow: return HandOverOutcome::step_underflow;
+        default: return HandOverOutcome::non_finite;
+    }
+}
+
+HandOverOutcome in_hand_over(SetValuedOutcome outcome) noexcept
+{
+    switch (outcome) {
+        case SetValuedOutcome::not_converged: return HandOverOutcome::not_converged;
+        case SetValuedOutcome::step_underflow: return HandOverOutcome::step_underflow;
+        case SetValuedOutcome::step_limit: return HandOverOutcome::step_limit;
+        default: return HandOverOutcome::reached_end;
+    }
+}
+
+}  // namespace detail
+
+}  // namespace ricochet

@@ -1,0 +1,361 @@
+// The hand-over between events and Bathe's steps: changes of mode, rest, release, bad input.
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <numbers>
+
+#include "piecewise_linear.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/systems/coulomb_oscillator.hpp"
+#include "ricochet/systems/friction_inclusion.hpp"
+#include "ricochet/systems/incline_block.hpp"
+#include "ricochet/systems/rolling_ball.hpp"
+#include "ricochet/systems/sliding_mode.hpp"
+#include "ricochet/systems/stick_slip.hpp"
+#include "ricochet/systems/super_twisting.hpp"
+
+namespace ricochet {
+namespace {
+
+using testing_support::ExactCircuit;
+using One = Eigen::Matrix<double, 1, 1>;
+
+One one(double value)
+{
+    return One::Constant(value);
+}
+
+template <class System>
+Branch branch_after(const Event<StateOf<System>>& event)
+{
+    return BranchModes<System>::branch(event.guard, event.mode_after);
+}
+
+// --- sliding mode ---
+
+void reach_zero(const SlidingMode& system, double from, double exact_time)
+{
+    // The right-hand side is a quadrature; Dormand and Prince's error at rtol 1e-12 is far below
+    // the tolerance, and w meets zero at a rate of 0.2 or more.
+    const auto run = hand_over(system, one(from),
+                               {.t_end = 0.5,
+                                .rtol = 1e-12,
+                                .atol = 1e-13,
+                                .sample_times = {0.05, exact_time + 1e-9, 0.3, 0.5}});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.events[0].kind, EventKind::stick);
+    EXPECT_NEAR(run.events[0].t, exact_time, 1e-12);
+    EXPECT_NEAR(run.trajectory.x[0][0], system.exact(0.05, from), 1e-12);
+    for (std::size_t i = 1; i < 4; ++i) EXPECT_EQ(run.trajectory.x[i][0], 0.0);
+    EXPECT_EQ(run.state.t, 0.5);
+    EXPECT_EQ(run.state.w[0], 0.0);
+    const auto& p = system.parameters();
+    EXPECT_NEAR(run.state.reaction[0], -p.amplitude * std::sin(p.frequency * 0.5), 1e-13);
+}
+
+TEST(HandOver, SlidingModeReachesZeroInTimeAndStaysThereToTheBit)
+{
+    reach_zero(SlidingMode{}, 0.15, 0.093315472931294579027);
+    reach_zero(SlidingMode({.amplitude = 1.5}), 0.1, 0.076589082534055237469);
+}
+
+// --- diode circuit ---
+
+void follow(const Eigen::Vector3d& start, double t_end, std::size_t changes)
+{
+    ExactCircuit exact;
+    exact.run(start, t_end);
+    ASSERT_EQ(exact.changes.size(), changes);
+
+    const auto run =
+        hand_over(DiodeCircuit{}, start, {.t_end = t_end, .rtol = 1e-12, .atol = 1e-12},
+                  ErrorControlled<Fehlberg78>{});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), changes);
+    int before = start[0] > 0 ? 1 : -1;
+    for (std::size_t i = 0; i < changes; ++i) {
+        const auto& event = run.events[i];
+        const auto& [t, sign] = exact.changes[i];
+        // Errors of some 300 steps within 1e-12 of a motion of size 10.
+        EXPECT_NEAR(event.t, t, 1e-9) << "change " << i;
+        EXPECT_EQ(-static_cast<int>(branch_after<DiodeCircuit>(event)), sign) << "change " << i;
+        EXPECT_EQ(event.kind, before == 0 ? EventKind::slip
+                              : sign == 0 ? EventKind::stick
+                                          : EventKind::mode);
+        before = sign;
+    }
+    EXPECT_LE((run.state.w - exact.final).norm(), 1e-10);
+    EXPECT_EQ(run.state.w[0], 0.0);
+    EXPECT_EQ(run.phases.size(), 1u);
+}
+
+TEST(HandOver, DiodeCircuitChangesItsModeTwelveTimes)
+{
+    follow(DiodeCircuit::start(), 20, 12);
+}
+
+TEST(HandOver, DiodeCircuitOfTheTrainingCaseSticksOnce)
+{
+    follow({0.15264, -0.02281, 0.38127}, 10, 1);
+}
+
+// --- friction ---
+
+TEST(HandOver, CoulombOscillatorTurnsAndRests)
+{
+    const CoulombOscillator closed;
+    const auto run = hand_over(FrictionInclusion({.law = FrictionLaw::constant}),
+                               Eigen::Vector2d(2, 0), {.t_end = 12, .rtol = 1e-12, .atol = 1e-13});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), 3u);
+    for (int n = 1; n <= 3; ++n) {
+        const auto& event = run.events[static_cast<std::size_t>(n - 1)];
+        EXPECT_NEAR(event.t, closed.turning_time(n), 1e-10);
+        EXPECT_NEAR(event.before[0], closed.turning_point(n), 1e-10);
+        EXPECT_EQ(event.kind, n < 3 ? EventKind::mode : EventKind::stick);
+    }
+    EXPECT_EQ(run.state.w[1], 0.0);
+    // The friction balances the spring, u + r = 0.
+    EXPECT_NEAR(run.state.reaction[0], -0.2, 1e-10);
+}
+
+TEST(HandOver, StickSlipStartsAtTheOnsetOfSlipAndRepeats)
+{
+    const auto run =
+        hand_over(FrictionInclusion({.belt_speed = 0.2, .friction = 1, .weakening = 3}),
+                  Eigen::Vector2d(1, 0.2), {.t_end = 25, .rtol = 1e-12, .atol = 1e-13});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), 4u);
+    const EventKind kinds[] = {EventKind::stick, EventKind::slip, EventKind::stick,
+                               EventKind::slip};
+    const double times[] = {StickSlip::stick_time, StickSlip::period,
+                            StickSlip::period + StickSlip::stick_time, 2 * StickSlip::period};
+    for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_EQ(run.events[i].kind, kinds[i]);
+        EXPECT_NEAR(run.events[i].t, times[i], 1e-9);
+    }
+    EXPECT_NEAR(run.events[0].before[0], StickSlip::stick_position, 1e-10);
+}
+
+TEST(HandOver, EveryLawOfFrictionSticksAndSlips)
+{
+    for (const FrictionLaw law :
+         {FrictionLaw::hyperbolic, FrictionLaw::exponential, FrictionLaw::humped}) {
+        const FrictionInclusion system(
+            {.belt_speed = 0.2, .friction = 1, .weakening = 1, .residual = 0.5, .law = law});
+        const auto run = hand_over(system, Eigen::Vector2d(0, 0.2), {.t_end = 40});
+        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        ASSERT_GE(run.events.size(), 4u);
+        // Slip begins where the spring meets the friction at rest.
+        EXPECT_EQ(run.events[0].kind, EventKind::slip);
+        EXPECT_NEAR(run.events[0].before[0], 1, 1e-9);
+        EXPECT_NEAR(run.events[0].t, 5, 1e-8);
+    }
+}
+
+// --- several reactions ---
+
+TEST(HandOver, BallSlidesRollsAndRestsOnThePlate)
+{
+    const RollingBall ball;
+    const double faster = 0.8;
+    const double plate = ball.parameters().plate_speed;
+    const auto run = hand_over(ball, Eigen::Vector2d(plate + faster, 0), {.t_end = 6});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), 2u);
+    // The motion is linear in time: only rounding is left.
+    EXPECT_EQ(run.events[0].kind, EventKind::stick);
+    EXPECT_EQ(run.events[0].guard, 0u);
+    EXPECT_NEAR(run.events[0].t, ball.rolling_time(faster), 1e-12);
+    EXPECT_EQ(run.events[1].kind, EventKind::stick);
+    EXPECT_EQ(run.events[1].guard, 1u);
+    EXPECT_NEAR(run.events[1].t, ball.rest_time(faster), 1e-12);
+    EXPECT_NEAR(run.state.w[0], plate, 1e-15);
+    EXPECT_EQ(run.state.w[1], 0.0);
+}
+
+TEST(HandOver, BallIsShakenOffItsRest)
+{
+    // It rests while |s'| = speed frequency sin <= resistance g / radius.
+    const RollingBall ball({.plate_speed = 0.5, .plate_frequency = 1});
+    const double limit = 0.001 * 9.81 / 0.05;
+    const auto run = hand_over(ball, Eigen::Vector2d(0.5, 0), {.t_end = 1});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.events[0].kind, EventKind::slip);
+    EXPECT_EQ(run.events[0].guard, 1u);
+    EXPECT_NEAR(run.events[0].t, std::asin(limit / 0.5), 1e-9);
+    // Rolling without slipping from there: with |M| = resistance m g against the spin,
+    // 7/5 v' = 2/5 s' + resistance g / radius, which is integrated in closed form.
+    const double t0 = std::asin(limit / 0.5);
+    const double v =
+        0.5 * std::cos(t0) + (0.4 * 0.5 * (std::cos(1) - std::cos(t0)) - limit * (1 - t0)) / 1.4;
+    EXPECT_NEAR(run.state.w[0], v, 1e-8);
+}
+
+/// Two relays on one force: where both let go at once, rates do not tell what follows.
+struct TwinRelays {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 2;
+    static constexpr bool affine = true;
+    void smooth(double t, const Eigen::Vector2d&, Eigen::Vector2d& f) const { f.setConstant(t); }
+    void smooth_jacobian(double, const Eigen::Vector2d&, Eigen::Matrix2d& j) const { j.setZero(); }
+    static Box<2> reaction_set(double, const Eigen::Vector2d&) { return Box<2>({-1, -1}, {1, 1}); }
+};
+
+TEST(HandOver, ChangesThatCoincideGoThroughStepsAndBack)
+{
+    // Both are held until t = 1, then w' = t - 1.
+    const auto run = hand_over(TwinRelays{}, Eigen::Vector2d(0, 0), {.t_end = 3});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_GE(run.phases.size(), 3u);
+    EXPECT_EQ(run.phases[1].cause, PhaseCause::several);
+    EXPECT_TRUE(run.phases[1].set_valued);
+    EXPECT_NEAR(run.phases[1].from, 1, 1e-12);
+    EXPECT_EQ(run.phases.back().cause, PhaseCause::released);
+    EXPECT_FALSE(run.phases.back().set_valued);
+    // The steps between are of 3e-3 and there are few of them.
+    EXPECT_LE(run.statistics.set_valued.accepted, 20u);
+    for (int i = 0; i < 2; ++i) EXPECT_NEAR(run.state.w[i], 2, 1e-4);
+    EXPECT_EQ(run.state.reaction[0], -1.0);
+}
+
+// --- accumulation, no modes ---
+
+TEST(HandOver, TwistingAccumulatesAndIsHeldBySteps)
+{
+    const SuperTwisting system;
+    const auto run = hand_over(system, Eigen::Vector2d(1, 0), {.t_end = 10});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.phases.size(), 2u);
+    EXPECT_EQ(run.phases[1].cause, PhaseCause::accumulation);
+    // Held at zero, the relay balances the rate of the disturbance, cos t.
+    EXPECT_LE(run.state.w.norm(), 1e-9);
+    EXPECT_NEAR(run.state.reaction[0], -std::cos(10.0), 1e-6);
+    EXPECT_NEAR(run.statistics.set_valued_time, 10 - run.phases[1].from, 1e-9);
+}
+
+TEST(HandOver, ABallOfReactionsIsFollowedBySteps)
+{
+    const InclineBlock system;
+    const auto& p = system.parameters();
+    const auto run = hand_over(system, Eigen::Vector4d(1, 0, 0, 0), {.t_end = 2});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.phases.size(), 1u);
+    EXPECT_EQ(run.phases[0].cause, PhaseCause::no_modes);
+    // Straight down the slope it stops after v^2 / (2 a); the step across the stop is of
+    // order one, 2e-3 s of 1 m/s.
+    const double deceleration = p.gravity * (p.friction * std::cos(p.slope) - std::sin(p.slope));
+    EXPECT_NEAR(run.state.w[2], 1 / (2 * deceleration), 1e-4);
+    EXPECT_NEAR(run.state.w[0], 0, 1e-12);
+}
+
+// --- the reaction is part of the state ---
+
+TEST(HandOver, GoesOnFromASavedStateWithItsReaction)
+{
+    const InclineBlock system;
+    const Eigen::Vector4d start(1, 0.5, 0, 0);
+    const auto options = [](double from, double to) {
+        HandOverOptions out{.t_start = from, .t_end = to};
+        out.set_valued.step = 0x1p-9;  // so that the steps fall together
+        return out;
+    };
+    const auto whole = hand_over(system, start, options(0, 1));
+    const auto half = hand_over(system, start, options(0, 0.25));
+    const auto rest = HandOver<InclineBlock>(system, half.state, options(0.25, 1)).take();
+
+    EXPECT_NE(half.state.reaction.norm(), 0.0);
+    EXPECT_EQ(rest.state.w, whole.state.w);
+    EXPECT_EQ(rest.state.reaction, whole.state.reaction);
+
+    auto wrong = half.state;
+    wrong.reaction *= 2;
+    EXPECT_THROW(HandOver<InclineBlock>(system, wrong, options(0.25, 1)), std::invalid_argument);
+}
+
+TEST(HandOver, EventDrivenRunsGoOnFromTheirEnd)
+{
+    ExactCircuit exact;
+    exact.run(DiodeCircuit::start(), 20);
+    // 1.5 s: held at zero.
+    const HandOverOptions first{.t_end = 1.5, .rtol = 1e-12, .atol = 1e-12};
+    const auto half = hand_over(DiodeCircuit{}, DiodeCircuit::start(), first);
+    ASSERT_EQ(half.state.w[0], 0.0);
+    const HandOverOptions second{.t_end = 20, .rtol = 1e-12, .atol = 1e-12};
+    const auto rest = HandOver<DiodeCircuit>(DiodeCircuit{}, half.state, second).take();
+    EXPECT_EQ(half.events.size() + rest.events.size(), 12u);
+    EXPECT_LE((rest.state.w - exact.final).norm(), 1e-10);
+}
+
+// --- ends and bad input ---
+
+TEST(HandOver, EndsAtOnceWhereItStarts)
+{
+    const auto run = hand_over(SlidingMode{}, one(0.15), {.t_end = 0});
+    EXPECT_EQ(run.outcome, HandOverOutcome::reached_end);
+    EXPECT_EQ(run.state.w[0], 0.15);
+}
+
+TEST(HandOver, ReportsLimitsAndCancelling)
+{
+    const auto few =
+        hand_over(DiodeCircuit{}, DiodeCircuit::start(), {.t_end = 20, .max_steps = 5});
+    EXPECT_EQ(few.outcome, HandOverOutcome::step_limit);
+    EXPECT_LT(few.state.t, 20);
+    const std::atomic<bool> stop{true};
+    const auto none =
+        hand_over(InclineBlock{}, Eigen::Vector4d(1, 0, 0, 0), {.t_end = 2, .cancelled = &stop});
+    EXPECT_EQ(none.outcome, HandOverOutcome::cancelled);
+}
+
+struct Singular : TwinRelays {
+    static void mass(Eigen::Matrix2d& a) { a.setZero(); }
+};
+
+struct EmptySet : TwinRelays {
+    static Box<2> reaction_set(double, const Eigen::Vector2d&) { return Box<2>({1, 1}, {-1, -1}); }
+};
+
+TEST(HandOver, RefusesWhatCannotBeRight)
+{
+    const Eigen::Vector2d zero(0, 0);
+    const HandOverOptions fine{.t_end = 1};
+    EXPECT_THROW((void)hand_over(Singular{}, zero, fine), std::invalid_argument);
+    EXPECT_THROW((void)hand_over(EmptySet{}, zero, fine), std::invalid_argument);
+    EXPECT_THROW((void)hand_over(TwinRelays{}, {std::nan(""), 0}, fine), std::invalid_argument);
+    EXPECT_THROW((void)hand_over(TwinRelays{}, zero, {.t_start = 2, .t_end = 1}),
+                 std::invalid_argument);
+    EXPECT_THROW((void)hand_over(TwinRelays{}, zero, {.t_end = 1, .rtol = -1}),
+                 std::invalid_argument);
+    EXPECT_THROW((void)hand_over(TwinRelays{}, zero, {.t_end = 1, .h_max = 0}),
+                 std::invalid_argument);
+    EXPECT_THROW((void)hand_over(TwinRelays{}, zero, {.t_end = 1, .sample_times = {0.5, 0.2}}),
+                 std::invalid_argument);
+    EXPECT_THROW(RollingBall({.radius = 0}), std::invalid_argument);
+}
+
+/// A half line of reactions: beyond its surface the reaction would be infinite.
+struct Obstacle : SlidingMode {
+    static IntervalSet reaction_set(double, const One&) { return IntervalSet::half_line(); }
+};
+
+TEST(HandOver, RefusesAStartInsideAnObstacle)
+{
+    EXPECT_THROW((void)hand_over(Obstacle{}, one(-1), {.t_end = 1}), std::invalid_argument);
+    EXPECT_EQ(hand_over(Obstacle{}, one(1), {.t_end = 0.1}).outcome, HandOverOutcome::reached_end);
+}
+
+}  // namespace
+}  // namespace ricochet
