@@ -32,6 +32,9 @@ struct Check {
 /// The semantics of events.
 [[nodiscard]] std::vector<Check> checks_of_part_3();
 
+/// Dear guards: the planner, networks, certificates.
+[[nodiscard]] std::vector<Check> checks_of_part_4();
+
 /// Whether every state type gives the same events, bit for bit.
 [[nodiscard]] Measured compare_state_types();
 
@@ -85,5 +88,14 @@ struct Check {
 [[nodiscard]] Measured time_recorded_crossings();
 [[nodiscard]] Measured time_idle_guard();
 [[nodiscard]] Measured time_hundred_idle_guards();
+
+/// Scenes with dear guards: the planner against a check at every step.
+[[nodiscard]] Measured time_cavern();
+[[nodiscard]] Measured compare_many_events();
+[[nodiscard]] Measured count_location();
+[[nodiscard]] Measured time_cave_body();
+[[nodiscard]] Measured time_arms();
+[[nodiscard]] Measured time_zones();
+[[nodiscard]] Measured count_eigenvalues();
 
 }  // namespace ricochet::bench

@@ -1,0 +1,51 @@
+// What skipping the checks of dear guards must show.
+#include <vector>
+
+#include "measure.hpp"
+
+namespace ricochet::bench {
+
+std::vector<Check> checks_of_part_4()
+{
+    return {
+        {.part = 4,
+         .id = "planned-cavern",
+         .sentence = "cavern of 10000 segments: planned against brute force at every ms",
+         .target = ">= 50x in time, the same events",
+         .run = time_cavern},
+        {.part = 4,
+         .id = "planned-events",
+         .sentence = "cavern of 10000 segments: the planner's events, times and states",
+         .target = "those of a look at every step, bit for bit, over >= 30000 events",
+         .run = compare_many_events},
+        {.part = 4,
+         .id = "location-calls",
+         .sentence = "exact calls to locate an event of a dear guard, rk4 and dopri5",
+         .target = "<= 5 on average",
+         .run = count_location},
+        {.part = 4,
+         .id = "planned-cave-body",
+         .sentence = "body of 1280 faces in a cave of 20480: planned against a look at every step",
+         .target = ">= 30x in time, the same events",
+         .run = time_cave_body},
+        {.part = 4,
+         .id = "planned-arms",
+         .sentence =
+             "arms of 4 and 6 joints among 8 and 40 obstacles: planned against brute force at "
+             "every ms",
+         .target = ">= 10x in time, the same events",
+         .run = time_arms},
+        {.part = 4,
+         .id = "planned-zones",
+         .sentence = "256 guards on one state",
+         .target = ">= 100x in time, the same events",
+         .run = time_zones},
+        {.part = 4,
+         .id = "planned-eigenvalue",
+         .sentence = "smallest eigenvalue of a matrix of order 24",
+         .target = ">= 25x in exact calls, the same events",
+         .run = count_eigenvalues},
+    };
+}
+
+}  // namespace ricochet::bench

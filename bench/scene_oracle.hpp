@@ -1,0 +1,112 @@
+// How many looks at a guard a perfect forecast would need: the ceiling of every way to
+// decide when to look.
+//
+// The states of a run are recorded at the ends of steps, with the guard and its bounds. From
+// a look the greedy planner goes to the furthest step at which a look will close the
+// stretch, which it knows, since it has seen the future. A step that no two looks close is
+// put before the exact detector: one look at its end. "Bounded" also has the lower bound at
+// the end of any step for nothing, and lets it stand in where it closes a stretch.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/hybrid/bounds.hpp"
+#include "ricochet/integrate/simulation.hpp"
+
+namespace ricochet::bench {
+
+/// FNV-1a over 64-bit words.
+class BitHash {
+public:
+    void add(std::uint64_t word) noexcept { hash_ = (hash_ ^ word) * 0x100000001b3U; }
+    void add(double value) noexcept { add(std::bit_cast<std::uint64_t>(value)); }
+    [[nodiscard]] std::uint64_t value() const noexcept { return hash_; }
+
+private:
+    std::uint64_t hash_ = 0xcbf29ce484222325U;
+};
+
+/// A guard at the end of a step.
+struct SeenGuard {
+    double time = 0;  ///< [s]
+    double value = 0;
+    double lower = -std::numeric_limits<double>::infinity();
+    double speed = 0;
+    double acceleration = 0;
+};
+
+struct OracleCalls {
+    std::uint64_t looks = 0;          ///< with exact values alone
+    std::uint64_t bounded_looks = 0;  ///< with lower bounds for nothing
+    std::uint64_t steps = 0;
+};
+
+/// Looks that one guard needs over one smooth piece of motion, whose last step may end in an
+/// event. `margin`: of the planner.
+[[nodiscard]] std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin,
+                                        bool with_lower_bounds);
+
+/// Counts over a run with a check at every step.
+template <class Stepping, class System>
+[[nodiscard]] OracleCalls count_oracle(const System& system, const typename System::State& x0,
+                                       const Options& options)
+{
+    using X = typename System::State;
+    struct Seen {
+        double t;
+        X x;
+        bool after_reset;
+    };
+    std::vector<Seen> path{{options.t_start, x0, true}};
+    Simulation simulation(system, x0, options, Stepping{}, Extremum{});
+    std::uint64_t events = 0;
+    while (simulation.step()) {
+        const bool fired = simulation.run().statistics.events != events;
+        events = simulation.run().statistics.events;
+        path.push_back({simulation.t(), simulation.x(), fired && Resetting<System, X>});
+    }
+
+    OracleCalls calls{.steps = path.size() - 1};
+    const double margin = PlannerOptions{}.margin;
+    std::vector<SeenGuard> piece;
+    const auto close_piece = [&] {
+        calls.looks += count_looks(piece, margin, false);
+        calls.bounded_looks += count_looks(piece, margin, true);
+        piece.clear();
+    };
+    const std::size_t guards = guard_count_of<X>(system);
+    for (std::size_t i = 0; i < guards; ++i) {
+        const double l = detail::call_lipschitz(system, i);
+        for (const Seen& at : path) {
+            SeenGuard seen{
+                .time = at.t,
+                .value = detail::call_guard(system, i, Mode{}, at.t, at.x),
+                .speed = l * detail::call_speed_bound(system, i, Mode{}, at.t, at.x),
+                .acceleration = l * detail::call_acceleration_bound(system, i, Mode{}, at.t, at.x)};
+            if constexpr (detail::HasLowerBound<System, X>) {
+                seen.lower = detail::call_lower_bound(system, i, Mode{}, at.t, at.x);
+            }
+            if (at.after_reset && !piece.empty()) {
+                // The event's own step: it ends at the surface.
+                SeenGuard last = seen;
+                last.value = 0;
+                piece.push_back(last);
+                close_piece();
+            }
+            piece.push_back(seen);
+        }
+        close_piece();
+    }
+    return calls;
+}
+
+}  // namespace ricochet::bench
