@@ -98,7 +98,7 @@ struct Extremum {
         const bool returns = on_surface && turns_back(probe, watch, cubic);
         const bool left = has_left(side, watch.end.value) && !returns;
         const bool known = std::isfinite(cubic.r0) && std::isfinite(cubic.r1);
-        if (returns && cubic.r0 < 0 && turns_now(cubic.r1, cubic.curvature1()) &&
+        if (returns && cubic.r0 < 0 && turns_now(cubic.v1, cubic.r1, cubic.curvature1()) &&
             counts(side, probe.guard().crossing())) {
             return Finding::touching(side, watch.end);
         }
@@ -117,10 +117,12 @@ struct Extremum {
     }
 
 private:
-    /// Whether a guard falling at this rate will turn at once: within the rounding of a rate.
-    [[nodiscard]] static bool turns_now(double rate, double curvature) noexcept
+    /// Whether a guard that is across its surface, or on it, and falls at this rate will turn
+    /// at once: within the rounding of a rate. One that is not yet there may be overlooked
+    /// at the end of a step, and is looked at from the start of the next.
+    [[nodiscard]] static bool turns_now(double value, double rate, double curvature) noexcept
     {
-        return rate == 0 || (rate < 0 && -rate <= 1e-9 * curvature);
+        return value <= 0 && (rate == 0 || (rate < 0 && -rate <= 1e-9 * curvature));
     }
 
     /// Whether a guard that is on its surface at the end is about to turn back there. Where
@@ -175,7 +177,8 @@ private:
     {
         GuardSample lo = watch.start;
         GuardSample hi = watch.end;
-        if (std::fabs(cubic.v0) <= watch.touch && turns_now(cubic.r0, cubic.curvature0())) {
+        if (std::fabs(cubic.v0) <= watch.touch &&
+            turns_now(cubic.v0, cubic.r0, cubic.curvature0())) {
             return Finding::clear(Evidence::checked);  // the step before has seen it turn
         }
         if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {
