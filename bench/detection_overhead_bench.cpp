@@ -3,6 +3,8 @@
 //
 //     step/<system>/<method>/<state type, of rk4>/<detector>
 //
+//     scene/<system>/<search>/<detector>      guards that are dear: 2 s of rk4 at 1 ms
+//
 // Networks are named by their hidden layers: 1x16 is the any-step model of the ball,
 // 5x16 the one for steps of 0.01 s. `line` is the rival that knows the boundary.
 #include <benchmark/benchmark.h>
@@ -11,16 +13,21 @@
 #include <array>
 #include <filesystem>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "problems.hpp"
 #include "ricochet/detect/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/detect/verified.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "ricochet/systems/cavern.hpp"
+#include "ricochet/systems/planar_arm.hpp"
+#include "ricochet/systems/zones.hpp"
 #include "score.hpp"
 #include "timing.hpp"
 
@@ -108,6 +115,55 @@ void controlled(benchmark::State& state, const System& system, const Array& x0, 
     per_step(state, system, x0, options, ErrorControlled<Dopri5>{}, detector);
 }
 
+/// Times a run through a scene with a dear guard.
+template <class System, class Detector>
+void scene(benchmark::State& state, const System& system, const Detector& detector)
+{
+    const Options options{.t_end = 2, .step = 1e-3, .record_events = false};
+    const auto start = system.start();
+    const auto once = [&] { return integrate(system, start, options, FixedStep<Rk4>{}, detector); };
+    const auto check = once();
+    for (auto _ : state) {
+        auto run = once();
+        bench::keep(run);
+    }
+    using benchmark::Counter;
+    const auto steps = static_cast<double>(check.statistics.steps);
+    state.counters["steps"] = steps;
+    state.counters["events"] = static_cast<double>(check.statistics.events);
+    state.counters["guard/step"] = static_cast<double>(check.statistics.guard_calls) / steps;
+    state.counters["bound/step"] = static_cast<double>(check.statistics.bound_calls) / steps;
+    state.counters["time/step"] =
+        Counter(steps, Counter::kIsIterationInvariantRate | Counter::kInvert);
+}
+
+/// Every step, planned, and every tenth.
+template <class System>
+void register_scene(const std::string& name, const System& system)
+{
+    const auto add = [&](const char* how, const auto& detector) {
+        benchmark::RegisterBenchmark(("scene/" + name + "/" + how).c_str(),
+                                     [=](benchmark::State& s) { scene(s, system, detector); });
+    };
+    const PlannerOptions trusting{.check_bounds = false};
+    add("every_step", Extremum{});
+    add("planned", Planned<>(trusting));
+    add("every_10", EveryK<>(10));
+}
+
+void register_scenes()
+{
+    for (const std::size_t segments : {100U, 10'000U}) {
+        const std::string name = "cavern_" + std::to_string(segments);
+        register_scene(name + "/tree", Cavern({.segments = segments}));
+        register_scene(name + "/brute",
+                       Cavern({.segments = segments, .search = Cavern::Search::brute}));
+    }
+    register_scene("arm_4_joints/tree", PlanarArm<4>());
+    register_scene("arm_4_joints/brute", PlanarArm<4>({.search = ArmScene::Search::brute}));
+    register_scene("zones_256/closed_form", Zones());
+}
+
 void register_all()
 {
     const auto add = [](const char* name, auto body) { benchmark::RegisterBenchmark(name, body); };
@@ -171,6 +227,7 @@ void register_all()
 int main(int argc, char** argv)
 {
     register_all();
+    register_scenes();
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();

@@ -91,6 +91,7 @@ struct Check {
 
 /// Scenes with dear guards: the planner against a check at every step.
 [[nodiscard]] Measured time_cavern();
+[[nodiscard]] Measured time_cavern_dopri5();
 [[nodiscard]] Measured compare_many_events();
 [[nodiscard]] Measured count_location();
 [[nodiscard]] Measured time_cave_body();
