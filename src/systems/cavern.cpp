@@ -26,7 +26,6 @@ struct Question {
     Cavern::Search search{};
 };
 using Last = detail::LastAnswer<Question, NearestOnSegment>;
-using LastWeight = detail::LastAnswer<double, Point2>;
 
 constexpr int waves = 24;
 
@@ -133,16 +132,6 @@ NearestOnSegment Cavern::nearest(Search search, Point2 p) const noexcept
         search == Search::tree ? edges.nearest(p, hint) : edges.nearest_brute(p);
     last = {rock_->number, {p, search}, found};
     return found;
-}
-
-Point2 Cavern::weight(double t) const noexcept
-{
-    LastWeight& last = LastWeight::of(rock_->number);
-    if (last.owner != rock_->number || last.question != t) {
-        const double angle = p_.turn * t;
-        last = {rock_->number, t, {p_.gravity * std::sin(angle), -p_.gravity * std::cos(angle)}};
-    }
-    return last.answer;
 }
 
 double Cavern::clearance(Search search, Point2 p) const noexcept

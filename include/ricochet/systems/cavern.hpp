@@ -93,11 +93,10 @@ public:
     void flow(double t, const X& x, X& dxdt) const noexcept
     {
         const double resistance = p_.drag * speed(x);
-        const geometry::Point2 fall = weight(t);
         dxdt[0] = x[2];
         dxdt[1] = x[3];
-        dxdt[2] = fall.x - resistance * x[2];
-        dxdt[3] = fall.y - resistance * x[3];
+        dxdt[2] = p_.gravity * std::sin(p_.turn * t) - resistance * x[2];
+        dxdt[3] = -p_.gravity * std::cos(p_.turn * t) - resistance * x[3];
     }
 
     template <class X>
@@ -156,9 +155,6 @@ private:
     }
 
     Cavern(const Parameters& parameters, std::shared_ptr<const Rock> rock);
-
-    /// Gravity at a time. The stages of a step share two times, and the last is remembered.
-    [[nodiscard]] geometry::Point2 weight(double t) const noexcept;
 
     [[nodiscard]] geometry::NearestOnSegment nearest(Search search,
                                                      geometry::Point2 p) const noexcept;
