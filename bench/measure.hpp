@@ -35,6 +35,24 @@ struct Check {
 /// Dear guards: the planner, networks, certificates.
 [[nodiscard]] std::vector<Check> checks_of_part_4();
 
+/// Set-valued motion.
+[[nodiscard]] std::vector<Check> checks_of_part_5();
+
+/// The sliding mode and the diode circuit, handed over: changes, times, states.
+[[nodiscard]] Measured hand_over_sliding_mode();
+[[nodiscard]] Measured hand_over_circuit();
+
+/// Their run times at the errors asked for, and those of Bathe's steps.
+[[nodiscard]] Measured time_circuit_to_1e8();
+[[nodiscard]] Measured time_sliding_mode();
+[[nodiscard]] Measured time_bathe_on_circuit();
+[[nodiscard]] Measured compare_work();
+
+/// Bathe's orders, the growth of energy with friction, random contact problems.
+[[nodiscard]] Measured observe_bathe_orders();
+[[nodiscard]] Measured grow_energy();
+[[nodiscard]] Measured solve_contacts();
+
 /// Whether every state type gives the same events, bit for bit.
 [[nodiscard]] Measured compare_state_types();
 

@@ -17,6 +17,7 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::non_finite: return "non_finite";
         case Outcome::cancelled: return "cancelled";
         case Outcome::wrong_bound: return "wrong_bound";
+        case Outcome::not_converged: return "not_converged";
         case Outcome::time_event_not_ahead: return "time_event_not_ahead";
     }
     return "unknown";
@@ -52,6 +53,9 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::wrong_bound:
             return "a guard changed faster than its declared bounds allow, or lies below its lower "
                    "bound; correct speed_bound, acceleration_bound, lipschitz or lower_bound";
+        case Outcome::not_converged:
+            return "a set-valued stage has no solution that the solver could find; try another "
+                   "stage method or a looser tolerance";
         case Outcome::time_event_not_ahead:
             return "asked for the time event after the one that has just happened, the system "
                    "returned a time that is not ahead; let next_time_event(t) exclude t, also "

@@ -13,6 +13,7 @@ std::string_view name(HandOverOutcome outcome) noexcept
         case HandOverOutcome::step_limit: return "step_limit";
         case HandOverOutcome::non_finite: return "non_finite";
         case HandOverOutcome::cancelled: return "cancelled";
+        case HandOverOutcome::not_handed_over: return "not_handed_over";
     }
     return "unknown";
 }
@@ -29,6 +30,8 @@ std::string_view describe(HandOverOutcome outcome) noexcept
         case HandOverOutcome::non_finite:
             return "the flow, a guard or the state is no longer finite; look at the system there";
         case HandOverOutcome::cancelled: return "the run was cancelled";
+        case HandOverOutcome::not_handed_over:
+            return "events alone do not lead on from here; allow set-valued steps";
     }
     return "unknown outcome";
 }

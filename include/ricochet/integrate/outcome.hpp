@@ -18,6 +18,7 @@ enum class Outcome {
     non_finite,            ///< the flow, a guard or a reset returned NaN or infinity
     cancelled,             ///< `Options::cancelled` was set
     wrong_bound,           ///< a guard broke a bound that the system declares for it
+    not_converged,         ///< a set-valued stage could not be solved however short the step
     time_event_not_ahead,  ///< `next_time_event(t)` returned a time that is not after t
 };
 

@@ -360,7 +360,8 @@ private:
                 r[0] = bound(t, w, 0, at);
                 return;
             }
-            double rate = matrices_.observe().row(0).transpose().cwiseProduct(free).sum();
+            const Eigen::Index k = matrices_.selected(0);
+            double rate = k >= 0 ? free[k] : matrices_.observe().row(0).dot(free);
             if constexpr (moves) rate -= offset_rate(t)[0];
             r[0] = -holds_[1].inverse(0, 0) * rate;
             return;

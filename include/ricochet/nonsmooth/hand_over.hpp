@@ -31,6 +31,7 @@ enum class HandOverOutcome {
     step_limit,      ///< `HandOverOptions::max_steps` steps were taken
     non_finite,      ///< the motion is no longer finite
     cancelled,       ///< `HandOverOptions::cancelled` was set
+    not_handed_over,  ///< a set-valued phase was due, and `HandOverOptions::events_only`
 };
 
 [[nodiscard]] std::string_view name(HandOverOutcome outcome) noexcept;
@@ -66,6 +67,9 @@ struct HandOverOptions {
     double atol = 1e-12;
     double h_max = std::numeric_limits<double>::infinity();
     double event_tolerance = 0;
+
+    /// The run ends, as `not_handed_over`, where a set-valued phase would begin.
+    bool events_only = false;
 
     /// Of the set-valued phases; their times are those of the run. A step of zero is a
     /// thousandth of the run. Changes are located where the set is a box.
@@ -332,6 +336,7 @@ private:
             patience_ = at_once ? std::min(2 * patience_, std::uint64_t{1} << 20) : 1;
             run_.mode = Modes::several;
         }
+        if (options_.events_only) return end_with(HandOverOutcome::not_handed_over);
         set_valued_ = true;
         ++run_.statistics.to_set_valued;
         run_.phases.push_back({.from = run_.state.t, .set_valued = true, .cause = cause});
