@@ -109,6 +109,10 @@ void add_simulate(CLI::App& app, int& status)
              "rk4 (default with --step), dopri5 (default without), fehlberg78, cash-karp54 or "
              "euler");
     add_number(command, "--step", run.step, "H", "take fixed steps of H [s]");
+    add_text(command, "--integrator", run.integrator, "NAME",
+             "of set-valued systems: handover (default), event, bathe or time-stepping");
+    add_text(command, "--controller", run.controller, "NAME",
+             "of the steps of bathe: constant (default), heuristic, pi or filter");
     add_number(command, "--rtol", run.rtol, "R", "relative error allowed in a step, default 1e-8");
     add_number(command, "--atol", run.atol, "A", "absolute error allowed in a step, default 1e-10");
     add_number(command, "--event-tolerance", run.event_tolerance, "T",

@@ -28,7 +28,8 @@ const std::vector<SystemEntry>& systems()
         coulomb_oscillator_entry(), stick_slip_entry(),  detest_f1_entry(),
         detest_f2_entry(),          detest_f3_entry(),   detest_f4_entry(),
         detest_f5_entry(),          cavern_entry(),      zones_entry(),
-        eigenvalue_entry(),         arm_entry(),
+        eigenvalue_entry(),         arm_entry(),         sliding_mode_entry(),
+        diode_circuit_entry(),
     };
     return all;
 }

@@ -54,10 +54,24 @@ struct GuardLabel {
     std::string_view event;  ///< "impact"
 };
 
+/// What set-valued steps did, counted.
+struct SetValuedSteps {
+    std::uint64_t attempted = 0, accepted = 0, rejected = 0, unsolved = 0;
+    std::uint64_t solves = 0, iterations = 0, switches = 0;
+};
+
+struct HandOverPhase {
+    double from = 0;  ///< [s]
+    bool set_valued = false;
+    std::string_view cause;
+};
+
 /// A run whatever the system's state type, and how long it took.
 struct TimedRun {
     Run<std::vector<double>> run;
     double seconds = 0;  ///< of wall time, per run
+    std::optional<SetValuedSteps> steps{};  ///< where there were any
+    std::vector<HandOverPhase> phases{};
 };
 
 /// What a training is asked for. What is absent has the library's default.
@@ -139,6 +153,13 @@ struct SystemEntry {
     /// What a certificate of a model has to prove; null where nothing bounds the guard.
     /// @throws std::invalid_argument if the model does not fit
     learn::GuardProblem (*guard_problem)(const Model& model) = nullptr;
+
+    /// It is a differential inclusion; else 0. [s] of its set-valued steps by default.
+    double set_valued_step = 0;
+    /// State at a time, for comparisons of inclusions, empty where it is not known; null, too: a
+    /// run to 1e-13 serves instead.
+    std::vector<double> (*exact_state)(const std::vector<double>& parameters, double t) = nullptr;
+    std::vector<std::string_view> published_errors{};  ///< lines of a source
 };
 
 [[nodiscard]] const std::vector<SystemEntry>& systems();

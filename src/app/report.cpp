@@ -9,6 +9,7 @@
 
 #include "files.hpp"
 #include "json_text.hpp"
+#include "set_valued.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -216,6 +217,7 @@ std::string to_json(const SystemEntry& system, const RunSettings& settings, cons
     if (run.guard != no_guard) out["ended_by"] = system.guards.at(run.guard).name;
     out["events"] = std::move(events);
     out["statistics"] = json(run.statistics);
+    add_set_valued(out, settings, timed);
     if (with_trajectory) out["trajectory"] = {{"t", run.trajectory.t}, {"state", run.trajectory.x}};
     out["seconds"] = timed.seconds;
     return json_text(out);
@@ -227,7 +229,7 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     const Statistics& s = run.statistics;
     std::string out = title(system, settings) + '\n';
     out += fmt::format(
-        "{}; events: {}, {}{}\n\n", describe_stepping(settings), name(settings.detector),
+        "{}; events: {}, {}{}\n\n", describe_integration(settings), name(settings.detector),
         name(settings.locator),
         settings.network ? fmt::format(", model {}", settings.model.filename().string()) : "");
     if (!run.events.empty()) out += events_table(system, run) + '\n';
@@ -256,6 +258,7 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
             ",\n{} predictions: {} checks put off, {} false alarms, {} missed events ({} late)",
             s.network_calls, s.checks_put_off, s.false_alarms, s.missed_events, s.late_events);
     }
+    out += set_valued_text(timed);
     out += fmt::format("\nsteps without an event: {} proved, {} checked, {} gated, {} assumed\n",
                        s.evidence.proved, s.evidence.checked, s.evidence.gated, s.evidence.assumed);
     return out + fmt::format("{}\n", duration(timed.seconds));

@@ -9,6 +9,7 @@
 #include "input.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
+#include "set_valued.hpp"
 
 namespace ricochet::app {
 
@@ -207,6 +208,7 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     require_not_negative("--event-tolerance", options.event_tolerance);
     options.max_steps = request.max_steps.value_or(default_max_steps);
 
+    if (choose_set_valued(system, request, settings)) return settings;
     choose_stepping(request, settings);
     if (request.locator) settings.locator = named("locator", locators, *request.locator);
     choose_detector(system, request, settings);

@@ -23,6 +23,13 @@ enum class StepperKind { rk4, dopri5, fehlberg78, cash_karp54, euler };
 [[nodiscard]] std::string_view name(LocatorKind kind) noexcept;
 [[nodiscard]] std::string_view name(StepperKind kind) noexcept;
 
+/// How a system that is a differential inclusion is integrated.
+struct SetValuedSettings {
+    std::string integrator = "handover";  ///< or "event", "bathe", "time-stepping"
+    std::string controller = "constant";  ///< of bathe: or "heuristic", "pi", "filter"
+    double step = 0;                      ///< [s] of set-valued steps
+};
+
 /// Everything a system needs to be run.
 struct RunSettings {
     std::vector<double> parameters;  ///< in the order of the system's
@@ -33,6 +40,7 @@ struct RunSettings {
     LocatorKind locator = LocatorKind::newton;
     std::optional<Network> network{};  ///< of the detectors `network` and `verified`
     std::filesystem::path model{};     ///< its file
+    std::optional<SetValuedSettings> set_valued{};
 };
 
 /// A run as it was asked for. What is absent has a default.
@@ -43,6 +51,7 @@ struct RunRequest {
     std::optional<std::string> detector{}, locator{}, stepper{}, model{};
     std::optional<double> step{}, rtol{}, atol{}, event_tolerance{};
     std::optional<std::uint64_t> max_steps{};
+    std::optional<std::string> integrator{}, controller{};  ///< of set-valued systems
 };
 
 /// The values of a system's parameters, in its order, after "name=value"s.

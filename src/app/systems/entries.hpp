@@ -25,5 +25,7 @@ namespace ricochet::app {
 [[nodiscard]] SystemEntry zones_entry();
 [[nodiscard]] SystemEntry eigenvalue_entry();
 [[nodiscard]] SystemEntry arm_entry();
+[[nodiscard]] SystemEntry sliding_mode_entry();
+[[nodiscard]] SystemEntry diode_circuit_entry();
 
 }  // namespace ricochet::app

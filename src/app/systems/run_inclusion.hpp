@@ -1,0 +1,168 @@
+// From settings to the integrators of inclusions. Included once per system.
+#pragma once
+
+#include <chrono>
+#include <utility>
+#include <vector>
+
+#include "../registry.hpp"
+#include "inclusion_options.hpp"
+
+namespace ricochet::app {
+
+template <class V>
+[[nodiscard]] std::vector<double> plain(const V& v)
+{
+    std::vector<double> out;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(v.size()); ++i) {
+        out.push_back(v[static_cast<decltype(v.size())>(i)]);
+    }
+    return out;
+}
+
+/// Modes are those of `BranchModes`, and one for set-valued steps.
+template <class System>
+[[nodiscard]] Mode shown_mode(Mode mode)
+{
+    return std::min<Mode>(mode, BranchModes<System>::branch_modes);
+}
+
+template <class System, class V>
+[[nodiscard]] Event<std::vector<double>> shown(const Event<V>& event)
+{
+    Event<std::vector<double>> out;
+    out.t = event.t;
+    out.kind = event.kind;
+    out.guard = event.guard;
+    out.mode_before = shown_mode<System>(event.mode_before);
+    out.mode_after = shown_mode<System>(event.mode_after);
+    out.before = plain(event.before);
+    out.after = plain(event.after);
+    out.bracket = event.bracket;
+    out.slope = event.slope;
+    out.error = event.error;
+    return out;
+}
+
+[[nodiscard]] inline SetValuedSteps shown(const SetValuedStatistics& s)
+{
+    return {.attempted = s.attempted,
+            .accepted = s.accepted,
+            .rejected = s.rejected,
+            .unsolved = s.unsolved,
+            .solves = s.stages,
+            .iterations = s.iterations,
+            .switches = s.switches};
+}
+
+template <class System>
+[[nodiscard]] TimedRun shown(const HandOverRun<System>& run)
+{
+    TimedRun out;
+    out.run.outcome = as_outcome(run.outcome);
+    out.run.t = run.state.t;
+    out.run.x = plain(run.state.w);
+    out.run.mode = shown_mode<System>(run.mode);
+    for (const auto& event : run.events) out.run.events.push_back(shown<System>(event));
+    out.run.trajectory.t = run.trajectory.t;
+    for (const auto& w : run.trajectory.x) out.run.trajectory.x.push_back(plain(w));
+    out.run.statistics = run.statistics.event_driven;
+    out.run.statistics.events = run.events.size();
+    if (run.statistics.to_set_valued > 0) out.steps = shown(run.statistics.set_valued);
+    for (const Phase& phase : run.phases) {
+        out.phases.push_back({phase.from, phase.set_valued, name(phase.cause)});
+    }
+    return out;
+}
+
+template <class System, class Stepping>
+[[nodiscard]] TimedRun run_by_hand_over(const System& system, const StateOf<System>& w0,
+                                        const RunSettings& settings)
+{
+    const Options& o = settings.options;
+    HandOverOptions options;
+    options.t_start = o.t_start;
+    options.t_end = o.t_end;
+    options.rtol = o.rtol;
+    options.atol = o.atol;
+    options.event_tolerance = o.event_tolerance;
+    options.sample_times = o.sample_times;
+    options.max_steps = o.max_steps;
+    options.events_only = settings.set_valued->integrator == "event";
+    options.set_valued.step = settings.set_valued->step;
+    return shown(HandOver<System, Stepping>(system, w0, options).take());
+}
+
+/// Bathe's steps, or backward Euler's; samples are straight lines between nodes.
+template <class System>
+[[nodiscard]] TimedRun run_by_steps(const System& system, const StateOf<System>& w0,
+                                    const RunSettings& settings)
+{
+    SetValuedMotion<System> motion(system, w0, set_valued_options(settings));
+    TimedRun out;
+    const auto& times = settings.options.sample_times;
+    std::size_t next = 0;
+    auto branches = motion.branches();
+    const auto look = [&](const SetValuedState<System>& now) {
+        const auto& before = motion.before();
+        for (; next < times.size() && times[next] <= now.t; ++next) {
+            const double span = now.t - before.t;
+            const double share = span > 0 ? (times[next] - before.t) / span : 1;
+            out.run.trajectory.t.push_back(times[next]);
+            out.run.trajectory.x.push_back(
+                plain(StateOf<System>(before.w + share * (now.w - before.w))));
+        }
+        auto after = branches;
+        motion.stepper().branches_of(now, after);
+        for (Eigen::Index i = 0; i < after.size(); ++i) {
+            if (after[i] == branches[i]) continue;
+            Event<std::vector<double>> event;
+            event.t = now.t;
+            event.kind = after[i] == Branch::inside      ? EventKind::stick
+                         : branches[i] == Branch::inside ? EventKind::slip
+                                                         : EventKind::mode;
+            event.guard = static_cast<std::size_t>(i);
+            event.mode_before = BranchModes<System>::mode_of(branches);
+            event.mode_after = BranchModes<System>::mode_of(after);
+            event.before = event.after = plain(now.w);
+            event.bracket = {before.t, now.t};
+            event.slope = std::numeric_limits<double>::quiet_NaN();
+            event.error = now.t - before.t;
+            out.run.events.push_back(std::move(event));
+        }
+        branches = after;
+    };
+    motion.stepper().branches_of(motion.state(), branches);
+    const SetValuedOutcome outcome = motion.run(look);
+    out.run.outcome = as_outcome(outcome);
+    out.run.t = motion.state().t;
+    out.run.x = plain(motion.state().w);
+    out.run.mode = BranchModes<System>::mode_of(branches);
+    out.run.statistics.events = out.run.events.size();
+    out.steps = shown(motion.statistics());
+    return out;
+}
+
+template <class System>
+[[nodiscard]] TimedRun run_inclusion(const System& system, const StateOf<System>& w0,
+                                     const RunSettings& settings, int repeats)
+{
+    const std::string& integrator = settings.set_valued->integrator;
+    const bool steps = integrator == "bathe" || integrator == "time-stepping";
+    TimedRun out;
+    const auto start = std::chrono::steady_clock::now();
+    for (int i = 0; i < repeats; ++i) {
+        if (steps) {
+            out = run_by_steps(system, w0, settings);
+        } else if (settings.stepper == StepperKind::fehlberg78) {
+            out = run_by_hand_over<System, ErrorControlled<Fehlberg78>>(system, w0, settings);
+        } else {
+            out = run_by_hand_over<System, ErrorControlled<Dopri5>>(system, w0, settings);
+        }
+    }
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    out.seconds = spent.count() / repeats;
+    return out;
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,76 @@
+#include "ricochet/systems/sliding_mode.hpp"
+
+#include "entries.hpp"
+#include "run_inclusion.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+enum : std::size_t { amplitude, frequency, gain, from };  // the order of parameters
+
+SlidingMode system(const std::vector<double>& p)
+{
+    return SlidingMode({.amplitude = p[amplitude], .frequency = p[frequency], .gain = p[gain]});
+}
+
+std::vector<double> start(const std::vector<double>& p)
+{
+    return {p[from]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    const auto& p = settings.parameters;
+    return run_inclusion(system(p), SlidingMode::Vector(SlidingMode::Vector::Constant(p[from])),
+                         settings, repeats);
+}
+
+std::vector<double> exact_state(const std::vector<double>& p, double t)
+{
+    if (!(p[from] > 0 && p[gain] > p[amplitude])) return {};
+    return {system(p).exact(t, p[from])};
+}
+
+}  // namespace
+
+SystemEntry sliding_mode_entry()
+{
+    return {
+        .name = SlidingMode::name,
+        .description = "A relay brings a disturbed state to zero and holds it there.",
+        .parameters = {{.name = "amplitude",
+                        .initial = 1.75,
+                        .unit = "1/s",
+                        .range = {.lower = 0, .lower_included = true},
+                        .meaning = "of the disturbance"},
+                       {.name = "frequency",
+                        .initial = 50,
+                        .unit = "rad/s",
+                        .range = {.lower = 0},
+                        .meaning = "of the disturbance"},
+                       {.name = "gain",
+                        .initial = 2,
+                        .unit = "1/s",
+                        .range = {.lower = 0, .lower_included = true},
+                        .meaning = "of the relay"},
+                       {.name = "start",
+                        .initial = SlidingMode::start,
+                        .unit = "1",
+                        .range = {},
+                        .meaning = "w at the start"}},
+        .state = {{.name = "w", .unit = "1", .meaning = "the controlled state"}},
+        .guards = {{.name = "relay", .event = "switch"}},
+        .modes = {"positive", "held", "negative", "set-valued"},
+        .t_end = SlidingMode::t_end,
+        .start = start,
+        .run = run,
+        .set_valued_step = 1.25e-3,
+        .exact_state = exact_state,
+        .published_errors = {"PI         48 steps, 0.678 s, L2 1.94e-4",
+                             "heuristic  55 steps, 0.631 s, L2 1.70e-4",
+                             "TQC        0.278 s, L2 2.94e-4", "TD3        0.297 s, L2 2.71e-4"},
+    };
+}
+
+}  // namespace ricochet::app
