@@ -267,7 +267,7 @@ TEST_F(App, SystemsWithoutNetworksRefuseThem)
     expect_refused({"simulate", "thermostat", "--detector", "verified"},
                    {"verified", "thermostat"});
     expect_refused({"simulate", "thermostat", "--detector", "line"}, {"line", "thermostat"});
-    expect_refused({"train", "pendulum", "--out", "m"}, {"no training", "pendulum"});
+    expect_refused({"train", "henon-heiles", "--out", "m"}, {"no training", "henon-heiles"});
     expect_refused({"compare", "detest-f1"}, {"no known event times", "detest-f1"});
 }
 

@@ -583,7 +583,8 @@ TEST(Safetensors, RefusesAnotherVersionKindOrActivation)
     EXPECT_EQ(refusal_with_metadata("ricochet", "2"),
               "m.safetensors: metadata \"ricochet\": expected format version \"1\", found \"2\"");
     EXPECT_EQ(refusal_with_metadata("kind", "poet"),
-              "m.safetensors: metadata \"kind\": expected \"event-classifier\", found \"poet\"");
+              "m.safetensors: metadata \"kind\": expected \"event-classifier\", "
+              "\"gate-horizon\" or \"gate-level\", found \"poet\"");
     EXPECT_EQ(refusal_with_metadata("activation", "gelu"),
               "m.safetensors: metadata \"activation\": expected \"relu\" or \"tanh\", "
               "found \"gelu\"");
