@@ -102,6 +102,7 @@ template <class X>
                                  .events = {},
                                  .trajectory = {.t = run.trajectory.t, .x = {}},
                                  .solution = {},
+                                 .wrong_bound = {},
                                  .statistics = run.statistics};
     for (const Event<X>& event : run.events) {
         out.events.push_back({.t = event.t,
