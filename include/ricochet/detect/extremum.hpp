@@ -95,7 +95,9 @@ struct Extremum {
 
         const detail::GuardCubic cubic(sign, watch.start, watch.end);
         const bool on_surface = std::fabs(cubic.v1) <= watch.touch;
-        const bool returns = on_surface && turns_back(probe, watch, cubic);
+        // A stretch that ends inside the step ends at an event, which others have looked at.
+        const bool whole = watch.end.s == probe.step().h();
+        const bool returns = on_surface && whole && turns_back(probe, watch, cubic);
         const bool left = has_left(side, watch.end.value) && !returns;
         const bool known = std::isfinite(cubic.r0) && std::isfinite(cubic.r1);
         if (returns && cubic.r0 < 0 && turns_now(cubic.v1, cubic.r1, cubic.curvature1()) &&
