@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "ricochet/geometry/concave_table.hpp"
 #include "ricochet/geometry/distance_grid.hpp"
 #include "ricochet/geometry/outline.hpp"
 #include "ricochet/geometry/segments.hpp"
@@ -296,6 +297,67 @@ TEST(DistanceGrid, IsBelowTheDistanceByNoMoreThanTwiceTheWayToTheCentre)
     }
     EXPECT_NE(refusal([&] { DistanceGrid<2>(box, 0, 0, distance); }), "accepted");
     EXPECT_NE(refusal([&] { DistanceGrid<2>(Box<2>{}, 3, 0, distance); }), "accepted");
+}
+
+/// The least of a few planes and a smooth bowl, upside down.
+Tangent<3> dome(const std::array<double, 3>& p)
+{
+    const auto [x, y, z] = p;
+    const Tangent<3> bowl{1 - x * x - 0.5 * y * y + x * z - z * z, {-2 * x + z, -y, x - 2 * z}};
+    const Tangent<3> plane{0.5 + 0.7 * x - 0.3 * y + 0.2 * z, {0.7, -0.3, 0.2}};
+    return bowl.value < plane.value ? bowl : plane;
+}
+
+TEST(ConcaveTable, BoundsAConcaveFunctionFromBothSides)
+{
+    Box<3> box;
+    box.add(std::array{-1.0, -2.0, 0.5});
+    box.add(std::array{1.0, 1.0, 2.0});
+    Random random(17);
+    std::array<double, 2> worst{};
+    for (const std::size_t cells : {4U, 16U}) {
+        const ConcaveTable<3> table(box, cells, 0, dome);
+        EXPECT_EQ(table.size(), (cells + 1) * (cells + 1) * (cells + 1));
+        double& widest = worst[cells == 4 ? 0 : 1];
+        for (int i = 0; i < 20'000; ++i) {
+            const std::array<double, 3> p{random.uniform(-1, 1), random.uniform(-2, 1),
+                                          random.uniform(0.5, 2)};
+            const double f = dome(p).value;
+            ASSERT_LE(table.lower_bound(p), f);
+            ASSERT_GE(table.upper_bound(p), f);
+            widest = std::max(widest, table.upper_bound(p) - table.lower_bound(p));
+        }
+    }
+    // Second order on the bowl, first order only in cells that the edge crosses.
+    EXPECT_LT(worst[1], worst[0] / 3);
+    EXPECT_LT(worst[1], 0.1);
+}
+
+TEST(ConcaveTable, SaysNothingOutsideAndRefusesWhatIsNoTable)
+{
+    Box<3> box;
+    box.add(std::array{-1.0, -1.0, -1.0});
+    box.add(std::array{1.0, 1.0, 1.0});
+    const ConcaveTable<3> table(box, 3, 0, dome);
+    for (const auto& p :
+         {std::array{1.5, 0.0, 0.0}, std::array{0.0, 0.0, -1.01}, std::array{0.0, nan, 0.0}}) {
+        EXPECT_EQ(table.lower_bound(p), -infinity);
+        EXPECT_EQ(table.upper_bound(p), infinity);
+    }
+    EXPECT_EQ(ConcaveTable<3>().lower_bound({0, 0, 0}), -infinity);
+    // A larger error of the values makes both bounds wider by that much.
+    const ConcaveTable<3> rough(box, 3, 0.25, dome);
+    const std::array<double, 3> p{0.3, -0.2, 0.4};
+    EXPECT_NEAR(table.lower_bound(p) - rough.lower_bound(p), 0.25, 1e-12);
+    EXPECT_NEAR(rough.upper_bound(p) - table.upper_bound(p), 0.25, 1e-12);
+    EXPECT_NE(refusal([&] { ConcaveTable<3>(box, 0, 0, dome); }), "accepted");
+    EXPECT_NE(refusal([&] { ConcaveTable<3>(box, 300, 0, dome); }).find("2^24"), std::string::npos);
+    EXPECT_NE(refusal([&] { ConcaveTable<3>(Box<3>{}, 3, 0, dome); }), "accepted");
+    const auto broken = [](const std::array<double, 3>& at) {
+        return at[0] > 0 ? Tangent<3>{.value = nan} : dome(at);
+    };
+    EXPECT_NE(refusal([&] { ConcaveTable<3>(box, 3, 0, broken); }).find("node 2"),
+              std::string::npos);
 }
 
 }  // namespace

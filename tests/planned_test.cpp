@@ -604,6 +604,49 @@ TEST(Planned, AWrongLowerBoundIsNamed)
     EXPECT_TRUE(run.wrong_bound->lower_bound);
 }
 
+/// x0 comes and goes; armed below its surface at the start.
+struct Outside {
+    using State = X;
+    double above = 0;  ///< added to the guard where it claims to be its upper bound
+
+    static constexpr GuardInfo guard_info(std::size_t)
+    {
+        return {.name = "section", .crossing = Crossing::either};
+    }
+    void flow(double t, const X&, X& dxdt) const { dxdt = {std::cos(t), -std::sin(0.7 * t), 0, 0}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0] + 0.3 * x[1] - 0.5; }
+    [[nodiscard]] double speed_bound(double, const X&) const { return 1.3; }
+};
+struct OutsideWithBound : Outside {
+    [[nodiscard]] double upper_bound(double t, const X& x) const { return guard(t, x) + above; }
+};
+
+TEST(Planned, AnUpperBoundSavesLooksBelowTheSurfaceAndKeepsTheEvents)
+{
+    const X start{-0.4, 0.1, 0, 0};
+    const Options options{.t_end = 60, .step = 0.01};
+    OutsideWithBound bounded;
+    bounded.above = 0.02;
+    const auto run = expect_planned_same<Fixed>(bounded, start, options);
+    EXPECT_GT(run.events.size(), 4u);
+    const auto without = integrate(Outside{}, start, options, Fixed{}, Planned{});
+    ASSERT_EQ(run.events.size(), without.events.size());
+    EXPECT_LT(run.statistics.guard_calls, without.statistics.guard_calls);
+}
+
+TEST(Planned, AWrongUpperBoundIsNamed)
+{
+    OutsideWithBound low;
+    low.above = -0.1;  // says that the guard is lower than it is
+    const auto run = integrate(low, X{-0.4, 0.1, 0, 0}, {.t_end = 60, .step = 0.01}, Fixed{},
+                               Planned({.check_bounds = true}));
+    ASSERT_EQ(run.outcome, Outcome::wrong_bound);
+    ASSERT_TRUE(run.wrong_bound);
+    EXPECT_TRUE(run.wrong_bound->upper_bound);
+    EXPECT_FALSE(run.wrong_bound->lower_bound);
+    EXPECT_NEAR(run.wrong_bound->value - run.wrong_bound->allowed, 0.1, 1e-12);
+}
+
 /// The distance to the room's wall is a lower bound of that to whatever is nearest, less the
 /// largest disc's way into it.
 struct TabulatedRoom : Room {

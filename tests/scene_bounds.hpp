@@ -29,6 +29,7 @@ namespace ricochet {
 RICOCHET_TEST_BOUND(speed_bound)
 RICOCHET_TEST_BOUND(acceleration_bound)
 RICOCHET_TEST_BOUND(lower_bound)
+RICOCHET_TEST_BOUND(upper_bound)
 #undef RICOCHET_TEST_BOUND
 
 template <class System>
@@ -47,6 +48,7 @@ struct BoundsSampled {
     std::size_t broken_way = 0;    ///< the guard changed by more than the way allows
     std::size_t broken_speed = 0;  ///< the speed changed by more than its rate allows
     std::size_t broken_lower = 0;  ///< the guard is below its lower bound
+    std::size_t broken_upper = 0;  ///< the guard is above its upper bound
     double closest_way = 0;        ///< the largest share of an allowed change that was used
 };
 
@@ -81,6 +83,11 @@ template <class System, class X>
             requires { system.lower_bound(times[i], x); } ||
             requires { system.lower_bound(which, times[i], x); }) {
             if (lower_bound_of(system, which, times[i], x) > g.back() + 1e-12) ++out.broken_lower;
+        }
+        if constexpr (
+            requires { system.upper_bound(times[i], x); } ||
+            requires { system.upper_bound(which, times[i], x); }) {
+            if (upper_bound_of(system, which, times[i], x) < g.back() - 1e-12) ++out.broken_upper;
         }
     }
     const auto events_until = [&](double t) {
@@ -117,6 +124,7 @@ inline void expect_bounds_hold(const BoundsSampled& sampled, std::size_t count, 
     EXPECT_EQ(sampled.broken_way, 0U);
     EXPECT_EQ(sampled.broken_speed, 0U);
     EXPECT_EQ(sampled.broken_lower, 0U);
+    EXPECT_EQ(sampled.broken_upper, 0U);
     EXPECT_GT(sampled.closest_way, used);
     EXPECT_LE(sampled.closest_way, 1 + 1e-3);
 }

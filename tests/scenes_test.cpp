@@ -232,6 +232,55 @@ TEST(LeastEigenvalue, BoundsHold)
     expect_bounds_hold(sample_bounds(system, run, 0), 100'000, 0.05);
 }
 
+TEST(LeastEigenvalue, ItsTableBoundsItFromBothSidesAndClosely)
+{
+    const LeastEigenvalue system({.table = 4});
+    EXPECT_EQ(system.tabulated(), 625U);
+    const auto run = sampled_run(system, system.start(), 100, 1e-2, 60'000);
+    expect_bounds_hold(sample_bounds(system, run, 0), 100'000, 0.05);
+    // Entries off the diagonal have a deviation of 0.25 / sqrt(3), so that the curvature along a
+    // load is about 2 * 0.02 * (1 + 1/2 + ... + 1/23) = 0.15, where eigenvalues are 1 apart. With
+    // cells of 0.5 both errors are some 4 * 0.15 * 0.5² / 8 = 0.02; where eigenvalues come close,
+    // more.
+    double below = 0;
+    double above = 0;
+    for (const auto& x : run.trajectory.x) {
+        const double g = system.guard(0, x);
+        below += g - system.lower_bound(0, x);
+        above += system.upper_bound(0, x) - g;
+    }
+    const auto n = static_cast<double>(run.trajectory.x.size());
+    EXPECT_LT(below / n, 0.1);
+    EXPECT_LT(above / n, 0.1);
+    const LeastEigenvalue::State outside{1.1, 0, 0, 0};
+    EXPECT_EQ(system.lower_bound(0, outside), -std::numeric_limits<double>::infinity());
+    EXPECT_EQ(system.upper_bound(0, outside), std::numeric_limits<double>::infinity());
+}
+
+TEST(LeastEigenvalue, ItsTableSavesLooksOnBothSidesAndKeepsTheEvents)
+{
+    const Options options{.t_end = 20, .step = 2e-3};
+    const auto planned = [&](const LeastEigenvalue& system) {
+        return integrate(system, system.start(), options, FixedStep<Rk4>{}, Planned{});
+    };
+    const LeastEigenvalue plain({.level = 1.55});
+    const LeastEigenvalue tabulated({.level = 1.55, .table = 6});
+    const auto every = integrate(plain, plain.start(), options, FixedStep<Rk4>{}, Extremum{});
+    const auto without = planned(plain);
+    const auto with = planned(tabulated);
+    ASSERT_GT(every.events.size(), 4U);
+    for (const auto* run : {&without, &with}) {
+        ASSERT_EQ(run->events.size(), every.events.size());
+        for (std::size_t i = 0; i < every.events.size(); ++i) {
+            EXPECT_EQ(run->events[i].t, every.events[i].t);
+            EXPECT_EQ(run->events[i].before, every.events[i].before);
+        }
+        EXPECT_EQ(run->x, every.x);
+    }
+    EXPECT_LT(1.5 * static_cast<double>(with.statistics.guard_calls),
+              static_cast<double>(without.statistics.guard_calls));
+}
+
 TEST(LeastEigenvalue, RateIsTheDerivativeAlongTheMotion)
 {
     const LeastEigenvalue system;
@@ -262,6 +311,7 @@ TEST(LeastEigenvalue, TheSlowFormHasTheSameValuesAndTakesItsTime)
     EXPECT_GE(spent.count(), 5 * 2e-3);
     EXPECT_TRUE(std::isnan(fast.guard(0, LeastEigenvalue::State{nan, 0, 0, 0})));
     EXPECT_NE(refusal([] { LeastEigenvalue({.slow = -1}); }).find("slow"), std::string::npos);
+    EXPECT_NE(refusal([] { LeastEigenvalue({.table = 49}); }).find("table"), std::string::npos);
     EXPECT_NE(refusal([] { LeastEigenvalue({.amplitude = 0}); }).find("amplitude"),
               std::string::npos);
 }

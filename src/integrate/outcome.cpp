@@ -51,8 +51,9 @@ std::string_view describe(Outcome outcome) noexcept
                    "the last finite state is kept";
         case Outcome::cancelled: return "the run was cancelled; it can be continued";
         case Outcome::wrong_bound:
-            return "a guard changed faster than its declared bounds allow, or lies below its lower "
-                   "bound; correct speed_bound, acceleration_bound, lipschitz or lower_bound";
+            return "a guard changed faster than its declared bounds allow, or lies beyond its "
+                   "lower or upper bound; correct speed_bound, acceleration_bound, lipschitz, "
+                   "lower_bound or upper_bound";
         case Outcome::not_converged:
             return "a set-valued stage has no solution that the solver could find; try another "
                    "stage method or a looser tolerance";

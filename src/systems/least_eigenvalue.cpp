@@ -6,6 +6,7 @@
 
 #include "random.hpp"
 #include "require.hpp"
+#include "ricochet/geometry/concave_table.hpp"
 #include "ricochet/systems/opaque.hpp"
 
 namespace ricochet {
@@ -37,6 +38,20 @@ struct LeastEigenvalue::Matrices {
         for (std::size_t k = 0; k < 4; ++k) out.noalias() += q[k] * by_load[k];
         return out;
     }
+
+    /// Rayleigh's quotient of any vector is a tangent from above; that of the eigenvector touches.
+    [[nodiscard]] geometry::Tangent<4> tangent(const State& q) const
+    {
+        const Matrix here = at(q);
+        const Solver solver(here);
+        const auto u = solver.eigenvectors().col(0);
+        const double squared = u.squaredNorm();
+        geometry::Tangent<4> out{.value = u.dot(here * u) / squared};
+        for (std::size_t k = 0; k < 4; ++k) out.slope[k] = u.dot(by_load[k] * u) / squared;
+        return out;
+    }
+
+    geometry::ConcaveTable<4> table;
 };
 
 LeastEigenvalue::LeastEigenvalue(const Parameters& parameters) : p_(parameters)
@@ -45,6 +60,8 @@ LeastEigenvalue::LeastEigenvalue(const Parameters& parameters) : p_(parameters)
     detail::require_finite(self, "level", p_.level);
     detail::require_positive(self, "amplitude", p_.amplitude);
     detail::require_positive(self, "frequency", p_.frequency);
+    detail::require(p_.table <= 48, self, "table", "be at most 48 cells",
+                    static_cast<double>(p_.table));
     detail::require(p_.slow >= 0 && p_.slow <= 1, self, "slow", "lie in [0, 1] s", p_.slow);
 
     detail::Random random(p_.seed);
@@ -65,7 +82,17 @@ LeastEigenvalue::LeastEigenvalue(const Parameters& parameters) : p_(parameters)
     const std::array<double, 4> factors{1, std::numbers::sqrt2, std::numbers::phi,
                                         std::numbers::e / 1.4};
     for (std::size_t k = 0; k < 4; ++k) frequency_[k] = p_.frequency * factors[k];
-    matrices_ = std::make_shared<const Matrices>(matrices);
+    if (p_.table > 0) {
+        // A little beyond the loads, which are integrated. The solver's error is some n u ||K||
+        // = 1e-13 (Golub and Van Loan, "Matrix Computations", 2013, section 8.3).
+        geometry::Box<4> box;
+        box.lower.fill(-1.001 * p_.amplitude);
+        box.upper.fill(1.001 * p_.amplitude);
+        const double size = 26 + p_.amplitude * (norm_[0] + norm_[1] + norm_[2] + norm_[3]);
+        matrices.table = geometry::ConcaveTable<4>(
+            box, p_.table, 1e-13 * size, [&](const State& q) { return matrices.tangent(q); });
+    }
+    matrices_ = std::make_shared<const Matrices>(std::move(matrices));
 }
 
 LeastEigenvalue::State LeastEigenvalue::start() const noexcept
@@ -73,6 +100,21 @@ LeastEigenvalue::State LeastEigenvalue::start() const noexcept
     State q{};
     for (std::size_t k = 0; k < 4; ++k) q[k] = p_.amplitude * std::sin(phase_[k]);
     return q;
+}
+
+std::size_t LeastEigenvalue::tabulated() const noexcept
+{
+    return matrices_->table.size();
+}
+
+double LeastEigenvalue::least(const State& q) const noexcept
+{
+    return matrices_->table.lower_bound(q);
+}
+
+double LeastEigenvalue::most(const State& q) const noexcept
+{
+    return matrices_->table.upper_bound(q);
 }
 
 double LeastEigenvalue::eigenvalue(const State& q) const noexcept

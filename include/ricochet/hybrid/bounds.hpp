@@ -4,6 +4,8 @@
 //     acceleration_bound(which, t, x)  how fast that speed can change, per second, optional
 //     lipschitz(which)                 change of the guard per unit of path, default 1
 //     lower_bound(which, t, x)         guard >= lower_bound, cheap and proved, optional
+//     upper_bound(which, t, x)         guard <= upper_bound, the same for a guard that is
+//                                      armed below its surface, optional
 //
 // `path` is whatever the system likes to measure its motion by: the way of a ball's
 // centre, the largest way of any point of a body. A guard of explicit time counts its
@@ -61,6 +63,11 @@ concept HasLowerBound = requires(const System& s, double t, const X& x) { { s.lo
     requires(const System& s, std::size_t which, double t, const X& x) { { s.lower_bound(which, t, x) } -> std::convertible_to<double>; } ||
     requires(const System& s, std::size_t which, Mode mode, double t, const X& x) { { s.lower_bound(which, mode, t, x) } -> std::convertible_to<double>; };
 
+template <class System, class X>
+concept HasUpperBound = requires(const System& s, double t, const X& x) { { s.upper_bound(t, x) } -> std::convertible_to<double>; } ||
+    requires(const System& s, std::size_t which, double t, const X& x) { { s.upper_bound(which, t, x) } -> std::convertible_to<double>; } ||
+    requires(const System& s, std::size_t which, Mode mode, double t, const X& x) { { s.upper_bound(which, mode, t, x) } -> std::convertible_to<double>; };
+
 }  // namespace detail
 
 /// Its guards change no faster than it says.
@@ -107,6 +114,13 @@ template <class System, class X>
     return call_bound<System>(call, which, mode, t, x);
 }
 
+template <class System, class X>
+[[nodiscard]] double call_upper_bound(const System& system, std::size_t which, Mode mode, double t, const X& x)
+{
+    const auto call = [&](const auto&... at) -> double requires requires { system.upper_bound(at...); } { return system.upper_bound(at...); };
+    return call_bound<System>(call, which, mode, t, x);
+}
+
 /// As `check_declarations`, of bounds that are there but do not fit.
 template <class System, class X>
 constexpr void check_bound_declarations()
@@ -119,6 +133,9 @@ constexpr void check_bound_declarations()
     }
     if constexpr (requires { &System::lower_bound; }) {
         static_assert(HasLowerBound<System, X> && Bounded<System, X>, "ricochet: lower_bound must be callable as lower_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
+    }
+    if constexpr (requires { &System::upper_bound; }) {
+        static_assert(HasUpperBound<System, X> && Bounded<System, X>, "ricochet: upper_bound must be callable as upper_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
     }
 }
 

@@ -44,7 +44,7 @@ struct Statistics {
     std::uint64_t late_events = 0;     ///< missed events that only a later step found
     std::uint64_t checks_put_off = 0;  ///< steps whose exact check a network or a plan saved
     std::uint64_t outside_domain = 0;  ///< states outside the box of a gate: checked exactly
-    std::uint64_t bound_calls = 0;     ///< evaluations of `lower_bound`
+    std::uint64_t bound_calls = 0;     ///< evaluations of `lower_bound`, `upper_bound`
     std::uint64_t rollbacks = 0;       ///< stretches taken back to a step that was not closed
     std::uint64_t repeated_steps = 0;  ///< steps taken again for that
     std::uint64_t events = 0;

@@ -411,7 +411,7 @@ private:
         Look look = place(k, step);
         look.value = value_at(i, look.time, look.t, *look.x, step.mode(), bank, counts);
         look.bound = bound(i, look, step.mode(), bank[i].side);
-        if (detector_.checks_bounds()) check_lower_bound(i, look, step.mode(), bank);
+        if (detector_.checks_bounds()) check_bound(i, look, step.mode(), bank);
         return look;
     }
 
@@ -426,12 +426,22 @@ private:
         return {.time = clock(start.t.value), .t = start.t.value, .x = &start.x};
     }
 
-    /// What a lower bound says there; false: nothing.
+    /// What a lower bound says there, or below the surface an upper one; false: nothing.
     template <class Step>
-    [[nodiscard]] bool bound_below(std::size_t i, std::size_t k, const Step& step, const Bank& bank,
-                                   Statistics& counts, Look& look)
+    [[nodiscard]] bool bound_at(std::size_t i, std::size_t k, const Step& step, const Bank& bank,
+                                Statistics& counts, Look& look)
     {
         constexpr bool levelled = requires { detector_.level(*system_, Mode{}, 0.0, *look.x); };
+        if constexpr (bounded && HasUpperBound<System, X>) {
+            if (bank[i].side == Side::below) {
+                look = place(k, step);
+                look.exact = false;
+                ++counts.bound_calls;
+                look.value = call_upper_bound(*system_, i, step.mode(), look.t, *look.x);
+                look.bound = bound(i, look, step.mode(), Side::below);
+                return look.value < 0;
+            }
+        }
         if constexpr (bounded && (HasLowerBound<System, X> || levelled)) {
             if (bank[i].side != Side::above) return false;
             look = place(k, step);
@@ -470,7 +480,7 @@ private:
         if (never_sleeps(bank[i]) || known.unclear) return steps_.size() - 1;
         Look from = last_look(i);
         Look end;
-        if (bound_below(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
+        if (bound_at(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
             detector_.sure(end.bound, band(bank, i, end.value, end.value)) >= h_next) {
             if (detector_.checks_bounds() && ++lower_bounds_used_ % 8 == 0) {
                 (void)look_at(i, steps_.size(), step, bank, counts);
@@ -506,7 +516,7 @@ private:
             failing_value_ = end.value;
             if (from.exact && from.time == place(lo, step).time) return lo;
             if (Look start;
-                bound_below(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
+                bound_at(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
                 from = end;
                 return none;
             }
@@ -553,6 +563,7 @@ private:
         if (!wrong || wrong_) return;
         wrong_ = {.guard = i,
                   .lower_bound = false,
+                  .upper_bound = false,
                   .t = to.t,
                   .x = *to.x,
                   .value = to.value,
@@ -561,22 +572,38 @@ private:
                   .allowed = allowed};
     }
 
-    void check_lower_bound(std::size_t i, const Look& look, Mode mode, const Bank& bank)
+    /// Whether an exact value contradicts the bound that would have stood in for it. Beyond the
+    /// surface a bound may well have ended at 0.
+    void check_bound([[maybe_unused]] std::size_t i, [[maybe_unused]] const Look& look,
+                     [[maybe_unused]] Mode mode, [[maybe_unused]] const Bank& bank)
     {
         if constexpr (bounded && HasLowerBound<System, X>) {
-            const double bound = call_lower_bound(*system_, i, mode, look.t, *look.x);
-            // Beyond the surface a bound may well have ended at 0.
-            if (bank[i].side != Side::above || wrong_) return;
-            if (!(bound > std::max(look.value, 0.0) + band(bank, i, look.value, 0))) return;
-            wrong_ = {.guard = i,
-                      .lower_bound = true,
-                      .t = look.t,
-                      .x = *look.x,
-                      .value = look.value,
-                      .since = look.t,
-                      .value_then = look.value,
-                      .allowed = bound};
+            if (bank[i].side == Side::above) {
+                check_against(call_lower_bound(*system_, i, mode, look.t, *look.x), i, look, bank);
+            }
         }
+        if constexpr (bounded && HasUpperBound<System, X>) {
+            if (bank[i].side == Side::below) {
+                check_against(call_upper_bound(*system_, i, mode, look.t, *look.x), i, look, bank);
+            }
+        }
+    }
+
+    void check_against(double bound, std::size_t i, const Look& look, const Bank& bank)
+    {
+        const double sign = sign_of(bank[i].side);
+        if (wrong_) return;
+        const double reach = band(bank, i, look.value, 0);
+        if (!(sign * bound > std::max(sign * look.value, 0.0) + reach)) return;
+        wrong_ = {.guard = i,
+                  .lower_bound = sign > 0,
+                  .upper_bound = sign < 0,
+                  .t = look.t,
+                  .x = *look.x,
+                  .value = look.value,
+                  .since = look.t,
+                  .value_then = look.value,
+                  .allowed = bound};
     }
 
     const System* system_;

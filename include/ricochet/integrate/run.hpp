@@ -23,13 +23,14 @@ struct Trajectory {
 template <class State>
 struct WrongBound {
     std::size_t guard = no_guard;
-    bool lower_bound = false;  ///< the guard lies below it; else the guard changed too fast
+    bool lower_bound = false;  ///< the guard lies below it
+    bool upper_bound = false;  ///< the guard lies above it; neither: it changed too fast
     double t = 0;              ///< [s]
     State x{};                 ///< where it was seen
     double value = 0;          ///< of the guard there
-    double since = 0;          ///< [s] when it was last looked at; t for a lower bound
+    double since = 0;          ///< [s] when it was last looked at; t for a bound of the value
     double value_then = 0;     ///< of the guard then
-    double allowed = 0;        ///< the lower bound, or the largest change since then
+    double allowed = 0;        ///< the bound, or the largest change since then
 };
 
 template <class State>

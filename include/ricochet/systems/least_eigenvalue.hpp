@@ -27,6 +27,11 @@ namespace ricochet {
 /// so the way per second is the sum of |q_k'| ||K_k||, and its rate at most the sum of
 /// amplitude w_k² ||K_k||, at any time.
 ///
+/// *Values.* The smallest eigenvalue is the least of u K(q) u over unit vectors u, a least of
+/// functions affine in q, hence concave. With `table` its values and tangents at the nodes of a
+/// grid of loads bound it from both sides (`geometry::ConcaveTable`); each node costs an eigenvalue
+/// problem when the system is made.
+///
 /// Every call solves an eigenvalue problem, some 20 us. `slow` adds a stated cost, spent
 /// waiting. Functions are generic in the state type.
 class LeastEigenvalue {
@@ -40,6 +45,7 @@ public:
         double frequency = 0.7;  ///< [rad/s] of the slowest load, positive
         double slow = 0;         ///< [s] that a call of the guard takes longer, at most 1
         std::uint64_t seed = 1;  ///< of the matrices
+        std::size_t table = 0;   ///< cells along a load, at most 48; 0: no bounds of the value
     };
 
     LeastEigenvalue() : LeastEigenvalue(Parameters{}) {}
@@ -98,6 +104,21 @@ public:
         return p_.amplitude * sum;
     }
 
+    /// -infinity where the table says nothing.
+    template <class X>
+    [[nodiscard]] double lower_bound(double /*t*/, const X& x) const noexcept
+    {
+        return least({x[0], x[1], x[2], x[3]}) - p_.level;
+    }
+    template <class X>
+    [[nodiscard]] double upper_bound(double /*t*/, const X& x) const noexcept
+    {
+        return most({x[0], x[1], x[2], x[3]}) - p_.level;
+    }
+
+    /// Eigenvalue problems that the table has cost.
+    [[nodiscard]] std::size_t tabulated() const noexcept;
+
     /// Smallest eigenvalue of K(q); NaN where q is not finite.
     [[nodiscard]] double eigenvalue(const State& q) const noexcept;
 
@@ -107,6 +128,8 @@ public:
 private:
     struct Matrices;
 
+    [[nodiscard]] double least(const State& q) const noexcept;
+    [[nodiscard]] double most(const State& q) const noexcept;
     [[nodiscard]] double eigenvalue_rate(const State& q, const State& rates) const noexcept;
 
     Parameters p_;

@@ -6,7 +6,7 @@ namespace ricochet::app {
 
 namespace {
 
-enum : std::size_t { level, amplitude, frequency, slow, seed };  // the order of parameters
+enum : std::size_t { level, amplitude, frequency, slow, seed, table };  // the order of parameters
 
 LeastEigenvalue system(const std::vector<double>& p)
 {
@@ -14,7 +14,8 @@ LeastEigenvalue system(const std::vector<double>& p)
                             .amplitude = p[amplitude],
                             .frequency = p[frequency],
                             .slow = p[slow],
-                            .seed = static_cast<std::uint64_t>(p[seed])});
+                            .seed = static_cast<std::uint64_t>(p[seed]),
+                            .table = static_cast<std::size_t>(p[table])});
 }
 
 std::vector<double> start(const std::vector<double>& p)
@@ -49,7 +50,12 @@ SystemEntry eigenvalue_entry()
                         static_cast<double>(d.seed),
                         "1",
                         {.lower = 0, .lower_included = true},
-                        "of the matrices"}},
+                        "of the matrices"},
+                       {"table",
+                        static_cast<double>(d.table),
+                        "1",
+                        {.lower = 0, .upper = 48, .lower_included = true, .upper_included = true},
+                        "cells along a load, for bounds of the value; 0: none"}},
         .state = {{"q0", "1", "load"},
                   {"q1", "1", "load"},
                   {"q2", "1", "load"},
