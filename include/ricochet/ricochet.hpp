@@ -3,10 +3,13 @@
 
 #include "ricochet/detect/ballistic_line.hpp"
 #include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/certified.hpp"
 #include "ricochet/detect/cover.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/features.hpp"
+#include "ricochet/detect/metered.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/detect/verified.hpp"

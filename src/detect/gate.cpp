@@ -132,35 +132,6 @@ double Gate::cleared(const double* features) const noexcept
     return value;
 }
 
-void Gate::check_system(std::string_view name) const
-{
-    if (model().system == name) return;
-    refuse(model(), fmt::format("cannot be used for {}", name));
-}
-
-void Gate::check_parameter(std::string_view name, double trained, std::optional<double> value) const
-{
-    if (!value) {
-        refuse(model(), fmt::format("is trained for {} = {}, which this system does not declare",
-                                    name, trained));
-    }
-    if (*value != trained) {
-        refuse(model(), fmt::format("is trained for {} = {}, got {}", name, trained, *value));
-    }
-}
-
-void Gate::check_layout(std::size_t features, std::size_t modes) const
-{
-    if (features != classifier_->inputs()) {
-        refuse(model(), fmt::format("takes {} features, but '{}' of this state are {}",
-                                    classifier_->inputs(), model().recipe, features));
-    }
-    if (recipe_.modes > 0 && recipe_.modes != modes) {
-        refuse(model(),
-               fmt::format("tells {} modes apart, and this system has {}", recipe_.modes, modes));
-    }
-}
-
 void Gate::check_step(double smallest, double largest) const
 {
     if (largest < model().step_min || smallest > model().step_max) {
@@ -170,6 +141,45 @@ void Gate::check_step(double smallest, double largest) const
 }
 
 namespace detail {
+
+void check_gate_system(const Model& model, std::string_view name)
+{
+    if (model.system != name) refuse(model, fmt::format("cannot be used for {}", name));
+}
+
+void check_gate_parameter(const Model& model, std::string_view name, double trained,
+                          std::optional<double> value)
+{
+    if (!value) {
+        refuse(model, fmt::format("is trained for {} = {}, which this system does not declare",
+                                  name, trained));
+    }
+    if (*value != trained) {
+        refuse(model, fmt::format("is trained for {} = {}, got {}", name, trained, *value));
+    }
+}
+
+void check_gate_layout(const Model& model, const GateRecipe& recipe, std::size_t features,
+                       std::size_t modes)
+{
+    if (features != model.offset.size()) {
+        refuse(model, fmt::format("takes {} features, but '{}' of this state are {}",
+                                  model.offset.size(), model.recipe, features));
+    }
+    if (recipe.modes > 0 && recipe.modes != modes) {
+        refuse(model,
+               fmt::format("tells {} modes apart, and this system has {}", recipe.modes, modes));
+    }
+}
+
+void check_certified(const Model& model)
+{
+    if (model.domain.empty()) refuse(model, "has no domain, and a certified one needs one");
+    if (model.offset.size() > GateRecipe::most) {
+        refuse(model, fmt::format("has {} features, expected at most {}", model.offset.size(),
+                                  GateRecipe::most));
+    }
+}
 
 void check_gate_kind(const Gate& gate, bool horizon)
 {

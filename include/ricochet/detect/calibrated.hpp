@@ -37,23 +37,10 @@ void check_gate_kind(const Gate& gate, bool horizon);
 /// @throws std::invalid_argument: no step is kept.
 void check_longest_stretch(std::size_t steps);
 
-}  // namespace detail
-
-template <class Exact = Extremum>
-class Calibrated : public detail::PutsOff<Exact> {
+/// A detector with a gate to ask.
+template <class Base>
+class AsksGate : public Base {
 public:
-    static constexpr bool needs_bounds = false;
-    static constexpr Evidence put_off = Evidence::gated;
-
-    /// @param longest_stretch  steps without a check, at most; as many starts are kept
-    /// @throws std::invalid_argument for a level gate, or if there is no stretch.
-    explicit Calibrated(Gate gate, std::size_t longest_stretch = 256, const Exact& exact = {})
-        : detail::PutsOff<Exact>(exact), gate_(std::move(gate)), longest_(longest_stretch)
-    {
-        detail::check_gate_kind(gate_, true);
-        detail::check_longest_stretch(longest_);
-    }
-
     [[nodiscard]] const Gate& gate() const noexcept { return gate_; }
 
     /// As `Gate::check`.
@@ -61,6 +48,37 @@ public:
     void check(const System& system, const X& x, double smallest, double largest) const
     {
         gate_.check(system, x, smallest, largest);
+    }
+
+protected:
+    /// @throws std::invalid_argument if the gate is of the other kind, or as `Base`.
+    template <class... Arguments>
+    AsksGate(Gate gate, bool horizon, const Arguments&... arguments)
+        : Base(arguments...), gate_(std::move(gate))
+    {
+        check_gate_kind(gate_, horizon);
+    }
+
+private:
+    Gate gate_;
+};
+
+}  // namespace detail
+
+template <class Exact = Extremum>
+class Calibrated : public detail::AsksGate<detail::PutsOff<Exact>> {
+    using Base = detail::AsksGate<detail::PutsOff<Exact>>;
+
+public:
+    static constexpr bool needs_bounds = false;
+    static constexpr Evidence put_off = Evidence::gated;
+
+    /// @param longest_stretch  steps without a check, at most; as many starts are kept
+    /// @throws std::invalid_argument for a level gate, or if there is no stretch.
+    explicit Calibrated(Gate gate, std::size_t longest_stretch = 256, const Exact& exact = {})
+        : Base(std::move(gate), true, exact), longest_(longest_stretch)
+    {
+        detail::check_longest_stretch(longest_);
     }
 
     [[nodiscard]] std::size_t longest() const noexcept { return longest_; }
@@ -79,77 +97,59 @@ public:
     template <class System, class X>
     [[nodiscard]] Gate::Answer horizon(const System& system, Mode mode, double t, const X& x) const
     {
-        Gate::Answer answer = gate_.ask(system, mode, t, x);
+        Gate::Answer answer = this->gate().ask(system, mode, t, x);
         answer.cleared *= 1 + 1e-9;
         return answer;
     }
 
 private:
-    Gate gate_;
     std::size_t longest_;
 };
 
 template <class Exact = Extremum>
-class CalibratedBounds : public Planned<Exact> {
+class CalibratedBounds : public detail::AsksGate<Planned<Exact>> {
 public:
     static constexpr Evidence put_off = Evidence::gated;
 
     /// @throws std::invalid_argument for a horizon gate, or as `Planned`.
     explicit CalibratedBounds(Gate gate, const PlannerOptions& options = {},
                               const Exact& exact = {})
-        : Planned<Exact>(options, exact), gate_(std::move(gate))
+        : detail::AsksGate<Planned<Exact>>(std::move(gate), false, options, exact)
     {
-        detail::check_gate_kind(gate_, false);
     }
 
-    [[nodiscard]] const Gate& gate() const noexcept { return gate_; }
+    /// The least that it ever clears.
+    [[nodiscard]] double lowest_level() const noexcept
+    {
+        return this->gate().model().levels.front().value;
+    }
 
-    /// As `Gate::check`.
+    /// A value that no guard is seen to be below; 0: nothing is known.
     template <class System, class X>
-    void check(const System& system, const X& x, double smallest, double largest) const
+    [[nodiscard]] Gate::Answer level(const System& system, std::size_t /*which*/, Mode mode,
+                                     double t, const X& x) const
     {
-        gate_.check(system, x, smallest, largest);
+        return this->gate().ask(system, mode, t, x);
     }
-
-    /// A value that the guard is not seen to be below; 0: nothing is known.
-    template <class System, class X>
-    [[nodiscard]] Gate::Answer level(const System& system, Mode mode, double t, const X& x) const
-    {
-        return gate_.ask(system, mode, t, x);
-    }
-
-private:
-    Gate gate_;
 };
 
 template <class Exact = Extremum>
-class Foreseen : public Planned<Exact> {
+class Foreseen : public detail::AsksGate<Planned<Exact>> {
 public:
+    static constexpr bool keeps_events = true;
+
     /// @throws std::invalid_argument for a level gate, or as `Planned`.
     explicit Foreseen(Gate gate, const PlannerOptions& options = {}, const Exact& exact = {})
-        : Planned<Exact>(options, exact), gate_(std::move(gate))
+        : detail::AsksGate<Planned<Exact>>(std::move(gate), true, options, exact)
     {
-        detail::check_gate_kind(gate_, true);
-    }
-
-    [[nodiscard]] const Gate& gate() const noexcept { return gate_; }
-
-    /// As `Gate::check`.
-    template <class System, class X>
-    void check(const System& system, const X& x, double smallest, double largest) const
-    {
-        gate_.check(system, x, smallest, largest);
     }
 
     /// When [s] to look at last.
     template <class System, class X>
     [[nodiscard]] Gate::Answer horizon(const System& system, Mode mode, double t, const X& x) const
     {
-        return gate_.ask(system, mode, t, x);
+        return this->gate().ask(system, mode, t, x);
     }
-
-private:
-    Gate gate_;
 };
 
 }  // namespace ricochet

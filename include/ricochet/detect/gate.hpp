@@ -20,6 +20,35 @@
 
 namespace ricochet {
 
+namespace detail {
+
+/// @throws std::invalid_argument: the model is for another system.
+void check_gate_system(const Model& model, std::string_view name);
+/// @throws std::invalid_argument: the model was trained for another value.
+void check_gate_parameter(const Model& model, std::string_view name, double trained,
+                          std::optional<double> value);
+/// @throws std::invalid_argument: the model takes other features, or tells other modes apart.
+void check_gate_layout(const Model& model, const GateRecipe& recipe, std::size_t features,
+                       std::size_t modes);
+/// @throws std::invalid_argument: the model has no box, or more features than a gate may.
+void check_certified(const Model& model);
+
+/// Name and parameters, where the system declares them.
+template <class System>
+void check_gate_model(const Model& model, const System& system)
+{
+    if constexpr (requires { std::string_view(system.name); }) {
+        check_gate_system(model, system.name);
+    }
+    if constexpr (requires { system.parameter(std::string_view()); }) {
+        for (const auto& [name, trained] : model.parameters) {
+            check_gate_parameter(model, name, trained, system.parameter(std::string_view(name)));
+        }
+    }
+}
+
+}  // namespace detail
+
 /// Immutable, shared by threads and copies; asking it allocates nothing.
 class Gate {
 public:
@@ -63,22 +92,13 @@ public:
     template <class System, class X>
     void check(const System& system, const X& x, double smallest, double largest) const
     {
-        if constexpr (requires { std::string_view(system.name); }) {
-            check_system(system.name);
-        }
-        if constexpr (requires { system.parameter(std::string_view()); }) {
-            for (const auto& [parameter, trained] : model().parameters) {
-                check_parameter(parameter, trained, system.parameter(std::string_view(parameter)));
-            }
-        }
-        check_layout(feature_count(recipe_, system, x), mode_count_of(system));
+        detail::check_gate_model(model(), system);
+        detail::check_gate_layout(model(), recipe_, feature_count(recipe_, system, x),
+                                  mode_count_of(system));
         check_step(smallest, largest);
     }
 
 private:
-    void check_system(std::string_view name) const;
-    void check_parameter(std::string_view name, double trained, std::optional<double> value) const;
-    void check_layout(std::size_t features, std::size_t modes) const;
     void check_step(double smallest, double largest) const;
 
     std::shared_ptr<const Classifier> classifier_;

@@ -23,6 +23,7 @@
 #include <limits>
 #include <utility>
 
+#include "ricochet/detect/around.hpp"
 #include "ricochet/detect/cover.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/bounds.hpp"
@@ -58,36 +59,12 @@ void validate(const PlannerOptions& options);
 /// @throws std::invalid_argument: SlopeSkip's fraction is not in (0, 1], or it has no steps.
 [[noreturn]] void throw_bad_slope_skip(double fraction, std::size_t longest);
 
-/// What a detector that puts off checks leaves to its exact detector.
 template <class Exact>
-class PutsOff {
+class PutsOff : public Around<Exact> {
 public:
-    static constexpr bool uses_rates = Exact::uses_rates;
-    static constexpr Evidence evidence = Exact::evidence;  ///< of a step it has looked at
     static constexpr bool puts_off = true;
 
-    explicit PutsOff(const Exact& exact) : exact_(exact) {}
-
-    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
-                                                 double rate1, double h) noexcept
-    {
-        return Exact::suspects(sign, g0, rate0, g1, rate1, h);
-    }
-
-    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,
-                                             const GuardSample& end, double touch) noexcept
-    {
-        return Exact::leaves_plainly(sign, start, end, touch);
-    }
-
-    template <class Probe>
-    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
-    {
-        return exact_.examine(probe, watch);
-    }
-
-private:
-    Exact exact_;
+    using Around<Exact>::Around;
 };
 
 }  // namespace detail

@@ -11,20 +11,20 @@
 
 #include <utility>
 
+#include "ricochet/detect/around.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/network.hpp"
 
 namespace ricochet {
 
 template <class Exact = Extremum>
-class Verified {
+class Verified : public detail::Around<Exact> {
 public:
-    static constexpr bool uses_rates = Exact::uses_rates;
-    static constexpr Evidence evidence = Exact::evidence;
     static constexpr bool checks_every_step = true;
+    static constexpr bool keeps_events = true;
 
     explicit Verified(Network network, const Exact& exact = {})
-        : network_(std::move(network)), exact_(exact)
+        : detail::Around<Exact>(exact), network_(std::move(network))
     {
     }
 
@@ -42,27 +42,8 @@ public:
         return network_.clears(guard, step);
     }
 
-    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
-                                                 double rate1, double h) noexcept
-    {
-        return Exact::suspects(sign, g0, rate0, g1, rate1, h);
-    }
-
-    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,
-                                             const GuardSample& end, double touch) noexcept
-    {
-        return Exact::leaves_plainly(sign, start, end, touch);
-    }
-
-    template <class Probe>
-    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
-    {
-        return exact_.examine(probe, watch);
-    }
-
 private:
     Network network_;
-    Exact exact_;
 };
 
 }  // namespace ricochet

@@ -20,6 +20,7 @@
 #include <span>
 
 #include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/meter.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/statistics.hpp"
@@ -41,6 +42,7 @@ struct LastLook {
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< of the distance, from two looks
     bool judge = false;     ///< the next step is one for the exact detector
     bool unclear = false;   ///< a gate clears nothing, so that the next step is, too
+    bool refused = false;   ///< a gate had no lower bound when it was last asked
     std::size_t first = 0;  ///< of the tentative steps, the first beyond `sure`
     double later_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] of another look
     double later_value = 0;
@@ -56,6 +58,7 @@ struct LastLook {
         visit(exact);
         visit(judge);
         visit(unclear);
+        visit(refused);
     }
 };
 
@@ -67,6 +70,11 @@ class Planner {
     /// Puts off nothing but what a gate clears.
     static constexpr bool gated = !bounded && requires(const Detector& d, const System& s,
                                                        const X& x) { d.horizon(s, Mode{}, 0.0, x); };
+    /// Has lower bounds from a gate.
+    static constexpr bool levelled = requires(const Detector& d, const System& s, const X& x)
+    {
+        d.level(s, std::size_t{}, Mode{}, 0.0, x);
+    };
     using Bank = GuardBank<System, X, Detector>;
     using Steps = TentativeSteps<X>;
 
@@ -77,6 +85,7 @@ public:
             std::size_t guards)
         : system_(&system),
           detector_(detector),
+          meter_(MeterOf<Detector>::make(detector)),
           backward_(backward),
           steps_(detector.longest(), like),
           looks_(guards),
@@ -143,6 +152,7 @@ public:
     template <class Step>
     [[nodiscard]] std::size_t close(const Step& step, Bank& bank, Statistics& counts, double h_next)
     {
+        meter_.look_back(counts);
         const std::size_t last = steps_.size() - 1;
         std::size_t doubt = none;
         for (const std::size_t i : owing_) {
@@ -187,14 +197,18 @@ public:
             const double value = value_at(i, clock(step.time(0)), step.time(0), step.x0(),
                                           step.mode(), bank, counts);
             if (!(look.rate == look.rate) || look.time != clock(step.time(0))) {
-                look.rate = bank.rate_of(i, step.mode(), step.time(0), step.x0(), step.rate0(),
-                                         last_h, counts.guard_calls);
+                look.rate = meter_.time_guard([&] {
+                    return bank.rate_of(i, step.mode(), step.time(0), step.x0(), step.rate0(),
+                                        last_h, counts.guard_calls);
+                });
             }
             const double h = step.h();
             const double end = value_at(i, clock(step.time(h)), step.time(h), step.x1(),
                                         step.mode(), bank, counts);
-            const double rate = bank.rate_of(i, step.mode(), step.time(h), step.x1(), step.rate1(),
-                                             h, counts.guard_calls);
+            const double rate = meter_.time_guard([&] {
+                return bank.rate_of(i, step.mode(), step.time(h), step.x1(), step.rate1(), h,
+                                    counts.guard_calls);
+            });
             bank.wake(i, {.s = 0, .value = value, .rate = look.rate},
                       {.s = h, .value = end, .rate = rate});
             remember(look, clock(step.time(h)), end);
@@ -231,6 +245,9 @@ public:
         counts.outside_domain += outside_;
         asked_ = outside_ = 0;
     }
+
+    /// Of a network, whether asking it pays.
+    [[nodiscard]] const auto& meter() const noexcept { return meter_; }
 
     /// A bound that a guard has broken.
     [[nodiscard]] const std::optional<WrongBound<X>>& wrong() const noexcept { return wrong_; }
@@ -337,9 +354,12 @@ private:
     [[nodiscard]] double horizon([[maybe_unused]] const Look& at, [[maybe_unused]] Mode mode)
     {
         if constexpr (requires { detector_.horizon(*system_, mode, at.t, *at.x); }) {
-            const auto answer = detector_.horizon(*system_, mode, at.t, *at.x);
+            if (!meter_.asks()) return 0;
+            const auto answer =
+                meter_.time_network([&] { return detector_.horizon(*system_, mode, at.t, *at.x); });
             ++asked_;
             outside_ += answer.outside ? 1 : 0;
+            if (answer.cleared > 0) meter_.note_cleared();
             return answer.cleared;
         } else {
             return 0;
@@ -371,7 +391,22 @@ private:
         look.unclear = gated && !(cleared > 0);
         if (look.unclear) look.judge = true;
         const double ahead = std::max(detector_.hoped(at.bound, look.slope, reach), cleared);
-        look.hoped = std::max(look.sure, at.time + ahead);
+        look.hoped = std::max(look.sure, at.time + (expects_level(look, bank[i].side) ? 0 : ahead));
+    }
+
+    /// Whether a gate is likely to have a lower bound where the cover of this look ends: any will
+    /// do there, so that it is asked at once.
+    [[nodiscard]] bool expects_level([[maybe_unused]] const LastLook& look,
+                                     [[maybe_unused]] Side side) const noexcept
+    {
+        if constexpr (levelled) {
+            if (side != Side::above) return false;
+            const double slope = std::isfinite(look.slope) ? look.slope : 0;
+            const double then = look.bound.distance + slope * (look.sure - look.time);
+            return meter_.asks() && !look.refused && then > detector_.lowest_level();
+        } else {
+            return false;
+        }
     }
 
     [[nodiscard]] static bool never_sleeps(const GuardRecord& record) noexcept
@@ -399,7 +434,8 @@ private:
         LastLook& look = looks_[i];
         if (look.exact && look.time == time) return look.value;
         if (look.later_time == time) return look.later_value;
-        return bank.view(i, mode, counts.guard_calls).value(t, x);
+        return meter_.time_guard(
+            [&] { return bank.view(i, mode, counts.guard_calls).value(t, x); });
     }
 
     /// An exact look at the start of tentative step k; past the last, at the end of the step
@@ -431,7 +467,6 @@ private:
     [[nodiscard]] bool bound_at(std::size_t i, std::size_t k, const Step& step, const Bank& bank,
                                 Statistics& counts, Look& look)
     {
-        constexpr bool levelled = requires { detector_.level(*system_, Mode{}, 0.0, *look.x); };
         if constexpr (bounded && HasUpperBound<System, X>) {
             if (bank[i].side == Side::below) {
                 look = place(k, step);
@@ -452,16 +487,27 @@ private:
                 look.value = call_lower_bound(*system_, i, step.mode(), look.t, *look.x);
             }
             if constexpr (levelled) {
-                const auto answer = detector_.level(*system_, step.mode(), look.t, *look.x);
-                ++asked_;
-                outside_ += answer.outside ? 1 : 0;
-                look.value = std::max(look.value, answer.cleared);
+                if (meter_.asks()) {
+                    look.value = std::max(look.value, ask_level(i, look, step.mode()));
+                }
             }
             look.bound = bound(i, look, step.mode(), Side::above);
             return look.value > 0;
         } else {
             return false;
         }
+    }
+
+    /// A lower bound of guard i by a gate; 0: none.
+    [[nodiscard]] double ask_level(std::size_t i, const Look& at, Mode mode)
+    {
+        const auto answer =
+            meter_.time_network([&] { return detector_.level(*system_, i, mode, at.t, *at.x); });
+        ++asked_;
+        outside_ += answer.outside ? 1 : 0;
+        looks_[i].refused = !(answer.cleared > 0);
+        if (answer.cleared > 0) meter_.note_cleared();
+        return answer.cleared;
     }
 
     /// The last look at guard i.
@@ -608,6 +654,7 @@ private:
 
     const System* system_;
     Detector detector_;
+    [[no_unique_address]] typename MeterOf<Detector>::type meter_;
     bool backward_;
     Steps steps_;
     GuardList<LastLook, fixed> looks_;

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/meter.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/declarations.hpp"
@@ -114,6 +115,7 @@ public:
         : system_(&system),
           options_(checked(options, x0)),
           detector_(detector),
+          meter_(detail::MeterOf<Detector>::make(detector)),
           locator_(locator),
           resolution_(options),
           backward_(options.t_end < options.t_start),
@@ -163,6 +165,16 @@ public:
     /// What has been computed so far; its time and state are brought up to date by
     /// `finish`.
     [[nodiscard]] const Run<X>& run() const noexcept { return run_; }
+
+    /// Of a `Metered` detector: what asking its network has cost and saved so far.
+    [[nodiscard]] MeterReading meter() const noexcept requires Metering<Detector>
+    {
+        if constexpr (puts_off) {
+            return planner_.meter().reading();
+        } else {
+            return meter_.reading();
+        }
+    }
 
     /// Takes one step, with whatever events it holds. False: the run has ended. A detector
     /// that puts off checks does not look ahead here, since every step is final.
@@ -740,8 +752,9 @@ private:
     {
         bool cleared = false;
         if constexpr (predicts) {
-            ++run_.statistics.network_calls;
-            cleared = detector_.clears(bank_.view(0, step_.mode(), calls()), step_);
+            meter_.look_back(run_.statistics);
+            asked_ = meter_.asks();
+            if (asked_) cleared = ask_network();
             if (cleared && !Detector::checks_every_step) {
                 ++run_.statistics.checks_put_off;
                 run_.statistics.evidence.add(Evidence::assumed);
@@ -751,12 +764,20 @@ private:
         if (bank_.size() == 0) return false;
         bank_.sample_end(step_, calls());
         if (!bank_.suspicious(step_.h())) {
-            if (predicts && !cleared) ++run_.statistics.false_alarms;
+            if (asked_ && !cleared) ++run_.statistics.false_alarms;
             run_.statistics.evidence.add(Detector::evidence);
             bank_.pass_on();
             return false;
         }
         return search(cleared);
+    }
+
+    /// Whether the network predicts that the step is free of events.
+    [[nodiscard]] bool ask_network()
+    {
+        ++run_.statistics.network_calls;
+        return meter_.time_network(
+            [&] { return detector_.clears(bank_.view(0, step_.mode(), calls()), step_); });
     }
 
     /// The step may hold events: finds out, and deals with them.
@@ -787,7 +808,7 @@ private:
         }
         note_crossings(step_.h());
         if (search_.notes().empty()) {
-            if (predicts && !cleared) ++run_.statistics.false_alarms;
+            if (asked_ && !cleared) ++run_.statistics.false_alarms;
             run_.statistics.evidence.add(search_.evidence());
         } else {
             record_notes(step_.h());
@@ -1400,6 +1421,7 @@ private:
     const System* system_;
     Options options_;
     Detector detector_;
+    [[no_unique_address]] typename detail::MeterOf<Detector>::type meter_;
     Locator locator_;
     detail::EventResolution resolution_;
     bool backward_;
@@ -1417,6 +1439,7 @@ private:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
+    bool asked_ = false;  ///< a network, about the step in hand
     detail::MergedResets<System, X> resets_;
     Mode mode_before_ = 0;
     std::size_t next_sample_ = 0;

@@ -32,27 +32,15 @@ inline double checked_cost(std::string_view system, double cost)
                                 std::to_string(cost));
 }
 
-}  // namespace detail
-
-/// A system with one guard of which nothing is known but its value: no rate, no bounds.
+/// A system with one guard, of which no more is shown than the flow, the reset and, at a cost,
+/// the value.
 template <class System>
-class Hidden {
+class Pinhole {
 public:
     using State = typename System::State;
 
-    /// `cost` [s] is what a call of the guard takes longer.
-    /// @throws std::invalid_argument for a cost outside of [0, 1] s.
-    explicit Hidden(System system, double cost = 0)
-        : system_(std::move(system)), cost_(detail::checked_cost("Hidden", cost))
-    {
-    }
-
     [[nodiscard]] const System& system() const noexcept { return system_; }
     [[nodiscard]] State start() const noexcept { return system_.start(); }
-    [[nodiscard]] GuardInfo guard_info(std::size_t which) const noexcept
-    {
-        return system_.guard_info(which);
-    }
 
     template <class X>
     void flow(double t, const X& x, X& dxdt) const noexcept
@@ -60,15 +48,22 @@ public:
         system_.flow(t, x, dxdt);
     }
     template <class X>
-    [[nodiscard]] double guard(double t, const X& x) const noexcept
-    {
-        detail::wait(cost_);
-        return system_.guard(t, x);
-    }
-    template <class X>
     void reset(double t, X& x) const noexcept
     {
         system_.reset(t, x);
+    }
+
+protected:
+    Pinhole(std::string_view name, System system, double cost)
+        : system_(std::move(system)), cost_(checked_cost(name, cost))
+    {
+    }
+
+    template <class X>
+    [[nodiscard]] double value(double t, const X& x) const noexcept
+    {
+        wait(cost_);
+        return system_.guard(t, x);
     }
 
 private:
@@ -76,53 +71,57 @@ private:
     double cost_;
 };
 
-/// A system with one guard of which only the sign is known, at a stated cost: a collision
-/// checker that says yes or no.
-template <class System>
-class BlackBox {
-public:
-    using State = typename System::State;
+}  // namespace detail
 
-    /// `cost` [s] of a call, spent waiting.
+/// A system with one guard of which nothing is known but its value: no rate, no bounds.
+template <class System>
+class Hidden : public detail::Pinhole<System> {
+public:
+    /// `cost` [s] is what a call of the guard takes longer.
     /// @throws std::invalid_argument for a cost outside of [0, 1] s.
-    explicit BlackBox(System system, double cost = 50e-6)
-        : system_(std::move(system)), cost_(detail::checked_cost("BlackBox", cost))
+    explicit Hidden(System system, double cost = 0)
+        : detail::Pinhole<System>("Hidden", std::move(system), cost)
     {
     }
 
-    [[nodiscard]] const System& system() const noexcept { return system_; }
-    [[nodiscard]] State start() const noexcept { return system_.start(); }
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const noexcept
     {
-        GuardInfo info = system_.guard_info(which);
+        return this->system().guard_info(which);
+    }
+    template <class X>
+    [[nodiscard]] double guard(double t, const X& x) const noexcept
+    {
+        return this->value(t, x);
+    }
+};
+
+/// A system with one guard of which only the sign is known, at a stated cost: a collision
+/// checker that says yes or no.
+template <class System>
+class BlackBox : public detail::Pinhole<System> {
+public:
+    /// `cost` [s] of a call, spent waiting.
+    /// @throws std::invalid_argument for a cost outside of [0, 1] s.
+    explicit BlackBox(System system, double cost = 50e-6)
+        : detail::Pinhole<System>("BlackBox", std::move(system), cost)
+    {
+    }
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const noexcept
+    {
+        GuardInfo info = this->system().guard_info(which);
         info.boolean = true;
         info.unilateral = false;  // on the surface it cannot tell pressing from leaving
         info.touch = 0;
         info.degree = 0;
         return info;
     }
-
-    template <class X>
-    void flow(double t, const X& x, X& dxdt) const noexcept
-    {
-        system_.flow(t, x, dxdt);
-    }
     /// Whether the state is inside. A guard that is no number is not.
     template <class X>
     [[nodiscard]] bool guard(double t, const X& x) const noexcept
     {
-        detail::wait(cost_);
-        return system_.guard(t, x) > 0;
+        return this->value(t, x) > 0;
     }
-    template <class X>
-    void reset(double t, X& x) const noexcept
-    {
-        system_.reset(t, x);
-    }
-
-private:
-    System system_;
-    double cost_;
 };
 
 }  // namespace ricochet

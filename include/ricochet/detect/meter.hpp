@@ -1,0 +1,218 @@
+// Whether asking a network pays, found out during a run.
+//
+// A run is cut into pieces of some hundred steps. In some of them the network is asked, in the
+// others not, and the cost of a step is compared:
+//
+//     cost = (guard looks x their cost + answers x their cost + steps x their cost) / steps
+//
+// Counts are exact; what one of each costs is sampled with a clock, every 32nd time. Both ways
+// are tried in turn until the better one is clear beyond its noise. After that the other one is
+// tried again now and then, but what trials cost more than not asking is kept below a share of
+// the whole run (1 %), so that a network of no use, however large or hostile, costs no more.
+//
+// Used through `Metered`; the state lives in the run, not in the detector.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "ricochet/hybrid/statistics.hpp"
+
+namespace ricochet {
+
+/// How `Metered` decides.
+struct MeterOptions {
+    enum class Decision : std::uint8_t {
+        measured,  ///< by costs sampled with a clock
+        counted,   ///< by the costs given here, so that the same run asks the same
+        always,    ///< asked whenever there is something to ask
+        never,
+    };
+    Decision decision = Decision::measured;
+    /// [s] of a look at the guard, an answer of the network and a step, if `counted`; not
+    /// negative, and the step above 0.
+    double guard = 0;
+    double network = 0;
+    double step = 0;
+    /// Of the run's time that trials may cost in vain, in [0, 1].
+    double trials = 0.01;
+    std::uint64_t piece = 256;  ///< steps between decisions, at least 1
+};
+
+/// What a meter has found so far. Costs in seconds, 0 before the first sample.
+struct MeterReading {
+    double guard = 0;    ///< of a look
+    double network = 0;  ///< of an answer
+    double step = 0;
+    std::uint64_t asked = 0;
+    std::uint64_t cleared = 0;  ///< answers that cleared something
+    double asking = 0;          ///< a step while the network is asked, all in all; 0: never tried
+    double not_asking = 0;      ///< a step while it is not
+    bool pays = false;
+
+    [[nodiscard]] double share_cleared() const noexcept
+    {
+        return asked > 0 ? static_cast<double>(cleared) / static_cast<double>(asked) : 0;
+    }
+};
+
+/// A detector whose network is metered.
+template <class Detector>
+concept Metering = requires(const Detector& detector)
+{
+    detector.metering();
+};
+
+namespace detail {
+
+/// @throws std::invalid_argument naming the option.
+void validate(const MeterOptions& options);
+
+/// A cost [s], from samples of which some were disturbed.
+class SampledCost {
+public:
+    [[nodiscard]] double value() const noexcept { return value_; }
+    void set(double value) noexcept { value_ = value; }
+
+    void add(double sample) noexcept
+    {
+        ++samples_;
+        if (samples_ > 1) sample = std::min(sample, 3 * value_);
+        const double weight = std::max(1.0 / static_cast<double>(samples_), 1.0 / 16);
+        value_ += weight * (sample - value_);
+    }
+
+private:
+    double value_ = 0;
+    std::uint64_t samples_ = 0;
+};
+
+/// Stands for a meter where there is none.
+struct NoMeter {
+    static constexpr bool asks() noexcept { return true; }
+    static constexpr void note_cleared() noexcept {}
+    static constexpr void look_back(const Statistics&) noexcept {}
+    template <class Call>
+    static auto time_guard(Call&& call)
+    {
+        return call();
+    }
+    template <class Call>
+    static auto time_network(Call&& call)
+    {
+        return call();
+    }
+};
+
+class Meter {
+public:
+    explicit Meter(const MeterOptions& options);
+
+    /// Whether the network is to be asked now.
+    [[nodiscard]] bool asks() const noexcept { return asks_ && asked_ < most_asked_; }
+    /// The answer has cleared something.
+    void note_cleared() noexcept { ++cleared_; }
+
+    template <class Call>
+    auto time_guard(Call&& call)
+    {
+        return timed(++looks_, guard_, call);
+    }
+    template <class Call>
+    auto time_network(Call&& call)
+    {
+        return timed(++asked_, network_, call);
+    }
+
+    /// Called now and then, with the counts of the run so far.
+    void look_back(const Statistics& counts)
+    {
+        if (!decides_) return;
+        if (counts.steps >= next_steps_ || (on_trial_ && looks_ + asked_ >= next_check_) ||
+            asked_ >= most_asked_) {
+            consider(counts);
+        }
+    }
+
+    [[nodiscard]] MeterReading reading() const noexcept;
+
+private:
+    using Clock = std::chrono::steady_clock;
+    static constexpr std::uint64_t every = 32;  ///< of which one is timed
+
+    /// Steps and their cost in one of the two ways, older pieces with less weight.
+    struct Way {
+        double steps = 0;
+        double cost = 0;     ///< [s]
+        double squares = 0;  ///< [s²] of what pieces cost beside their mean
+        std::uint64_t pieces = 0;
+
+        [[nodiscard]] double mean() const noexcept { return cost / steps; }
+        [[nodiscard]] double error() const noexcept { return std::sqrt(squares) / steps; }
+        void add(double more_steps, double more_cost) noexcept;
+    };
+    struct Counts {
+        double steps = 0;  ///< that stand
+        double work = 0;   ///< those taken back included
+        double looks = 0;
+        double asked = 0;
+    };
+
+    template <class Call>
+    auto timed(std::uint64_t count, SampledCost& cost, Call& call)
+    {
+        if (!samples_ || (count > 8 && count % every != 0)) return call();
+        const auto start = Clock::now();
+        const auto answer = call();
+        cost.add(std::chrono::duration<double>(Clock::now() - start).count());
+        return answer;
+    }
+
+    void consider(const Statistics& counts);
+    void sample_step(const Counts& piece);
+    void close_piece(const Counts& piece, double cost);
+    void choose_next();
+    [[nodiscard]] bool may_try() const noexcept;
+    [[nodiscard]] double allowance() const noexcept;
+    [[nodiscard]] double cost_of(const Counts& piece) const noexcept;
+
+    MeterOptions options_;
+    bool decides_;
+    bool samples_;
+    bool asks_;
+    bool on_trial_ = false;  ///< asking, without being known to pay
+    bool pays_ = false;
+    SampledCost guard_, network_, step_;
+    std::uint64_t looks_ = 0;
+    std::uint64_t asked_ = 0;
+    std::uint64_t cleared_ = 0;
+    std::uint64_t most_asked_ = std::numeric_limits<std::uint64_t>::max();  ///< in this piece
+    std::uint64_t next_steps_;
+    std::uint64_t next_check_ = 0;
+    Counts then_;  ///< when the piece began
+    Clock::time_point began_;
+    Way asking_, not_asking_;
+    double spent_ = 0;        ///< [s] on trials in vain
+    double total_ = 0;        ///< [s] of the run
+    std::uint64_t wait_ = 1;  ///< pieces between trials
+    std::uint64_t waited_ = 0;
+};
+
+/// The meter of a detector that has one.
+template <class Detector>
+struct MeterOf {
+    using type = NoMeter;
+    static constexpr NoMeter make(const Detector&) noexcept { return {}; }
+};
+template <Metering Detector>
+struct MeterOf<Detector> {
+    using type = Meter;
+    static Meter make(const Detector& detector) { return Meter(detector.metering()); }
+};
+
+}  // namespace detail
+
+}  // namespace ricochet
