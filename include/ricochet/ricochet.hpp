@@ -33,6 +33,8 @@
 #include "ricochet/locate/toms748.hpp"
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nonsmooth/contact_motion.hpp"
+#include "ricochet/nonsmooth/event_hand_over.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"

@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/nonsmooth/event_hand_over.hpp"
 
 #include <fmt/format.h>
 
@@ -14,6 +14,7 @@ std::string_view name(HandOverOutcome outcome) noexcept
         case HandOverOutcome::non_finite: return "non_finite";
         case HandOverOutcome::cancelled: return "cancelled";
         case HandOverOutcome::not_handed_over: return "not_handed_over";
+        case HandOverOutcome::released: return "released";
     }
     return "unknown";
 }
@@ -32,6 +33,7 @@ std::string_view describe(HandOverOutcome outcome) noexcept
         case HandOverOutcome::cancelled: return "the run was cancelled";
         case HandOverOutcome::not_handed_over:
             return "events alone do not lead on from here; allow set-valued steps";
+        case HandOverOutcome::released: return "every reaction is at a bound, as was asked for";
     }
     return "unknown outcome";
 }
@@ -88,6 +90,30 @@ HandOverOptions completed(HandOverOptions options, bool locate)
     return options;
 }
 
+HandOverOptions hand_over_options(const Options& options)
+{
+    const auto refuse = [](bool given, std::string_view what) {
+        if (given) {
+            throw std::invalid_argument(
+                fmt::format("integrate: a run that may be handed over has no {}", what));
+        }
+    };
+    refuse(options.stop_at_event, "stop_at_event");
+    refuse(options.record_steps, "record_steps");
+    refuse(options.t_end < options.t_start, "backward direction");
+    HandOverOptions out;
+    out.t_start = options.t_start;
+    out.t_end = options.t_end;
+    out.rtol = options.rtol;
+    out.atol = options.atol;
+    out.h_max = options.h_max;
+    out.event_tolerance = options.event_tolerance;
+    out.sample_times = options.sample_times;
+    out.max_steps = std::min(options.max_steps, out.max_steps);
+    out.cancelled = options.cancelled;
+    return out;
+}
+
 void add(Statistics& sum, const Statistics& more) noexcept
 {
     sum.steps += more.steps;
@@ -102,6 +128,17 @@ void add(Statistics& sum, const Statistics& more) noexcept
     sum.evidence.checked += more.evidence.checked;
     sum.evidence.gated += more.evidence.gated;
     sum.evidence.assumed += more.evidence.assumed;
+}
+
+void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept
+{
+    sum.attempted += more.attempted;
+    sum.accepted += more.accepted;
+    sum.rejected += more.rejected;
+    sum.unsolved += more.unsolved;
+    sum.stages += more.stages;
+    sum.iterations += more.iterations;
+    sum.switches += more.switches;
 }
 
 std::optional<PhaseCause> cause_after(Outcome outcome) noexcept

@@ -29,11 +29,14 @@ requires Flowing<System, X> && StateVector<X>
         .take();
 }
 
+/// What has no flow for such a state.
+template <class System, class X>
+concept NotIntegrable = !(Flowing<System, X> && StateVector<X>);
+
 /// What cannot be integrated is refused with a sentence instead of a list of concepts.
 template <class System, class X = typename System::State, class... Choices>
-requires(!(Flowing<System, X> && StateVector<X>)) Run<X> integrate(const System&, const X&,
-                                                                   const Options&,
-                                                                   const Choices&...)
+requires NotIntegrable<System, X> Run<X> integrate(const System&, const X&, const Options&,
+                                                   const Choices&...)
 {
     static_assert(StateVector<X>,
                   "ricochet: found a start that is no state; expected std::array, std::vector or a "

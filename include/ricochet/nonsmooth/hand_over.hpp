@@ -32,6 +32,7 @@ enum class HandOverOutcome {
     non_finite,      ///< the motion is no longer finite
     cancelled,       ///< `HandOverOptions::cancelled` was set
     not_handed_over,  ///< a set-valued phase was due, and `HandOverOptions::events_only`
+    released,         ///< no reaction is held any more, and `HandOverOptions::until_released`
 };
 
 [[nodiscard]] std::string_view name(HandOverOutcome outcome) noexcept;
@@ -70,6 +71,10 @@ struct HandOverOptions {
 
     /// The run ends, as `not_handed_over`, where a set-valued phase would begin.
     bool events_only = false;
+
+    /// The run ends, as `released`, where every reaction is at a bound and no y so near to zero
+    /// that its sign is an accident.
+    bool until_released = false;
 
     /// Of the set-valued phases; their times are those of the run. A step of zero is a
     /// thousandth of the run. Changes are located where the set is a box.
@@ -110,6 +115,7 @@ namespace detail {
 [[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
 
 void add(Statistics& sum, const Statistics& more) noexcept;
+void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
 
 /// What an event-driven phase ended with, as a reason for a set-valued one; nothing if the
 /// run is over.
@@ -237,9 +243,14 @@ private:
             return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
         }
         bool chatters = false;
+        bool released = false;
         std::uint64_t mark = 0;
         double marked = run_.state.t;
         while (simulation->step() && simulation->mode() < Modes::branch_modes) {
+            released = options_.until_released &&
+                       is_released(Modes::branches_of(simulation->mode()), simulation->t(),
+                                   Modes::vector(simulation->x()));
+            if (released) break;
             const std::uint64_t events = simulation->run().statistics.events;
             if (events < mark + most_events) continue;
             chatters = simulation->t() - marked < options_.set_valued.step / 100;
@@ -248,6 +259,7 @@ private:
             marked = simulation->t();
         }
         finish_events(simulation->finish(), chatters);
+        if (released && !set_valued_) end_with(HandOverOutcome::released);
     }
 
     [[nodiscard]] Options event_options() const
@@ -366,6 +378,11 @@ private:
                 end_with(HandOverOutcome::cancelled);
             }
             if constexpr (branching) {
+                if (!ended_ && options_.until_released &&
+                    is_released(motion_.branches(), motion_.state().t, motion_.state().w)) {
+                    run_.mode = Modes::mode_of(motion_.branches());
+                    end_with(HandOverOutcome::released);
+                }
                 if (!ended_ && steps >= patience_ && is_plain(switched)) {
                     release();
                     break;
@@ -382,15 +399,30 @@ private:
         requires branching
     {
         const auto& branches = motion_.branches();
-        if (!modes_.flows(Modes::mode_of(branches))) return false;
         const State& now = motion_.state();
-        const Reaction y = modes_.observed(now.t, now.w);
-        const double size = now.w.template lpNorm<Eigen::Infinity>();
+        return modes_.flows(Modes::mode_of(branches)) &&
+               (switched || are_clear(branches, now.t, now.w));
+    }
+
+    /// Whether every y of a reaction at a bound is farther from zero than errors reach.
+    template <class Branches>
+    [[nodiscard]] bool are_clear(const Branches& branches, double t, const Vector& w) const
+        requires branching
+    {
+        const Reaction y = modes_.observed(t, w);
+        const double size = w.template lpNorm<Eigen::Infinity>();
         const double least = 1e3 * (options_.atol + options_.rtol * size);
         for (Eigen::Index i = 0; i < y.size(); ++i) {
-            if (branches[i] != Branch::inside && !switched && std::abs(y[i]) < least) return false;
+            if (branches[i] != Branch::inside && std::abs(y[i]) < least) return false;
         }
         return true;
+    }
+
+    template <class Branches>
+    [[nodiscard]] bool is_released(const Branches& branches, double t, const Vector& w) const
+        requires branching
+    {
+        return !(branches.array() == Branch::inside).any() && are_clear(branches, t, w);
     }
 
     void release()

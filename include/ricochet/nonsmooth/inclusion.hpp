@@ -56,8 +56,10 @@ enum class Confines {
 };
 
 template <class System>
+requires requires { System::state_size; }
 inline constexpr int state_size = System::state_size;
 template <class System>
+requires requires { System::reaction_size; }
 inline constexpr int reaction_size = System::reaction_size;
 
 template <class System>

@@ -114,6 +114,13 @@ public:
         closed_.reserve(C);
     }
 
+    /// Goes on from (t, q, v), where an integrator of free flight hands over.
+    void restart(double t, const Vector& q, const Vector& v)
+    {
+        state_ = {t, q, v, Impulses::Zero()};
+        outcome_ = t < options_.t_end ? SetValuedOutcome::running : SetValuedOutcome::reached_end;
+    }
+
     [[nodiscard]] const State& state() const noexcept { return state_; }
     [[nodiscard]] const TimeSteppingStatistics& statistics() const noexcept { return statistics_; }
     [[nodiscard]] SetValuedOutcome outcome() const noexcept { return outcome_; }

@@ -1,0 +1,253 @@
+// One run of a mechanical system with contacts: flight by events, contact by time stepping.
+//
+//     flight   while every contact is open: impacts are located and resolved one instant at
+//              a time, by any explicit stepper (free_flight.hpp)
+//     contact  where impacts accumulate, where a contact stays closed, or where an impact has
+//              no solution: Moreau's midpoint rule, until every contact has opened
+//
+// Nothing is declared for it beyond what time stepping needs.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/nonsmooth/free_flight.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/nonsmooth/time_stepping.hpp"
+
+namespace ricochet {
+
+/// A system as `TimeStepping` takes it.
+template <class System>
+concept Contacting = requires(const System& system, const Eigen::Matrix<double, System::coordinates, 1>& q,
+                              Eigen::Matrix<double, System::contacts, 1>& gaps) {
+    system.gaps(q, gaps);
+    { system.restitution(0) } -> std::convertible_to<double>;
+    { system.friction(0) } -> std::convertible_to<double>;
+    System::tangents;
+};
+
+struct ContactStatistics {
+    Statistics event_driven;
+    TimeSteppingStatistics time_stepping;
+    std::uint64_t to_contact = 0;  ///< hand-overs, a start there included
+    std::uint64_t to_flight = 0;
+    double contact_time = 0;  ///< [s] of the motion
+};
+
+/// Events are impacts in flight; `Event::guard` is the contact, and x = (q, v).
+template <Contacting System>
+struct ContactRun {
+    using X = typename FreeFlight<System>::State;
+
+    HandOverOutcome outcome = HandOverOutcome::reached_end;
+    double t = 0;
+    X x{};
+    std::vector<Event<X>> events;
+    std::vector<Phase> phases;
+    Trajectory<X> trajectory;  ///< at the sample times
+    ContactStatistics statistics;
+    ContactReport failure;  ///< with `not_converged`
+};
+
+/// Of `HandOverOptions` those of the event-driven phases count, and `set_valued.step` as the
+/// step of time stepping.
+template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
+class ContactMotion {
+public:
+    using Flight = FreeFlight<System>;
+    using X = typename Flight::State;
+    using Vector = typename Flight::Vector;
+
+    /// @throws std::invalid_argument for what `TimeStepping` refuses, a start inside an obstacle
+    /// among it.
+    ContactMotion(const System& system, const Vector& q, const Vector& v,
+                  const HandOverOptions& options)
+        : options_(detail::completed(options, false)),
+          flight_(system),
+          steps_(system, q, v, stepping_options(options_))
+    {
+        run_.t = options_.t_start;
+        run_.x = Flight::state(q, v);
+    }
+
+    /// To the end; whatever the outcome, what was computed is there.
+    [[nodiscard]] ContactRun<System> take()
+    {
+        run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = PhaseCause::start});
+        while (!ended_) in_contact_ ? follow_contact() : follow_flight();
+        run_.statistics.time_stepping = steps_.statistics();
+        return std::move(run_);
+    }
+
+private:
+    static constexpr std::uint64_t most_impacts = 200;  ///< in a hundredth of a step
+
+    [[nodiscard]] static TimeSteppingOptions stepping_options(const HandOverOptions& options)
+    {
+        // A run of no length takes no step.
+        const double end = std::max(options.t_end, std::nextafter(options.t_start, options.t_start + 1));
+        return {.t_start = options.t_start, .t_end = end, .step = options.set_valued.step};
+    }
+
+    void end_with(HandOverOutcome outcome)
+    {
+        run_.outcome = outcome;
+        ended_ = true;
+    }
+
+    // --- flight ---
+
+    void follow_flight()
+    {
+        std::optional<Simulation<Flight, X, Stepping>> simulation;
+        try {
+            simulation.emplace(flight_, run_.x, flight_options());
+        } catch (const std::invalid_argument&) {
+            return touch_down(PhaseCause::stuck);  // behind a contact by more than rounding
+        }
+        bool chatters = false;
+        std::uint64_t mark = 0;
+        double marked = run_.t;
+        while (!chatters && simulation->step()) {
+            const std::uint64_t impacts = simulation->run().statistics.events;
+            if (impacts < mark + most_impacts) continue;
+            chatters = simulation->t() - marked < options_.set_valued.step / 100;
+            mark = impacts;
+            marked = simulation->t();
+        }
+        finish_flight(simulation->finish(), chatters);
+    }
+
+    [[nodiscard]] Options flight_options() const
+    {
+        Options options{.t_start = run_.t,
+                        .t_end = options_.t_end,
+                        .rtol = options_.rtol,
+                        .atol = options_.atol,
+                        .h_max = options_.h_max,
+                        .event_tolerance = options_.event_tolerance};
+        if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
+            options.step = options_.set_valued.step;
+        }
+        options.sample_times.assign(options_.sample_times.begin() + next_sample(),
+                                    options_.sample_times.end());
+        options.max_steps = options_.max_steps - run_.statistics.event_driven.steps;
+        options.cancelled = options_.cancelled;
+        return options;
+    }
+
+    void finish_flight(Run<X>&& done, bool chatters)
+    {
+        run_.t = done.t;
+        run_.x = done.x;
+        std::move(done.events.begin(), done.events.end(), std::back_inserter(run_.events));
+        run_.trajectory.t.insert(run_.trajectory.t.end(), done.trajectory.t.begin(),
+                                 done.trajectory.t.end());
+        run_.trajectory.x.insert(run_.trajectory.x.end(), done.trajectory.x.begin(),
+                                 done.trajectory.x.end());
+        detail::add(run_.statistics.event_driven, done.statistics);
+        if (chatters) return touch_down(PhaseCause::chattering);
+        if (const auto cause = detail::cause_after(done.outcome)) return touch_down(*cause);
+        end_with(detail::in_hand_over(done.outcome));
+    }
+
+    // --- contact ---
+
+    void touch_down(PhaseCause cause)
+    {
+        if (options_.events_only) return end_with(HandOverOutcome::not_handed_over);
+        // Who is back at once stays longer.
+        const bool at_once = run_.t - run_.phases.back().from < 10 * options_.set_valued.step;
+        patience_ = at_once ? std::min(2 * patience_, std::uint64_t{1} << 20) : 1;
+        in_contact_ = true;
+        ++run_.statistics.to_contact;
+        run_.phases.push_back({.from = run_.t, .set_valued = true, .cause = cause});
+        steps_.restart(run_.t, Flight::position(run_.x), Flight::velocity(run_.x));
+    }
+
+    void follow_contact()
+    {
+        const double from = run_.t;
+        std::uint64_t open = 0;
+        while (!ended_ && in_contact_) {
+            const auto before = steps_.state();
+            const SetValuedOutcome outcome = steps_.advance();
+            const auto& now = steps_.state();
+            run_.t = now.t;
+            run_.x = Flight::state(now.q, now.v);
+            emit_samples(before.t, Flight::state(before.q, before.v));
+            open = is_open() ? open + 1 : 0;
+            if (outcome == SetValuedOutcome::not_converged) run_.failure = steps_.failure();
+            if (outcome != SetValuedOutcome::running) {
+                end_with(detail::in_hand_over(outcome));
+            } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+                end_with(HandOverOutcome::cancelled);
+            } else if (open >= patience_) {
+                in_contact_ = false;
+            }
+        }
+        run_.statistics.contact_time += run_.t - from;
+        if (ended_) return;
+        ++run_.statistics.to_flight;
+        run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = PhaseCause::released});
+    }
+
+    /// Whether no contact pushed in the last step, and all are open after it.
+    [[nodiscard]] bool is_open() const
+    {
+        if (!steps_.state().impulse.isZero(0)) return false;
+        for (std::size_t c = 0; c < Flight::guard_count; ++c) {
+            if (!(flight_.guard(c, run_.t, run_.x) > 0)) return false;
+        }
+        return true;
+    }
+
+    // --- samples ---
+
+    [[nodiscard]] std::ptrdiff_t next_sample() const noexcept
+    {
+        return static_cast<std::ptrdiff_t>(run_.trajectory.t.size());
+    }
+
+    /// On straight lines, which is as accurate as the steps are.
+    void emit_samples(double t_before, const X& before)
+    {
+        while (run_.trajectory.t.size() < options_.sample_times.size()) {
+            const double t = options_.sample_times[run_.trajectory.t.size()];
+            if (t > run_.t) return;
+            const double share = run_.t > t_before ? (t - t_before) / (run_.t - t_before) : 1;
+            X x;
+            for (std::size_t i = 0; i < x.size(); ++i) {
+                x[i] = before[i] + share * (run_.x[i] - before[i]);
+            }
+            run_.trajectory.t.push_back(t);
+            run_.trajectory.x.push_back(x);
+        }
+    }
+
+    HandOverOptions options_;
+    Flight flight_;
+    TimeStepping<System> steps_;
+    ContactRun<System> run_;
+    std::uint64_t patience_ = 1;
+    bool in_contact_ = false;
+    bool ended_ = false;
+};
+
+/// A whole run in one call.
+template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
+[[nodiscard]] ContactRun<System> hand_over(const System& system,
+                                           const Eigen::Matrix<double, System::coordinates, 1>& q,
+                                           const Eigen::Matrix<double, System::coordinates, 1>& v,
+                                           const HandOverOptions& options,
+                                           const Stepping& /*stepping*/ = {})
+{
+    return ContactMotion<System, Stepping>(system, q, v, options).take();
+}
+
+}  // namespace ricochet

@@ -1,0 +1,243 @@
+// Hybrid systems that also know their motion as an inclusion.
+//
+// A system with a flow and guards of its own may declare
+//
+//     set_valued()         an Inclusion (inclusion.hpp) of the same state
+//     start_mode(t, x)     where it has modes: the one in which it goes on from (t, x)
+//
+// `integrate` then follows its events while they lead on. Where they do not (switchings that
+// accumulate or chatter, a motion that presses on its guard, resets that contradict one another)
+// the inclusion takes over, by hand_over.hpp, and gives back where none of its reactions is held
+// any more. Inclusions without events of their own are handed to hand_over.hpp at once.
+#pragma once
+
+#include <algorithm>
+#include <iterator>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
+
+namespace ricochet {
+
+template <class System>
+concept KnowsInclusion = requires(const System& system)
+{
+    requires Inclusion<std::remove_cvref_t<decltype(system.set_valued())>>;
+};
+
+/// Events of the event-driven phases are the system's; in set-valued phases `Event::guard` is
+/// the reaction, and the modes are the one before the phase.
+template <class X>
+struct MixedRun {
+    HandOverOutcome outcome = HandOverOutcome::reached_end;
+    double t = 0;
+    X x{};
+    Mode mode = 0;
+    std::vector<Event<X>> events;
+    std::vector<Phase> phases;
+    Trajectory<X> trajectory;  ///< at the sample times
+    HandOverStatistics statistics;
+    StageReport failure;  ///< with `not_converged`
+};
+
+namespace detail {
+
+/// @throws std::invalid_argument for options that a hand-over does not have.
+[[nodiscard]] HandOverOptions hand_over_options(const Options& options);
+
+template <class To, class From>
+[[nodiscard]] To converted_state(const From& from, To like)
+{
+    for (std::size_t i = 0; i < static_cast<std::size_t>(from.size()); ++i) {
+        like[static_cast<decltype(like.size())>(i)] = from[static_cast<decltype(from.size())>(i)];
+    }
+    return like;
+}
+
+}  // namespace detail
+
+template <KnowsInclusion System, class X, class Stepping = ErrorControlled<Dopri5>,
+          class Detector = Extremum, class Locator = Newton>
+class EventHandOver {
+public:
+    using Set = std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>;
+    using Vector = StateOf<Set>;
+
+    EventHandOver(const System& system, const X& x0, const Options& options,
+                  const Stepping& stepping, const Detector& detector, const Locator& locator)
+        : system_(system),
+          set_(system.set_valued()),
+          options_(options),
+          hand_over_(detail::completed(detail::hand_over_options(options), false)),
+          stepping_(stepping),
+          detector_(detector),
+          locator_(locator)
+    {
+        static_assert(
+            !Moded<System, X> || requires(Mode & mode) { mode = system.start_mode(0.0, x0); },
+            "ricochet: found a system with modes and set_valued(); expected Mode "
+            "start_mode(double t, const State& x) const as well, the mode after it");
+        run_.t = options.t_start;
+        run_.x = x0;
+        run_.mode = options.mode;
+        hand_over_.until_released = true;
+    }
+
+    /// To the end; whatever the outcome, what was computed is there.
+    [[nodiscard]] MixedRun<X> take()
+    {
+        bool ended = false;
+        PhaseCause cause = PhaseCause::start;
+        while (!ended) {
+            run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = cause});
+            if (const auto end = follow_events()) {
+                ended = follow_inclusion(*end);
+                cause = PhaseCause::released;
+                if (!ended) ++run_.statistics.to_events;
+            } else {
+                ended = true;
+            }
+        }
+        return std::move(run_);
+    }
+
+private:
+    static constexpr std::uint64_t most_events = 200;  ///< in a hundredth of a set-valued step
+
+    /// Why the inclusion is to go on; nothing if the run is over.
+    [[nodiscard]] std::optional<PhaseCause> follow_events()
+    {
+        Options options = options_;
+        options.t_start = run_.t;
+        options.mode = run_.mode;
+        options.sample_times = remaining_samples();
+        options.max_steps = options_.max_steps - run_.statistics.event_driven.steps;
+        using Loop = Simulation<System, X, Stepping, Detector, Locator>;
+        std::optional<Loop> simulation;
+        try {
+            simulation.emplace(system_, run_.x, options, stepping_, detector_, locator_);
+        } catch (const std::invalid_argument&) {
+            if (run_.phases.size() == 1) throw;  // of the caller
+            return PhaseCause::stuck;
+        }
+        bool chatters = false;
+        std::uint64_t mark = 0;
+        double marked = run_.t;
+        while (!chatters && simulation->step()) {
+            const std::uint64_t events = simulation->run().statistics.events;
+            if (events < mark + most_events) continue;
+            chatters = simulation->t() - marked < hand_over_.set_valued.step / 100;
+            mark = events;
+            marked = simulation->t();
+        }
+        Run<X> done = simulation->finish();
+        run_.t = done.t;
+        run_.x = done.x;
+        run_.mode = done.mode;
+        std::move(done.events.begin(), done.events.end(), std::back_inserter(run_.events));
+        append(done.trajectory);
+        detail::add(run_.statistics.event_driven, done.statistics);
+        if (chatters) return PhaseCause::chattering;
+        if (const auto cause = detail::cause_after(done.outcome)) return cause;
+        run_.outcome = detail::in_hand_over(done.outcome);
+        return std::nullopt;
+    }
+
+    /// Whether the run is over.
+    bool follow_inclusion(PhaseCause cause)
+    {
+        HandOverOptions options = hand_over_;
+        options.t_start = run_.t;
+        options.sample_times = remaining_samples();
+        Vector w(static_cast<Eigen::Index>(run_.x.size()));
+        w = detail::converted_state(run_.x, w);
+        HandOver<Set> inclusion(set_, w, options);
+        HandOverRun<Set> done = inclusion.take();
+        run_.phases.push_back({.from = run_.t, .set_valued = true, .cause = cause});
+        for (const auto& event : done.events) run_.events.push_back(converted(event));
+        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
+            run_.trajectory.t.push_back(done.trajectory.t[i]);
+            run_.trajectory.x.push_back(detail::converted_state(done.trajectory.x[i], run_.x));
+        }
+        detail::add(run_.statistics.event_driven, done.statistics.event_driven);
+        detail::add(run_.statistics.set_valued, done.statistics.set_valued);
+        ++run_.statistics.to_set_valued;
+        run_.statistics.set_valued_time += done.state.t - run_.t;
+        const bool moved = done.state.t > run_.t;
+        run_.t = done.state.t;
+        run_.x = detail::converted_state(done.state.w, run_.x);
+        run_.failure = done.failure;
+        run_.outcome = done.outcome;
+        if (done.outcome != HandOverOutcome::released) return true;
+        if (!moved) {
+            // The inclusion sees nothing that would hold the motion back, and events do not lead
+            // on.
+            run_.outcome = HandOverOutcome::not_handed_over;
+            return true;
+        }
+        if constexpr (Moded<System, X>) run_.mode = system_.start_mode(run_.t, run_.x);
+        return false;
+    }
+
+    [[nodiscard]] Event<X> converted(const Event<Vector>& from) const
+    {
+        Event<X> event;
+        event.t = from.t;
+        event.kind = from.kind;
+        event.guard = from.guard;
+        event.mode_before = event.mode_after = run_.mode;
+        event.before = detail::converted_state(from.before, run_.x);
+        event.after = detail::converted_state(from.after, run_.x);
+        event.bracket = from.bracket;
+        event.slope = from.slope;
+        event.error = from.error;
+        return event;
+    }
+
+    [[nodiscard]] std::vector<double> remaining_samples() const
+    {
+        const auto done = static_cast<std::ptrdiff_t>(run_.trajectory.t.size());
+        return {options_.sample_times.begin() + done, options_.sample_times.end()};
+    }
+    void append(const Trajectory<X>& more)
+    {
+        run_.trajectory.t.insert(run_.trajectory.t.end(), more.t.begin(), more.t.end());
+        run_.trajectory.x.insert(run_.trajectory.x.end(), more.x.begin(), more.x.end());
+    }
+
+    const System& system_;
+    Set set_;
+    Options options_;
+    HandOverOptions hand_over_;
+    Stepping stepping_;
+    Detector detector_;
+    Locator locator_;
+    MixedRun<X> run_;
+};
+
+/// Events first, the inclusion where they do not lead on.
+///
+/// @throws std::invalid_argument as for other systems; also for `stop_at_event`,
+///         `record_steps` and a backward run, which a hand-over does not have.
+template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
+          class Detector = Extremum, class Locator = Newton>
+requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
+[[nodiscard]] MixedRun<X> integrate(const System& system, const X& x0, const Options& options,
+                                    const Stepping& stepping = {}, const Detector& detector = {},
+                                    const Locator& locator = {})
+{
+    return EventHandOver<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
+                                                                 detector, locator)
+        .take();
+}
+
+/// An inclusion alone: `hand_over`.
+template <class System, class X, class Stepping = ErrorControlled<Dopri5>>
+requires NotIntegrable<System, X> && Inclusion<System>
+[[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,
+                                            const Options& options, const Stepping& stepping = {})
+{
+    return hand_over(system, StateOf<System>(w0), detail::hand_over_options(options), stepping);
+}
+
+}  // namespace ricochet

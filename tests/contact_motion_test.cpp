@@ -1,0 +1,128 @@
+// Flight by events and contact by time stepping in one run.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "ricochet/nonsmooth/contact_motion.hpp"
+#include "ricochet/systems/two_contact_block.hpp"
+#include "ricochet/systems/woodpecker.hpp"
+
+namespace ricochet {
+namespace {
+
+/// A point of 1 kg over a floor with friction that may move up and down.
+struct Ball {
+    static constexpr int coordinates = 2;
+    static constexpr int contacts = 1;
+    static constexpr int tangents = 1;
+    using V = Eigen::Vector2d;
+    double e = 0.5;
+    double mu = 0.2;
+    double lift = 0;      ///< [m/s^2], a pull upward
+    double lift_at = 10;  ///< [s], from then on
+    static void mass(const V&, Eigen::Matrix2d& m) { m.setIdentity(); }
+    void force(double t, const V&, const V&, V& f) const
+    {
+        f << 0, -10 + (t >= lift_at ? lift : 0);
+    }
+    static void gaps(const V& q, Eigen::Matrix<double, 1, 1>& g) { g[0] = q[1]; }
+    static void directions(const V&, Eigen::Matrix2d& h) { h << 0, 1, 1, 0; }
+    [[nodiscard]] double restitution(int) const { return e; }
+    [[nodiscard]] double friction(int) const { return mu; }
+};
+
+// Dropped from 0.8 m under 10 m/s^2: the first impact is at 0.4 s with 4 m/s, the flights
+// after it last 0.8 s e^n, and they end at 0.4 + 0.8 e / (1 - e) = 1.2 s for e = 1/2. All
+// impulses of the floor up to then are 12 N s, the weight over that time, so that friction,
+// while it slides, takes 0.2 of that from the velocity: as it does afterwards.
+
+TEST(ContactMotion, ImpactsAccumulateIntoSlidingAndRest)
+{
+    const double h = 1e-3;
+    const auto run =
+        hand_over(Ball{}, {0, 0.8}, {4, 0},
+                  {.t_end = 3, .set_valued = {.step = h}, .sample_times = {0.4, 1.0, 1.5, 3}});
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_GE(run.events.size(), 20U);
+    double t = 0.4;
+    double u = 4;
+    for (int n = 0; n < 20; ++n) {
+        const auto& impact = run.events[static_cast<std::size_t>(n)];
+        const double speed = 4 * std::pow(0.5, n);  // before it, downward
+        u -= 0.2 * 1.5 * speed;
+        EXPECT_NEAR(impact.t, t, 1e-14 * (n + 1)) << n;
+        EXPECT_NEAR(impact.after[2], u, 1e-12) << n;
+        EXPECT_NEAR(impact.after[3], speed / 2, 1e-12) << n;
+        t += speed / 10;
+    }
+    ASSERT_EQ(run.phases.size(), 2U);
+    EXPECT_TRUE(run.phases[1].set_valued);
+    EXPECT_EQ(run.phases[1].cause, PhaseCause::accumulation);
+    EXPECT_NEAR(run.phases[1].from, 1.2, 1e-9);
+    // While it slides: 4 - 0.2 * 10 t; at rest from 2 s.
+    EXPECT_NEAR(run.trajectory.x[2][2], 1, 1e-9);
+    EXPECT_NEAR(run.x[2], 0, 1e-12);
+    EXPECT_NEAR(run.x[3], 0, 1e-12);
+    EXPECT_NEAR(run.x[1], 0, 10 * h * h);  // what a step may fall before it is closed
+    EXPECT_EQ(run.t, 3);
+}
+
+TEST(ContactMotion, GoesBackToFlightWhereTheContactOpens)
+{
+    // At rest until a pull of 14 m/s^2 sets in: then up with 4 m/s^2. The step in which it
+    // opens is as long as h, which is what the height is off by.
+    for (const double h : {1e-3, 1e-4}) {
+        const auto run = hand_over(Ball{.lift = 14, .lift_at = 1}, {0, 0}, {0, 0},
+                                   {.t_end = 2, .set_valued = {.step = h}});
+        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        ASSERT_EQ(run.phases.size(), 3U);
+        EXPECT_EQ(run.phases[2].cause, PhaseCause::released);
+        EXPECT_FALSE(run.phases[2].set_valued);
+        EXPECT_NEAR(run.phases[2].from, 1, 4 * h);
+        EXPECT_NEAR(run.x[1], 2, 8 * h);
+        EXPECT_NEAR(run.x[3], 4, 8 * h);
+    }
+}
+
+TEST(ContactMotion, ABlockThatFallsOnTwoCornersComesToRest)
+{
+    // Tilted, so that one corner strikes first and the two take turns.
+    TwoContactBlock block;
+    block.bounce = 0.3;
+    const auto run =
+        hand_over(block, {0, 0.3, 0.05}, {1, 0, 0}, {.t_end = 4, .set_valued = {.step = 1e-3}});
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    EXPECT_GT(run.events.size(), 10U);
+    EXPECT_GT(run.statistics.contact_time, 1);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(run.x[3 + i], 0, 1e-8) << i;
+    EXPECT_NEAR(run.x[2], 0, 1e-4);
+    // Friction of both corners stops what is left of the metre per second.
+    EXPECT_GT(run.x[0], 0);
+}
+
+TEST(ContactMotion, TheWoodpeckerDescendsAsUnderTimeSteppingAlone)
+{
+    // A sleeve that jams and slides is in contact most of the time; its beak strikes in
+    // between. Both are of order 1 there, so that the descents agree to some steps.
+    const Woodpecker toy;
+    const double h = 1e-5;
+    const auto run = hand_over(toy, Woodpecker::start(), Woodpecker::start_velocity(),
+                               {.t_end = 1, .set_valued = {.step = h}});
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    EXPECT_GT(run.statistics.to_flight, 2U);
+    TimeStepping<Woodpecker> steps(toy, Woodpecker::start(), Woodpecker::start_velocity(),
+                                   {.t_end = 1, .step = h});
+    ASSERT_EQ(steps.run(), SetValuedOutcome::reached_end);
+    EXPECT_NEAR(run.x[0], steps.state().q[0], 0.02 * std::abs(steps.state().q[0]));
+}
+
+TEST(ContactMotion, RefusesAStartInsideAnObstacle)
+{
+    EXPECT_THROW((void)hand_over(Ball{}, {0, -0.1}, {0, 0}, {.t_end = 1}), std::invalid_argument);
+    EXPECT_THROW((void)hand_over(Ball{.mu = -1}, {0, 1}, {0, 0}, {.t_end = 1}),
+                 std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ricochet
