@@ -5,14 +5,17 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <new>
 #include <string>
 #include <vector>
 
+#include "ricochet/detect/gate.hpp"
 #include "ricochet/learn/random.hpp"
 #include "ricochet/nn/bounds.hpp"
 #include "ricochet/nn/certificate.hpp"
@@ -428,6 +431,133 @@ TEST(Certify, AWrongSlackIsNamedWithBothStates)
     EXPECT_NE(said.find("is declared"), std::string::npos) << said;
 }
 
+/// The room, which also knows its least guard over a box.
+struct MeasuredRoom : Room {
+    double raised = 0;  ///< added to the bound
+
+    [[nodiscard]] double guard_least(const State& lower, const State& upper) const
+    {
+        double furthest = 0;
+        State nearest{};  // to the middle of the room
+        for (std::size_t i = 0; i < 2; ++i) {
+            furthest = std::max({furthest, std::fabs(lower[i]), std::fabs(upper[i])});
+            nearest[i] = std::clamp(0.0, lower[i], upper[i]);
+        }
+        const double pillar_gap = std::hypot(nearest[0], nearest[1]) - pillar;
+        return std::min(1 - furthest, pillar_gap) - 1e-14 + raised;
+    }
+};
+static_assert(LeastGuard<MeasuredRoom, Room::State> && !LeastGuard<Room, Room::State>);
+
+learn::GuardProblem measured_problem(double raised = 0)
+{
+    MeasuredRoom room;
+    room.raised = raised;
+    return learn::guard_problem(room, room_model(), Room::State{});
+}
+
+TEST(Certify, ALeastGuardProvesTheSameWithFewerBoxes)
+{
+    const learn::CertifyOptions options{.margin = 0.05, .search = false};
+    Model model = room_model();
+    model.threshold = 1.45;
+    const auto by_slack = learn::certify(model, room_problem(), options);
+    const auto by_least = learn::certify(model, measured_problem(), options);
+    ASSERT_EQ(by_slack.report.outcome, learn::CertifyOutcome::proved);
+    ASSERT_EQ(by_least.report.outcome, learn::CertifyOutcome::proved);
+    EXPECT_LT(by_least.report.levels[0].boxes, by_slack.report.levels[0].boxes);
+    model.threshold = 1.7;  // a state with a guard of 0.05 has a logit of 1.525
+    EXPECT_EQ(learn::certify(model, measured_problem(), options).report.outcome,
+              learn::CertifyOutcome::refuted);
+}
+
+TEST(Certify, AWrongLeastGuardIsNamedAndOneThatIsNoNumberProvesNothing)
+{
+    const std::string said = sentence<std::invalid_argument>([] {
+        static_cast<void>(
+            learn::certify(room_model(), measured_problem(0.4), {.margin = 0.01, .closest = 1e-3}));
+    });
+    EXPECT_NE(said.find("guard_least is wrong: the guard is "), std::string::npos) << said;
+
+    Model model = room_model();
+    model.threshold = 1;
+    const auto out = learn::certify(model, measured_problem(nan),
+                                    {.margin = 0.05, .search = false, .smallest = 1.0 / 16});
+    ASSERT_EQ(out.report.outcome, learn::CertifyOutcome::partly_proved);
+    const CertifiedClassifier certified(out.model);
+    Random random(6);
+    for (int i = 0; i < 1000; ++i) {
+        const Room::State x{random.uniform(-1, 1), random.uniform(-1, 1)};
+        EXPECT_FALSE(certified.clears(x.data()));
+    }
+}
+
+/// The room's network as a gate, whose thresholds are far too high.
+Model gate_model()
+{
+    Model model = room_model();
+    model.kind = "gate-level";
+    model.levels = {{.value = 0.03, .threshold = 3}, {.value = 0.1, .threshold = 2.5}};
+    model.calibration = {.events = 100, .misses = 0, .miss_bound = 0.03, .steps = 1000, .seed = 1};
+    return model;
+}
+
+TEST(Certify, AGateOfLevelsKeepsWhatIsProvedOfEachLevel)
+{
+    for (const auto& problem : {room_problem(), measured_problem()}) {
+        const auto out = learn::certify(gate_model(), problem, {});
+        ASSERT_TRUE(out.proved());
+        ASSERT_EQ(out.model.levels.size(), 2U);
+        EXPECT_EQ(out.model.levels[0].value, 0.03);
+        EXPECT_EQ(out.model.levels[1].value, 0.1);
+        // At the pillar a guard of r has a logit of at least 5 (0.8 - (0.3 + r) sqrt 2), which is
+        // 1.67 and 1.17.
+        EXPECT_LE(out.model.levels[0].threshold, 1.6667);
+        EXPECT_LE(out.model.levels[1].threshold, 1.1717);
+        EXPECT_GE(out.model.levels[1].threshold, 0.9);
+        EXPECT_EQ(out.model.calibration.events, 0U);
+        EXPECT_EQ(why_void(out.model), "");
+
+        const Gate gate(out.model);
+        const CertifiedClassifier certified(out.model);
+        Random random(9);
+        int far = 0;
+        for (int i = 0; i < 20'000; ++i) {
+            const Room::State x{random.uniform(-1, 1), random.uniform(-1, 1)};
+            const double cleared = gate.cleared(x.data());
+            EXPECT_TRUE(cleared == 0 || Room{}.guard(0, x) > cleared);
+            EXPECT_EQ(std::max(certified.lower_bound(x.data()), 0.0), cleared);
+            far += cleared == 0.1 ? 1 : 0;
+        }
+        EXPECT_GT(far, 5000);
+
+        Model bolder = out.model;
+        bolder.levels[1].threshold += 0.01;
+        EXPECT_NE(why_void(bolder).find("above 0.1"), std::string::npos);
+        bolder = out.model;
+        bolder.levels[1].value = 0.2;
+        EXPECT_NE(why_void(bolder), "");
+        Model shier = out.model;
+        shier.levels[1].threshold -= 0.01;
+        EXPECT_EQ(why_void(shier), "");
+    }
+}
+
+TEST(Certify, AGateOfHorizonsIsRefused)
+{
+    Model model = gate_model();
+    model.kind = "gate-horizon";
+    EXPECT_NE(sentence<std::invalid_argument>([&] {
+                  static_cast<void>(learn::certify(model, room_problem(), {}));
+              }).find("horizons"),
+              std::string::npos);
+    EXPECT_NE(sentence<std::invalid_argument>([&] {
+                  static_cast<void>(
+                      learn::certify(room_model(), room_problem(), {.margins = {0.1, 0.05}}));
+              }).find("rise"),
+              std::string::npos);
+}
+
 TEST(Certify, DoesNotTrustASlackOrGuardThatIsNotANumber)
 {
     // All that is left to prove with is the logit: whatever may clear stays unproved.
@@ -533,6 +663,51 @@ TEST_F(CertifyFiles, OutOfTimeKeepsAPartialRecord)
     EXPECT_NE(refusal(room_model(), room_problem()).find("cut short"), std::string::npos);
     fs::remove(checkpoint_);
     EXPECT_NE(refusal(room_model(), room_problem()).find("cannot be read"), std::string::npos);
+}
+
+TEST_F(CertifyFiles, OutOfMemoryKeepsAPartialRecord)
+{
+    learn::CertifyOptions options{.margin = 0.01, .closest = 1e-3, .smallest = 1.0 / 65536};
+    std::atomic<std::uint64_t> asked = 0;
+    learn::GuardProblem counted = room_problem();
+    counted.guard = [&, guard = counted.guard](const double* x) {
+        ++asked;
+        return guard(x);
+    };
+    const learn::CertifiedModel whole = learn::certify(room_model(), counted, options);
+    ASSERT_TRUE(whole.proved());
+    const std::uint64_t all = asked;
+
+    // A guard that finds no memory, at any time from the first call to the last but one in a
+    // hundred: in a search, an estimate or a proof.
+    options.checkpoint = checkpoint_;
+    int partial = 0;
+    for (const double share : {0.0, 0.3, 0.7, 0.99}) {
+        options.resume = false;
+        fs::remove(checkpoint_);
+        std::atomic<bool> starved = true;
+        asked = 0;
+        learn::GuardProblem hungry = room_problem();
+        hungry.guard = [&, guard = hungry.guard](const double* x) {
+            // The key of a checkpoint takes the first four.
+            if (starved && ++asked > 4 + static_cast<std::uint64_t>(share * (double(all) - 4))) {
+                throw std::bad_alloc();
+            }
+            return guard(x);
+        };
+        const learn::CertifiedModel cut = learn::certify(room_model(), hungry, options);
+        ASSERT_EQ(cut.report.outcome, learn::CertifyOutcome::out_of_memory);
+        EXPECT_TRUE(cut.model.certificate.empty());
+        EXPECT_NE(learn::describe(cut.report.outcome).find("memory"), std::string_view::npos);
+        ASSERT_TRUE(fs::exists(checkpoint_));
+        partial += fs::file_size(checkpoint_) > 1000 ? 1 : 0;
+        starved = false;
+        options.resume = true;
+        const learn::CertifiedModel out = learn::certify(room_model(), hungry, options);
+        EXPECT_TRUE(out.proved());
+        EXPECT_EQ(without_times(out.model), without_times(whole.model));
+    }
+    EXPECT_GT(partial, 0);  // some of it was kept
 }
 
 TEST(Certify, EstimatesTheNumberOfBoxes)

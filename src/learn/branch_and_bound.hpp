@@ -68,6 +68,7 @@ public:
 
 private:
     bool proved_by_guard(Box& box) const;
+    bool proved_by_least(Box& box) const;
     bool proved_by_logit(Box& box, NetworkBounds::Scratch& scratch, double* influence) const;
     std::size_t choose_axis(const Box& box, const double* half, const double* influence) const;
     [[nodiscard]] bool is_counterexample(const double* x) const;

@@ -35,6 +35,13 @@ void check(const CertifyOptions& o)
     require(o.levels >= 1 && o.levels <= 32, "levels must lie in [1, 32]", number(o.levels));
     require(std::isfinite(o.ratio) && o.ratio > 1, "ratio must be above 1", o.ratio);
     require(o.levels == 1 || o.margin > 0, "several levels need a positive margin", o.margin);
+    double before = -1;
+    for (const double m : o.margins) {
+        require(std::isfinite(m) && m >= 0 && m > before,
+                "margins must be finite, not negative and rise", m);
+        before = m;
+    }
+    require(o.margins.size() <= 32, "there may be at most 32 margins", number(o.margins.size()));
     require(o.closest > 0 && o.closest < 1, "closest must lie in (0, 1)", o.closest);
     require(o.smallest > 0 && o.smallest <= 1, "smallest must lie in (0, 1]", o.smallest);
     require(o.limit > 0, "limit must be positive", o.limit);
@@ -42,8 +49,26 @@ void check(const CertifyOptions& o)
     require(o.threads >= 1 && o.threads <= 64, "threads must lie in [1, 64]", o.threads);
 }
 
+constexpr std::string_view level_gate = "gate-level";
+
+/// The margins of a gate of levels, unless others are asked for.
+CertifyOptions completed(const Model& model, CertifyOptions o)
+{
+    if (model.kind == level_gate && o.margins.empty()) {
+        for (const GateLevel& level : model.levels) o.margins.push_back(level.value);
+    }
+    if (!o.margins.empty()) o.levels = o.margins.size();
+    return o;
+}
+
 void check_recipe(const Model& model)
 {
+    if (model.kind == "gate-horizon") {
+        throw std::invalid_argument(
+            "certify: expected a classifier or a gate of levels, got a gate of horizons, which "
+            "says "
+            "nothing of the guard's value");
+    }
     if (model.recipe == name(Recipe::state)) return;
     throw std::invalid_argument(
         fmt::format("certify: expected a model with the recipe 'state', whose features are the "
@@ -67,8 +92,10 @@ std::string key(const Model& model, const GuardProblem& problem, const CertifyOp
     std::string out =
         fmt::format("{} {} {} {} {} {} {} {} {}", fingerprint(model), o.margin, o.levels, o.ratio,
                     o.search, o.closest, o.smallest, o.max_unproved, o.seed);
+    for (const double margin : o.margins) out += fmt::format(" {}", margin);
     for (int i = 0; i < 4; ++i) {
         draw(model, random, x);
+        if (problem.least) out += fmt::format(" {}", problem.least(x.data(), x.data()));
         out += fmt::format(" {} {}", problem.guard(x.data()), problem.slack(x.data()));
     }
     return out;
@@ -80,11 +107,11 @@ public:
               const CertifyCallback& progress)
         : model_(model),
           problem_(problem),
-          o_(options),
+          o_(completed(model, options)),
           progress_(progress),
           classifier_(model),
           bounds_(model),
-          key_(key(model, problem, options))
+          key_(key(model, problem, o_))
     {
         if (o_.resume) all_ = load(key_, o_.checkpoint);
     }
@@ -128,6 +155,7 @@ private:
 
     [[nodiscard]] double margin_of(std::size_t level) const
     {
+        if (!o_.margins.empty()) return o_.margins[level];
         return o_.margin * std::pow(o_.ratio, static_cast<double>(level));
     }
 
@@ -295,7 +323,9 @@ private:
                                .seconds = begun.seconds,
                                .unproved = total.unproved};
         const double lowest = std::min(total.lowest, begun.threshold);
-        if (begun.threshold - lowest <= begun.lowering) {
+        // A gate has no list of exceptions.
+        if (begun.threshold - lowest <= begun.lowering ||
+            (model_.kind == level_gate && std::isfinite(lowest))) {
             level.threshold = lowest;
             level.unproved.clear();
         }
@@ -313,11 +343,27 @@ private:
         }
     }
 
+    /// The levels that a gate may keep: proved without exception.
+    [[nodiscard]] std::vector<GateLevel> proved_gate() const
+    {
+        std::vector<GateLevel> out;
+        for (const CertificateLevel& level : all_.levels) {
+            if (!(level.margin > 0) || !level.unproved.empty()) continue;
+            out.push_back({.value = level.margin, .threshold = level.threshold});
+        }
+        return out;
+    }
+
     CertifiedModel result(CertifyOutcome outcome)
     {
         CertifiedModel out{.model = model_, .report = {}};
         out.model.certificate.clear();
-        if (!all_.levels.empty()) {
+        const std::vector<GateLevel> gate = proved_gate();
+        if (!all_.levels.empty() && (model_.kind != level_gate || !gate.empty())) {
+            if (model_.kind == level_gate) {
+                out.model.levels = gate;
+                out.model.calibration = {};
+            }
             out.model.threshold = all_.levels.front().threshold;
             out.model.certificate = to_text(Certificate{.tool = RICOCHET_TOOL,
                                                         .fingerprint = fingerprint(out.model),
@@ -340,7 +386,7 @@ private:
 
     const Model& model_;
     const GuardProblem& problem_;
-    const CertifyOptions& o_;
+    const CertifyOptions o_;
     const CertifyCallback& progress_;
     Classifier classifier_;
     NetworkBounds bounds_;

@@ -211,6 +211,17 @@ std::string why_void(const Model& model)
         return fmt::format("is for a threshold of {}, the model has {}",
                            certificate.levels.front().threshold, model.threshold);
     }
+    for (const GateLevel& level :
+         model.kind == "gate-level" ? model.levels : std::vector<GateLevel>{}) {
+        const bool proved = std::any_of(
+            certificate.levels.begin(), certificate.levels.end(), [&](const CertificateLevel& l) {
+                return l.margin >= level.value && l.threshold >= level.threshold &&
+                       l.unproved.empty();
+            });
+        if (proved) continue;
+        return fmt::format("does not prove that the guard is above {} where the logit is below {}",
+                           level.value, level.threshold);
+    }
     if (const std::string now = fingerprint(model); certificate.fingerprint != now) {
         return fmt::format("is for other weights: their fingerprint was {}, it is {}",
                            certificate.fingerprint, now);

@@ -1,6 +1,8 @@
 #include "ricochet/systems/least_eigenvalue.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -115,6 +117,28 @@ double LeastEigenvalue::least(const State& q) const noexcept
 double LeastEigenvalue::most(const State& q) const noexcept
 {
     return matrices_->table.upper_bound(q);
+}
+
+double LeastEigenvalue::least_over(const State& lower, const State& upper) const noexcept
+{
+    double out = std::numeric_limits<double>::infinity();
+    for (unsigned corner = 0; corner < 16; ++corner) {
+        State q;
+        for (std::size_t k = 0; k < 4; ++k) q[k] = (corner >> k & 1U) != 0 ? upper[k] : lower[k];
+        const double here = p_.table > 0 ? least(q) : eigenvalue(q) - 1e-11;
+        if (std::isnan(here)) return here;
+        out = std::min(out, here);
+    }
+    return out;
+}
+
+std::optional<double> LeastEigenvalue::parameter(std::string_view which) const noexcept
+{
+    if (which == "level") return p_.level;
+    if (which == "amplitude") return p_.amplitude;
+    if (which == "frequency") return p_.frequency;
+    if (which == "seed") return static_cast<double>(p_.seed);
+    return std::nullopt;
 }
 
 double LeastEigenvalue::eigenvalue(const State& q) const noexcept

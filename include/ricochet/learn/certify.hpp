@@ -15,8 +15,15 @@
 // prove a part of a box, is not asked there again. A box that is too narrow to be cut is
 // unproved: it is listed in the record, and asked exactly at run time.
 //
-// What the proof takes as true is `guard_slack`. Every cut samples it, at the centres of a
-// box and its halves; one that is broken is named with both states.
+// A system that knows more declares `guard_least`, a lower bound of its guard over a box, which
+// then takes the place of the second condition: that of a concave guard is at a corner.
+//
+// A gate of levels is proved level by level: its certificate says "logit < threshold_k implies
+// guard > rho_k", and its thresholds become those that were proved.
+//
+// What the proof takes as true is `guard_slack` and `guard_least`. Every cut samples the first, at
+// the centres of a box and its halves; one proof in 64 by the second compares it with the guard at
+// the centre. One that is broken is named with the states.
 #pragma once
 
 #include <array>
@@ -58,6 +65,17 @@ concept SlackedGuard = Guarded<System, X> && requires(const System& system, cons
         } -> std::convertible_to<double>;
 };
 
+/// It also bounds its guard from below over a box of states, the guard's own rounding included:
+/// guard(t, x) >= guard_least(lower, upper) if lower_i <= x_i <= upper_i for all i. -infinity says
+/// nothing. Its slack then only says along which edge a box is cut.
+template <class System, class X>
+concept LeastGuard = SlackedGuard<System, X> && requires(const System& system, const X& corner)
+{
+    {
+        system.guard_least(corner, corner)
+        } -> std::convertible_to<double>;
+};
+
 }  // namespace ricochet
 
 namespace ricochet::learn {
@@ -67,12 +85,17 @@ namespace ricochet::learn {
 struct GuardProblem {
     std::function<double(const double* x)> guard;
     std::function<double(const double* half_widths)> slack;  ///< see `SlackedGuard`
+    /// See `LeastGuard`; empty: there is none.
+    std::function<double(const double* lower, const double* upper)> least{};
 };
 
 struct CertifyOptions {
     double margin = 0;       ///< of the first level, in units of the guard
     std::size_t levels = 1;  ///< 1 to 32
     double ratio = 2;        ///< between margins; above 1, needs a positive margin
+    /// Of each level, rising, instead of the three above. Empty, and the model a gate of levels:
+    /// those of the gate.
+    std::vector<double> margins{};
     /// Look for the highest threshold that can be proved, and put it into the model. Otherwise
     /// the stored threshold is proved as it is; further levels are always searched for.
     bool search = true;
@@ -139,7 +162,8 @@ struct CertifyReport {
 };
 
 /// A model with its certificate, which has the levels that were finished; none: empty. The
-/// threshold is the proved one.
+/// threshold is the proved one. A gate keeps the levels that were proved, with the proved
+/// thresholds, and no calibration: that was of other ones.
 struct CertifiedModel {
     Model model;
     CertifyReport report;
@@ -156,7 +180,8 @@ struct CertifiedModel {
 /// search is cut short by `limit`, which depends on the speed of the machine.
 ///
 /// @throws std::invalid_argument if an option is outside its range, if the recipe of the model is
-///         not `state`, as `NetworkBounds`, or if the slack is found broken, with both states.
+///         not `state`, if it is a gate of horizons (which speak of times, not of values), as
+///         `NetworkBounds`, or if slack or least guard are found broken, with the states.
 /// @throws std::runtime_error if the checkpoint cannot be written or read, or belongs to another
 ///         model or other options.
 [[nodiscard]] CertifiedModel certify(const Model& model, const GuardProblem& problem,
@@ -218,12 +243,18 @@ GuardProblem guard_problem(System system, const Model& model, const X& like)
         for (std::size_t i = 0; i < n; ++i) x[i] = from[i];
         return x;
     };
-    return {
+    GuardProblem problem{
         .guard =
             [system, state](const double* x) {
                 return ricochet::detail::call_guard(system, 0, 0, 0.0, state(x));
             },
         .slack = [system, state](const double* h) { return double(system.guard_slack(state(h))); }};
+    if constexpr (LeastGuard<System, X>) {
+        problem.least = [system, state](const double* lower, const double* upper) {
+            return double(system.guard_least(state(lower), state(upper)));
+        };
+    }
+    return problem;
 }
 
 }  // namespace ricochet::learn

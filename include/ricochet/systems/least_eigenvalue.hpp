@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
@@ -116,6 +117,27 @@ public:
         return most({x[0], x[1], x[2], x[3]}) - p_.level;
     }
 
+    /// By Weyl's inequality, for `learn::certify`.
+    template <class X>
+    [[nodiscard]] double guard_slack(const X& half_widths) const noexcept
+    {
+        double sum = 1e-11;  // of two solutions
+        for (std::size_t k = 0; k < 4; ++k) sum += norm_[k] * half_widths[k];
+        return sum;
+    }
+    /// A concave function is least at a corner of a box. From the table, or without one from 16
+    /// eigenvalue problems.
+    template <class X>
+    [[nodiscard]] double guard_least(const X& lower, const X& upper) const noexcept
+    {
+        return least_over({lower[0], lower[1], lower[2], lower[3]},
+                          {upper[0], upper[1], upper[2], upper[3]}) -
+               p_.level;
+    }
+
+    /// By name; nothing for one that does not exist.
+    [[nodiscard]] std::optional<double> parameter(std::string_view which) const noexcept;
+
     /// Eigenvalue problems that the table has cost.
     [[nodiscard]] std::size_t tabulated() const noexcept;
 
@@ -130,6 +152,7 @@ private:
 
     [[nodiscard]] double least(const State& q) const noexcept;
     [[nodiscard]] double most(const State& q) const noexcept;
+    [[nodiscard]] double least_over(const State& lower, const State& upper) const noexcept;
     [[nodiscard]] double eigenvalue_rate(const State& q, const State& rates) const noexcept;
 
     Parameters p_;
