@@ -70,9 +70,9 @@ template <StateEvolution evolution>
         const double heal = p.v_star * std::exp(-xi) / l;
         return {heal - s / l, -1 / l, -heal, 0, 0, heal};
     } else if constexpr (evolution == StateEvolution::slip) {
+        if (!(s > 0)) return {};  // its slope is -infinity, but vanishes with ds/dV
         const double log_omega = std::log(s / p.v_star) + xi;  // of V theta / D_RS
-        const double rate = s > 0 ? -(s / l) * log_omega : 0;
-        return {rate, -(log_omega + 1) / l, -s / l, -1 / (l * s), -1 / l, 0};
+        return {-(s / l) * log_omega, -(log_omega + 1) / l, -s / l, -1 / (l * s), -1 / l, 0};
     } else {
         const double heal = p.v_star * std::exp(-xi) / l;
         const double cut = 1 / (4 * heal * l * l);
