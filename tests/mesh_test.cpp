@@ -105,6 +105,25 @@ TEST(Mesh, BumpySpheresAreClosed)
     }
 }
 
+TEST(Mesh, WindsAroundWhatIsInside)
+{
+    Mesh mesh = potato(2, 1.5);
+    Random random(8);
+    int inside = 0;
+    for (int i = 0; i < 500; ++i) {
+        const Vector3d p(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2));
+        // A ray from the origin leaves a surface that is seen whole from there once, so that a
+        // point is inside if no face lies between.
+        const double r = p.norm();
+        if (r > 1 && r < 2.3) continue;  // radii of the potato
+        EXPECT_EQ(winding_number(mesh, p), r <= 1 ? 1 : 0);
+        inside += r <= 1 ? 1 : 0;
+    }
+    EXPECT_GT(inside, 10);
+    for (auto& face : mesh.faces) std::swap(face[0], face[1]);
+    EXPECT_EQ(winding_number(mesh, {0.1, 0.2, 0}), -1);
+}
+
 TEST(Triangles, TheTreeFindsTheNearestFaceOfAPoint)
 {
     Random random(1);
@@ -271,6 +290,11 @@ TEST(CaveBody, BadMeshesAreRefused)
     EXPECT_NE(sentence(potato(1, 5), undefined).find("is not finite"), std::string::npos);
     EXPECT_NE(sentence(potato(1, 1), potato(1, 1)).find("must be clear of face"),
               std::string::npos);
+    Mesh beside = potato(1, 0.5);
+    for (Vector3d& v : beside.vertices) v.x() += 20;
+    EXPECT_NE(sentence(potato(1, 5), beside).find("inside of the cave"), std::string::npos);
+    EXPECT_NE(sentence(potato(1, 0.5), potato(1, 5)).find("inside of the cave"),
+              std::string::npos);  // the body around the cave
     EXPECT_NE(refusal([] { CaveBody({.cave_refinements = 9}); }).find("cave_refinements"),
               std::string::npos);
     EXPECT_NE(refusal([] { CaveBody({.drag = 0}); }).find("drag"), std::string::npos);

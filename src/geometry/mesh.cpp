@@ -184,6 +184,20 @@ void require_closed(const Mesh& mesh)
     }
 }
 
+int winding_number(const Mesh& mesh, const Eigen::Vector3d& p)
+{
+    double angle = 0;
+    for (const auto& [i, j, k] : mesh.faces) {
+        const Eigen::Vector3d a = mesh.vertices[i] - p;
+        const Eigen::Vector3d b = mesh.vertices[j] - p;
+        const Eigen::Vector3d c = mesh.vertices[k] - p;
+        const double la = a.norm(), lb = b.norm(), lc = c.norm();
+        angle += 2 * std::atan2(a.dot(b.cross(c)),
+                                la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+    }
+    return static_cast<int>(std::lround(angle / (4 * std::numbers::pi)));
+}
+
 Mesh bumpy_sphere(int refinements, const std::function<double(const Eigen::Vector3d&)>& radius)
 {
     const double g = std::numbers::phi;

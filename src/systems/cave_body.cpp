@@ -100,10 +100,18 @@ struct CaveBody::Shapes {
 };
 
 CaveBody::CaveBody(const Parameters& parameters)
-    : CaveBody(checked(parameters),
-               bumpy("cave_refinements", parameters.cave_refinements, parameters.cave_size, 0.06),
-               bumpy("body_refinements", parameters.body_refinements, parameters.body_size, 0.1))
+    : CaveBody(checked(parameters), cave_of(parameters), body_of(parameters))
 {
+}
+
+geometry::Mesh CaveBody::cave_of(const Parameters& p)
+{
+    return bumpy("cave_refinements", p.cave_refinements, p.cave_size, 0.06);
+}
+
+geometry::Mesh CaveBody::body_of(const Parameters& p)
+{
+    return bumpy("body_refinements", p.body_refinements, p.body_size, 0.1);
 }
 
 CaveBody::CaveBody(const Parameters& parameters, const geometry::Mesh& cave,
@@ -119,6 +127,11 @@ CaveBody::CaveBody(const Parameters& parameters, const geometry::Mesh& cave,
             "CaveBody: face {} of the body must be clear of face {} of the cave at the start by "
             "more than {}, its distance is {}",
             found.other_face, found.face, p_.clearance, found.distance));
+    }
+    // Surfaces that do not cross: one vertex speaks for the whole body.
+    if (geometry::winding_number(cave, body.vertices[body.faces[0][0]]) == 0) {
+        throw std::invalid_argument(
+            "CaveBody: the body must be inside of the cave at the start; face 0 is not");
     }
     if (p_.grid > 0) {
         std::uint32_t hint = 0;

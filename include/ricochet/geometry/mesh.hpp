@@ -29,6 +29,11 @@ struct Mesh {
 /// to exactly one other face, run through the other way.
 void require_closed(const Mesh& mesh);
 
+/// How often the surface of a closed mesh winds around p, from the solid angles of its faces
+/// (Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983, eq. 8): 0 outside; 1 or -1
+/// inside of a simple surface, by the way its faces run. Not defined on the surface.
+[[nodiscard]] int winding_number(const Mesh& mesh, const Eigen::Vector3d& p);
+
 /// A sphere around the origin whose radius depends on the direction: an icosahedron,
 /// every face cut into four `refinements` times; 20 * 4^refinements faces.
 [[nodiscard]] Mesh bumpy_sphere(int refinements,

@@ -29,9 +29,11 @@ namespace ricochet {
 ///
 /// Where the surfaces cross, the guard is minus the clearance.
 ///
-/// *Bounds.* Points of the body move at most by |v| + R |w|, R the distance of the farthest from
-/// p. Until the next impact |v| <= max(|v|, sqrt(gravity / drag)) and |w| falls, so that
-/// this speed changes by at most gravity + drag |v|² + R spin_drag |w|.
+/// *Bounds.* The point r of the body, |r| <= R, R the distance of the farthest from p, moves with
+/// v + w x r, and w x r is a vector of at most R |w| at a right angle to w: no point is faster than
+/// the root of u² + (s + R |w|)², u and s the parts of v along w and across it. Until the next
+/// impact |v| <= max(|v|, sqrt(gravity / drag)) and |w| falls, so that this speed changes by at
+/// most gravity + drag |v|² + R spin_drag |w|.
 ///
 /// *Lower bound.* The body is covered by balls; the distance of their centres to the cave comes
 /// from a table.
@@ -73,8 +75,13 @@ public:
 
     /// These meshes; refinements and sizes are not used. The body begins where it is.
     /// @throws std::invalid_argument also for a mesh that is empty, open or has a
-    /// coordinate that is no number, naming the face.
+    /// coordinate that is no number, naming the face, and for a body that is not inside of the
+    /// cave.
     CaveBody(const Parameters& parameters, const geometry::Mesh& cave, const geometry::Mesh& body);
+
+    /// The bumpy meshes of these parameters.
+    [[nodiscard]] static geometry::Mesh cave_of(const Parameters& parameters);
+    [[nodiscard]] static geometry::Mesh body_of(const Parameters& parameters);
 
     static constexpr std::string_view name = "cave-body";
     static constexpr bool unilateral = true;
@@ -131,7 +138,12 @@ public:
     template <class X>
     [[nodiscard]] double speed_bound(double /*t*/, const X& x) const noexcept
     {
-        return norm(x, 7) + farthest_ * norm(x, 10);
+        const double v = norm(x, 7);
+        const double w = norm(x, 10);
+        const double along = w > 0 ? (x[7] * x[10] + x[8] * x[11] + x[9] * x[12]) / w : v;
+        const double across = std::sqrt(std::fmax(v * v - along * along, 0)) + farthest_ * w;
+        // Rounding of the two parts of v is far below 1e-12 of it.
+        return (1 + 1e-12) * std::sqrt(along * along + across * across);
     }
 
     template <class X>
