@@ -252,6 +252,17 @@ TEST(Metered, APredictionThatSavesNothingIsHardlyAskedFor)
     EXPECT_LT(verified.run.statistics.network_calls, verified.run.statistics.steps / 20);
 }
 
+TEST(Metered, AWrongBoundIsNamedUnderAGate)
+{
+    const Shuttle boastful{.loose = 0.25};  // four times as fast as it says
+    const Foreseen foreseen(horizon_gate(0.02), {.check_bounds = true});
+    const auto run = integrate(boastful, at_centre, fifty_seconds, Fixed{}, foreseen);
+    ASSERT_EQ(run.outcome, Outcome::wrong_bound);
+    ASSERT_TRUE(run.wrong_bound);
+    EXPECT_GT(std::fabs(run.wrong_bound->value - run.wrong_bound->value_then),
+              run.wrong_bound->allowed);
+}
+
 TEST(Metered, RefusesOptionsThatMakeNoSense)
 {
     const auto refusal = [](const MeterOptions& options) -> std::string {

@@ -2,9 +2,12 @@
 #include "ricochet/learn/train_gate.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -212,6 +215,52 @@ TEST(TrainGate, StopsWhenItIsToldAndKeepsTheBest)
     EXPECT_NO_THROW(Gate gate(trained.model));
 }
 
+TEST(TrainGate, InterruptedAnywhereItIsResumedToTheSameBits)
+{
+    const auto file = std::filesystem::temp_directory_path() /
+                      ("ricochet-gate-" + std::to_string(getpid()) + ".checkpoint");
+    GateTraining training = quick();
+    training.events = 60;
+    training.validation_events = 40;
+    training.fresh_events = 40;
+    training.iterations = 300;
+    training.evaluate_every = 100;
+    training.rounds = 3;
+    const auto whole = train_gate(Table{}, on_the_table(), Fixed{}, {}, training);
+    training.checkpoint = file;
+    // In the first round, at the end of it, in the last one.
+    for (const std::size_t stop : {2U, 3U, 8U}) {
+        std::filesystem::remove(file);
+        std::size_t calls = 0;
+        training.resume = false;
+        const auto part = train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
+                                     [&](const Progress&) { return ++calls < stop; });
+        ASSERT_EQ(part.report.outcome, TrainingOutcome::stopped) << stop;
+        EXPECT_EQ(part.report.trial.events, 0U);
+        training.resume = true;
+        const std::size_t before = calls;
+        const auto rest = train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
+                                     [&](const Progress&) { return ++calls > 0; });
+        EXPECT_EQ(to_safetensors(rest.model), to_safetensors(whole.model)) << stop;
+        EXPECT_EQ(rest.report.iterations, whole.report.iterations);
+        EXPECT_EQ(rest.report.trial.gated_calls, whole.report.trial.gated_calls);
+        EXPECT_EQ(calls - before, 9U - stop);  // nothing was done twice
+    }
+    training.seed = 4;
+    try {
+        (void)train_gate(Table{}, on_the_table(), Fixed{}, {}, training);
+        ADD_FAILURE() << "the checkpoint of another seed was taken";
+    } catch (const std::runtime_error& error) {
+        EXPECT_NE(std::string(error.what()).find("other data or options"), std::string::npos);
+    }
+    std::ofstream(file, std::ios::app) << "x";
+    EXPECT_THROW((void)train_gate(Table{}, on_the_table(), Fixed{}, {}, training),
+                 std::runtime_error);
+    std::filesystem::remove(file);
+    EXPECT_THROW((void)train_gate(Table{}, on_the_table(), Fixed{}, {}, training),
+                 std::runtime_error);
+}
+
 TEST(TrainGate, RefusesRunsWithoutEventsAndRunsOfNothingButEvents)
 {
     /// At rest in the middle of the table.
@@ -238,6 +287,53 @@ TEST(TrainGate, RefusesRunsWithoutEventsAndRunsOfNothingButEvents)
     EXPECT_NE(refusal([&] {
                   (void)train_gate(Table{}, beyond, Fixed{}, {}, quick());
               }).find("none of 1000 starts can be run"),
+              std::string::npos);
+}
+
+/// It says that it is half as fast as it is.
+struct BoastfulTable : MeasuredTable {
+    static constexpr std::string_view name = "boastful-table";
+    template <class V>
+    double speed_bound(double t, const V& x) const
+    {
+        return 0.5 * MeasuredTable::speed_bound(t, x);
+    }
+    template <class V>
+    double acceleration_bound(double, const V&) const
+    {
+        return 0;
+    }
+};
+
+TEST(TrainGate, RefusesLevelsThatTellNothingApartAndBoundsThatAreBroken)
+{
+    GateTraining training = quick();
+    training.kind = GateKind::level;
+    training.levels = {5, 10};  // the table has a radius of 1
+    EXPECT_NE(refusal([&] {
+                  (void)train_gate(MeasuredTable{}, on_the_table(), Fixed{}, {}, training);
+              }).find("nothing is ever clear"),
+              std::string::npos);
+    training.levels = {1e-9};
+    training.most_steps = 2000;
+    EXPECT_NE(refusal([&] {
+                  (void)train_gate(MeasuredTable{},
+                                   from_box(X{-0.1, -0.1, 0, 0}, X{0.1, 0.1, 0.1, 0.1}), Fixed{},
+                                   {}, [&] {
+                                       GateTraining brief = training;
+                                       brief.run_length = 0.1;
+                                       return brief;
+                                   }());
+              }).find("there is none below the highest level"),
+              std::string::npos);
+    training.levels = {0.1, 0.2};
+    const std::string why =
+        refusal([&] { (void)train_gate(BoastfulTable{}, on_the_table(), Fixed{}, {}, training); });
+    EXPECT_NE(why.find("guard 0 went from"), std::string::npos) << why;
+    EXPECT_NE(why.find("declared bounds allow a change of"), std::string::npos) << why;
+    EXPECT_NE(refusal([&] {
+                  (void)train_gate(Table{}, on_the_table(), Fixed{}, {}, training);
+              }).find("declares a speed_bound"),
               std::string::npos);
 }
 

@@ -12,6 +12,7 @@ namespace ricochet::learn {
 namespace {
 
 constexpr std::string_view magic = "ricochet training checkpoint 1\n";
+constexpr std::string_view gate_magic = "ricochet gate checkpoint 1\n";
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what)
 {
@@ -41,7 +42,7 @@ public:
     void put(const std::vector<Number>& values)
     {
         put(std::uint64_t{values.size()});
-        for (const Number value : values) put(value);
+        for (const Number& value : values) put(value);
     }
 
     [[nodiscard]] const std::string& bytes() const { return bytes_; }
@@ -109,19 +110,35 @@ void fields(Member&& member, Stream&& c)
     member(c.best_score.loss);
 }
 
-}  // namespace
-
-void save_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& file)
+template <class Stream, class Member>
+void gate_fields(Member&& member, Stream&& c)
 {
-    Writer writer;
-    fields([&writer](const auto& member) { writer.put(member); }, checkpoint);
+    member(c.fingerprint);
+    member(c.round);
+    member(c.iteration);
+    member(c.iterations);
+    member(c.since_best);
+    member(c.seconds);
+    for (auto& word : c.random) member(word);
+    member(c.parameters);
+    member(c.adam.steps);
+    member(c.adam.first);
+    member(c.adam.second);
+    member(c.best_cost);
+    member(c.best_parameters);
+    member(c.best_thresholds);
+}
+
+/// With a checksum behind it.
+void write_file(std::string_view first, const Writer& writer, const std::filesystem::path& file)
+{
     Writer tail;
     tail.put(checksum(writer.bytes()));
 
     const std::filesystem::path fresh = file.string() + ".part";
     {
         std::ofstream out(fresh, std::ios::binary | std::ios::trunc);
-        out << magic << writer.bytes() << tail.bytes();
+        out << first << writer.bytes() << tail.bytes();
         out.close();
         if (!out) refuse(file, "cannot be written");
     }
@@ -130,24 +147,56 @@ void save_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& 
     if (error) refuse(file, "cannot be written: " + error.message());
 }
 
-Checkpoint load_checkpoint(const std::filesystem::path& file)
+/// The bytes between the first line and the checksum, which fits.
+std::string read_file(std::string_view first, const std::filesystem::path& file)
 {
     std::ifstream in(file, std::ios::binary);
     if (!in) refuse(file, "cannot be read");
     const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
     std::string_view rest = bytes;
-    if (!rest.starts_with(magic)) refuse(file, "is not a training checkpoint of this version");
-    rest.remove_prefix(magic.size());
+    if (!rest.starts_with(first)) refuse(file, "is not a training checkpoint of this version");
+    rest.remove_prefix(first.size());
     if (rest.size() < 8) refuse(file, "is cut short");
 
     std::uint64_t stored = 0;
     Reader(rest.substr(rest.size() - 8), file).get(stored);
     rest.remove_suffix(8);
     if (stored != checksum(rest)) refuse(file, "is cut short or has been altered");
+    return std::string(rest);
+}
 
+}  // namespace
+
+void save_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& file)
+{
+    Writer writer;
+    fields([&writer](const auto& member) { writer.put(member); }, checkpoint);
+    write_file(magic, writer, file);
+}
+
+void save_checkpoint(const GateCheckpoint& checkpoint, const std::filesystem::path& file)
+{
+    Writer writer;
+    gate_fields([&writer](const auto& member) { writer.put(member); }, checkpoint);
+    write_file(gate_magic, writer, file);
+}
+
+Checkpoint load_checkpoint(const std::filesystem::path& file)
+{
+    const std::string bytes = read_file(magic, file);
     Checkpoint checkpoint;
-    Reader reader(rest, file);
+    Reader reader(bytes, file);
     fields([&reader](auto& member) { reader.get(member); }, checkpoint);
+    if (!reader.at_end()) refuse(file, "is longer than it should be");
+    return checkpoint;
+}
+
+GateCheckpoint load_gate_checkpoint(const std::filesystem::path& file)
+{
+    const std::string bytes = read_file(gate_magic, file);
+    GateCheckpoint checkpoint;
+    Reader reader(bytes, file);
+    gate_fields([&reader](auto& member) { reader.get(member); }, checkpoint);
     if (!reader.at_end()) refuse(file, "is longer than it should be");
     return checkpoint;
 }

@@ -3,15 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <ctime>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "ricochet/learn/assessment.hpp"
+#include "ricochet/learn/checkpoint.hpp"
 #include "ricochet/learn/random.hpp"
 #include "ricochet/learn/train_gate.hpp"
 #include "ricochet/learn/trainable_mlp.hpp"
@@ -168,18 +172,33 @@ public:
         prepare(validation_, validation_states_);
         prepare(training_, training_states_);
         sort_out();
+        fingerprint_ = fingerprint();
+        if (options_.resume) load();
     }
 
     bool run(std::size_t round, const ProgressCallback& progress)
     {
-        const auto start = std::chrono::steady_clock::now();
-        const double before = seconds_;
+        if (resumed_ && round < resumed_->round) {
+            best_ = resumed_->best_parameters[round];
+            thresholds_ = resumed_->best_thresholds[round];
+            keep_round(round);
+            return true;
+        }
         Adam adam(network_.parameters().size(), {});
         best_cost_ = infinity;  // more states may have made what was best too bold
         std::size_t since_best = 0;
-        for (std::size_t i = 0;; ++i) {
+        std::size_t i = 0;
+        const bool goes_on = resumed_ && round == resumed_->round;
+        if (goes_on) {
+            i = static_cast<std::size_t>(resumed_->iteration);
+            since_best = static_cast<std::size_t>(resumed_->since_best);
+            restore(adam);
+        }
+        const auto start = std::chrono::steady_clock::now();
+        const double before = seconds_;
+        for (bool judged = goes_on;; ++i, judged = false) {
             const bool last = i == options_.iterations;
-            if (last || (i > 0 && i % options_.evaluate_every == 0)) {
+            if (!judged && (last || (i > 0 && i % options_.evaluate_every == 0))) {
                 const double loss = evaluate(since_best);
                 const std::chrono::duration<double> spent =
                     std::chrono::steady_clock::now() - start;
@@ -188,6 +207,8 @@ public:
                     outcome_ = TrainingOutcome::diverged;
                     return false;
                 }
+                keep_round(round);
+                if (!options_.checkpoint.empty()) save(round, i, since_best, adam);
                 if (progress && !progress({.iteration = round * options_.iterations + i,
                                            .total = options_.rounds * options_.iterations,
                                            .loss = loss,
@@ -203,6 +224,15 @@ public:
                                                           (1 + std::cos(std::numbers::pi * done));
             step(adam, rate);
         }
+    }
+
+    /// The best of this round so far, from which the next one draws its hard states.
+    void keep_round(std::size_t round)
+    {
+        best_parameters_.resize(round + 1);
+        best_thresholds_.resize(round + 1);
+        best_parameters_[round] = best_;
+        best_thresholds_[round] = thresholds_;
     }
 
     void add(const GateSamples& samples)
@@ -257,6 +287,86 @@ public:
 
 private:
     static constexpr double never = 1e30;
+
+    /// Of all that the training follows from.
+    [[nodiscard]] std::uint64_t fingerprint() const
+    {
+        std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a over 64-bit words
+        const auto add = [&](double value) {
+            hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 0x100000001b3U;
+        };
+        const auto count = [&](std::size_t n) { add(static_cast<double>(n)); };
+        const GateTraining& o = options_;
+        count(horizon() ? 1 : 2);
+        for (const char c : to_string(o.recipe)) count(static_cast<unsigned char>(c));
+        for (const double level : o.levels) add(level);
+        for (const double value : {o.step_min, o.step_max, o.run_length, o.rate, o.final_rate,
+                                   o.fatal_weight, o.quantile, o.logit_margin}) {
+            add(value);
+        }
+        for (const std::size_t n :
+             {o.events, o.states, o.validation_events, o.iterations, o.rounds, o.hard_events,
+              o.neighbours, o.batch, o.evaluate_every, o.patience}) {
+            count(n);
+        }
+        for (const std::size_t width : o.hidden) count(width);
+        add(std::bit_cast<double>(o.seed));
+        for (const GateSamples* set : {&training_, &validation_}) {
+            for (const double value : set->features) add(value);
+            for (const double value : set->event) add(value);
+        }
+        return hash;
+    }
+
+    void load()
+    {
+        GateCheckpoint found = load_gate_checkpoint(options_.checkpoint);
+        const bool fits = found.fingerprint == fingerprint_ && found.round < options_.rounds &&
+                          found.best_parameters.size() == found.round + 1 &&
+                          found.best_thresholds.size() == found.round + 1 &&
+                          found.parameters.size() == network_.parameters().size() &&
+                          found.iteration <= options_.iterations;
+        if (!fits) {
+            throw std::runtime_error(
+                fmt::format("checkpoint '{}' is of a gate with other data or options",
+                            options_.checkpoint.string()));
+        }
+        resumed_ = std::move(found);
+    }
+
+    void save(std::size_t round, std::size_t iteration, std::size_t since_best,
+              const Adam& adam) const
+    {
+        GateCheckpoint now{
+            .fingerprint = fingerprint_,
+            .round = round,
+            .iteration = iteration,
+            .iterations = iterations_,
+            .since_best = since_best,
+            .seconds = seconds_,
+            .random = random_.state(),
+            .parameters = {network_.parameters().begin(), network_.parameters().end()},
+            .adam = adam.state(),
+            .best_cost = best_cost_,
+            .best_parameters = best_parameters_,
+            .best_thresholds = best_thresholds_};
+        save_checkpoint(now, options_.checkpoint);
+    }
+
+    /// What the checkpoint says of the round that it was written in.
+    void restore(Adam& adam)
+    {
+        const GateCheckpoint& from = *resumed_;
+        std::copy(from.parameters.begin(), from.parameters.end(), network_.parameters().begin());
+        adam.restore(from.adam);
+        random_ = Random(from.random);
+        best_ = from.best_parameters.back();
+        thresholds_ = from.best_thresholds.back();
+        keep_round(static_cast<std::size_t>(from.round));
+        best_cost_ = from.best_cost;
+        iterations_ = static_cast<std::size_t>(from.iterations);
+        seconds_ = from.seconds;
+    }
 
     [[nodiscard]] bool horizon() const noexcept { return options_.kind == GateKind::horizon; }
     [[nodiscard]] double largest() const noexcept { return options_.levels.back(); }
@@ -518,6 +628,9 @@ private:
     std::size_t iterations_ = 0;
     double seconds_ = 0;
     TrainingOutcome outcome_ = TrainingOutcome::finished;
+    std::uint64_t fingerprint_ = 0;
+    std::optional<GateCheckpoint> resumed_;
+    std::vector<std::vector<double>> best_parameters_, best_thresholds_;  ///< of every round
 };
 
 GateTrainer::GateTrainer(const GateTraining& options, GateSamples training, GateSamples validation)
@@ -569,6 +682,17 @@ void throw_no_events(std::uint64_t steps)
 void throw_no_bounds()
 {
     refuse("a level gate is for a system that declares a speed_bound, and this one does not");
+}
+
+void throw_wrong_bound(std::size_t guard, double since, double then, double t, double value,
+                       double allowed)
+{
+    refuse(t > since
+               ? fmt::format("guard {} went from {} at {} s to {} at {} s, where its declared "
+                             "bounds allow a change of {}",
+                             guard, then, since, value, t, allowed)
+               : fmt::format("guard {} is {} at {} s, where its declared bound is {}", guard, value,
+                             t, allowed));
 }
 
 double processor_seconds() noexcept

@@ -35,6 +35,27 @@ struct Checkpoint {
     Score best_score;
 };
 
+/// The same of the training of a gate, whose states are drawn again from its seed.
+struct GateCheckpoint {
+    std::uint64_t fingerprint = 0;  ///< of the options and the states of the first round
+    std::uint64_t round = 0;
+    std::uint64_t iteration = 0;   ///< iterations done in this round
+    std::uint64_t iterations = 0;  ///< in all
+    std::uint64_t since_best = 0;  ///< evaluations
+    double seconds = 0;
+    Random::State random{};
+    std::vector<double> parameters;
+    Adam::State adam;
+    double best_cost = 0;
+    /// The best so far of every round, this one last: weights as float, and thresholds.
+    std::vector<std::vector<double>> best_parameters;
+    std::vector<std::vector<double>> best_thresholds;
+};
+
+/// As of a `Checkpoint`.
+void save_checkpoint(const GateCheckpoint& checkpoint, const std::filesystem::path& file);
+[[nodiscard]] GateCheckpoint load_gate_checkpoint(const std::filesystem::path& file);
+
 /// Writes to a neighbouring file and renames it, so that an interruption leaves
 /// the old checkpoint or the new one, never half of one. Numbers are stored as
 /// their bits, little-endian.

@@ -15,6 +15,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -68,6 +69,9 @@ struct GateTraining {
     double quantile = 0.98;      ///< of a level gate: the share of states that it stays below
     double logit_margin = 0.25;  ///< of the threshold below the lowest fatal logit
     std::uint64_t seed = 1;
+
+    std::filesystem::path checkpoint{};  ///< written at every evaluation; empty: none
+    bool resume = false;                 ///< continue from `checkpoint`, to the same bits
 };
 
 /// States of runs, and what became of them.
@@ -142,12 +146,15 @@ class GateTrainer {
 public:
     /// @throws std::invalid_argument if an option is outside its range, or the samples hold no
     /// event (or guard near its surface), or nothing else.
+    /// @throws std::runtime_error if the checkpoint cannot be read, or is of another training.
     GateTrainer(const GateTraining& options, GateSamples training, GateSamples validation);
     ~GateTrainer();
     GateTrainer(const GateTrainer&) = delete;
     GateTrainer& operator=(const GateTrainer&) = delete;
 
-    /// One round. False: it was stopped by the callback.
+    /// One round. False: it was stopped by the callback. A round that the checkpoint has behind it
+    /// is not run again.
+    /// @throws std::runtime_error if the checkpoint cannot be written.
     [[nodiscard]] bool run(std::size_t round, const ProgressCallback& progress);
 
     /// More states, for the rounds to come and for the thresholds.

@@ -101,6 +101,9 @@ struct FlowOnly {
 
 /// @throws std::invalid_argument: a level gate of a system without bounds.
 [[noreturn]] void throw_no_bounds();
+/// @throws std::invalid_argument: a guard has broken a bound; see `WrongBound`.
+[[noreturn]] void throw_wrong_bound(std::size_t guard, double since, double then, double t,
+                                    double value, double allowed);
 
 /// Processor time of this thread's process [s].
 [[nodiscard]] double processor_seconds() noexcept;
@@ -182,6 +185,27 @@ public:
         }
         add_neighbours(out, random);
         return out;
+    }
+
+    /// Compares the declared bounds with the guard along runs of so many steps in all.
+    /// @throws std::invalid_argument naming one that is broken.
+    void check_bounds(std::size_t steps, std::uint64_t seed)
+    {
+        Random random(seed);
+        const Planned<> planned({.longest_stretch = 16, .check_bounds = true});
+        for (std::size_t done = 0; done < steps;) {
+            const Exact exact = start(random);
+            Simulation<System, X, Stepping, Planned<>> run(*system_, exact.x(), options_used_,
+                                                           Stepping{}, planned);
+            while (run.advance()) {
+            }
+            const Run<X> followed = run.finish();
+            done += static_cast<std::size_t>(followed.statistics.steps) + 1;
+            if (const auto& wrong = followed.wrong_bound) {
+                detail::throw_wrong_bound(wrong->guard, wrong->since, wrong->value_then, wrong->t,
+                                          wrong->value, wrong->allowed);
+            }
+        }
     }
 
     /// Runs the exact detector and the gated one side by side, until `events` events.
@@ -461,11 +485,15 @@ private:
     std::vector<RunStart<X>> near_;  ///< states shortly before fatal events
 };
 
-/// Trains a gate on runs of `system`, and measures what it misses on fresh ones.
+/// Trains a gate on runs of `system`, and measures what it misses on fresh ones, unless it was
+/// stopped. With a checkpoint a training that was stopped is resumed to the same bits.
 ///
 /// @param options  tolerances of the runs; times and steps come from `training`
 /// @throws std::invalid_argument if an option is outside its range, the recipe does not fit the
-///         states, the runs hold no event (no guard near its surface), or nothing else.
+///         states, the runs hold no event (no guard near its surface), or nothing else, or a
+///         bound that a level gate would rely on is found broken.
+/// @throws std::runtime_error if the checkpoint cannot be written or read, or is of another
+///         training.
 template <class System, class X, class Stepping>
 [[nodiscard]] TrainedGate train_gate(const System& system, const Starts<X>& starts,
                                      const Stepping& /*stepping*/, const Options& options,
@@ -474,6 +502,13 @@ template <class System, class X, class Stepping>
 {
     const auto begin = std::chrono::steady_clock::now();
     GateRuns<System, X, Stepping> runs(system, starts, options, training);
+    if (training.kind == GateKind::level) {
+        if constexpr (Bounded<System, X>) {
+            runs.check_bounds(20'000, training.seed + 5'000'003);
+        } else {
+            detail::throw_no_bounds();
+        }
+    }
     GateSamples first = runs.sample(training.events, training.states, training.seed);
     GateSamples second =
         runs.sample(training.validation_events, training.states / 4, training.seed + 1'000'003);
@@ -497,7 +532,9 @@ template <class System, class X, class Stepping>
     TrainedGate trained{.model = complete(), .report = trainer.report()};
     trained.report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (training.fresh_events == 0) return trained;
+    if (training.fresh_events == 0 || trained.report.outcome == TrainingOutcome::stopped) {
+        return trained;
+    }
     const std::uint64_t fresh = training.seed + 7'000'003;
     GateTrial& trial = trained.report.trial;
     const Gate gate(trained.model);
@@ -505,8 +542,6 @@ template <class System, class X, class Stepping>
         trial = runs.compare(Calibrated(gate), training.fresh_events, fresh);
     } else if constexpr (Bounded<System, X>) {
         trial = runs.compare(CalibratedBounds(gate), training.fresh_events, fresh);
-    } else {
-        detail::throw_no_bounds();
     }
     if (trial.events > 0) {
         trained.model.calibration = {.events = trial.events,
