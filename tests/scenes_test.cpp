@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -93,6 +95,47 @@ TEST(Cavern, TheRateIsTheDerivativeOfTheGuard)
         EXPECT_NEAR(rate, (forward + backward) / 2, 1e-2);
     }
     EXPECT_GT(compared, 1900U);
+}
+
+/// Two states in a box of half-widths `h`, of which `bound` says how much the guard may differ.
+template <class System>
+void expect_slack_holds(const System& system, const typename System::State& middle,
+                        const typename System::State& spread, std::size_t pairs)
+{
+    using X = typename System::State;
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    double closest = 0;
+    for (std::size_t k = 0; k < pairs; ++k) {
+        const double size = std::pow(10.0, -6 * std::fabs(uniform(random)));
+        X a = middle;
+        X b = middle;
+        X half{};
+        for (std::size_t i = 0; i < a.size(); ++i) {
+            a[i] += spread[i] * uniform(random);
+            b[i] = a[i] + size * spread[i] * uniform(random);
+            half[i] = std::fabs(b[i] - a[i]);
+        }
+        const double change = std::fabs(system.guard(0, a) - system.guard(0, b));
+        const double slack = system.guard_slack(half);
+        ASSERT_LE(change, slack) << k;
+        closest = std::max(closest, change / slack);
+        for (double& h : half) h *= 2;
+        ASSERT_GE(system.guard_slack(half), slack);
+    }
+    EXPECT_GT(closest, 0.5);  // it is no idle bound
+}
+
+TEST(Cavern, TheGuardChangesByNoMoreThanItsSlack)
+{
+    const Cavern system(cavern(false, 1000, Cavern::Search::tree));
+    expect_slack_holds(system, {0, 0, 0, 0}, {12, 12, 5, 5}, 20'000);
+    EXPECT_EQ(system.parameter("segments"), 1000.0);
+    EXPECT_EQ(system.parameter("launch"), 5.0);
+    EXPECT_EQ(system.parameter("weight"), std::nullopt);
+    const Cavern square({}, {{-3, -3}, {3, -3}, {3, 3}, {-3, 3}});
+    EXPECT_EQ(square.parameter("seed"), std::nullopt);  // says nothing of this wall
+    EXPECT_EQ(square.parameter("radius"), 0.1);
 }
 
 TEST(Cavern, AnErrorControlledRunStaysInsideToo)
@@ -358,6 +401,17 @@ TEST(PlanarArm, BoundsHoldAndTheArmStaysOutside)
 {
     expect_arm_bounds<4>(8);
     expect_arm_bounds<6>(40);
+}
+
+TEST(PlanarArm, TheGuardChangesByNoMoreThanItsSlack)
+{
+    expect_slack_holds(PlanarArm<4>({.obstacles = 8}), {0, 0, 0, 0, 0, 0, 0, 0},
+                       {3, 3, 3, 3, 1, 1, 1, 1}, 20'000);
+    expect_slack_holds(PlanarArm<2>(), {0, 0, 0, 0}, {3, 3, 1, 1}, 20'000);
+    const PlanarArm<2> arm({.obstacles = 8, .seed = 3});
+    EXPECT_EQ(arm.parameter("obstacles"), 8.0);
+    EXPECT_EQ(arm.parameter("seed"), 3.0);
+    EXPECT_EQ(arm.parameter("joints"), std::nullopt);
 }
 
 TEST(PlanarArm, TheRateIsTheDerivativeOfTheGuard)

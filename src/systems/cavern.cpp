@@ -84,11 +84,15 @@ struct Cavern::Rock {
     std::optional<geometry::DistanceGrid<2>> table{};
 };
 
-Cavern::Cavern(const Parameters& parameters) : Cavern(parameters, random_wall(parameters)) {}
+Cavern::Cavern(const Parameters& parameters)
+    : Cavern(parameters, std::make_shared<Rock>(random_wall(parameters)))
+{
+}
 
 Cavern::Cavern(const Parameters& parameters, const std::vector<Point2>& wall)
     : Cavern(parameters, std::make_shared<Rock>(wall))
 {
+    given_ = true;
 }
 
 Cavern::Cavern(const Parameters& parameters, std::shared_ptr<const Rock> rock)
@@ -154,6 +158,27 @@ Point2 Cavern::rebound(Point2 normal, Point2 v) const noexcept
     const double allowed = std::sqrt(std::max(top_speed_ * top_speed_ - dot(along, along), 0.0));
     const double away = std::max(-p_.restitution * onto, std::min(p_.kick, allowed));
     return along + away * normal;
+}
+
+double Cavern::rounding() const noexcept
+{
+    return 1e-13 * rock_->wall.edges().bounds().reach();
+}
+
+std::optional<double> Cavern::parameter(std::string_view of) const noexcept
+{
+    if (of == "radius") return p_.radius;
+    if (of == "gravity") return p_.gravity;
+    if (of == "turn") return p_.turn;
+    if (of == "drag") return p_.drag;
+    if (of == "restitution") return p_.restitution;
+    if (of == "kick") return p_.kick;
+    if (of == "launch") return p_.launch_speed;
+    if (given_) return std::nullopt;
+    if (of == "segments") return static_cast<double>(p_.segments);
+    if (of == "seed") return static_cast<double>(p_.seed);
+    if (of == "size") return p_.size;
+    return std::nullopt;
 }
 
 double Cavern::tabulated(Point2 p) const noexcept

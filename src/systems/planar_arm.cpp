@@ -121,6 +121,7 @@ ArmScene::ArmScene(const Parameters& parameters, std::size_t joints,
     check();
     choose_joints();
     place(obstacles);
+    given_ = true;
 }
 
 void ArmScene::check() const
@@ -313,6 +314,28 @@ double ArmScene::lower_bound(const double* angles) const noexcept
         least = std::min(least, lower_bound_of({joints[i], joints[i + 1]}));
     }
     return least - p_.clearance;
+}
+
+double ArmScene::slack(const double* half_widths) const noexcept
+{
+    double way = 0;
+    for (std::size_t i = 0; i < n_; ++i) {
+        way += half_widths[i] * link_ * static_cast<double>(n_ - i);
+    }
+    return way * (1 + 1e-14) + 1e-12 * p_.reach;
+}
+
+std::optional<double> ArmScene::parameter(std::string_view of) const noexcept
+{
+    if (of == "reach") return p_.reach;
+    if (of == "clearance") return p_.clearance;
+    if (of == "drive") return p_.drive;
+    if (of == "damping") return p_.damping;
+    if (of == "restitution") return p_.restitution;
+    if (of == "least_rate") return p_.least_rate;
+    if (of == "seed") return static_cast<double>(p_.seed);  // of the torques, too
+    if (of == "obstacles" && !given_) return static_cast<double>(p_.obstacles);
+    return std::nullopt;
 }
 
 double ArmScene::lower_bound_of(const Segment2& link) const noexcept

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -142,6 +143,18 @@ public:
         return tabulated({x[0], x[1]});
     }
 
+    /// For certificates: the distance of the centres, and the rounding of the guard at positions
+    /// within some ten times the extent of the wall.
+    template <class X>
+    [[nodiscard]] double guard_slack(const X& half_widths) const noexcept
+    {
+        return std::hypot(half_widths[0], half_widths[1]) + rounding();
+    }
+
+    /// The parameter of that name, for models that depend on it. Of a wall that was given nothing
+    /// is told that would make it.
+    [[nodiscard]] std::optional<double> parameter(std::string_view of) const noexcept;
+
     /// The guard at a position, by either search.
     [[nodiscard]] double clearance(Search search, geometry::Point2 p) const noexcept;
 
@@ -162,8 +175,10 @@ private:
     [[nodiscard]] geometry::Point2 rebound(geometry::Point2 normal,
                                            geometry::Point2 v) const noexcept;
     [[nodiscard]] double tabulated(geometry::Point2 p) const noexcept;
+    [[nodiscard]] double rounding() const noexcept;
 
     Parameters p_;
+    bool given_ = false;  ///< the wall
     double top_speed_;
     std::shared_ptr<const Rock> rock_;
 };

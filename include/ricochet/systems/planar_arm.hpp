@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -119,6 +120,14 @@ public:
     [[nodiscard]] double largest_acceleration(const double* rates) const noexcept;
     [[nodiscard]] double lower_bound(const double* angles) const noexcept;
 
+    /// How far a point of the arm can move where no angle changes by more than that, each joint
+    /// turning what is beyond it, with the rounding of the distance.
+    [[nodiscard]] double slack(const double* half_widths) const noexcept;
+
+    /// The parameter of that name, for models that depend on it; of obstacles that were given
+    /// nothing is told that would make them.
+    [[nodiscard]] std::optional<double> parameter(std::string_view of) const noexcept;
+
     /// The factor of all rates at an impact.
     [[nodiscard]] double reversal(const double* rates) const noexcept;
 
@@ -139,7 +148,8 @@ private:
 
     Parameters p_;
     std::size_t n_;
-    double link_;  ///< [m] length
+    double link_;         ///< [m] length
+    bool given_ = false;  ///< the obstacles
     std::array<Joint, most_joints> joints_{};
     std::shared_ptr<const Place> place_;
 };
@@ -229,6 +239,17 @@ public:
     [[nodiscard]] double lower_bound(double /*t*/, const X& x) const noexcept
     {
         return scene_.lower_bound(part(x, 0).data());
+    }
+
+    /// For certificates.
+    template <class X>
+    [[nodiscard]] double guard_slack(const X& half_widths) const noexcept
+    {
+        return scene_.slack(part(half_widths, 0).data());
+    }
+    [[nodiscard]] std::optional<double> parameter(std::string_view of) const noexcept
+    {
+        return scene_.parameter(of);
     }
 
     /// The guard by either search.
