@@ -15,6 +15,7 @@
 #include "ricochet/detect/verified.hpp"
 #include "ricochet/friction/affine_law.hpp"
 #include "ricochet/friction/baselines.hpp"
+#include "ricochet/friction/histories.hpp"
 #include "ricochet/friction/spring_slider.hpp"
 #include "ricochet/friction/wright_omega.hpp"
 #include "ricochet/hybrid/bounds.hpp"
