@@ -1,5 +1,5 @@
-// What certificates cost, and how much they clear: a ball in a cavern, and a planar arm of two,
-// three and four joints among few obstacles.
+// What certificates cost, and how much they clear: a ball in a cavern, a planar arm of two,
+// three and four joints among few obstacles, and a smallest eigenvalue under four loads.
 //
 //     ricochet_certificates [--scene NAME] [--models DIR] [--iterations N]
 //
@@ -27,6 +27,7 @@
 #include "ricochet/learn/trainable_mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/cavern.hpp"
+#include "ricochet/systems/least_eigenvalue.hpp"
 #include "ricochet/systems/planar_arm.hpp"
 
 namespace ricochet::bench {
@@ -100,6 +101,30 @@ Scene arm()
                                 }
                                 return sum;
                             }}};
+}
+
+/// The guard's least value over a box is that of the corners, from a table.
+Scene eigenvalue()
+{
+    const auto system =
+        std::make_shared<const LeastEigenvalue>(LeastEigenvalue::Parameters{.table = 16});
+    using State = LeastEigenvalue::State;
+    const auto state = [](const double* x) { return State{x[0], x[1], x[2], x[3]}; };
+    return {.name = "eigenvalue",
+            .dimension = 4,
+            .components = 4,
+            .domain = std::vector<Interval>(4, {-1, 1}),
+            .margin = 0.02,
+            .far = 0.1,
+            .hidden = {64, 64},
+            .iterations = 12'000,
+            .problem = {
+                .guard = [system, state](const double* x) { return system->guard(0, state(x)); },
+                .slack = [system, state](const double* h) { return system->guard_slack(state(h)); },
+                .least =
+                    [system, state](const double* lower, const double* upper) {
+                        return system->guard_least(state(lower), state(upper));
+                    }}};
 }
 
 /// Regression by classification: a state is called an event with the probability
@@ -313,7 +338,7 @@ int main(int count, char** arguments)
     std::string models;
     std::size_t iterations = 0;
     learn::CertifyOptions options;
-    app.add_option("--scene", only, "cavern, arm2, arm3 or arm4; default: all");
+    app.add_option("--scene", only, "cavern, arm2, arm3, arm4 or eigenvalue; default: all");
     app.add_option("--models", models, "directory where networks are kept");
     app.add_option("--iterations", iterations, "of the training");
     app.add_option("--limit", options.limit, "[s]");
@@ -322,7 +347,7 @@ int main(int count, char** arguments)
     app.add_option("--threads", options.threads, "default 2");
     CLI11_PARSE(app, count, arguments);
     bool good = true;
-    for (const auto& make : {&cavern, &arm<2>, &arm<3>, &arm<4>}) {
+    for (const auto& make : {&cavern, &arm<2>, &arm<3>, &arm<4>, &eigenvalue}) {
         const Scene scene = make();
         if (only.empty() || only == scene.name) {
             good = measure(scene, models, iterations, options) && good;

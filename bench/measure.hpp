@@ -116,5 +116,6 @@ struct Check {
 [[nodiscard]] Measured time_arms();
 [[nodiscard]] Measured time_zones();
 [[nodiscard]] Measured count_eigenvalues();
+[[nodiscard]] Measured count_bounded_eigenvalues();
 
 }  // namespace ricochet::bench

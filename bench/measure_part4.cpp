@@ -51,6 +51,11 @@ std::vector<Check> checks_of_part_4()
          .sentence = "smallest eigenvalue of a matrix of order 24",
          .target = ">= 25x in exact calls, the same events",
          .run = count_eigenvalues},
+        {.part = 4,
+         .id = "bounded-eigenvalue",
+         .sentence = "the same with a table of proved bounds, against the two-ended cover alone",
+         .target = ">= 1.5x in exact calls, the same events",
+         .run = count_bounded_eigenvalues},
     };
 }
 

@@ -4,8 +4,8 @@
 // The states of a run are recorded at the ends of steps, with the guard and its bounds. From
 // a look the greedy planner goes to the furthest step at which a look will close the
 // stretch, which it knows, since it has seen the future. A step that no two looks close is
-// put before the exact detector: one look at its end. "Bounded" also has the lower bound at
-// the end of any step for nothing, and lets it stand in where it closes a stretch.
+// put before the exact detector: one look at its end. "Bounded" also has the bound of the value
+// at the end of any step for nothing, and lets it stand in where it closes a stretch.
 #pragma once
 
 #include <algorithm>
@@ -40,20 +40,21 @@ struct SeenGuard {
     double time = 0;  ///< [s]
     double value = 0;
     double lower = -std::numeric_limits<double>::infinity();
+    double upper = std::numeric_limits<double>::infinity();
     double speed = 0;
     double acceleration = 0;
 };
 
 struct OracleCalls {
     std::uint64_t looks = 0;          ///< with exact values alone
-    std::uint64_t bounded_looks = 0;  ///< with lower bounds for nothing
+    std::uint64_t bounded_looks = 0;  ///< with bounds of the value for nothing
     std::uint64_t steps = 0;
 };
 
 /// Looks that one guard needs over one smooth piece of motion, whose last step may end in an
 /// event. `margin`: of the planner.
 [[nodiscard]] std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin,
-                                        bool with_lower_bounds);
+                                        bool with_bounds);
 
 /// Counts over a run with a check at every step.
 template <class Stepping, class System>
@@ -94,6 +95,9 @@ template <class Stepping, class System>
                 .acceleration = l * detail::call_acceleration_bound(system, i, Mode{}, at.t, at.x)};
             if constexpr (detail::HasLowerBound<System, X>) {
                 seen.lower = detail::call_lower_bound(system, i, Mode{}, at.t, at.x);
+            }
+            if constexpr (detail::HasUpperBound<System, X>) {
+                seen.upper = detail::call_upper_bound(system, i, Mode{}, at.t, at.x);
             }
             if (at.after_reset && !piece.empty()) {
                 // The event's own step: it ends at the surface.

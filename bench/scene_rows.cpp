@@ -23,8 +23,7 @@ bool closes(const SeenGuard& from, double value, const SeenGuard& to, double end
 
 }  // namespace
 
-std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin,
-                          bool with_lower_bounds)
+std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin, bool with_bounds)
 {
     std::uint64_t looks = 0;
     std::size_t at = 0;  // of the last exact look
@@ -33,17 +32,19 @@ std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin,
         const double sign = value < 0 ? -1 : 1;
         std::size_t best = at;
         std::size_t free = at;  // as far as lower bounds alone have closed it
+        const auto cheap = [&](std::size_t k) {
+            return sign < 0 ? piece[k].upper : piece[k].lower;
+        };
         const auto closed_to = [&](std::size_t k, double end) {
             return closes(piece[at], value, piece[k], end, sign, margin) ||
-                   (free > at &&
-                    closes(piece[free], piece[free].lower, piece[k], end, sign, margin));
+                   (free > at && closes(piece[free], cheap(free), piece[k], end, sign, margin));
         };
         for (std::size_t k = at + 1; k < piece.size(); ++k) {
             if (k > std::max(best, free) + horizon) break;
             const bool whole = closed_to(k, piece[k].value);
             if (whole) best = k;
-            if (!with_lower_bounds || sign < 0 || !(piece[k].lower > 0)) continue;
-            if (closed_to(k, piece[k].lower)) free = k;
+            if (!with_bounds || !(sign * cheap(k) > 0)) continue;
+            if (closed_to(k, cheap(k))) free = k;
         }
         if (free + 1 == piece.size()) return looks;
         // What lower bounds reach is looked at only if nothing beyond closes; a step that no
