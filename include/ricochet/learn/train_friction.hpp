@@ -1,0 +1,102 @@
+// Learning potentials of friction from histories of slip rate: recurrent neural operators
+// whose internal variables are found by the fit.
+//
+// What is fitted knows slip rate and friction alone. Along a history the internal variables
+// xi_j' = G_j(d_j), d_j = -dDdag/dxi_j, are integrated by an L-stable method of order 4, and
+// the parameters are moved by Levenberg and Marquardt's method, with sensitivities carried
+// through the stages, so that the gradient is that of the computed friction.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "ricochet/friction/additive_pair.hpp"
+#include "ricochet/friction/histories.hpp"
+#include "ricochet/learn/levenberg_marquardt.hpp"
+
+namespace ricochet::learn {
+
+namespace detail {
+class FrictionModel;
+}
+
+enum class FrictionNetwork {
+    /// AdditivePair: f = A(log V) + beta sum of xi_j, with monotone nets.
+    additive,
+    /// Ddag = V N(log V, xi) + c(xi): N one hidden layer of softplus units, convex in both
+    /// arguments, with a linear part (B. Amos, L. Xu and J. Z. Kolter, Input convex neural
+    /// networks, 2017); one internal variable.
+    general,
+};
+
+struct FrictionTrainingOptions {
+    FrictionNetwork network = FrictionNetwork::additive;
+    int internal = 1;               ///< internal variables: 0, 1 or 2 (general: 1)
+    std::size_t direct_units = 8;   ///< of A, at most 8
+    std::size_t state_units = 7;    ///< of C, at most 8
+    std::size_t rate_units = 7;     ///< of G, at most 8
+    std::size_t hidden_units = 16;  ///< of N
+    double v_star = 1e-4;           ///< [m/s] unit of the slip rate
+    std::uint64_t seed = 1;         ///< of the weights at the start
+    int iterations = 60;
+    double seconds = 60;   ///< of processor time
+    double target = 1e-7;  ///< stop at this root mean square relative error
+    /// Moves by Adam's method first, each on a few histories; Levenberg-Marquardt goes on.
+    int adam_iterations = 0;
+    double adam_rate = 3e-3;
+};
+
+/// A fit, ready to use.
+class LearnedFriction {
+public:
+    explicit LearnedFriction(std::shared_ptr<const detail::FrictionModel> model);
+
+    /// Friction along a history. `refine` halves the steps of the integration as many times.
+    /// @throws std::invalid_argument for a history that `validate` refuses.
+    [[nodiscard]] std::vector<double> friction(const FrictionHistory& history,
+                                               int refine = 0) const;
+    /// The internal variables along it, one list for each.
+    [[nodiscard]] std::vector<std::vector<double>> internal(const FrictionHistory& history) const;
+
+    /// Numbers that were fitted.
+    [[nodiscard]] std::size_t parameters() const noexcept;
+    /// The pair of potentials, of an additive network with one internal variable; its
+    /// domain is that of the training.
+    [[nodiscard]] std::optional<AdditivePair> pair() const;
+
+    double seconds = 0;  ///< of processor time that the training took
+    int iterations = 0;
+    double training_error = 0;  ///< root mean square over histories of the relative error
+
+    [[nodiscard]] const std::shared_ptr<const detail::FrictionModel>& model() const noexcept
+    {
+        return model_;
+    }
+
+private:
+    std::shared_ptr<const detail::FrictionModel> model_;
+};
+
+/// Trains on histories with friction.
+/// @throws std::invalid_argument for options outside their range, no histories, or one that
+/// `validate` refuses or that has no friction.
+[[nodiscard]] LearnedFriction train_friction(const std::vector<FrictionHistory>& histories,
+                                             const FrictionTrainingOptions& options = {});
+
+/// Goes on from a fit with other histories, as transfer learning does.
+[[nodiscard]] LearnedFriction train_further(const LearnedFriction& from,
+                                            const std::vector<FrictionHistory>& histories,
+                                            const FrictionTrainingOptions& options);
+
+struct FrictionErrors {
+    double mean = 0, deviation = 0, most = 0;  ///< of relative L2 errors of friction
+    double mean_beyond = 0;                    ///< mean of those relative to f - f*
+};
+[[nodiscard]] FrictionErrors assess(const LearnedFriction& fit,
+                                    const std::vector<FrictionHistory>& histories, double f_star);
+
+}  // namespace ricochet::learn

@@ -1,0 +1,282 @@
+// Learned potentials of friction: the pair, its file, its derivatives, its training.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "../src/learn/friction_models.hpp"
+#include "ricochet/friction/along_history.hpp"
+#include "ricochet/learn/train_friction.hpp"
+
+namespace ricochet {
+namespace {
+
+/// The exact ageing law as a pair: A, C and G linear, xi = log(V* theta / D_RS) b / beta.
+AdditivePair::Parameters exact_parameters()
+{
+    const RateStateParameters p;
+    const double beta = 0.01;
+    return {.v_star = p.v_star,
+            .beta = beta,
+            .direct = {.offset = p.f_star, .slope = p.a},
+            .state = {.slope = beta / p.b},
+            .rate = {.slope = p.b / beta * p.v_star / p.d_rs},
+            .domain = {.v_min = 1e-7, .v_max = 1e-3, .xi_min = -4, .xi_max = 12}};
+}
+
+/// Units with something to them.
+AdditivePair::Parameters crooked_parameters()
+{
+    AdditivePair::Parameters p = exact_parameters();
+    const auto bend = [](MonotoneNet& net, double size) {
+        net.units = 3;
+        net.weight = {size, 0.5 * size, -0.3 * size};
+        net.scale = {0.4, 1.1, -0.7};
+        net.shift = {-0.5, 1, 0.2};
+    };
+    bend(p.direct, 0.01);
+    bend(p.state, 0.4);
+    bend(p.rate, 40);
+    return p;
+}
+
+double central(const std::function<double(double)>& f, double x, double h)
+{
+    return (f(x - 2 * h) - 8 * f(x - h) + 8 * f(x + h) - f(x + 2 * h)) / (12 * h);
+}
+
+TEST(AdditivePair, OfLinearNetsIsTheAgeingLaw)
+{
+    const AdditivePair pair(exact_parameters());
+    const AgeingLaw<DirectEffect::log> law;
+    for (const double v : {1e-7, 1e-4, 1e-3}) {
+        for (const double xi : {-2.0, 0.0, 6.0}) {
+            const FrictionAndRate found = pair.evaluate(v, 1.6 * xi);
+            EXPECT_NEAR(found.friction, law.friction(v, xi), 1e-15);
+            const double sides = 1.6 * (v + 1e-4 * std::exp(-xi)) / 1e-6;
+            EXPECT_NEAR(found.rate, 1.6 * law.state_rate(v, xi), 1e-14 * sides);
+        }
+    }
+    const auto history = make_histories(2, 4);
+    for (const FrictionHistory& h : history) {
+        // 64 steps of order 4 between samples; a change of V takes a thousandth of a second.
+        EXPECT_LE(relative_error(friction_along(pair, h, 0, 64), h.friction), 1e-6);
+    }
+}
+
+TEST(AdditivePair, PotentialsGiveFrictionAndRate)
+{
+    // Differences of order four with relative steps of 1e-3: 1e-12 of the value.
+    const AdditivePair pair(crooked_parameters());
+    for (const double v : {1e-6, 2e-4}) {
+        for (const double xi : {-1.0, 3.0}) {
+            const FrictionAndRateGradient g = pair.gradient(v, xi);
+            const RateStateJet j = pair.rate_potential(v, xi);
+            const auto by_v = [&](double x) { return pair.rate_potential(x, xi).value; };
+            const auto by_xi = [&](double x) { return pair.rate_potential(v, x).value; };
+            const double scale = std::abs(j.value);
+            EXPECT_NEAR(central(by_v, v, 1e-3 * v) * v, j.v * v, 1e-9 * scale);
+            EXPECT_NEAR(central(by_xi, xi, 1e-3), j.xi, 1e-9 * scale);
+            EXPECT_NEAR(j.v, g.friction, 1e-15);
+            EXPECT_NEAR(pair.dual(-j.xi).first, g.rate, 1e-12 * std::abs(g.rate));
+            EXPECT_NEAR(
+                central([&](double x) { return pair.rate_potential(x, xi).v; }, v, 1e-3 * v), j.vv,
+                1e-9 * std::abs(j.vv));
+            EXPECT_NEAR(central([&](double x) { return pair.rate_potential(v, x).xi; }, xi, 1e-3),
+                        j.xixi, 1e-9 * std::abs(j.xixi));
+            EXPECT_NEAR(central([&](double x) { return pair.evaluate(x, xi).rate; }, v, 1e-3 * v),
+                        g.rate_v, 1e-9 * std::abs(g.rate_v));
+            EXPECT_NEAR(central([&](double x) { return pair.evaluate(v, x).rate; }, xi, 1e-3),
+                        g.rate_xi, 1e-9 * std::abs(g.rate_xi));
+            const double d = -j.xi;
+            const ScalarJet dual = pair.dual(d);
+            EXPECT_NEAR(
+                central([&](double x) { return pair.dual(x).value; }, d, 1e-3 * std::abs(d)),
+                dual.first, 1e-9 * std::abs(dual.first));
+            const ScalarJet primal = pair.primal(dual.first);
+            EXPECT_NEAR(primal.first / d, 1, 1e-12);
+            EXPECT_NEAR(primal.value, d * dual.first - dual.value,
+                        1e-12 * std::abs(d * dual.first));
+            EXPECT_NEAR(primal.second * dual.second, 1, 1e-10);
+            // Convex in each argument.
+            EXPECT_GT(j.vv, 0);
+            EXPECT_GT(j.xixi, 0);
+            EXPECT_GT(dual.second, 0);
+        }
+    }
+}
+
+TEST(AdditivePair, RefusesWhatIsNotConvex)
+{
+    const auto refusal = [](auto change) -> std::string {
+        AdditivePair::Parameters p = crooked_parameters();
+        change(p);
+        try {
+            AdditivePair pair(p);
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "";
+    };
+    const auto says = [](const std::string& text, const std::string& piece) {
+        EXPECT_NE(text.find(piece), std::string::npos) << text;
+    };
+    EXPECT_EQ(refusal([](auto&) {}), "");
+    says(refusal([](auto& p) { p.state.weight[1] = -0.2; }),
+         "net 'state': a convex potential needs weight x scale >= 0, found -0.22");
+    says(refusal([](auto& p) { p.rate.slope = -1; }), "net 'rate': the slope");
+    says(refusal([](auto& p) { p.direct.shift[0] = std::nan(""); }), "unit 0 is not finite");
+    says(refusal([](auto& p) { p.beta = 0; }), "beta must be positive");
+    EXPECT_THROW((void)AdditivePair(crooked_parameters()).evaluate(0, 0), std::invalid_argument);
+}
+
+TEST(PairFile, KeepsItsBits)
+{
+    const AdditivePair pair(crooked_parameters());
+    const AdditivePair again = parse_pair(to_json(pair), "memory");
+    EXPECT_EQ(to_json(again), to_json(pair));
+    EXPECT_EQ(again.evaluate(3e-5, 0.7).friction, pair.evaluate(3e-5, 0.7).friction);
+    EXPECT_EQ(again.evaluate(3e-5, 0.7).rate, pair.evaluate(3e-5, 0.7).rate);
+}
+
+TEST(PairFile, RefusesWhatItIsNot)
+{
+    const nlohmann::json good = nlohmann::json::parse(to_json(AdditivePair(crooked_parameters())));
+    const auto refusal = [&](auto change) -> std::string {
+        nlohmann::json bad = good;
+        change(bad);
+        try {
+            (void)parse_pair(bad.dump(), "pair.json");
+        } catch (const PotentialFileError& error) {
+            return error.what();
+        }
+        return "";
+    };
+    const auto says = [](const std::string& text, const std::string& piece) {
+        EXPECT_NE(text.find("pair.json: "), std::string::npos) << text;
+        EXPECT_NE(text.find(piece), std::string::npos) << text;
+    };
+    EXPECT_EQ(refusal([](auto&) {}), "");
+    says(refusal([](auto& j) { j["state"]["scale"][0] = -0.4; }),
+         "claims to be convex: AdditivePair: net 'state'");
+    says(refusal([](auto& j) { j["convex"] = false; }), "expected \"convex\": true, found false");
+    says(refusal([](auto& j) { j["format"] = "x"; }), "expected format");
+    says(refusal([](auto& j) { j["version"] = 7; }), "expected version 1, found 7");
+    says(refusal([](auto& j) { j["rate"].erase("shift"); }), "\"rate\".\"shift\"");
+    says(refusal([](auto& j) { j["rate"]["shift"] = {1}; }), "expected 3 numbers, found 1");
+    says(refusal([](auto& j) { j["direct"]["offset"] = 0.6; }), "self test: friction");
+    says(refusal([](auto& j) { j["v_star"] = "fast"; }), "expected a number");
+    EXPECT_THROW((void)parse_pair("[", "x"), PotentialFileError);
+    EXPECT_THROW((void)load_pair("no-such-file.json"), PotentialFileError);
+}
+
+/// Gradients of a model by its parameters against central differences of order four.
+void check_model(learn::detail::FrictionModel& model)
+{
+    learn::Random random(3);
+    Eigen::VectorXd p(static_cast<Eigen::Index>(model.size()));
+    model.start(p, 0.5, 0.02, random);
+    const std::vector<double> xi{0.7, -0.4};
+    std::vector<double> by_xi(2), ignored(2);
+    const double y = -1.3;
+    const double u = std::exp(y);
+    model.set(p);
+    std::vector<double> g(model.size());
+    (void)model.friction(y, xi.data(), by_xi.data(), g.data());
+    const auto friction = [&](Eigen::Index k) {
+        return [&, k](double value) {
+            Eigen::VectorXd q = p;
+            q[k] = value;
+            model.set(q);
+            return model.friction(y, xi.data(), ignored.data(), nullptr);
+        };
+    };
+    for (Eigen::Index k = 0; k < p.size(); ++k) {
+        EXPECT_NEAR(central(friction(k), p[k], 1e-3), g[static_cast<std::size_t>(k)], 1e-11);
+    }
+    for (std::size_t j = 0; j < model.internals(); ++j) {
+        const auto block = model.block(j);
+        std::vector<double> own(block.size);
+        model.set(p);
+        const auto rate = model.rate(j, y, u, xi[j], own.data());
+        const double slope =
+            central([&](double x) { return model.rate(j, y, u, x, nullptr).value; }, xi[j], 1e-3);
+        EXPECT_NEAR(slope, rate.slope, 1e-9 * std::abs(rate.slope));
+        EXPECT_LT(rate.slope, 0);
+        for (std::size_t k = 0; k < block.size; ++k) {
+            const auto at = static_cast<Eigen::Index>(block.first + k);
+            const auto by = [&](double value) {
+                Eigen::VectorXd q = p;
+                q[at] = value;
+                model.set(q);
+                return model.rate(j, y, u, xi[j], nullptr).value;
+            };
+            EXPECT_NEAR(central(by, p[at], 1e-3), own[k], 1e-9 * std::abs(rate.value) + 1e-8);
+        }
+    }
+}
+
+TEST(FrictionModels, HaveTheDerivativesTheySay)
+{
+    learn::detail::AdditiveModel additive(8, 7, 7, 2);
+    check_model(additive);
+    learn::detail::GeneralModel general(6, 3, 4);
+    check_model(general);
+}
+
+TEST(TrainFriction, FindsAStateThatItIsNotTold)
+{
+    const auto histories = make_histories(4, 21);
+    const learn::LearnedFriction fit =
+        learn::train_friction(histories, {.iterations = 20, .seconds = 100});
+    EXPECT_EQ(fit.parameters(), 71U);
+    EXPECT_LT(fit.training_error, 2e-3);  // the best function of V alone leaves 2e-2
+    ASSERT_TRUE(fit.pair().has_value());
+    EXPECT_EQ(fit.pair()->fitted(), 71U);
+    // The pair, run by other steps, is the fit.
+    const auto along = friction_along(*fit.pair(), histories[1], 0, 32);
+    EXPECT_LE(relative_error(along, fit.friction(histories[1], 2)), 1e-5);
+    EXPECT_EQ(fit.internal(histories[0]).size(), 1U);
+    const learn::LearnedFriction again =
+        learn::train_friction(histories, {.iterations = 20, .seconds = 100});
+    EXPECT_EQ(again.friction(histories[2]), fit.friction(histories[2]));
+}
+
+TEST(TrainFriction, WithoutStateIsAFunctionOfTheSlipRate)
+{
+    const auto histories = make_histories(20, 21);
+    const learn::LearnedFriction fit =
+        learn::train_friction(histories, {.internal = 0, .iterations = 40});
+    EXPECT_GT(fit.training_error, 1e-2);
+    EXPECT_LT(fit.training_error, 4e-2);
+    EXPECT_FALSE(fit.pair().has_value());
+}
+
+TEST(TrainFriction, GoesOnFromAFitAndByAdam)
+{
+    const auto histories = make_histories(2, 21);
+    const learn::LearnedFriction rough = learn::train_friction(
+        histories, {.iterations = 2, .adam_iterations = 5, .adam_rate = 1e-2});
+    const learn::LearnedFriction fine = learn::train_further(rough, histories, {.iterations = 6});
+    EXPECT_LT(fine.training_error, rough.training_error);
+}
+
+TEST(TrainFriction, RefusesWhatMakesNoSense)
+{
+    const auto histories = make_histories(2, 1);
+    using learn::train_friction;
+    EXPECT_THROW((void)train_friction({}), std::invalid_argument);
+    EXPECT_THROW((void)train_friction(histories, {.internal = 3}), std::invalid_argument);
+    EXPECT_THROW((void)train_friction(histories, {.direct_units = 9}), std::invalid_argument);
+    EXPECT_THROW((void)train_friction(histories, {.v_star = 0}), std::invalid_argument);
+    auto bare = histories;
+    bare[1].friction.clear();
+    EXPECT_THROW((void)train_friction(bare), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ricochet
