@@ -240,6 +240,8 @@ bool finite(const Pose& pose) noexcept
     return pose.rotation.allFinite() && pose.translation.allFinite();
 }
 
+constexpr int most_turns = 8;
+
 /// The ball around one of four boxes.
 Ball ball_of(const FourBoxes<3>& boxes, std::size_t i) noexcept
 {
@@ -266,6 +268,19 @@ NearestFaces Triangles::nearest(const Triangles& body, const Pose& pose,
         const std::uint32_t face = hint.face < size() ? hint.face : 0;
         const std::uint32_t other = hint.other_face < body.size() ? hint.other_face : 0;
         best.offer(triangles_[face], face, moved(body[other], pose), other);
+    }
+    // To and fro between the surfaces, which soon comes near to the nearest pair, or to one that is
+    // hardly further. The search that follows only has to show that.
+    Vector3d from = best.found.other_point;
+    for (int turn = 0; turn < most_turns; ++turn) {
+        const NearestOnTriangle here = nearest(from, best.found.face);
+        const NearestOnTriangle there = body.nearest(
+            pose.rotation.transpose() * (here.point - pose.translation), best.found.other_face);
+        const double before = best.found.distance;
+        best.offer(triangles_[here.triangle], here.triangle, moved(body[there.triangle], pose),
+                   there.triangle);
+        if (!(best.found.distance < before)) break;
+        from = best.found.other_point;
     }
     const auto ball_at = [&](const Ball& ball) {
         return Ball{pose.rotation * ball.centre + pose.translation, ball.radius};
@@ -312,6 +327,8 @@ NearestFaces Triangles::nearest(const Triangles& body, const Pose& pose,
                         within * within * (1 + 1e-12)) {
                         continue;
                     }
+                    const Vector3d near = nearest_point(triangles_[face], ball.centre);
+                    if ((near - ball.centre).squaredNorm() > squared_reach(ball.radius)) continue;
                     best.offer(triangles_[face], face, triangle, other);
                 }
                 reach = squared_reach(ball.radius);
