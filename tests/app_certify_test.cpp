@@ -3,6 +3,8 @@
 
 #include <fstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "app.hpp"
 #include "ricochet/nn/certificate.hpp"
@@ -117,6 +119,78 @@ TEST_F(Certify, RefusesWhatItCannotProve)
     other.activation = Activation::tanh;
     store(other);
     expect_refused({"certify", "ball.safetensors"}, {"ReLU", "tanh"});
+}
+
+/// logit = |x_first - middle| + |x_second - middle'| of a state, which must lie in `domain`.
+Model diamond(std::string system, std::vector<Interval> domain, std::size_t first,
+              std::size_t second)
+{
+    Model out;
+    const std::size_t n = domain.size();
+    out.system = std::move(system);
+    out.recipe = "state";
+    out.scale.assign(n, 1);
+    for (const Interval& range : domain) out.offset.push_back(0.5 * (range.lower + range.upper));
+    out.domain = std::move(domain);
+    DenseLayer fold{.inputs = n, .outputs = 4, .weight = std::vector<double>(4 * n), .bias = {}};
+    fold.weight[first] = fold.weight[2 * n + second] = 1;
+    fold.weight[n + first] = fold.weight[3 * n + second] = -1;
+    fold.bias.assign(4, 0);
+    out.layers = {fold, {.inputs = 4, .outputs = 1, .weight = {1, 1, 1, 1}, .bias = {0}}};
+    out.threshold = 1;
+    return out;
+}
+
+TEST_F(Certify, ProvesAModelOfTheCavernThatARunThenReliesOn)
+{
+    Model model = diamond("cavern", {{-3, 3}, {-3, 3}, {-30, 30}, {-30, 30}}, 0, 1);
+    model.parameters = {{"segments", 200}, {"kick", 6}};
+    store(model, "cavern.safetensors");
+    const auto certified = json({"certify", "cavern.safetensors", "--margin", "1", "--json"});
+    EXPECT_EQ(certified["outcome"], "proved");
+    // The wall is some 10 m away, and nowhere nearer than 4 m to a corner of the box.
+    EXPECT_GT(load_model(work() / "cavern.safetensors").threshold, 2);
+
+    const Words run_it{"simulate", "cavern",  "--set", "segments=200", "--step",
+                       "0.001",    "--t-end", "20",    "--json"};
+    const nlohmann::json exact = json(run_it);
+    Words gated_words = run_it;
+    for (const char* word : {"--gate", "certified", "--model", "cavern.safetensors"}) {
+        gated_words.emplace_back(word);
+    }
+    const nlohmann::json gated = json(gated_words);
+    ASSERT_GT(exact["events"].size(), 10U);
+    EXPECT_EQ(gated["events"], exact["events"]);
+    EXPECT_EQ(gated["state"], exact["state"]);
+    EXPECT_EQ(gated["statistics"]["evidence"]["gated"], 0);
+    EXPECT_GT(gated["statistics"]["evidence"]["proved"], 15'000);
+    EXPECT_GT(gated["statistics"]["network_calls"], 10);
+    EXPECT_LT(10 * gated["statistics"]["guard_calls"].get<int>(),
+              exact["statistics"]["guard_calls"].get<int>());
+
+    gated_words[3] = "segments=300";
+    expect_refused(gated_words, {"segments = 200", "300"});
+    model.parameters = {{"weight", 1}};
+    store(model, "cavern.safetensors");
+    expect_refused({"certify", "cavern.safetensors"}, {"'weight'", "cavern"});
+}
+
+TEST_F(Certify, ProvesAModelOfTheArm)
+{
+    // Close around the start, where eight obstacles leave some room.
+    const nlohmann::json still =
+        json({"simulate", "arm", "--set", "obstacles=8", "--t-end", "1e-9", "--json"});
+    std::vector<Interval> box;
+    for (const auto& q : still["state"]) {
+        const double half = box.size() < 4 ? 0.005 : 0.1;
+        box.push_back({q.get<double>() - half, q.get<double>() + half});
+    }
+    Model model = diamond("arm", box, 0, 1);
+    model.parameters = {{"obstacles", 8}};
+    store(model, "arm.safetensors");
+    const Result result = run({"certify", "arm.safetensors", "--margin", "0.005"});
+    EXPECT_EQ(result.status, 0) << result.err << result.out;
+    EXPECT_EQ(why_void(load_model(work() / "arm.safetensors")), "");
 }
 
 }  // namespace

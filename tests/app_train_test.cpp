@@ -100,5 +100,100 @@ TEST_F(App, ResumingWithoutACheckpointIsRefused)
     expect_refused(train({"--kind", "any-step", "--step", "1"}), {"--step", "fixed-step"});
 }
 
+/// A gate for a thermostat, small enough for a test.
+Words train_gate(const Words& more)
+{
+    Words words{"train",    "thermostat", "--kind",  "gate", "--out", "gate.safetensors",
+                "--states", "4000",       "--fresh", "200"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+}
+
+Words simulate_thermostat(const Words& more)
+{
+    Words words{"simulate", "thermostat", "--step", "0.02", "--t-end", "60", "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+}
+
+TEST_F(App, TrainedGateIsWrittenAndSavesChecks)
+{
+    const nlohmann::json report = json(train_gate({"--iterations", "500", "--json"}));
+    EXPECT_EQ(report["model"], "gate.safetensors");
+    EXPECT_EQ(report["trial"]["misses"], 0);
+    EXPECT_EQ(files(), Words{"gate.safetensors"});
+    const nlohmann::json exact = json(simulate_thermostat({}));
+    const nlohmann::json gated =
+        json(simulate_thermostat({"--gate", "calibrated", "--model", "gate.safetensors"}));
+    EXPECT_EQ(gated["detector"], "calibrated");
+    ASSERT_GT(exact["events"].size(), 5U);
+    EXPECT_EQ(gated["events"].size(), exact["events"].size());
+    EXPECT_EQ(gated["state"], exact["state"]);
+    EXPECT_LT(2 * gated["statistics"]["guard_calls"].get<int>(),
+              exact["statistics"]["guard_calls"].get<int>());
+    EXPECT_GT(gated["statistics"]["evidence"]["gated"].get<int>(), 100);
+}
+
+TEST_F(App, AGateIsTrustedByNameOnly)
+{
+    ASSERT_EQ(run(train_gate({"--iterations", "500"})).status, 0);
+    expect_refused(simulate_thermostat({"--model", "gate.safetensors"}), {"network"});
+    expect_refused(simulate_thermostat({"--gate", "calibrated"}), {"--model FILE"});
+    expect_refused(simulate_thermostat({"--gate", "extremum", "--model", "gate.safetensors"}),
+                   {"gate", "extremum", "calibrated"});
+    expect_refused(simulate_thermostat({"--gate", "verified", "--model", "gate.safetensors"}),
+                   {"bounds", "calibrated"});
+    expect_refused(simulate_thermostat({"--gate", "certified", "--model", "gate.safetensors"}),
+                   {"no certificate", "ricochet certify"});
+    expect_refused(simulate_thermostat({"--gate", "calibrated", "--model", "gate.safetensors",
+                                        "--set", "low=18.5"}),
+                   {"low", "18.5"});
+    expect_refused({"simulate", "thermostat", "--step", "0.5", "--gate", "calibrated", "--model",
+                    "gate.safetensors"},
+                   {"steps", "0.5"});
+    expect_refused({"simulate", "thermostat", "--step", "0.02", "--stepper", "euler", "--gate",
+                    "calibrated", "--model", "gate.safetensors"},
+                   {"rk4", "euler"});
+    expect_refused({"simulate", "pendulum", "--step", "0.01", "--gate", "calibrated", "--model",
+                    "gate.safetensors"},
+                   {"thermostat", "pendulum"});
+}
+
+TEST_F(App, InterruptedGateTrainingLosesNothing)
+{
+    const Words words = train_gate({"--iterations", "2000"});
+    const pid_t child = start(words);
+    const fs::path err = work().parent_path() / "err";
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (content(err).find("training:") == std::string::npos &&
+           std::chrono::steady_clock::now() < deadline) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    kill(child, SIGINT);
+    const Result interrupted = wait_for(child);
+    EXPECT_EQ(interrupted.status, 1);
+    EXPECT_NE(interrupted.err.find("--resume"), std::string::npos) << interrupted.err;
+    EXPECT_EQ(files(), Words{"gate.safetensors.checkpoint"});
+
+    Words resumed = words;
+    resumed.emplace_back("--resume");
+    const Result rest = run(resumed);
+    EXPECT_EQ(rest.status, 0) << rest.err;
+    EXPECT_EQ(files(), Words{"gate.safetensors"});
+    const std::string bytes = content(work() / "gate.safetensors");
+    EXPECT_EQ(run(words).status, 0);
+    EXPECT_EQ(content(work() / "gate.safetensors"), bytes);
+    expect_refused(resumed, {"gate.safetensors.checkpoint", "cannot be read"});
+}
+
+TEST_F(App, GateTrainingOnStatesWithoutEventsIsRefused)
+{
+    // A ball that the wall is too far away for.
+    expect_refused({"train", "impact-oscillator", "--kind", "gate", "--out", "gate.safetensors",
+                    "--set", "wall=1000", "--iterations", "10"},
+                   {"no event"});
+    EXPECT_TRUE(files().empty());
+}
+
 }  // namespace
 }  // namespace ricochet

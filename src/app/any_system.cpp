@@ -1,6 +1,7 @@
 #include "any_system.hpp"
 
 #include <stdexcept>
+#include <utility>
 
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/ends.hpp"
@@ -9,9 +10,11 @@
 
 namespace ricochet::app {
 
-TimedRun run_any(const AnySystem& system, const std::vector<double>& x0,
-                 const RunSettings& settings, int repeats)
+TimedRun run_any(AnySystem any, const std::vector<double>& x0, const RunSettings& settings,
+                 int repeats)
 {
+    const BoundedSystem system(std::move(any));
+    if (settings.gate) return run_gated(system, x0, settings, repeats);
     TimedRun timed = with_stepping(settings, [&](auto stepping) {
         switch (settings.detector) {
             case DetectorKind::ends:

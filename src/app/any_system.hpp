@@ -16,6 +16,8 @@
 #include <vector>
 
 #include "registry.hpp"
+#include "ricochet/detect/cover.hpp"
+#include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 
@@ -67,6 +69,15 @@ public:
         return held_->time_reset(mode, t, x);
     }
 
+    /// What it promises of its guards, see `BoundedSystem`.
+    [[nodiscard]] bool has_bounds() const { return held_->has_bounds(); }
+    /// 0 where there are no bounds.
+    [[nodiscard]] GuardBound bound(std::size_t which, Mode mode, double t, const State& x) const
+    {
+        return held_->bound(which, mode, t, x);
+    }
+    [[nodiscard]] double lipschitz_of(std::size_t which) const { return held_->lipschitz(which); }
+
 private:
     struct Holder {
         virtual ~Holder() = default;
@@ -84,6 +95,10 @@ private:
         [[nodiscard]] virtual double next_time_event(double t) const = 0;
         [[nodiscard]] virtual double previous_time_event(double t) const = 0;
         [[nodiscard]] virtual Mode time_reset(Mode mode, double t, State& x) const = 0;
+        [[nodiscard]] virtual bool has_bounds() const = 0;
+        [[nodiscard]] virtual GuardBound bound(std::size_t which, Mode mode, double t,
+                                               const State& x) const = 0;
+        [[nodiscard]] virtual double lipschitz(std::size_t which) const = 0;
     };
 
     template <class System>
@@ -155,15 +170,62 @@ public:
     {
         return detail::call_time_reset(system_, mode, t, x);
     }
+    bool has_bounds() const override { return Bounded<System, State>; }
+    GuardBound bound(std::size_t which, Mode mode, double t, const State& x) const override
+    {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        GuardBound out{.distance = -infinity, .speed = infinity, .acceleration = infinity};
+        if constexpr (Bounded<System, State>) {
+            out.speed = detail::call_speed_bound(system_, which, mode, t, x);
+            out.acceleration = detail::call_acceleration_bound(system_, which, mode, t, x);
+            if constexpr (detail::HasLowerBound<System, State>) {
+                out.distance = detail::call_lower_bound(system_, which, mode, t, x);
+            }
+        }
+        return out;
+    }
+    double lipschitz(std::size_t which) const override
+    {
+        return detail::call_lipschitz(system_, which);
+    }
 
 private:
     System system_;
 };
 
+/// The same with its bounds where the planner finds them; where there are none, they are infinite,
+/// and cover nothing. Of one type, so that a run has the same bits with and without a gate.
+class BoundedSystem : public AnySystem {
+public:
+    explicit BoundedSystem(AnySystem system) : AnySystem(std::move(system)) {}
+
+    [[nodiscard]] double lipschitz(std::size_t which) const { return lipschitz_of(which); }
+    [[nodiscard]] double speed_bound(std::size_t which, Mode mode, double t, const State& x) const
+    {
+        return bound(which, mode, t, x).speed;
+    }
+    [[nodiscard]] double acceleration_bound(std::size_t which, Mode mode, double t,
+                                            const State& x) const
+    {
+        return bound(which, mode, t, x).acceleration;
+    }
+    [[nodiscard]] double lower_bound(std::size_t which, Mode mode, double t, const State& x) const
+    {
+        return bound(which, mode, t, x).distance;
+    }
+};
+
 /// Runs `system` from x0 `repeats` times and returns the last run. Only the detectors
-/// `ends`, `extremum` and `bernstein` are served.
-[[nodiscard]] TimedRun run_any(const AnySystem& system, const std::vector<double>& x0,
+/// `ends`, `extremum` and `bernstein` are served, and gates.
+/// @throws BadInput for a gate that does not fit the system.
+[[nodiscard]] TimedRun run_any(AnySystem system, const std::vector<double>& x0,
                                const RunSettings& settings, int repeats);
+
+/// With the gate of the settings: one of the detectors `verified`, `certified`, `calibrated`.
+/// @throws BadInput for a gate that does not fit the system, or another stepper than rk4 in fixed
+///         steps and dopri5 under error control.
+[[nodiscard]] TimedRun run_gated(const BoundedSystem& system, const std::vector<double>& x0,
+                                 const RunSettings& settings, int repeats);
 
 /// The guards of a system by their own names, with what happens on their surfaces.
 template <class System>

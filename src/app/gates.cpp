@@ -177,6 +177,8 @@ GateTraining training_of(const GateSpec& spec, const TrainingRequest& request)
     training.iterations = request.iterations.value_or(4000);
     training.fresh_events = request.fresh_events.value_or(30'000);
     training.seed = request.seed.value_or(1);
+    training.checkpoint = request.checkpoint;
+    training.resume = request.resume;
     return training;
 }
 
@@ -193,9 +195,6 @@ std::vector<std::string_view> gate_kinds(std::string_view system)
 learn::TrainedGate train_system_gate(const SystemEntry& system, const TrainingRequest& request,
                                      const learn::ProgressCallback& progress)
 {
-    if (request.resume || !request.checkpoint.empty()) {
-        throw BadInput("the training of a gate takes seconds and keeps no checkpoint");
-    }
     const Values value(system, request.set);
     const auto* const entry = std::find_if(known.begin(), known.end(),
                                            [&](const Known& k) { return k.name == system.name; });

@@ -100,8 +100,12 @@ void add_simulate(CLI::App& app, int& status)
     add_text(command, "--mode", run.mode, "NAME",
              "mode at the start, where the system has modes; default: the system's");
     add_text(command, "--detector", run.detector, "NAME",
-             "ends, extremum (default), bernstein, network (default with --model), verified or "
-             "line");
+             "ends, extremum (default), bernstein, network (default with --model), line, verified, "
+             "certified or calibrated");
+    add_text(command, "--gate", run.gate, "NAME",
+             "how far a model that clears several steps is trusted: verified (not at all), "
+             "certified (where it has been proved right) or calibrated (by name only: events may "
+             "be missed, see inspect)");
     add_text(command, "--model", run.model, "FILE",
              "network to use, by path or name; default: one that suits");
     add_text(command, "--locator", run.locator, "NAME", "newton (default), bisection or toms748");

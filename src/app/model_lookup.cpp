@@ -55,13 +55,10 @@ std::string objection_to_shape(const SystemEntry& system, const Model& model)
     return {};
 }
 
-/// Why `model` cannot be used for this run; empty if it can.
-std::string objection(const SystemEntry& system, const RunSettings& settings, const Model& model)
+/// Why `model` does not speak of the system with these parameters; empty if it does.
+std::string objection_to_parameters(const SystemEntry& system, const RunSettings& settings,
+                                    const Model& model)
 {
-    if (model.system != system.name) {
-        return fmt::format("is for the system '{}', expected '{}'", model.system, system.name);
-    }
-    if (std::string why = objection_to_shape(system, model); !why.empty()) return why;
     for (const auto& [name, trained] : model.parameters) {
         const auto found =
             std::find_if(system.parameters.begin(), system.parameters.end(),
@@ -75,6 +72,24 @@ std::string objection(const SystemEntry& system, const RunSettings& settings, co
             return fmt::format("is trained for {} = {}, got {}", name, trained,
                                settings.parameters[i]);
         }
+    }
+    return {};
+}
+
+std::string objection_to_system(const SystemEntry& system, const Model& model)
+{
+    return model.system == system.name
+               ? std::string()
+               : fmt::format("is for the system '{}', expected '{}'", model.system, system.name);
+}
+
+/// Why `model` cannot be used for this run; empty if it can.
+std::string objection(const SystemEntry& system, const RunSettings& settings, const Model& model)
+{
+    if (std::string why = objection_to_system(system, model); !why.empty()) return why;
+    if (std::string why = objection_to_shape(system, model); !why.empty()) return why;
+    if (std::string why = objection_to_parameters(system, settings, model); !why.empty()) {
+        return why;
     }
     const double step = settings.options.step;
     if (settings.fixed_step && !(model.step_min <= step && step <= model.step_max)) {
@@ -144,6 +159,38 @@ FoundModel named_model(const SystemEntry& system, const RunSettings& settings,
         throw BadInput(fmt::format("model '{}' {}", file.string(), why));
     }
     return found;
+}
+
+FoundModel named_gate(const SystemEntry& system, const RunSettings& settings,
+                      const std::string& given)
+{
+    const fs::path file = find_model(given);
+    FoundModel found{.file = file, .model = load_model(file)};
+    std::string why = objection_to_system(system, found.model);
+    if (why.empty()) why = objection_to_parameters(system, settings, found.model);
+    if (why.empty() && found.model.kind == "event-classifier" && found.model.certificate.empty()) {
+        why = "predicts the events of single steps, expected a gate";
+    }
+    if (!why.empty()) throw BadInput(fmt::format("model '{}' {}", file.string(), why));
+    return found;
+}
+
+std::vector<double> parameters_of(const SystemEntry& system, const Model& model)
+{
+    std::vector<double> values;
+    for (const Parameter& parameter : system.parameters) values.push_back(parameter.initial);
+    for (const auto& [name, value] : model.parameters) {
+        const auto found =
+            std::find_if(system.parameters.begin(), system.parameters.end(),
+                         [&wanted = name](const Parameter& p) { return p.name == wanted; });
+        if (found == system.parameters.end()) {
+            throw std::invalid_argument(
+                fmt::format("the model depends on the parameter '{}', which {} does not have", name,
+                            system.name));
+        }
+        values[static_cast<std::size_t>(found - system.parameters.begin())] = value;
+    }
+    return values;
 }
 
 FoundModel suitable_model(const SystemEntry& system, const RunSettings& settings)

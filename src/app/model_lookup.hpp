@@ -35,6 +35,17 @@ struct FoundModel {
 [[nodiscard]] FoundModel named_model(const SystemEntry& system, const RunSettings& settings,
                                      const std::string& given);
 
+/// The gate that the user named: any model for the system and its parameters that is none of a
+/// single step, or that has a certificate.
+/// @throws BadInput or ModelError, as `named_model`.
+[[nodiscard]] FoundModel named_gate(const SystemEntry& system, const RunSettings& settings,
+                                    const std::string& given);
+
+/// The values of the system's parameters that a model was made for; what it does not depend on has
+/// its default.
+/// @throws std::invalid_argument for a parameter that the system does not have.
+[[nodiscard]] std::vector<double> parameters_of(const SystemEntry& system, const Model& model);
+
 /// The first of the system's own models that suits its parameters, start and
 /// stepping.
 /// @throws BadInput saying why each does not.

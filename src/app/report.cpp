@@ -63,6 +63,7 @@ Json json(const Statistics& s)
             {"missed_events", s.missed_events},
             {"late_events", s.late_events},
             {"checks_put_off", s.checks_put_off},
+            {"outside_domain", s.outside_domain},
             {"suppressed", s.suppressed},
             {"disabled", s.disabled},
             {"evidence",
@@ -209,7 +210,7 @@ std::string to_json(const SystemEntry& system, const RunSettings& settings, cons
         out["rtol"] = settings.options.rtol;
         out["atol"] = settings.options.atol;
     }
-    if (settings.network) out["model"] = settings.model.string();
+    if (settings.network || settings.gate) out["model"] = settings.model.string();
     out["outcome"] = ricochet::name(run.outcome);
     out["t"] = run.t;
     out["state"] = run.x;
@@ -228,10 +229,11 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     const PlainRun& run = timed.run;
     const Statistics& s = run.statistics;
     std::string out = title(system, settings) + '\n';
-    out += fmt::format(
-        "{}; events: {}, {}{}\n\n", describe_integration(settings), name(settings.detector),
-        name(settings.locator),
-        settings.network ? fmt::format(", model {}", settings.model.filename().string()) : "");
+    out += fmt::format("{}; events: {}, {}{}\n\n", describe_integration(settings),
+                       name(settings.detector), name(settings.locator),
+                       settings.network || settings.gate
+                           ? fmt::format(", model {}", settings.model.filename().string())
+                           : "");
     if (!run.events.empty()) out += events_table(system, run) + '\n';
 
     std::vector<std::string> state;
@@ -257,6 +259,10 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
         out += fmt::format(
             ",\n{} predictions: {} checks put off, {} false alarms, {} missed events ({} late)",
             s.network_calls, s.checks_put_off, s.false_alarms, s.missed_events, s.late_events);
+    }
+    if (s.outside_domain > 0) {
+        out += fmt::format(",\n{} of them of states outside of the model's box, checked exactly",
+                           s.outside_domain);
     }
     out += set_valued_text(timed);
     out += fmt::format("\nsteps without an event: {} proved, {} checked, {} gated, {} assumed\n",

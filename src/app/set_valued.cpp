@@ -81,6 +81,7 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
     refuse(request.locator && *request.locator != "newton", "--locator",
            "of a differential inclusion can only be newton");
     refuse(request.model.has_value(), "--model", "is not for differential inclusions");
+    refuse(request.gate.has_value(), "--gate", "is not for differential inclusions");
     refuse(request.mode.has_value(), "--mode",
            "of a differential inclusion follows from its state");
     refuse(steps && request.stepper, "--stepper", "is for --integrator handover and event");

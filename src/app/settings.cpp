@@ -21,12 +21,14 @@ constexpr std::uint64_t default_max_steps = 10'000'000;
 template <class Kind, std::size_t n>
 using Names = std::array<std::pair<std::string_view, Kind>, n>;
 
-constexpr Names<DetectorKind, 6> detectors{{{"ends", DetectorKind::ends},
+constexpr Names<DetectorKind, 8> detectors{{{"ends", DetectorKind::ends},
                                             {"extremum", DetectorKind::extremum},
                                             {"bernstein", DetectorKind::bernstein},
                                             {"network", DetectorKind::network},
                                             {"verified", DetectorKind::verified},
-                                            {"line", DetectorKind::line}}};
+                                            {"line", DetectorKind::line},
+                                            {"certified", DetectorKind::certified},
+                                            {"calibrated", DetectorKind::calibrated}}};
 constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
                                           {"bisection", LocatorKind::bisection},
                                           {"toms748", LocatorKind::toms748}}};
@@ -114,9 +116,45 @@ Mode mode_named(const SystemEntry& system, std::string_view given)
     return static_cast<Mode>(found - system.modes.begin());
 }
 
+bool is_gate(DetectorKind kind)
+{
+    return kind == DetectorKind::verified || kind == DetectorKind::certified ||
+           kind == DetectorKind::calibrated;
+}
+
+/// A model that clears more than one step, with what is to be believed of it.
+void choose_gate(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
+{
+    if (!request.model) {
+        throw BadInput(fmt::format("the {} gate of {} needs a trained model, expected --model FILE",
+                                   name(settings.detector), system.name));
+    }
+    FoundModel found = named_gate(system, settings, *request.model);
+    if (settings.detector == DetectorKind::certified && found.model.certificate.empty()) {
+        throw BadInput(fmt::format("model '{}' has no certificate, see ricochet certify",
+                                   found.file.string()));
+    }
+    if (settings.detector == DetectorKind::verified && found.model.kind != "gate-horizon") {
+        throw BadInput(
+            fmt::format("the verified gate forecasts with a gate-horizon, model '{}' is "
+                        "a {}",
+                        found.file.string(), found.model.kind));
+    }
+    settings.model = std::move(found.file);
+    settings.gate = std::move(found.model);
+}
+
 void choose_detector(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
 {
-    if (request.detector) {
+    if (request.gate) {
+        if (request.detector) {
+            throw BadInput("--gate is a detector, too; expected one of the two, got both");
+        }
+        settings.detector = named("gate", detectors, *request.gate);
+        if (!is_gate(settings.detector)) {
+            throw unknown("gate", *request.gate, {"verified", "certified", "calibrated"});
+        }
+    } else if (request.detector) {
         settings.detector = named("detector", detectors, *request.detector);
     } else if (request.model) {
         settings.detector = DetectorKind::network;
@@ -126,6 +164,16 @@ void choose_detector(const SystemEntry& system, const RunRequest& request, RunSe
             fmt::format("the detector line is for guards that are parabolas in time, which those "
                         "of {} are not",
                         system.name));
+    }
+    if (is_gate(settings.detector)) {
+        // The models of a system that has its own are of single steps.
+        if (system.models.empty()) return choose_gate(system, request, settings);
+        if (settings.detector != DetectorKind::verified) {
+            throw BadInput(
+                fmt::format("the {} gate is not for {}, whose networks are of single "
+                            "steps; expected verified",
+                            name(settings.detector), system.name));
+        }
     }
     const bool bare = settings.detector == DetectorKind::network;
     if (!bare && settings.detector != DetectorKind::verified) {

@@ -15,7 +15,16 @@ namespace ricochet::app {
 
 struct SystemEntry;
 
-enum class DetectorKind { ends, extremum, bernstein, network, verified, line };
+enum class DetectorKind {
+    ends,
+    extremum,
+    bernstein,
+    network,
+    verified,
+    line,
+    certified,
+    calibrated
+};
 enum class LocatorKind { newton, bisection, toms748 };
 enum class StepperKind { rk4, dopri5, fehlberg78, cash_karp54, euler };
 
@@ -39,7 +48,8 @@ struct RunSettings {
     DetectorKind detector = DetectorKind::extremum;
     LocatorKind locator = LocatorKind::newton;
     std::optional<Network> network{};  ///< of the detectors `network` and `verified`
-    std::filesystem::path model{};     ///< its file
+    std::optional<Model> gate{};       ///< of `certified` and `calibrated`, and of `verified`
+    std::filesystem::path model{};     ///< the file of either
     std::optional<SetValuedSettings> set_valued{};
 };
 
@@ -48,7 +58,7 @@ struct RunRequest {
     std::vector<std::string> set{};  ///< name=value
     std::optional<double> t_start{}, t_end{};
     std::optional<std::string> mode{};  ///< at the start, by name
-    std::optional<std::string> detector{}, locator{}, stepper{}, model{};
+    std::optional<std::string> detector{}, gate{}, locator{}, stepper{}, model{};
     std::optional<double> step{}, rtol{}, atol{}, event_tolerance{};
     std::optional<std::uint64_t> max_steps{};
     std::optional<std::string> integrator{}, controller{};  ///< of set-valued systems

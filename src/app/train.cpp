@@ -157,12 +157,13 @@ std::string_view kind_named(const SystemEntry& system, const Training& training,
 }
 
 /// @throws BadInput if the checkpoint to resume is not there or of another training.
-learn::Trained run_training(const Training& training, const TrainingRequest& request,
-                            const learn::ProgressCallback& progress)
+template <class Train>
+auto run_training(const Train& train, const TrainingRequest& request,
+                  const learn::ProgressCallback& progress)
 {
     bool started = false;
     try {
-        return training.train(request, [&](const learn::Progress& now) {
+        return train(request, [&](const learn::Progress& now) {
             started = true;
             return progress(now);
         });
@@ -215,20 +216,38 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
         throw unknown(fmt::format("kind of network for {}", system.name), training.kind, kinds);
     }
     check_writable("--out", request.out);
+    const bool own_checkpoint = training.checkpoint.empty();
+    if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
+    check_writable("--checkpoint", training.checkpoint);
     ProgressBar bar;
     const InterruptWatch watch;
+    const auto train_it = [&](const TrainingRequest& wanted,
+                              const learn::ProgressCallback& progress) {
+        return train_system_gate(system, wanted, progress);
+    };
     const learn::TrainedGate trained =
-        train_system_gate(system, training, [&](const learn::Progress& progress) {
+        run_training(train_it, training, [&](const learn::Progress& progress) {
             bar.show(progress);
             return interrupted == 0;
         });
     bar.finish();
 
     const learn::GateReport& report = trained.report;
+    if (report.outcome == learn::TrainingOutcome::stopped) {
+        // What it misses has not been measured: no model yet.
+        fmt::print(stderr,
+                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+                   training.checkpoint.string());
+        return 1;
+    }
     const bool sound =
         report.trial.misses == 0 && report.outcome != learn::TrainingOutcome::diverged;
     const bool write = sound || request.allow_misses;
     if (write) save_model(trained.model, request.out);
+    if (own_checkpoint && write) {
+        std::error_code ignored;
+        fs::remove(training.checkpoint, ignored);
+    }
     if (request.json) {
         auto object = Json::parse(learn::to_json(report));
         object["model"] = write ? Json(request.out.string()) : Json();
@@ -238,14 +257,19 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     }
     if (write) {
         fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
-    } else {
-        fmt::print(
-            stderr,
-            "ricochet: events are missed and no model was written; --allow-misses writes the "
-            "model all the same, with its miss rate\n");
+        return 0;
     }
-    const bool finished = report.outcome != learn::TrainingOutcome::stopped;
-    return write && finished ? 0 : 1;
+    fmt::print(stderr,
+               "ricochet: events are missed and no model was written; --allow-misses writes the "
+               "model all the same, with its miss rate\n");
+    std::error_code error;
+    if (fs::exists(training.checkpoint, error)) {
+        fmt::print(stderr,
+                   "ricochet: the best is kept in '{}'; the same command with --resume "
+                   "--allow-misses writes it\n",
+                   training.checkpoint.string());
+    }
+    return 1;
 }
 
 }  // namespace
@@ -268,7 +292,7 @@ int train(const TrainRequest& request)
     learn::Progress last;
     const InterruptWatch watch;
     const learn::Trained trained =
-        run_training(*system.training, training, [&](const learn::Progress& progress) {
+        run_training(system.training->train, training, [&](const learn::Progress& progress) {
             last = progress;
             bar.show(progress);
             return interrupted == 0;

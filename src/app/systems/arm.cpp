@@ -1,4 +1,5 @@
 #include "../any_system.hpp"
+#include "../model_lookup.hpp"
 #include "entries.hpp"
 #include "ricochet/systems/planar_arm.hpp"
 
@@ -33,6 +34,12 @@ TimedRun run(const RunSettings& settings, int repeats)
 {
     return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
                    repeats);
+}
+
+learn::GuardProblem guard_problem(const Model& model)
+{
+    const Arm made = system(parameters_of(find_system(Arm::name), model));
+    return learn::guard_problem(made, model, made.start());
 }
 
 }  // namespace
@@ -76,6 +83,7 @@ SystemEntry arm_entry()
         .t_end = 10,
         .start = start,
         .run = run,
+        .guard_problem = guard_problem,
     };
 }
 

@@ -1,6 +1,7 @@
 #include "ricochet/systems/cavern.hpp"
 
 #include "../any_system.hpp"
+#include "../model_lookup.hpp"
 #include "entries.hpp"
 
 namespace ricochet::app {
@@ -33,6 +34,12 @@ TimedRun run(const RunSettings& settings, int repeats)
 {
     return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
                    repeats);
+}
+
+learn::GuardProblem guard_problem(const Model& model)
+{
+    const Cavern made = system(parameters_of(find_system(Cavern::name), model));
+    return learn::guard_problem(made, model, made.start());
 }
 
 }  // namespace
@@ -71,6 +78,7 @@ SystemEntry cavern_entry()
         .t_end = 10,
         .start = start,
         .run = run,
+        .guard_problem = guard_problem,
     };
 }
 

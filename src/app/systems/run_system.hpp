@@ -78,6 +78,8 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
             } else {
                 throw std::logic_error("a system with a line has a guard curvature");
             }
+        case DetectorKind::certified:
+        case DetectorKind::calibrated: throw std::logic_error("gates are run by run_gated");
         case DetectorKind::extremum: break;
     }
     return use(Extremum{});
