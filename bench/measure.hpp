@@ -38,6 +38,9 @@ struct Check {
 /// Set-valued motion.
 [[nodiscard]] std::vector<Check> checks_of_part_5();
 
+/// Rate-and-state friction.
+[[nodiscard]] std::vector<Check> checks_of_part_7();
+
 /// The sliding mode and the diode circuit, handed over: changes, times, states.
 [[nodiscard]] Measured hand_over_sliding_mode();
 [[nodiscard]] Measured hand_over_circuit();
@@ -117,5 +120,23 @@ struct Check {
 [[nodiscard]] Measured time_zones();
 [[nodiscard]] Measured count_eigenvalues();
 [[nodiscard]] Measured count_bounded_eigenvalues();
+[[nodiscard]] Measured count_certified_eigenvalue();
+
+/// Rate-and-state friction: exact potentials, histories, learned pairs, sliders, speed.
+[[nodiscard]] Measured check_potentials();
+[[nodiscard]] Measured compare_exact_friction();
+[[nodiscard]] Measured identify_friction();
+[[nodiscard]] Measured train_pair();
+[[nodiscard]] Measured train_general();
+[[nodiscard]] Measured count_internal_variables();
+[[nodiscard]] Measured compare_internal_variables();
+[[nodiscard]] Measured transfer_to_sliders();
+[[nodiscard]] Measured count_unstable();
+[[nodiscard]] Measured compare_forms();
+[[nodiscard]] Measured take_adversarial_steps();
+[[nodiscard]] Measured bound_convexity();
+[[nodiscard]] Measured slider_accuracy();
+[[nodiscard]] Measured time_friction();
+[[nodiscard]] Measured learn_slip_law();
 
 }  // namespace ricochet::bench

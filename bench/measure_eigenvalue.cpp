@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
 #include <string>
 
 #include "measure.hpp"
+#include "ricochet/detect/certified.hpp"
+#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/least_eigenvalue.hpp"
 #include "scene_rows.hpp"
 
@@ -108,6 +112,34 @@ Measured count_bounded_eigenvalues()
     for (const double level : {1.3, 1.55}) measure_level(level, out);
     measure_slow(out);
     out.text += fmt::format(" with {} cells along a load, the same events", demanded);
+    return out;
+}
+
+Measured count_certified_eigenvalue()
+{
+    const Model model =
+        load_model(std::filesystem::path(RICOCHET_MODELS) / "eigenvalue-certified.safetensors");
+    const std::string why = why_void(model);
+    const Options options{.t_end = duration, .step = step};
+    const LeastEigenvalue system;
+    const auto every = integrate(system, system.start(), options, Fixed{}, Extremum{});
+    const auto cover = integrate(system, system.start(), options, Fixed{}, planner());
+    const Certified<> detector(model, {.check_bounds = false});
+    const auto proved = integrate(system, system.start(), options, Fixed{}, detector);
+    const double gain = ratio(cover.statistics.guard_calls, proved.statistics.guard_calls);
+    Measured out{.pass = why.empty() && gain >= 1.5 && every.statistics.events > 0 &&
+                         hash_of(cover) == hash_of(every) && hash_of(proved) == hash_of(every),
+                 .text = fmt::format("{:.2f}x, {} events", gain, every.statistics.events),
+                 .details = {}};
+    out.details.push_back(fmt::format(
+        "two-ended cover {:.5f} calls/step, with the network {:.5f}, which is asked {:.4f} times a "
+        "step; certificate {}",
+        per_step(cover.statistics.guard_calls), per_step(proved.statistics.guard_calls),
+        per_step(proved.statistics.network_calls), why.empty() ? "holds" : why));
+    for (const CertificateLevel& l : detector.certificate().levels) {
+        out.details.push_back(fmt::format("guard > {} below a logit of {:.4f}: {} boxes, {:.2f} s",
+                                          l.margin, l.threshold, l.boxes, l.seconds));
+    }
     return out;
 }
 

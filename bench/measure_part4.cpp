@@ -56,6 +56,11 @@ std::vector<Check> checks_of_part_4()
          .sentence = "the same with a table of proved bounds, against the two-ended cover alone",
          .target = ">= 1.5x in exact calls, the same events",
          .run = count_bounded_eigenvalues},
+        {.part = 4,
+         .id = "certified-eigenvalue",
+         .sentence = "the same with a network that is proved, against the two-ended cover alone",
+         .target = ">= 1.5x in exact calls, the same events",
+         .run = count_certified_eigenvalue},
     };
 }
 
