@@ -139,4 +139,8 @@ struct Check {
 [[nodiscard]] Measured time_friction();
 [[nodiscard]] Measured learn_slip_law();
 
+/// Networks of any weights in front of these guards: time with the meter on, and events.
+[[nodiscard]] Measured time_metered_networks();
+[[nodiscard]] Measured same_events_whatever_the_weights();
+
 }  // namespace ricochet::bench

@@ -61,6 +61,16 @@ std::vector<Check> checks_of_part_4()
          .sentence = "the same with a network that is proved, against the two-ended cover alone",
          .target = ">= 1.5x in exact calls, the same events",
          .run = count_certified_eigenvalue},
+        {.part = 4,
+         .id = "metered-networks",
+         .sentence = "a useless and a hostile network of 2 x 64 with the meter on, in every scene",
+         .target = "<= 1.05x the time of the better of planned and every step, the same events",
+         .run = time_metered_networks},
+        {.part = 4,
+         .id = "verified-events",
+         .sentence = "the verified gate with random, hostile and NaN weights, in every scene",
+         .target = "the events of a look at every step, bit for bit",
+         .run = same_events_whatever_the_weights},
     };
 }
 

@@ -1,0 +1,147 @@
+// What is done to every scene with a dear guard: networks of any weights are attached, and the
+// events and times compared with those of runs without.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "measure.hpp"
+#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/metered.hpp"
+#include "ricochet/detect/verified.hpp"
+#include "scene_rows.hpp"
+#include "timing.hpp"
+
+namespace ricochet::bench {
+
+struct AnyGate {
+    std::string name;
+    Gate gate;
+};
+struct AnyNetwork {
+    std::string name;
+    Network network;
+};
+
+/// Small gates that clear everything, nothing, or whatever their weights make of it.
+[[nodiscard]] std::vector<AnyGate> odd_gates(std::string_view system, std::size_t inputs,
+                                             double step);
+/// Gates that cost some 0.2 us an answer, and know nothing.
+[[nodiscard]] std::vector<AnyGate> dear_gates(std::string_view system, std::size_t inputs,
+                                              double step);
+/// Predictions for one step.
+[[nodiscard]] std::vector<AnyNetwork> odd_networks(std::string_view system, std::size_t inputs);
+
+/// A scene with all of these networks, one at a time.
+struct SameEvents {
+    std::string name;
+    std::uint64_t events = 0;
+    std::size_t runs = 0;
+    std::uint64_t answers = 0;
+    std::string different{};  ///< networks under which events differ
+};
+
+template <class Stepping, class System, class Detector>
+void compare_events(SameEvents& scene, const System& system, const Options& options,
+                    std::uint64_t exact, const std::string& network, const Detector& detector)
+{
+    const auto run = integrate(system, system.start(), options, Stepping{}, detector);
+    ++scene.runs;
+    scene.answers += run.statistics.network_calls;
+    if (hash_of(run) != exact) scene.different += network + "; ";
+}
+
+/// Steps are some `step` [s] long.
+template <class Stepping, class System>
+[[nodiscard]] SameEvents same_events(std::string name, std::string_view known_as,
+                                     const System& system, const Options& options, double step)
+{
+    using X = typename System::State;
+    const std::size_t inputs = system.start().size();
+    const auto exact = integrate(system, system.start(), options, Stepping{}, Extremum{});
+    const std::uint64_t hash = hash_of(exact);
+    SameEvents scene{.name = std::move(name), .events = exact.statistics.events};
+    if constexpr (Bounded<System, X>) {
+        const PlannerOptions planning{.check_bounds = false};
+        for (const AnyGate& any : odd_gates(known_as, inputs, step)) {
+            const Foreseen<> detector(any.gate, planning);
+            compare_events<Stepping>(scene, system, options, hash, any.name, detector);
+            if (any.name != "bold") continue;
+            compare_events<Stepping>(scene, system, options, hash, any.name + ", metered",
+                                     Metered(detector));
+        }
+    } else {
+        for (const AnyNetwork& any : odd_networks(known_as, inputs)) {
+            compare_events<Stepping>(scene, system, options, hash, any.name,
+                                     Verified<>(any.network));
+        }
+    }
+    return scene;
+}
+
+/// Times [s] of a run.
+struct MeteredRow {
+    std::string name;
+    std::string network;
+    std::uint64_t steps = 0;
+    std::uint64_t asked = 0;
+    double every = 0;
+    double planned = 0;
+    double metered = 0;
+    bool same = false;  ///< events
+
+    [[nodiscard]] double ratio() const { return metered / std::min(every, planned); }
+};
+
+/// Two rows: what knows nothing, and what looks too far ahead. The tenth of the samples that was
+/// disturbed least counts.
+template <class Stepping, class System>
+void time_metered(std::vector<MeteredRow>& rows, const std::string& name, const System& system,
+                  const Options& options, double step, double budget)
+{
+    using X = typename System::State;
+    const X x0 = system.start();
+    const auto run = [&](const auto& detector) {
+        return integrate(system, x0, options, Stepping{}, detector);
+    };
+    const std::vector<AnyGate> gates = dear_gates(system.name, x0.size(), step);
+    const PlannerOptions planning{.check_bounds = false};
+    const std::array<Metered<Foreseen<>>, 2> metered{Metered(Foreseen<>(gates[0].gate, planning)),
+                                                     Metered(Foreseen<>(gates[1].gate, planning))};
+    const std::array<Work, 3> works{repeated([&] { return run(planner()); }),
+                                    repeated([&] { return run(metered[0]); }),
+                                    repeated([&] { return run(metered[1]); })};
+    const auto exact = run(Extremum{});
+    const Timing every =
+        time_alone(repeated([&] { return run(Extremum{}); }), {.budget = budget, .fewest = 2});
+    const auto timings = time_in_turns(works, {.budget = budget, .fewest = 15});
+    for (std::size_t k = 0; k < 2; ++k) {
+        const auto once = run(metered[k]);
+        rows.push_back({.name = name,
+                        .network = gates[k].name,
+                        .steps = exact.statistics.steps,
+                        .asked = once.statistics.network_calls,
+                        .every = every.p10,
+                        .planned = timings[0].p10,
+                        .metered = timings[1 + k].p10,
+                        .same = hash_of(once) == hash_of(exact)});
+    }
+}
+
+void add_cavern_events(std::vector<SameEvents>& scenes);
+void add_cave_body_events(std::vector<SameEvents>& scenes);
+void add_arm_events(std::vector<SameEvents>& scenes);
+void add_other_events(std::vector<SameEvents>& scenes);
+
+void add_cavern_times(std::vector<MeteredRow>& rows);
+void add_cave_body_times(std::vector<MeteredRow>& rows);
+void add_arm_times(std::vector<MeteredRow>& rows);
+void add_other_times(std::vector<MeteredRow>& rows);
+
+}  // namespace ricochet::bench
