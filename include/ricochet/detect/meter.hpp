@@ -5,7 +5,7 @@
 //
 //     cost = (guard looks x their cost + answers x their cost + steps x their cost) / steps
 //
-// Counts are exact; what one of each costs is sampled with a clock, every 32nd time. Both ways
+// Counts are exact; what one of each costs is sampled with a clock, ever more rarely. Both ways
 // are tried in turn until the better one is clear beyond its noise. After that the other one is
 // tried again now and then, but what trials cost more than not asking is kept below a share of
 // the whole run (1 %), so that a network of no use, however large or hostile, costs no more.
@@ -141,7 +141,7 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
-    static constexpr std::uint64_t every = 32;  ///< of which one is timed
+    static constexpr std::uint64_t every = 32;  ///< of which one is timed, later of 512
 
     /// Steps and their cost in one of the two ways, older pieces with less weight.
     struct Way {
@@ -164,7 +164,8 @@ private:
     template <class Call>
     auto timed(std::uint64_t count, SampledCost& cost, Call& call)
     {
-        if (!samples_ || (count > 8 && count % every != 0)) return call();
+        const std::uint64_t gap = count > 32 * every ? 16 * every : every;
+        if (!samples_ || (count > 8 && count % gap != 0)) return call();
         const auto start = Clock::now();
         const auto answer = call();
         cost.add(std::chrono::duration<double>(Clock::now() - start).count());
