@@ -40,7 +40,7 @@ template <class System, class Detector>
     const auto go = [&] { return integrate(system, x0, options, FixedStep<Rk4>{}, detector); };
     const auto run = go();
     const auto steps = static_cast<double>(run.statistics.steps);
-    const Timing timing = time_alone(repeated(go), {.budget = 0.2, .fewest = 5});
+    const Timing timing = time_alone(repeated(go), {.budget = 0.1, .fewest = 3});
     return {.name = std::move(name),
             .time = timing.median / steps,
             .calls = static_cast<double>(run.statistics.guard_calls) / steps,

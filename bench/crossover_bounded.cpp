@@ -23,14 +23,14 @@ Regime regime_of(std::string name, std::size_t dimension, const System& system, 
 Regime cavern(double kick, double step)
 {
     return regime_of(fmt::format("cavern, kick {} m/s, {} ms", kick, 1e3 * step), 2,
-                     Cavern({.segments = 1000, .kick = kick}), 20'000, step);
+                     Cavern({.segments = 1000, .kick = kick}), 100'000, step);
 }
 
 template <std::size_t N>
 Regime arm(std::size_t obstacles, double step)
 {
     return regime_of(fmt::format("arm, {} obstacles, {} ms", obstacles, 1e3 * step), N,
-                     PlanarArm<N>({.obstacles = obstacles}), 40'000, step);
+                     PlanarArm<N>({.obstacles = obstacles}), 200'000, step);
 }
 
 }  // namespace

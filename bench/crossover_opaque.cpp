@@ -38,7 +38,7 @@ Regime regime_of(std::string name, std::size_t dimension, const System& inner,
     const learn::TrainedGate trained =
         learn::train_gate(system, starts, FixedStep<Rk4>{}, {}, training);
 
-    const Options options{.t_end = 100'000 * step, .step = step};
+    const Options options{.t_end = 200'000 * step, .step = step};
     std::uint64_t hash = 0;
     Regime regime = plain_regime(std::move(name), dimension, system, options, hash);
     regime.opaque = true;
