@@ -141,9 +141,9 @@ void count_allocations(std::string_view name, const Stepping& stepping, const De
 {
     const BallProblem problem = b1();
     const Options options{.t_end = problem.t_end, .step = 0.01, .record_events = false};
-    const std::uint64_t before = allocations();
+    const std::uint64_t before = testing_support::allocations();
     const auto run = integrate(problem.system, problem.x0, options, stepping, detector);
-    const std::uint64_t made = allocations() - before;
+    const std::uint64_t made = testing_support::allocations() - before;
     const bool right = run.statistics.events == problem.events.size();
     total += made + (right ? 0 : 1);
     text += fmt::format("{}{} {}{}", text.empty() ? "" : ", ", name, made,
@@ -165,10 +165,10 @@ Measured no_allocation()
                       text);
 
     // The counter counts: an allocation between two readings shows.
-    const std::uint64_t before = allocations();
+    const std::uint64_t before = testing_support::allocations();
     std::vector<double> something(100);
     keep(something);
-    if (allocations() == before) return {.pass = false, .text = "the counter does not count"};
+    if (testing_support::allocations() == before) return {.pass = false, .text = "the counter does not count"};
     return {.pass = total == 0, .text = std::move(text)};
 }
 

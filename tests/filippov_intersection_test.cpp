@@ -6,58 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <new>
 #include <optional>
 #include <random>
 #include <thread>
 #include <vector>
 
+#include "allocations.hpp"
 #include "filippov_runs.hpp"
-
-// --- allocations are counted, on every thread by itself ---
-
-namespace {
-thread_local long allocations = 0;
-
-void* count_and_allocate(std::size_t size)
-{
-    ++allocations;
-    if (void* memory = std::malloc(size ? size : 1)) return memory;
-    throw std::bad_alloc();
-}
-}  // namespace
-
-void* operator new(std::size_t size)
-{
-    return count_and_allocate(size);
-}
-void* operator new[](std::size_t size)
-{
-    return count_and_allocate(size);
-}
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept
-{
-    ++allocations;
-    return std::malloc(size ? size : 1);
-}
-void operator delete(void* memory) noexcept
-{
-    std::free(memory);
-}
-void operator delete[](void* memory) noexcept
-{
-    std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept
-{
-    std::free(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept
-{
-    std::free(memory);
-}
 
 namespace ricochet {
 namespace {
@@ -839,15 +795,15 @@ TEST(Filippov, SlidingAllocatesNothing)
     const auto allocated_by_run = [](const auto& system, const auto& x0) {
         Options options = tight(10, system.start_mode(0, x0));
         options.record_events = false;
-        const long before = allocations;
+        const auto before = testing_support::allocations();
         const auto run = integrate(system, x0, options);
-        const long count = allocations - before;
+        const auto count = testing_support::allocations() - before;
         EXPECT_GT(run.statistics.events, 0u);
         return count;
     };
-    EXPECT_EQ(allocated_by_run(Filippov<OneRelay>(), std::array{2.0}), 0);
-    EXPECT_EQ(allocated_by_run(Filippov<TwoRelays>(), std::array{1.0, -2.0}), 0);
-    EXPECT_EQ(allocated_by_run(Filippov<TwoRelays>(), Eigen::Vector2d(1.0, -2.0)), 0);
+    EXPECT_EQ(allocated_by_run(Filippov<OneRelay>(), std::array{2.0}), 0u);
+    EXPECT_EQ(allocated_by_run(Filippov<TwoRelays>(), std::array{1.0, -2.0}), 0u);
+    EXPECT_EQ(allocated_by_run(Filippov<TwoRelays>(), Eigen::Vector2d(1.0, -2.0)), 0u);
 }
 
 TEST(Filippov, SlidingOfDynamicStatesAllocatesOncePerThread)
@@ -864,9 +820,9 @@ TEST(Filippov, SlidingOfDynamicStatesAllocatesOncePerThread)
         }
     };
     calls();
-    const long before = allocations;
+    const auto before = testing_support::allocations();
     calls();
-    EXPECT_EQ(allocations - before, 0);
+    EXPECT_EQ(testing_support::allocations() - before, 0u);
 }
 
 TEST(Filippov, TwoThreadsMayShareASystem)

@@ -1,17 +1,16 @@
 #include "allocations.hpp"
 
-#include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
 
 namespace {
 
-std::atomic<std::uint64_t> count{0};
+thread_local std::uint64_t count = 0;
 
 void* counted(std::size_t size)
 {
-    count.fetch_add(1, std::memory_order_relaxed);
+    ++count;
     void* const memory = std::malloc(size > 0 ? size : 1);
     if (memory == nullptr) throw std::bad_alloc();
     return memory;
@@ -19,7 +18,7 @@ void* counted(std::size_t size)
 
 void* counted(std::size_t size, std::align_val_t alignment)
 {
-    count.fetch_add(1, std::memory_order_relaxed);
+    ++count;
     const auto unit = static_cast<std::size_t>(alignment);
     void* const memory = std::aligned_alloc(unit, (size + unit - 1) / unit * unit);
     if (memory == nullptr) throw std::bad_alloc();
@@ -54,11 +53,11 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept
     std::free(memory);
 }
 
-namespace ricochet::bench {
+namespace ricochet::testing_support {
 
 std::uint64_t allocations() noexcept
 {
-    return count.load(std::memory_order_relaxed);
+    return count;
 }
 
-}  // namespace ricochet::bench
+}  // namespace ricochet::testing_support
