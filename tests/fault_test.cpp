@@ -1,0 +1,372 @@
+// The strike-slip fault: kernels, products, polynomials, ruptures.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <string>
+
+#include "ricochet/systems/fault_kernel.hpp"
+#include "ricochet/systems/fault_rupture.hpp"
+#include "ricochet/systems/stiffness_series.hpp"
+#include "ricochet/systems/strike_slip_fault.hpp"
+
+namespace ricochet {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kernels = fs::path(RICOCHET_TEST_FIXTURES) / "fault_kernels";
+
+/// What a call throws; empty if it does not.
+template <class Call>
+std::string refusal(Call&& call)
+{
+    try {
+        call();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "";
+}
+
+bool contains(const std::string& text, std::string_view part)
+{
+    return text.find(part) != std::string::npos;
+}
+
+Eigen::MatrixXd dense_matrix(const FaultStiffness& stiffness)
+{
+    const auto n = static_cast<Eigen::Index>(stiffness.size());
+    StiffnessProduct product(stiffness);
+    Eigen::MatrixXd out(n, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        const Eigen::VectorXd unit = Eigen::VectorXd::Unit(n, i);
+        product(unit.data(), out.col(i).data());
+    }
+    return out;
+}
+
+TEST(FaultKernel, FullSpaceSelfStressOfASquareIsKnown)
+{
+    // Four equal corners at p = q = a/2: -(1 / (1 - nu) + 1) sqrt(2) / (pi a).
+    const double expected = -(1 / 0.75 + 1) * std::numbers::sqrt2 / std::numbers::pi;
+    EXPECT_NEAR(full_space_stress(0, 0, 1, 1, 0.25), expected, 1e-14);
+    EXPECT_NEAR(full_space_stress(0, 0, 100, 100, 0.25), expected / 100, 1e-16);
+}
+
+TEST(FaultKernel, HalfSpaceIsTheFullSpaceFarBelowTheSurface)
+{
+    // The image is 2000 sides away: (1/2000)^3 of the self stress, times a few.
+    EXPECT_NEAR(half_space_stress(0.3, 1000, 1000.2, 1, 1, 0.25),
+                full_space_stress(0.3, -0.2, 1, 1, 0.25), 1e-9);
+}
+
+TEST(FaultKernel, LongStripUnderASurfaceHasAMirrorImage)
+{
+    // Antiplane shear: the surface is a mirror. The ends, a length l away, add (1 / l)^2.
+    const double strip = half_space_stress(0, 1.5, 0.5, 2e4, 1, 0.25);
+    const double mirrored =
+        full_space_stress(0, 1, 2e4, 1, 0.25) + full_space_stress(0, 2, 2e4, 1, 0.25);
+    EXPECT_NEAR(strip, mirrored, 1e-7);
+}
+
+TEST(FaultKernel, SmallRectanglesActOnEachOtherAlike)
+{
+    // Betti: the stress is reciprocal up to the size of the rectangle over the distance, squared.
+    for (const double dx : {0.0, 0.7}) {
+        const double down = half_space_stress(dx, 2, 1, 1e-3, 1e-3, 0.25);
+        const double up = half_space_stress(dx, 1, 2, 1e-3, 1e-3, 0.25);
+        EXPECT_NEAR(down, up, 1e-5 * std::abs(up)) << dx;
+    }
+}
+
+TEST(FaultKernel, TopRowUnderASurfaceIsSofterByElevenPercent)
+{
+    // -0.934929 by an independent program that differentiates displacements numerically.
+    EXPECT_NEAR(half_space_stress(0, 0.5, 0.5, 1, 1, 0.25), -0.934929, 2e-5);
+}
+
+TEST(FaultStiffness, ProductsByTransformsAreThoseOfTheMatrix)
+{
+    // Rounding of transforms: a few ulp times log n.
+    for (const int n : {1, 2, 3, 4, 5, 7, 12}) {
+        const auto by_distance = [](int dx, int dz) {
+            return 3 / (1.0 + dx * dx + 0.3 * dz) + (dx + dz == 0 ? 9 : 0);
+        };
+        const auto matrix_of = [&](int i, int j) {
+            return by_distance(std::abs(i % n - j % n), std::abs(i / n - j / n));
+        };
+        const FaultStiffness toeplitz = FaultStiffness::toeplitz(n, by_distance);
+        const FaultStiffness layered = FaultStiffness::layered(
+            n, [&](int dx, int r, int s) { return by_distance(dx, std::abs(r - s)); });
+        const Eigen::MatrixXd a = dense_matrix(toeplitz);
+        const Eigen::MatrixXd b = dense_matrix(layered);
+        for (int i = 0; i < n * n; ++i) {
+            for (int j = 0; j < n * n; ++j) {
+                EXPECT_NEAR(a(i, j), matrix_of(i, j), 1e-13) << n;
+                EXPECT_NEAR(b(i, j), matrix_of(i, j), 1e-13) << n;
+            }
+        }
+    }
+}
+
+TEST(FaultStiffness, SpectrumHoldsTheEigenvalues)
+{
+    for (const FaultMedium medium : {FaultMedium::full_space, FaultMedium::half_space}) {
+        const StrikeSlipFault fault({.elements = 12, .medium = medium});
+        const Eigen::MatrixXd k = dense_matrix(fault.stiffness());
+        EXPECT_LT((k - k.transpose()).norm(), 1e-13 * k.norm());
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(k);
+        const Spectrum spectrum = fault.stiffness().spectrum();
+        EXPECT_LE(spectrum.lower, solver.eigenvalues().minCoeff());
+        EXPECT_GE(spectrum.lower, 0.9 * solver.eigenvalues().minCoeff());
+        EXPECT_GE(spectrum.upper, solver.eigenvalues().maxCoeff());
+        EXPECT_LE(spectrum.upper, 1.4 * solver.eigenvalues().maxCoeff());
+    }
+}
+
+TEST(FaultStiffness, FactorsAreThoseOfTheLiterature)
+{
+    // One element is a spring; the published matrices have 1.24362 and 0.523076.
+    EXPECT_NEAR(dense_matrix(StrikeSlipFault().stiffness())(0, 0), 1, 1e-14);
+    EXPECT_NEAR(StrikeSlipFault({.elements = 10}).factor(), 0.448018, 1e-6);
+    EXPECT_NEAR(StrikeSlipFault({.elements = 25}).factor(), 0.413334, 1e-6);
+    EXPECT_NEAR(StrikeSlipFault({.elements = 10, .kernel = kernels / "fault-kernel-10x10-3km.npy"})
+                    .factor(),
+                0.523076, 1e-6);
+    EXPECT_NEAR(
+        StrikeSlipFault({.elements = 1, .kernel = kernels / "fault-kernel-1x1-3km.npy"}).factor(),
+        1.24362, 1e-5);
+    // The tip-corrected mesh converges faster, to 0.39002.
+    EXPECT_NEAR(StrikeSlipFault({.elements = 40, .mesh = FaultMesh::tip_corrected}).factor(),
+                0.39002, 3e-4);
+}
+
+TEST(StiffnessSeries, PolynomialIsWithinItsBoundOnTheMatrix)
+{
+    const StrikeSlipFault fault({.elements = 10});
+    const Eigen::MatrixXd k = dense_matrix(fault.stiffness());
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(k);
+    const auto root = [](double x) { return std::sqrt(x); };
+    for (const double bound : {1e-2, 1e-5, 1e-9}) {
+        const auto series = StiffnessSeries::within(root, fault.stiffness().spectrum(), bound);
+        EXPECT_LE(series.relative_error(root), bound);
+        const StiffnessSeries shorter(root, fault.stiffness().spectrum(), series.degree() - 1);
+        EXPECT_GT(shorter.relative_error(root), bound);
+        // In the eigenbasis the error of each component is at most the bound.
+        StiffnessProduct product(fault.stiffness());
+        StiffnessSeries::Scratch scratch;
+        const Eigen::VectorXd x = solver.eigenvectors() * Eigen::VectorXd::Ones(100);
+        Eigen::VectorXd y(100);
+        series.apply(product, x, y, scratch);
+        EXPECT_EQ(product.count(), static_cast<std::uint64_t>(series.degree()));
+        const Eigen::VectorXd ratio =
+            (solver.eigenvectors().transpose() * y).array() / solver.eigenvalues().array().sqrt();
+        EXPECT_LE((ratio.array() - 1).abs().maxCoeff(), bound + 1e-12);
+    }
+}
+
+TEST(StiffnessSeries, RefusesABoundThatCannotBeMet)
+{
+    const auto root = [](double x) { return std::sqrt(x); };
+    const std::string said =
+        refusal([&] { (void)StiffnessSeries::within(root, {.lower = 1e-3, .upper = 1e3}, 1e-9); });
+    EXPECT_TRUE(contains(said, "cannot be met")) << said;
+}
+
+TEST(StrikeSlipFault, RefusesWrongParameters)
+{
+    const auto with = [](auto&& change) {
+        StrikeSlipFault::Parameters p;
+        change(p);
+        return refusal([&] { (void)StrikeSlipFault(p); });
+    };
+    EXPECT_TRUE(
+        contains(with([](auto& p) { p.elements = 0; }), "elements must be at least 1, got 0"));
+    EXPECT_TRUE(contains(with([](auto& p) { p.side = -1; }), "side"));
+    EXPECT_TRUE(contains(with([](auto& p) { p.poisson = 0.5; }), "poisson"));
+    EXPECT_TRUE(contains(with([](auto& p) { p.overload = 0; }), "overload"));
+    // Refused from the estimate: nothing of that size is made first.
+    const std::string large = with([](auto& p) { p.elements = 100'000; });
+    EXPECT_TRUE(contains(large, "memory_limit")) << large;
+    const std::string layers = with([](auto& p) {
+        p.elements = 1000;
+        p.medium = FaultMedium::half_space;
+    });
+    EXPECT_TRUE(contains(layers, "memory_limit")) << layers;
+}
+
+class KernelFile : public testing::Test {
+protected:
+    KernelFile()
+        : file_(fs::temp_directory_path() / ("ricochet-kernel-" + std::to_string(getpid())))
+    {
+    }
+    ~KernelFile() override { fs::remove(file_); }
+
+    std::string refusal_of(const Eigen::MatrixXd& m, int elements) const
+    {
+        std::string header = "{'descr': '<f8', 'fortran_order': True, 'shape': (" +
+                             std::to_string(m.rows()) + ", " + std::to_string(m.cols()) + "), }";
+        header.resize(118, ' ');
+        std::ofstream out(file_, std::ios::binary);
+        out << "\x93NUMPY" << '\x01' << '\0' << static_cast<char>(header.size()) << '\0' << header;
+        out.write(reinterpret_cast<const char*>(m.data()),
+                  static_cast<std::streamsize>(sizeof(double)) * m.size());
+        out.close();
+        return refusal([&] { (void)StrikeSlipFault({.elements = elements, .kernel = file_}); });
+    }
+    std::string refusal_of_bytes(const std::string& bytes) const
+    {
+        std::ofstream(file_, std::ios::binary) << bytes;
+        return refusal([&] { (void)read_npy_square(file_); });
+    }
+
+    fs::path file_;
+};
+
+TEST_F(KernelFile, ThatFitsIsTaken)
+{
+    EXPECT_EQ(refusal_of(-Eigen::MatrixXd::Identity(4, 4), 2), "");
+}
+
+TEST_F(KernelFile, ThatDoesNotFitIsRefused)
+{
+    Eigen::MatrixXd m = -Eigen::MatrixXd::Identity(4, 4);
+    EXPECT_TRUE(contains(refusal_of(m, 3), "needs a kernel of 9 x 9 entries, got 4 x 4"));
+    m(0, 1) = 0.1;
+    EXPECT_TRUE(contains(refusal_of(m, 2), "must be symmetric"));
+    EXPECT_TRUE(contains(refusal_of(Eigen::MatrixXd::Identity(4, 4), 2), "negative definite"));
+    m.setConstant(-1);
+    EXPECT_TRUE(contains(refusal_of(m, 2), "positive definite"));
+    m(2, 2) = std::nan("");
+    EXPECT_TRUE(contains(refusal_of(m, 2), "no numbers"));
+    EXPECT_TRUE(contains(refusal_of(Eigen::MatrixXd::Zero(2, 3), 1), "square"));
+}
+
+TEST_F(KernelFile, ThatIsNoneIsRefused)
+{
+    EXPECT_TRUE(contains(refusal_of_bytes("nonsense, no matrix"), "no NumPy file"));
+    EXPECT_TRUE(contains(refusal_of_bytes(std::string("\x93NUMPY\x01\0\xff\xff{", 11) + "  "),
+                         "ends within its header"));
+    EXPECT_TRUE(
+        contains(refusal([] { (void)read_npy_square("/nowhere/k.npy"); }), "cannot be read"));
+    std::string cut;
+    {
+        std::ifstream in(kernels / "fault-kernel-10x10-3km.npy", std::ios::binary);
+        cut.assign(std::istreambuf_iterator<char>(in), {});
+    }
+    cut.resize(cut.size() - 1);
+    EXPECT_TRUE(contains(refusal_of_bytes(cut), "80000 bytes, found 79999"));
+}
+
+TEST(Rupture, OneElementHasTheKnownSlipArrestAndPeak)
+{
+    // Computed once to 1e-12 as a smooth equation up to the arrest.
+    const Rupture r = simulate(StrikeSlipFault(), {.t_end = 30});
+    EXPECT_EQ(r.outcome, RuptureOutcome::at_rest);
+    EXPECT_EQ(r.t, 30);
+    EXPECT_NEAR(r.mean_slip, 0.22799875, 1e-7);
+    EXPECT_NEAR(r.arrest_time, 12.683187, 1e-6);
+    EXPECT_EQ(r.rest_time, r.arrest_time);
+    EXPECT_NEAR(r.peak_velocity, 0.0684778, 1e-7);
+    EXPECT_NEAR(r.peak_time, 10.43650, 1e-5);
+    EXPECT_EQ(r.statistics.arrests, 1U);
+}
+
+TEST(Rupture, PublishedKernelsGiveTheirConvergedSlip)
+{
+    // Limits of steps going to zero: 237.0438 and 825.2032 mm.
+    const Rupture small = simulate(
+        StrikeSlipFault({.elements = 10, .kernel = kernels / "fault-kernel-10x10-3km.npy"}),
+        {.t_end = 30});
+    EXPECT_NEAR(small.mean_slip, 0.2370438, 5e-6);
+    EXPECT_NEAR(small.peak_velocity, 0.0712653, 1e-6);
+    EXPECT_NEAR(small.peak_time, 8.5493, 1e-3);
+    const Rupture large = simulate(
+        StrikeSlipFault(
+            {.elements = 10, .side = 5000, .kernel = kernels / "fault-kernel-10x10-5km.npy"}),
+        {.t_end = 50});
+    EXPECT_NEAR(large.mean_slip, 0.8252032, 1e-5);
+    EXPECT_NEAR(large.peak_velocity, 0.194085, 1e-6);
+}
+
+TEST(Rupture, IsOfOrderFiveBeforeTheFirstArrestAndTwoAfterIt)
+{
+    const StrikeSlipFault fault({.elements = 4});
+    const auto slip = [&](double t_end, double step) {
+        return simulate(fault, {.t_end = t_end,
+                                .step = step,
+                                .rtol = std::numeric_limits<double>::infinity(),
+                                .polynomial_bound = 1e-10})
+            .mean_slip;
+    };
+    // Halving divides the error by 32, and more than 2^3.5 where the next term counts.
+    const double before = slip(7, 0.02);
+    EXPECT_GT(std::abs(slip(7, 0.5) - before) / std::abs(slip(7, 0.25) - before), 11.3);
+    // Over four halvings, single ratios being ragged: at least 2^(4 * 1.6) in all.
+    const double after = slip(30, 0.0078125 / 4);
+    EXPECT_GT(std::abs(slip(30, 0.25) - after) / std::abs(slip(30, 0.015625) - after), 84);
+}
+
+TEST(Rupture, EndsWhereItIsToldAndKeepsSnapshots)
+{
+    const StrikeSlipFault fault({.elements = 5});
+    const Rupture r = simulate(
+        fault,
+        {.t_end = 8, .snapshot_times = {0, 3.3, 8}, .progress = [](double) { return true; }});
+    EXPECT_EQ(r.outcome, RuptureOutcome::reached_end);
+    EXPECT_EQ(r.t, 8);
+    EXPECT_TRUE(std::isnan(r.rest_time));
+    ASSERT_EQ(r.snapshots.size(), 3U);
+    EXPECT_EQ(r.snapshots[0].slip.norm(), 0);
+    EXPECT_NEAR((r.snapshots[2].slip - r.slip).norm(), 0, 1e-12);
+    // A run that ends at a snapshot has the same fields, up to its own steps' errors.
+    const Rupture early = simulate(fault, {.t_end = 3.3});
+    EXPECT_NEAR((r.snapshots[1].velocity - early.velocity).norm() / early.velocity.norm(), 0, 1e-5);
+    const Rupture cancelled =
+        simulate(fault, {.t_end = 8, .progress = [](double t) { return t < 1; }});
+    EXPECT_EQ(cancelled.outcome, RuptureOutcome::cancelled);
+    EXPECT_LT(cancelled.t, 2);
+}
+
+TEST(Rupture, IsSymmetricAlongTheStrike)
+{
+    const Rupture r = simulate(StrikeSlipFault({.elements = 6}), {.t_end = 30});
+    for (Eigen::Index z = 0; z < 6; ++z) {
+        for (Eigen::Index x = 0; x < 3; ++x) {
+            EXPECT_NEAR(r.slip[6 * z + x], r.slip[6 * z + 5 - x], 1e-9);
+        }
+    }
+}
+
+TEST(Rupture, RefusesWrongOptions)
+{
+    const StrikeSlipFault fault;
+    const auto said = [&](const RuptureOptions& options) {
+        return refusal([&] { (void)simulate(fault, options); });
+    };
+    EXPECT_TRUE(contains(said({}), "t_end"));
+    EXPECT_TRUE(contains(said({.t_end = 1, .step = -1}), "step"));
+    EXPECT_TRUE(contains(said({.t_end = 1, .rtol = 0}), "rtol"));
+    EXPECT_TRUE(contains(said({.t_end = 1, .polynomial_bound = -1}), "polynomial_bound"));
+    EXPECT_TRUE(contains(said({.t_end = 1, .snapshot_times = {2}}), "snapshot_times"));
+    const StrikeSlipFault large({.elements = 10});
+    EXPECT_TRUE(
+        contains(refusal([&] { (void)simulate(large, {.t_end = 1, .polynomial_bound = 1e-18}); }),
+                 "cannot be met"));
+}
+
+TEST(Rupture, StabilityOfTheMethodIsKnown)
+{
+    // Dormand and Prince's interval on the negative axis ends at 3.31; at 0.8/3 near 3.15.
+    EXPECT_NEAR(stable_step_of_mode(1), 3.31, 0.01);
+    EXPECT_NEAR(stable_step_of_mode(0.8 / 3), 3.15, 0.02);
+}
+
+}  // namespace
+}  // namespace ricochet
