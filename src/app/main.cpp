@@ -130,6 +130,8 @@ void add_simulate(CLI::App& app, int& status)
     command.add_flag("--json", request->json, "print JSON");
     add_text(command, "--csv", request->csv, "FILE", "write the sampled trajectory");
     add_text(command, "--plot", request->plot, "FILE", "draw it with gnuplot, as .svg or .png");
+    add_text(command, "--kernel", request->kernel, "FILE",
+             "of fault: stresses for slip, a .npy file [1/km], in place of the medium's");
     command.footer(
         "Examples:\n"
         "  ricochet simulate bouncing-ball --set restitution=0.8 --plot ball.svg\n"

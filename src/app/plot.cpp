@@ -81,22 +81,12 @@ bool jumps_in(const PlainRun& run, std::size_t i)
     return jump > 1e-6 * size;
 }
 
-std::string script(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,
-                   bool svg)
+std::string script(const SystemEntry& system, const RunSettings& settings, const PlainRun& run)
 {
     const std::size_t panels = system.state.size();
-    const std::size_t height = 100 + 320 * panels;
     const std::string_view event = system.guards.size() == 1 ? system.guards[0].event : "event";
 
-    std::string out = "set encoding utf8\n";
-    out +=
-        svg ? fmt::format(
-                  "set terminal svg noenhanced size 1200,{} font 'sans-serif,15' "
-                  "background rgb 'white'\n",
-                  height)
-            : fmt::format("set terminal pngcairo noenhanced size 1200,{} font 'Sans,13'\n", height);
-    out += fmt::format(
-        "set output 'plot'\n"
+    std::string out = fmt::format(
         "set multiplot layout {},1 title {}.\"\\n\"\n"
         "set grid linecolor rgb '#d8d8d8' linetype 1\n"
         "set border 3 linecolor rgb '#404040'\n"
@@ -141,7 +131,7 @@ std::string script(const SystemEntry& system, const RunSettings& settings, const
         }
         out += fmt::format("plot {}\n", fmt::join(curves, ", \\\n     "));
     }
-    return out + "unset multiplot\nunset output\n";
+    return out + "unset multiplot\n";
 }
 
 std::string content(const fs::path& file)
@@ -200,13 +190,31 @@ void check_plot(const fs::path& file)
 void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,
           const fs::path& file)
 {
+    draw({{"flights", flights(system, run)}, {"jumps", jumps(run)}, {"marks", marks(run)}},
+         plot_head(file, 1200, static_cast<int>(100 + 320 * system.state.size())) +
+             script(system, settings, run),
+         file);
+}
+
+std::string plot_head(const fs::path& file, int width, int height)
+{
+    const bool svg = file.extension() == ".svg";
+    return "set encoding utf8\n" +
+           (svg ? fmt::format("set terminal svg noenhanced size {},{} font 'sans-serif,15' "
+                              "background rgb 'white'\n",
+                              width, height)
+                : fmt::format("set terminal pngcairo noenhanced size {},{} font 'Sans,13'\n", width,
+                              height)) +
+           "set output 'plot'\n";
+}
+
+void draw(const PlotFiles& files, const std::string& script, const fs::path& file)
+{
     const TemporaryDirectory directory;
     const fs::path& path = directory.path();
-    write_file(path / "flights", flights(system, run));
-    write_file(path / "jumps", jumps(run));
-    write_file(path / "marks", marks(run));
-    write_file(path / "script", fmt::format("cd {}\n", single_quoted(path.string())) +
-                                    script(system, settings, run, file.extension() == ".svg"));
+    for (const auto& [name, text] : files) write_file(path / name, text);
+    write_file(path / "script",
+               fmt::format("cd {}\n", single_quoted(path.string())) + script + "unset output\n");
     run_gnuplot(path);
     const std::string drawing = content(path / "plot");
     if (drawing.empty()) throw WriteError("gnuplot drew nothing");

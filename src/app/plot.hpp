@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "registry.hpp"
@@ -18,5 +20,15 @@ void check_plot(const std::filesystem::path& file);
 /// @throws WriteError if there is no gnuplot (saying how to get it), or it fails.
 void plot(const SystemEntry& system, const RunSettings& settings,
           const Run<std::vector<double>>& run, const std::filesystem::path& file);
+
+/// Names and contents of the files that a script reads.
+using PlotFiles = std::vector<std::pair<std::string, std::string>>;
+
+/// What a script for gnuplot begins with: terminal by the ending of `file`, size in pixels.
+[[nodiscard]] std::string plot_head(const std::filesystem::path& file, int width, int height);
+
+/// Runs gnuplot, as `plot` does, on a script of ours among `files`.
+/// @throws WriteError as `plot` does.
+void draw(const PlotFiles& files, const std::string& script, const std::filesystem::path& file);
 
 }  // namespace ricochet::app

@@ -30,6 +30,7 @@ const std::vector<SystemEntry>& systems()
         detest_f5_entry(),          cavern_entry(),      zones_entry(),
         eigenvalue_entry(),         arm_entry(),         sliding_mode_entry(),
         diode_circuit_entry(),
+        fault_entry(),
     };
     return all;
 }

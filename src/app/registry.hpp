@@ -113,6 +113,12 @@ struct OwnModel {
     bool any_step;          ///< else it is for one step only
 };
 
+struct SimulateRequest;
+struct SystemEntry;
+
+/// `ricochet simulate` of a system that has a command of its own.
+using OwnSimulation = int (*)(const SystemEntry& system, const SimulateRequest& request);
+
 struct SystemEntry {
     std::string_view name;
     std::string_view description;  ///< one sentence
@@ -160,6 +166,9 @@ struct SystemEntry {
     /// run to 1e-13 serves instead.
     std::vector<double> (*exact_state)(const std::vector<double>& parameters, double t) = nullptr;
     std::vector<std::string_view> published_errors{};  ///< lines of a source
+
+    /// It is simulated by this, and `start` and `run` are null; else null.
+    OwnSimulation simulate = nullptr;
 };
 
 [[nodiscard]] const std::vector<SystemEntry>& systems();

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "files.hpp"
+#include "input.hpp"
 #include "plot.hpp"
 #include "registry.hpp"
 #include "report.hpp"
@@ -31,6 +32,8 @@ std::vector<double> evenly(double start, double end, std::size_t n)
 int simulate(const SimulateRequest& request)
 {
     const SystemEntry& system = find_system(request.system);
+    if (system.simulate != nullptr) return system.simulate(system, request);
+    if (request.kernel) throw BadInput("--kernel is for the system fault");
     RunSettings settings = resolve(system, request.run);
     if (request.csv) check_writable("--csv", *request.csv);
     if (request.plot) check_plot(*request.plot);

@@ -16,6 +16,7 @@ struct SimulateRequest {
     std::optional<std::size_t> samples{};
     bool json = false;
     std::optional<std::filesystem::path> csv{}, plot{};
+    std::optional<std::filesystem::path> kernel{};  ///< of the system fault
 };
 
 /// Prints the run, and writes the files asked for.

@@ -27,5 +27,6 @@ namespace ricochet::app {
 [[nodiscard]] SystemEntry arm_entry();
 [[nodiscard]] SystemEntry sliding_mode_entry();
 [[nodiscard]] SystemEntry diode_circuit_entry();
+[[nodiscard]] SystemEntry fault_entry();
 
 }  // namespace ricochet::app

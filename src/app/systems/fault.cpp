@@ -1,0 +1,385 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../files.hpp"
+#include "../input.hpp"
+#include "../json_text.hpp"
+#include "../plot.hpp"
+#include "../report.hpp"
+#include "../simulate.hpp"
+#include "entries.hpp"
+#include "ricochet/systems/fault_rupture.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+constexpr double mib = 1048576;
+const StrikeSlipFault::Parameters defaults{};
+
+double whole(std::string_view name, double value)
+{
+    if (value != std::floor(value)) {
+        throw BadInput(fmt::format("{} of fault must be a whole number, got {}", name, value));
+    }
+    return value;
+}
+
+/// In the order of the entry's.
+StrikeSlipFault::Parameters parameters(const std::vector<double>& p, const SimulateRequest& request)
+{
+    constexpr double most = 1e9;  // far beyond any memory
+    StrikeSlipFault::Parameters out{
+        .elements = static_cast<int>(std::min(whole("elements", p[0]), most)),
+        .side = p[1],
+        .shear_modulus = p[2],
+        .poisson = p[3],
+        .density = p[4],
+        .damping = p[5],
+        .stress_gradient = p[6],
+        .residual_friction = p[7],
+        .friction_drop = p[8],
+        .slip_distance = p[9],
+        .overload = p[10],
+        .medium =
+            whole("half_space", p[11]) != 0 ? FaultMedium::half_space : FaultMedium::full_space,
+        .mesh = whole("tip_corrected", p[12]) != 0 ? FaultMesh::tip_corrected : FaultMesh::plain,
+        .memory_limit = p[13] * mib};
+    if (request.kernel) out.kernel = *request.kernel;
+    if (request.kernel && out.medium == FaultMedium::half_space) {
+        throw BadInput("--kernel stands for the medium: half_space must be 0 with it");
+    }
+    return out;
+}
+
+void refuse_what_is_not_for_faults(const RunRequest& run)
+{
+    const std::pair<bool, std::string_view> options[] = {
+        {run.mode.has_value(), "--mode"},
+        {run.detector.has_value(), "--detector"},
+        {run.locator.has_value(), "--locator"},
+        {run.stepper.has_value(), "--stepper"},
+        {run.model.has_value(), "--model"},
+        {run.atol.has_value(), "--atol"},
+        {run.event_tolerance.has_value(), "--event-tolerance"},
+        {run.controller.has_value(), "--controller"}};
+    for (const auto& [given, option] : options) {
+        if (given) throw BadInput(fmt::format("{} is not for the system fault", option));
+    }
+    if (run.t_start.value_or(0) != 0) {
+        throw BadInput(fmt::format("a fault starts at 0 s, got --t-start {}", *run.t_start));
+    }
+    if (run.integrator && *run.integrator != "explicit") {
+        throw unknown("integrator of fault", *run.integrator, {"explicit"});
+    }
+}
+
+RuptureOptions options(const SystemEntry& system, const SimulateRequest& request)
+{
+    const RunRequest& run = request.run;
+    RuptureOptions out;
+    out.t_end = run.t_end.value_or(system.t_end);
+    if (!(out.t_end > 0)) {
+        throw BadInput(fmt::format("--t-end must be positive, got {}", out.t_end));
+    }
+    if (run.step && !(*run.step > 0)) {
+        throw BadInput(fmt::format("--step must be positive, got {}", *run.step));
+    }
+    if (run.rtol && !(*run.rtol > 0)) {
+        throw BadInput(fmt::format("--rtol must be positive, got {}", *run.rtol));
+    }
+    out.step = run.step.value_or(0);
+    if (run.step && !run.rtol) out.rtol = std::numeric_limits<double>::infinity();
+    if (run.rtol) out.rtol = *run.rtol;
+    if (run.max_steps) out.max_steps = *run.max_steps;
+    if (request.plot) {
+        constexpr int pictures = 120;
+        for (int i = 0; i <= pictures; ++i) {
+            out.snapshot_times.push_back(std::min(out.t_end, i * (out.t_end / pictures)));
+        }
+    }
+    return out;
+}
+
+/// The mean motion at `n` even times, between the samples that there are.
+struct Samples {
+    std::vector<double> t, slip, velocity;
+};
+
+Samples sampled(const Rupture& r, double t_end, std::size_t n)
+{
+    Samples out;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double t = t_end * static_cast<double>(i) / static_cast<double>(n - 1);
+        while (at + 2 < r.times.size() && r.times[at + 1] < t) ++at;
+        const double span = r.times[at + 1] - r.times[at];
+        const double x = span > 0 ? std::clamp((t - r.times[at]) / span, 0.0, 1.0) : 1;
+        out.t.push_back(t);
+        out.slip.push_back(std::lerp(r.mean_slips[at], r.mean_slips[at + 1], x));
+        out.velocity.push_back(std::lerp(r.mean_velocities[at], r.mean_velocities[at + 1], x));
+    }
+    return out;
+}
+
+std::string json(const SystemEntry& system, const std::vector<double>& values,
+                 const StrikeSlipFault& fault, const RuptureOptions& asked, const Rupture& r,
+                 const SimulateRequest& request, double seconds)
+{
+    Json parameters = Json::object();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        parameters[std::string(system.parameters[i].name)] = values[i];
+    }
+    const RuptureStatistics& s = r.statistics;
+    Json out{{"system", system.name},
+             {"parameters", parameters},
+             {"integrator", "explicit"},
+             {"outcome", ricochet::name(r.outcome)},
+             {"t", r.t},
+             {"mean_slip", r.mean_slip},
+             {"peak_velocity", r.peak_velocity},
+             {"peak_time", r.peak_time},
+             {"arrest_time", r.arrest_time},
+             {"rest_time", r.rest_time},
+             {"largest_slip", r.slip.maxCoeff()},
+             {"kernel_factor", fault.factor()},
+             {"longest_step", r.longest_step},
+             {"stable_step", r.stable_step},
+             {"rtol", asked.rtol},
+             {"polynomial", {{"degree", s.degree}, {"error_bound", s.bound}}},
+             {"statistics",
+              {{"steps", s.steps},
+               {"rejected", s.rejected},
+               {"force_evaluations", s.evaluations},
+               {"stiffness_products", s.products},
+               {"arrests", s.arrests},
+               {"restarts", s.restarts}}},
+             {"memory_estimate", StrikeSlipFault::memory(fault.parameters())}};
+    if (request.kernel) out["kernel"] = request.kernel->string();
+    if (request.samples) {
+        const Samples samples = sampled(r, asked.t_end, *request.samples);
+        out["trajectory"] = {
+            {"t", samples.t}, {"mean_slip", samples.slip}, {"mean_velocity", samples.velocity}};
+    }
+    out["seconds"] = seconds;
+    return json_text(out);
+}
+
+std::string text(const SystemEntry& system, const StrikeSlipFault& fault, const Rupture& r,
+                 double seconds)
+{
+    const RuptureStatistics& s = r.statistics;
+    const auto& p = fault.parameters();
+    std::string out = fmt::format("{}: {} x {} elements on a square of {} m, {}\n", system.name,
+                                  p.elements, p.elements, p.side,
+                                  !p.kernel.empty() ? "kernel " + p.kernel.string()
+                                  : p.medium == FaultMedium::half_space ? "half space"
+                                                                        : "full space");
+    out += fmt::format("{:<16}{:.6f} m\n", "mean slip", r.mean_slip);
+    out += fmt::format("{:<16}{:.6f} m/s at {:.6f} s\n", "peak velocity", r.peak_velocity,
+                       r.peak_time);
+    if (!std::isnan(r.arrest_time)) out += fmt::format("{:<16}{:.6f} s\n", "arrest", r.arrest_time);
+    if (!std::isnan(r.rest_time)) out += fmt::format("{:<16}{:.6f} s\n", "at rest", r.rest_time);
+    out += fmt::format("ended at {} s: {}\n", r.t, describe(r.outcome));
+    out += fmt::format(
+        "{} steps of at most {:.4g} s (stable to {:.4g} s), {} rejected, {} force evaluations, {} "
+        "products with K\n",
+        s.steps, r.longest_step, r.stable_step, s.rejected, s.evaluations, s.products);
+    out += fmt::format("sqrt(K) by a polynomial of degree {}, within {:.2g}\n{:.3g} s of time\n",
+                       s.degree, s.bound, seconds);
+    return out;
+}
+
+std::string csv(const Samples& samples)
+{
+    std::string out = "t [s],mean slip [m],mean velocity [m/s]\n";
+    for (std::size_t i = 0; i < samples.t.size(); ++i) {
+        out += fmt::format("{},{},{}\n", samples.t[i], samples.slip[i], samples.velocity[i]);
+    }
+    return out;
+}
+
+/// x [km], depth [km], value; rows separated by blank lines, as gnuplot's images want them.
+std::string field(const StrikeSlipFault& fault, const Eigen::VectorXd& values)
+{
+    std::string out;
+    const int n = fault.elements();
+    for (int z = 0; z < n; ++z) {
+        for (int x = 0; x < n; ++x) {
+            out += fmt::format("{} {} {}\n", fault.depth(x) / 1000, fault.depth(z) / 1000,
+                               values[Eigen::Index{z} * n + x]);
+        }
+        out += '\n';
+    }
+    return out;
+}
+
+const RuptureSnapshot& nearest(const Rupture& r, double t)
+{
+    return *std::min_element(r.snapshots.begin(), r.snapshots.end(), [t](auto& a, auto& b) {
+        return std::abs(a.t - t) < std::abs(b.t - t);
+    });
+}
+
+void draw_rupture(const StrikeSlipFault& fault, const RuptureOptions& asked, const Rupture& r,
+                  const std::filesystem::path& file)
+{
+    const Samples samples = sampled(r, asked.t_end, 1001);
+    std::string mean;
+    for (std::size_t i = 0; i < samples.t.size(); ++i) {
+        mean += fmt::format("{} {} {}\n", samples.t[i], samples.slip[i], samples.velocity[i]);
+    }
+    const double unit = fault.time_unit();
+    const RuptureSnapshot* times[] = {&nearest(r, r.peak_time - 2 * unit), &nearest(r, r.peak_time),
+                                      &nearest(r, r.peak_time + 1.5 * unit)};
+    PlotFiles files{
+        {"mean", mean}, {"slip", field(fault, r.slip)}, {"peak", field(fault, r.peak_velocity_of)}};
+    for (std::size_t i = 0; i < 3; ++i) {
+        files.emplace_back(fmt::format("velocity{}", i), field(fault, times[i]->velocity));
+    }
+    std::string script = plot_head(file, 1500, 1250) +
+                         fmt::format(
+                             "set multiplot layout 3,3 title 'strike-slip fault, {0} x {0} "
+                             "elements: mean slip {1:.4g} m'\n"
+                             "set xlabel 'time [s]'\nset ylabel 'mean slip [m]'\nplot 'mean' using "
+                             "1:2 with lines linewidth 2 notitle\n"
+                             "set ylabel 'mean velocity [m/s]'\nplot 'mean' using 1:3 with lines "
+                             "linewidth 2 notitle\n"
+                             "set multiplot next\n"
+                             "set size ratio -1\nset yrange [{2}:0] \nset xrange [0:{2}]\nset "
+                             "xlabel 'along strike [km]'\n"
+                             "set ylabel 'depth [km]'\nset palette defined (0 '#081d58', 1 "
+                             "'#225ea8', 2 '#41b6c4', 3 "
+                             "'#c7e9b4', 4 '#ffffd9')\n",
+                             fault.elements(), r.mean_slip, fault.parameters().side / 1000);
+    script +=
+        "set title 'slip [m]'\nplot 'slip' with image notitle\n"
+        "set title 'largest velocity [m/s]'\nplot 'peak' with image notitle\n"
+        "set multiplot next\n";
+    script += fmt::format("set cbrange [0:{}]\n", std::max(1e-12, r.peak_velocity_of.maxCoeff()));
+    for (std::size_t i = 0; i < 3; ++i) {
+        script += fmt::format(
+            "set title 'velocity [m/s] at {:.2f} s'\nplot 'velocity{}' with image notitle\n",
+            times[i]->t, i);
+    }
+    draw(files, script + "unset multiplot\n", file);
+}
+
+int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
+{
+    refuse_what_is_not_for_faults(request.run);
+    const std::vector<double> values = parameter_values(system, request.run.set);
+    const RuptureOptions asked = options(system, request);
+    validate(asked);
+    if (request.csv) check_writable("--csv", *request.csv);
+    if (request.plot) check_plot(*request.plot);
+    const auto start = std::chrono::steady_clock::now();
+    const StrikeSlipFault fault(parameters(values, request));
+    const Rupture r = ricochet::simulate(fault, asked);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    print(request.json ? json(system, values, fault, asked, r, request, taken.count())
+                       : text(system, fault, r, taken.count()));
+    if (request.csv) {
+        write_file(*request.csv, csv(sampled(r, asked.t_end, request.samples.value_or(1001))));
+    }
+    if (request.plot) draw_rupture(fault, asked, r, *request.plot);
+    return r.outcome == RuptureOutcome::reached_end || r.outcome == RuptureOutcome::at_rest ? 0 : 1;
+}
+
+}  // namespace
+
+SystemEntry fault_entry()
+{
+    constexpr double inf = std::numeric_limits<double>::infinity();
+    const Range positive{.lower = 0};
+    const Range not_negative{.lower = 0, .lower_included = true};
+    const Range share{.lower = 0, .upper = 1, .lower_included = true, .upper_included = true};
+    return {
+        .name = StrikeSlipFault::name,
+        .description = "A strike-slip fault of n x n elements slips in an earthquake.",
+        .parameters = {{.name = "elements",
+                        .initial = 1,
+                        .unit = "1",
+                        .range = {.lower = 1, .upper = inf, .lower_included = true},
+                        .meaning = "per side, a whole number"},
+                       {.name = "side",
+                        .initial = defaults.side,
+                        .unit = "m",
+                        .range = positive,
+                        .meaning = "of the square"},
+                       {.name = "shear_modulus",
+                        .initial = defaults.shear_modulus,
+                        .unit = "Pa",
+                        .range = positive,
+                        .meaning = "of the rock"},
+                       {.name = "poisson",
+                        .initial = defaults.poisson,
+                        .unit = "1",
+                        .range = {.lower = 0, .upper = 0.5, .lower_included = true},
+                        .meaning = "Poisson's ratio"},
+                       {.name = "density",
+                        .initial = defaults.density,
+                        .unit = "kg/m³",
+                        .range = positive,
+                        .meaning = "of the rock"},
+                       {.name = "damping",
+                        .initial = defaults.damping,
+                        .unit = "1",
+                        .range = not_negative,
+                        .meaning = "damping ratio of every mode"},
+                       {.name = "stress_gradient",
+                        .initial = defaults.stress_gradient,
+                        .unit = "Pa/m",
+                        .range = positive,
+                        .meaning = "effective normal stress by depth"},
+                       {.name = "residual_friction",
+                        .initial = defaults.residual_friction,
+                        .unit = "1",
+                        .range = not_negative,
+                        .meaning = "coefficient after much slip"},
+                       {.name = "friction_drop",
+                        .initial = defaults.friction_drop,
+                        .unit = "1",
+                        .range = positive,
+                        .meaning = "by which it begins higher"},
+                       {.name = "slip_distance",
+                        .initial = defaults.slip_distance,
+                        .unit = "m",
+                        .range = positive,
+                        .meaning = "over which friction falls"},
+                       {.name = "overload",
+                        .initial = defaults.overload,
+                        .unit = "1",
+                        .range = positive,
+                        .meaning = "stress beyond strength at the start"},
+                       {.name = "half_space",
+                        .initial = 0,
+                        .unit = "1",
+                        .range = share,
+                        .meaning = "1: under a free surface (Okada)"},
+                       {.name = "tip_corrected",
+                        .initial = 0,
+                        .unit = "1",
+                        .range = share,
+                        .meaning = "1: elements a quarter off the edges"},
+                       {.name = "memory",
+                        .initial = defaults.memory_limit / mib,
+                        .unit = "MiB",
+                        .range = positive,
+                        .meaning = "a larger mesh is refused"}},
+        .state = {{.name = "slip", .unit = "m", .meaning = "mean slip"},
+                  {.name = "velocity", .unit = "m/s", .meaning = "mean velocity"}},
+        .t_end = 30,
+        .start = nullptr,
+        .run = nullptr,
+        .simulate = simulate_fault,
+    };
+}
+
+}  // namespace ricochet::app

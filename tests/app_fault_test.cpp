@@ -1,0 +1,57 @@
+// `simulate fault`.
+
+#include "app.hpp"
+
+namespace ricochet {
+namespace {
+
+const std::string kernels = std::string(RICOCHET_TEST_FIXTURES) + "/fault_kernels/";
+
+TEST_F(App, SimulateFaultOfOneElementByDefault)
+{
+    const nlohmann::json run = json({"simulate", "fault", "--json"});
+    EXPECT_EQ(run["outcome"], "at_rest");
+    EXPECT_EQ(run["t"], 30.0);
+    EXPECT_NEAR(run["mean_slip"].get<double>(), 0.22799875, 1e-7);
+    EXPECT_NEAR(run["peak_velocity"].get<double>(), 0.0684778, 1e-7);
+    EXPECT_NEAR(run["peak_time"].get<double>(), 10.43650, 1e-5);
+    EXPECT_NEAR(run["arrest_time"].get<double>(), 12.683187, 1e-6);
+    EXPECT_FALSE(run.contains("trajectory"));
+}
+
+TEST_F(App, SimulateFaultTakesAKernelAndWritesFiles)
+{
+    const nlohmann::json run = json(
+        {"simulate", "fault", "--set", "elements=10", "side=5000", "--t-end", "50", "--kernel",
+         kernels + "fault-kernel-10x10-5km.npy", "--json", "--csv", "mean.csv", "--samples", "11"});
+    EXPECT_NEAR(run["mean_slip"].get<double>(), 0.825203, 1e-5);
+    EXPECT_EQ(run["trajectory"]["t"].size(), 11U);
+    EXPECT_EQ(run["trajectory"]["mean_slip"][10], run["mean_slip"]);
+    const std::string csv = content(work() / "mean.csv");
+    EXPECT_TRUE(csv.starts_with("t [s],mean slip [m],mean velocity [m/s]\n"));
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 12);
+}
+
+TEST_F(App, SimulateFaultDrawsMaps)
+{
+    const Result result = run({"simulate", "fault", "--set", "elements=4", "--plot", "maps.svg"});
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_NE(content(work() / "maps.svg").find("depth [km]"), std::string::npos);
+}
+
+TEST_F(App, SimulateFaultRefusesWhatDoesNotFit)
+{
+    expect_refused({"simulate", "fault", "--set", "elements=0"}, {"elements", "got 0"});
+    expect_refused({"simulate", "fault", "--set", "elements=2.5"}, {"whole number", "2.5"});
+    expect_refused({"simulate", "fault", "--set", "elements=1e5"}, {"MiB", "limit"});
+    expect_refused({"simulate", "fault", "--t-end", "-1"}, {"--t-end"});
+    expect_refused({"simulate", "fault", "--detector", "ends"}, {"--detector"});
+    expect_refused({"simulate", "fault", "--kernel", "none.npy"}, {"none.npy", "cannot be read"});
+    expect_refused({"simulate", "fault", "--kernel", kernels + "fault-kernel-10x10-3km.npy"},
+                   {"1 x 1", "100 x 100"});
+    expect_refused({"simulate", "pendulum", "--kernel", "k.npy"}, {"--kernel"});
+    expect_refused({"compare", "fault"}, {"fault"});
+}
+
+}  // namespace
+}  // namespace ricochet
