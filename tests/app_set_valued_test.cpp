@@ -62,6 +62,57 @@ TEST_F(App, SimulateTakesEveryIntegratorAndController)
     }
 }
 
+TEST_F(App, SystemsWithFrictionAndImpactsTakeTheirIntegrators)
+{
+    // Sticks at -0.2 m after three turns; backward Euler damps it on the way.
+    for (const char* integrator : {"event", "handover", "bathe", "time-stepping"}) {
+        const nlohmann::json run =
+            json({"simulate", "coulomb-oscillator", "--json", "--integrator", integrator});
+        EXPECT_EQ(run["outcome"], "reached_end") << integrator;
+        EXPECT_EQ(run["mode"], "stick") << integrator;
+        EXPECT_NEAR(run["state"][0].get<double>(), -0.2,
+                    integrator == std::string("time-stepping") ? 0.06 : 1e-4)
+            << integrator;
+    }
+    const nlohmann::json belt =
+        json({"simulate", "friction-inclusion", "--json", "--set", "law=1", "--set", "position=1"});
+    EXPECT_EQ(belt["outcome"], "reached_end");
+    EXPECT_GE(belt["events"].size(), 4U);
+    const nlohmann::json ball = json({"simulate", "rolling-ball", "--json"});
+    ASSERT_EQ(ball["events"].size(), 2U);
+    // Faster than the plate by 0.9 m/s: 0.9 / (3.5 0.3 g - 2.5 0.001 g / 0.05).
+    EXPECT_NEAR(ball["events"][0]["t"].get<double>(), 0.9 / (9.81 * (1.05 - 0.05)), 1e-12);
+    EXPECT_EQ(ball["mode"], "at rest on the plate");
+    const nlohmann::json twisting = json({"simulate", "super-twisting", "--json"});
+    EXPECT_EQ(twisting["state"], nlohmann::json({0.0, 0.0}));
+    const nlohmann::json incline = json({"simulate", "incline-block", "--json"});
+    EXPECT_NEAR(incline["state"][0].get<double>(), 0, 1e-10);
+    const nlohmann::json block = json({"simulate", "two-contact-block", "--json"});
+    EXPECT_EQ(block["outcome"], "reached_end");
+    EXPECT_NEAR(block["state"][3].get<double>(), 0, 1e-10);
+    EXPECT_EQ(block["phases"].size(), 2U);
+    for (const char* integrator : {"handover", "time-stepping"}) {
+        const nlohmann::json toy =
+            json({"simulate", "woodpecker", "--json", "--integrator", integrator});
+        EXPECT_EQ(toy["outcome"], "reached_end") << integrator;
+        // About seven cycles of 0.146 s down the pole.
+        EXPECT_LT(toy["state"][0].get<double>(), -0.02) << integrator;
+        EXPECT_GT(toy["events"].size(), 20U) << integrator;
+    }
+}
+
+TEST_F(App, IntegratorsThatDoNotFitAreRefused)
+{
+    EXPECT_NE(run({"simulate", "woodpecker", "--integrator", "bathe"}).status, 0);
+    EXPECT_NE(run({"simulate", "coulomb-oscillator", "--integrator", "handover", "--set",
+                   "static-friction=0.5"})
+                  .status,
+              0);
+    EXPECT_NE(run({"simulate", "friction-inclusion", "--set", "law=5"}).status, 0);
+    EXPECT_NE(run({"simulate", "rolling-ball", "--stepper", "fehlberg78"}).status, 0);
+    EXPECT_NE(run({"simulate", "pendulum", "--integrator", "handover"}).status, 0);
+}
+
 TEST_F(App, CompareShowsTrueErrorsOfInclusions)
 {
     for (const char* system : {"sliding-mode", "diode-circuit"}) {

@@ -117,6 +117,16 @@ TEST(ContactMotion, TheWoodpeckerDescendsAsUnderTimeSteppingAlone)
     EXPECT_NEAR(run.x[0], steps.state().q[0], 0.02 * std::abs(steps.state().q[0]));
 }
 
+TEST(ContactMotion, StopsAfterSoManySteps)
+{
+    const auto run = hand_over(Ball{}, {0, 0.8}, {4, 0},
+                               {.t_end = 3, .set_valued = {.step = 1e-3}, .max_steps = 500});
+    EXPECT_EQ(run.outcome, HandOverOutcome::step_limit);
+    EXPECT_EQ(run.statistics.event_driven.steps + run.statistics.time_stepping.steps, 500U);
+    EXPECT_GT(run.t, 1.2);
+    EXPECT_LT(run.t, 2);
+}
+
 TEST(ContactMotion, RefusesAStartInsideAnObstacle)
 {
     EXPECT_THROW((void)hand_over(Ball{}, {0, -0.1}, {0, 0}, {.t_end = 1}), std::invalid_argument);

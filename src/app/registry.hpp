@@ -160,8 +160,9 @@ struct SystemEntry {
     /// @throws std::invalid_argument if the model does not fit
     learn::GuardProblem (*guard_problem)(const Model& model) = nullptr;
 
-    /// It is a differential inclusion; else 0. [s] of its set-valued steps by default.
-    double set_valued_step = 0;
+    /// Names for --integrator, the default first; empty where there is but "event".
+    std::vector<std::string_view> integrators{};
+    double set_valued_step = 0;  ///< [s] of its set-valued steps by default
     /// State at a time, for comparisons of inclusions, empty where it is not known; null, too: a
     /// run to 1e-13 serves instead.
     std::vector<double> (*exact_state)(const std::vector<double>& parameters, double t) = nullptr;

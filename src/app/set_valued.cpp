@@ -57,7 +57,7 @@ StepController controller(const std::string& name)
 
 bool choose_set_valued(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
 {
-    if (system.set_valued_step == 0) {
+    if (system.integrators.empty()) {
         if (request.integrator && *request.integrator != "event") {
             throw BadInput(
                 fmt::format("--integrator {} is for differential inclusions, and {} is none; "
@@ -69,8 +69,11 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
         return false;
     }
     SetValuedSettings chosen;
-    chosen.integrator =
-        one_of("integrator", request.integrator, {"handover", "event", "bathe", "time-stepping"});
+    chosen.integrator = one_of("integrator", request.integrator, system.integrators);
+    if (system.integrators.front() == "event" && chosen.integrator == "event") {
+        refuse(request.controller.has_value(), "--controller", "is for --integrator bathe");
+        return false;
+    }
     chosen.controller =
         one_of("controller", request.controller, {"constant", "heuristic", "pi", "filter"});
     const bool steps = chosen.integrator == "bathe" || chosen.integrator == "time-stepping";
@@ -146,6 +149,7 @@ Outcome as_outcome(HandOverOutcome outcome) noexcept
         case HandOverOutcome::step_limit: return Outcome::step_limit;
         case HandOverOutcome::non_finite: return Outcome::non_finite;
         case HandOverOutcome::cancelled: return Outcome::cancelled;
+        case HandOverOutcome::released: return Outcome::reached_end;
         case HandOverOutcome::not_handed_over: break;
     }
     return Outcome::zeno;

@@ -187,6 +187,9 @@ private:
                 end_with(detail::in_hand_over(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
                 end_with(HandOverOutcome::cancelled);
+            } else if (run_.statistics.event_driven.steps + steps_.statistics().steps >=
+                       options_.max_steps) {
+                end_with(HandOverOutcome::step_limit);
             } else if (open >= patience_) {
                 in_contact_ = false;
             }

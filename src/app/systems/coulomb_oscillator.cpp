@@ -3,6 +3,7 @@
 #include "../any_system.hpp"
 #include "../input.hpp"
 #include "entries.hpp"
+#include "friction_inclusion.hpp"
 
 namespace ricochet::app {
 
@@ -37,6 +38,14 @@ Mode start_mode(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
+    if (settings.set_valued) {
+        const auto& p = settings.parameters;
+        return run_oscillator(FrictionInclusion::of({.mass = p[mass],
+                                                     .stiffness = p[stiffness],
+                                                     .friction = p[friction],
+                                                     .static_friction = p[static_friction]}),
+                              {p[position], p[velocity]}, settings, repeats);
+    }
     return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
                    repeats);
 }
@@ -98,13 +107,15 @@ SystemEntry coulomb_oscillator_entry()
         .state = {{.name = "u", .unit = "m", .meaning = "position"},
                   {.name = "v", .unit = "m/s", .meaning = "velocity"}},
         .guards = labels(CoulombOscillator{}, {"stop", "pulled left", "pulled right"}),
-        .modes = mode_names<CoulombOscillator>(),
+        .modes = with_set_valued(mode_names<CoulombOscillator>()),
         .t_end = 10,
         .start = start,
         .run = run,
         .start_mode = start_mode,
         .exact_events = exact_events,
         .comparison_step = 0.01,
+        .integrators = {"event", "handover", "bathe", "time-stepping"},
+        .set_valued_step = 0.01,
     };
 }
 

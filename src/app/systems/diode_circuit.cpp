@@ -35,7 +35,7 @@ std::vector<double> start(const std::vector<double>& p)
 TimedRun run(const RunSettings& settings, int repeats)
 {
     const auto& p = settings.parameters;
-    return run_inclusion(system(p), Eigen::Vector3d(p[voltage_1], p[voltage_2], p[coil_current]),
+    return run_inclusion<Fehlberg78>(system(p), Eigen::Vector3d(p[voltage_1], p[voltage_2], p[coil_current]),
                          settings, repeats);
 }
 
@@ -96,6 +96,7 @@ SystemEntry diode_circuit_entry()
         .t_end = DiodeCircuit::t_end,
         .start = start,
         .run = run,
+        .integrators = {"handover", "event", "bathe", "time-stepping"},
         .set_valued_step = 0.05,
         .published_errors = {"PI         293 steps, 25.3 s, relative L2 3.8e-3",
                              "heuristic  414 steps, 34.8 s, relative L2 4.4e-3",

@@ -28,5 +28,11 @@ namespace ricochet::app {
 [[nodiscard]] SystemEntry sliding_mode_entry();
 [[nodiscard]] SystemEntry diode_circuit_entry();
 [[nodiscard]] SystemEntry fault_entry();
+[[nodiscard]] SystemEntry friction_inclusion_entry();
+[[nodiscard]] SystemEntry super_twisting_entry();
+[[nodiscard]] SystemEntry rolling_ball_entry();
+[[nodiscard]] SystemEntry incline_block_entry();
+[[nodiscard]] SystemEntry woodpecker_entry();
+[[nodiscard]] SystemEntry two_contact_block_entry();
 
 }  // namespace ricochet::app

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "../input.hpp"
 #include "../registry.hpp"
 #include "inclusion_options.hpp"
 
@@ -20,11 +21,20 @@ template <class V>
     return out;
 }
 
-/// Modes are those of `BranchModes`, and one for set-valued steps.
+/// Modes are those of `BranchModes`, and one for set-valued steps; without branches there is
+/// but one.
 template <class System>
 [[nodiscard]] Mode shown_mode(Mode mode)
 {
-    return std::min<Mode>(mode, BranchModes<System>::branch_modes);
+    if constexpr (Branching<System>) return std::min<Mode>(mode, BranchModes<System>::branch_modes);
+    return 0;
+}
+
+template <class System, class Branches>
+[[nodiscard]] Mode branch_mode([[maybe_unused]] const Branches& branches)
+{
+    if constexpr (Branching<System>) return BranchModes<System>::mode_of(branches);
+    return 0;
 }
 
 template <class System, class V>
@@ -102,7 +112,13 @@ template <class System>
     TimedRun out;
     const auto& times = settings.options.sample_times;
     std::size_t next = 0;
-    auto branches = motion.branches();
+    using Branches = std::remove_cvref_t<decltype(motion.branches())>;
+    const auto branches_at = [&]([[maybe_unused]] const SetValuedState<System>& now) {
+        Branches at = motion.branches();
+        if constexpr (Branching<System>) motion.stepper().branches_of(now, at);
+        return at;
+    };
+    Branches branches = branches_at(motion.state());
     const auto look = [&](const SetValuedState<System>& now) {
         const auto& before = motion.before();
         for (; next < times.size() && times[next] <= now.t; ++next) {
@@ -112,8 +128,7 @@ template <class System>
             out.run.trajectory.x.push_back(
                 plain(StateOf<System>(before.w + share * (now.w - before.w))));
         }
-        auto after = branches;
-        motion.stepper().branches_of(now, after);
+        const Branches after = branches_at(now);
         for (Eigen::Index i = 0; i < after.size(); ++i) {
             if (after[i] == branches[i]) continue;
             Event<std::vector<double>> event;
@@ -122,8 +137,8 @@ template <class System>
                          : branches[i] == Branch::inside ? EventKind::slip
                                                          : EventKind::mode;
             event.guard = static_cast<std::size_t>(i);
-            event.mode_before = BranchModes<System>::mode_of(branches);
-            event.mode_after = BranchModes<System>::mode_of(after);
+            event.mode_before = branch_mode<System>(branches);
+            event.mode_after = branch_mode<System>(after);
             event.before = event.after = plain(now.w);
             event.bracket = {before.t, now.t};
             event.slope = std::numeric_limits<double>::quiet_NaN();
@@ -132,18 +147,18 @@ template <class System>
         }
         branches = after;
     };
-    motion.stepper().branches_of(motion.state(), branches);
     const SetValuedOutcome outcome = motion.run(look);
     out.run.outcome = as_outcome(outcome);
     out.run.t = motion.state().t;
     out.run.x = plain(motion.state().w);
-    out.run.mode = BranchModes<System>::mode_of(branches);
+    out.run.mode = branch_mode<System>(branches);
     out.run.statistics.events = out.run.events.size();
     out.steps = shown(motion.statistics());
     return out;
 }
 
-template <class System>
+/// `Steppers` that the event-driven phases may have besides dopri5: `Fehlberg78` or none.
+template <class... Steppers, class System>
 [[nodiscard]] TimedRun run_inclusion(const System& system, const StateOf<System>& w0,
                                      const RunSettings& settings, int repeats)
 {
@@ -155,7 +170,11 @@ template <class System>
         if (steps) {
             out = run_by_steps(system, w0, settings);
         } else if (settings.stepper == StepperKind::fehlberg78) {
-            out = run_by_hand_over<System, ErrorControlled<Fehlberg78>>(system, w0, settings);
+            if constexpr (sizeof...(Steppers) > 0) {
+                out = run_by_hand_over<System, ErrorControlled<Steppers>...>(system, w0, settings);
+            } else {
+                throw BadInput("--stepper of this system can only be dopri5");
+            }
         } else {
             out = run_by_hand_over<System, ErrorControlled<Dopri5>>(system, w0, settings);
         }

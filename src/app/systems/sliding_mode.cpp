@@ -22,7 +22,7 @@ std::vector<double> start(const std::vector<double>& p)
 TimedRun run(const RunSettings& settings, int repeats)
 {
     const auto& p = settings.parameters;
-    return run_inclusion(system(p), SlidingMode::Vector(SlidingMode::Vector::Constant(p[from])),
+    return run_inclusion<Fehlberg78>(system(p), SlidingMode::Vector(SlidingMode::Vector::Constant(p[from])),
                          settings, repeats);
 }
 
@@ -65,6 +65,7 @@ SystemEntry sliding_mode_entry()
         .t_end = SlidingMode::t_end,
         .start = start,
         .run = run,
+        .integrators = {"handover", "event", "bathe", "time-stepping"},
         .set_valued_step = 1.25e-3,
         .exact_state = exact_state,
         .published_errors = {"PI         48 steps, 0.678 s, L2 1.94e-4",

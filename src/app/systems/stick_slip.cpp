@@ -2,6 +2,7 @@
 
 #include "../any_system.hpp"
 #include "entries.hpp"
+#include "friction_inclusion.hpp"
 
 namespace ricochet::app {
 
@@ -38,6 +39,16 @@ Mode start_mode(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
+    if (settings.set_valued) {
+        const auto& p = settings.parameters;
+        return run_oscillator(FrictionInclusion::of({.mass = p[mass],
+                                                     .stiffness = p[stiffness],
+                                                     .belt_speed = p[belt_speed],
+                                                     .friction = p[friction],
+                                                     .static_friction = p[friction],
+                                                     .weakening = p[weakening]}),
+                              {p[position], p[velocity]}, settings, repeats);
+    }
     return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
                    repeats);
 }
@@ -98,7 +109,7 @@ SystemEntry stick_slip_entry()
         .state = {{.name = "u", .unit = "m", .meaning = "position"},
                   {.name = "v", .unit = "m/s", .meaning = "velocity"}},
         .guards = labels(StickSlip{}, {"stick", "slip left", "slip right"}),
-        .modes = mode_names<StickSlip>(),
+        .modes = with_set_valued(mode_names<StickSlip>()),
         .t_end = 40,
         .start = start,
         .run = run,
@@ -106,6 +117,8 @@ SystemEntry stick_slip_entry()
         .exact_events = exact_events,
         .any_parameters = false,
         .comparison_step = 0.01,
+        .integrators = {"event", "handover", "bathe", "time-stepping"},
+        .set_valued_step = 0.01,
     };
 }
 

@@ -1,0 +1,153 @@
+#include "friction_inclusion.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "entries.hpp"
+#include "run_inclusion.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+enum : std::size_t {
+    law,
+    mass,
+    stiffness,
+    belt_speed,
+    friction,
+    weakening,
+    residual,
+    position,
+    velocity
+};  // the order of parameters
+
+FrictionInclusion system(const std::vector<double>& p)
+{
+    constexpr std::array laws{FrictionLaw::constant, FrictionLaw::hyperbolic,
+                              FrictionLaw::exponential, FrictionLaw::humped};
+    const auto which = static_cast<std::size_t>(p[law]);
+    if (which >= laws.size() || p[law] != static_cast<double>(which)) {
+        throw BadInput(
+            fmt::format("law must be 0 (constant), 1 (hyperbolic), 2 (exponential) or 3 "
+                        "(humped), got {}",
+                        p[law]));
+    }
+    return FrictionInclusion({.mass = p[mass],
+                              .stiffness = p[stiffness],
+                              .belt_speed = p[belt_speed],
+                              .friction = p[friction],
+                              .weakening = p[weakening],
+                              .residual = p[residual],
+                              .law = laws[which]});
+}
+
+std::vector<double> start(const std::vector<double>& p)
+{
+    return {p[position], p[velocity]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    const auto& p = settings.parameters;
+    return run_friction(system(p), {p[position], p[velocity]}, settings, repeats);
+}
+
+/// From the branches of the sliding velocity, faster than the belt first.
+Mode oscillator_mode(Mode branch)
+{
+    constexpr std::array modes{FrictionOscillator::slip_right, FrictionOscillator::stick,
+                               FrictionOscillator::slip_left};
+    return branch < modes.size() ? modes[branch] : branch;
+}
+
+}  // namespace
+
+TimedRun run_friction(const FrictionInclusion& system, const FrictionInclusion::Vector& w0,
+                      const RunSettings& settings, int repeats)
+{
+    return run_inclusion(system, w0, settings, repeats);
+}
+
+TimedRun run_oscillator(const FrictionInclusion& system, const FrictionInclusion::Vector& w0,
+                        const RunSettings& settings, int repeats)
+{
+    TimedRun timed = run_friction(system, w0, settings, repeats);
+    timed.run.mode = oscillator_mode(timed.run.mode);
+    for (auto& event : timed.run.events) {
+        event.mode_before = oscillator_mode(event.mode_before);
+        event.mode_after = oscillator_mode(event.mode_after);
+    }
+    return timed;
+}
+
+std::vector<std::string_view> with_set_valued(std::vector<std::string_view> modes)
+{
+    modes.push_back("set-valued");
+    return modes;
+}
+
+SystemEntry friction_inclusion_entry()
+{
+    return {
+        .name = FrictionInclusion::name,
+        .description = "A mass on a spring rubs on a belt, under one of several laws of friction.",
+        .parameters = {{.name = "law",
+                        .initial = 2,
+                        .unit = "1",
+                        .range = {.lower = 0, .lower_included = true},
+                        .meaning = "0 constant, 1 hyperbolic, 2 exponential, 3 humped"},
+                       {.name = "mass",
+                        .initial = 1,
+                        .unit = "kg",
+                        .range = {.lower = 0},
+                        .meaning = "on the belt"},
+                       {.name = "stiffness",
+                        .initial = 1,
+                        .unit = "N/m",
+                        .range = {.lower = 0, .lower_included = true},
+                        .meaning = "of the spring"},
+                       {.name = "belt-speed",
+                        .initial = 0.2,
+                        .unit = "m/s",
+                        .range = {},
+                        .meaning = "of the belt"},
+                       {.name = "friction",
+                        .initial = 1,
+                        .unit = "N",
+                        .range = {.lower = 0, .lower_included = true},
+                        .meaning = "at rest on the belt"},
+                       {.name = "weakening",
+                        .initial = 3,
+                        .unit = "s/m",
+                        .range = {.lower = 0, .lower_included = true},
+                        .meaning = "with the sliding speed"},
+                       {.name = "residual",
+                        .initial = 0.2,
+                        .unit = "N",
+                        .range = {.lower = 0, .lower_included = true},
+                        .meaning = "at high speed, of the laws 2 and 3"},
+                       {.name = "position",
+                        .initial = 0,
+                        .unit = "m",
+                        .range = {},
+                        .meaning = "at the start"},
+                       {.name = "velocity",
+                        .initial = 0.2,
+                        .unit = "m/s",
+                        .range = {},
+                        .meaning = "at the start"}},
+        .state = {{.name = "u", .unit = "m", .meaning = "position"},
+                  {.name = "v", .unit = "m/s", .meaning = "velocity"}},
+        .guards = {{.name = "belt", .event = "switch"}},
+        .modes = {"faster", "held", "slower", "set-valued"},
+        .t_end = 30,
+        .start = start,
+        .run = run,
+        .integrators = {"handover", "event", "bathe", "time-stepping"},
+        .set_valued_step = 0.01,
+    };
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,80 @@
+#include "ricochet/systems/woodpecker.hpp"
+
+#include "entries.hpp"
+#include "run_contact.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+enum : std::size_t { friction, beak_restitution, spring, gravity };  // the order of parameters
+
+Woodpecker system(const std::vector<double>& p)
+{
+    Woodpecker toy;
+    toy.coefficient = p[friction];
+    toy.beak_restitution = p[beak_restitution];
+    toy.spring = p[spring];
+    toy.gravity = p[gravity];
+    return toy;
+}
+
+std::vector<double> start(const std::vector<double>& /*p*/)
+{
+    const auto q = Woodpecker::start();
+    const auto v = Woodpecker::start_velocity();
+    return {q[0], q[1], q[2], v[0], v[1], v[2]};
+}
+
+TimedRun run(const RunSettings& settings, int repeats)
+{
+    return run_contact(system(settings.parameters), Woodpecker::start(),
+                       Woodpecker::start_velocity(), settings, repeats);
+}
+
+}  // namespace
+
+SystemEntry woodpecker_entry()
+{
+    return {
+        .name = Woodpecker::name,
+        .description = "A toy bird on a spring climbs down a pole by impacts and jamming.",
+        .parameters =
+            {{.name = "friction",
+              .initial = 0.3,
+              .unit = "1",
+              .range = {.lower = 0, .lower_included = true},
+              .meaning = "coefficient at all contacts"},
+             {.name = "beak-restitution",
+              .initial = 0.5,
+              .unit = "1",
+              .range = {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
+              .meaning = "of the beak on the pole"},
+             {.name = "spring",
+              .initial = 5.6e-3,
+              .unit = "N m",
+              .range = {.lower = 0},
+              .meaning = "between sleeve and bird"},
+             {.name = "gravity",
+              .initial = 9.81,
+              .unit = "m/s^2",
+              .range = {.lower = 0},
+              .meaning = "downward"}},
+        .state = {{.name = "y", .unit = "m", .meaning = "height of the sleeve"},
+                  {.name = "sleeve", .unit = "rad", .meaning = "angle of the sleeve"},
+                  {.name = "bird", .unit = "rad", .meaning = "angle of the bird"},
+                  {.name = "y'", .unit = "m/s", .meaning = "velocity of the sleeve"},
+                  {.name = "sleeve'", .unit = "rad/s", .meaning = "rate of the sleeve"},
+                  {.name = "bird'", .unit = "rad/s", .meaning = "rate of the bird"}},
+        .guards = {{.name = "beak", .event = "impact"},
+                   {.name = "lower edge", .event = "impact"},
+                   {.name = "upper edge", .event = "impact"}},
+        .t_end = 1,
+        .start = start,
+        .run = run,
+        .integrators = {"handover", "time-stepping"},
+        .set_valued_step = 2e-5,
+    };
+}
+
+}  // namespace ricochet::app
