@@ -10,6 +10,7 @@
 
 #include "../src/learn/friction_models.hpp"
 #include "ricochet/friction/along_history.hpp"
+#include "ricochet/learn/friction_study.hpp"
 #include "ricochet/learn/train_friction.hpp"
 
 namespace ricochet {
@@ -276,6 +277,54 @@ TEST(TrainFriction, RefusesWhatMakesNoSense)
     auto bare = histories;
     bare[1].friction.clear();
     EXPECT_THROW((void)train_friction(bare), std::invalid_argument);
+}
+
+TEST(FrictionStudy, MethodsAgreeOnASliderThatSlidesSteadily)
+{
+    const auto cases = slider_cases(1);
+    ASSERT_GT(cases[40].stiffness_ratio, 1);
+    const auto reference = learn::slider_velocities(cases[40], 4, 128);
+    ASSERT_TRUE(reference.stable);
+    EXPECT_EQ(reference.velocity.size(), 128U);
+    const auto explicit_run =
+        learn::slider_velocities(cases[40], BaselineOptions{.method = Baseline::rk4}, 128);
+    ASSERT_TRUE(explicit_run.stable);
+    // RK4 at 2^-13 s has an error of 1e-8 to 1e-6 on these, by its stability.
+    EXPECT_LE(relative_error(explicit_run.velocity, reference.velocity), 1e-6);
+    EXPECT_LE(
+        relative_error(learn::slider_velocities(cases[40], 2, 128).velocity, reference.velocity),
+        1e-4);
+}
+
+TEST(FrictionStudy, TheExactPairMovesSlidersAsTheLawDoes)
+{
+    // The pair of linear nets is the law: only rounding is between the two.
+    SliderState a = slider_case_start();
+    SliderState b = a;
+    const SliderCase c = slider_cases(1)[40];
+    const VariationalStep<AgeingLaw<DirectEffect::log>> law(AgeingLaw<DirectEffect::log>(),
+                                                            c.slider.block, 4);
+    const VariationalStep<AdditivePair> pair(AdditivePair(exact_parameters()), c.slider.block, 4);
+    for (int i = 0; i < 2000; ++i) {
+        (void)law.take(a, 1e-4, c.slider.load);
+        (void)pair.take(b, 1e-4, c.slider.load);
+    }
+    EXPECT_NEAR(b.v / a.v, 1, 1e-10);
+    EXPECT_NEAR(b.xi, 1.6 * a.xi, 1e-10);
+}
+
+TEST(StoredPair, IsTheAgeingLawToFiveMillionths)
+{
+    const AdditivePair pair = load_pair(RICOCHET_MODELS "/ageing-friction.json");
+    EXPECT_EQ(pair.fitted(), 71U);
+    double mean = 0;
+    const auto histories = make_histories(10, 77);
+    for (const FrictionHistory& h : histories) {
+        const double error = relative_error(friction_along(pair, h, 0, 32), h.friction);
+        EXPECT_LE(error, 5e-5);
+        mean += error / 10;
+    }
+    EXPECT_LE(mean, 5e-6);
 }
 
 }  // namespace
