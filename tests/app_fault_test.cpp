@@ -32,6 +32,35 @@ TEST_F(App, SimulateFaultTakesAKernelAndWritesFiles)
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 12);
 }
 
+TEST_F(App, SimulateFaultByImplicitSteps)
+{
+    const Words words{"simulate",    "fault",    "--set",
+                      "elements=10", "--kernel", kernels + "fault-kernel-10x10-3km.npy",
+                      "--json"};
+    const auto with = [&](const Words& more) {
+        Words all = words;
+        all.insert(all.end(), more.begin(), more.end());
+        return json(all);
+    };
+    const nlohmann::json published = with({"--integrator", "bathe-published", "--step", "0.5"});
+    EXPECT_NEAR(published["mean_slip"].get<double>(), 0.243671, 1e-6);
+    const nlohmann::json averaged = with({"--integrator", "bathe", "--step", "0.125"});
+    EXPECT_NEAR(averaged["mean_slip"].get<double>(), 0.237107, 2e-6);
+    EXPECT_EQ(averaged["controller"], "constant");
+    EXPECT_EQ(averaged["statistics"]["solves"], 190);
+    for (const char* controller : {"error", "heuristic", "pi", "filter"}) {
+        const nlohmann::json run = with({"--integrator", "bathe", "--controller", controller});
+        EXPECT_EQ(run["outcome"], "at_rest") << controller;
+        // Of order 2 at tolerance 1e-3; no controller is off by more than half a percent.
+        EXPECT_NEAR(run["mean_slip"].get<double>(), 0.23704, 0.0012) << controller;
+    }
+    expect_refused({"simulate", "fault", "--integrator", "handover"}, {"handover", "explicit"});
+    expect_refused({"simulate", "fault", "--controller", "pi"}, {"--controller"});
+    expect_refused(
+        {"simulate", "fault", "--integrator", "bathe-published", "--controller", "error"},
+        {"averaged"});
+}
+
 TEST_F(App, SimulateFaultDrawsMaps)
 {
     const Result result = run({"simulate", "fault", "--set", "elements=4", "--plot", "maps.svg"});

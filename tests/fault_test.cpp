@@ -9,6 +9,7 @@
 #include <numbers>
 #include <string>
 
+#include "ricochet/systems/fault_bathe.hpp"
 #include "ricochet/systems/fault_kernel.hpp"
 #include "ricochet/systems/fault_rupture.hpp"
 #include "ricochet/systems/stiffness_series.hpp"
@@ -366,6 +367,101 @@ TEST(Rupture, StabilityOfTheMethodIsKnown)
     // Dormand and Prince's interval on the negative axis ends at 3.31; at 0.8/3 near 3.15.
     EXPECT_NEAR(stable_step_of_mode(1), 3.31, 0.01);
     EXPECT_NEAR(stable_step_of_mode(0.8 / 3), 3.15, 0.02);
+}
+
+Rupture bathe(const StrikeSlipFault& fault, double step, const BatheOptions& options = {})
+{
+    return simulate(fault, {.t_end = 30, .step = step, .polynomial_bound = 1e-7}, options);
+}
+
+TEST(FaultBathe, PublishedSchemeGivesThePublishedSlips)
+{
+    // As the source's own code, with its stages solved to the last digit: 234.268 and 229.058 mm,
+    // 243.671 and 238.089 mm.
+    const StrikeSlipFault one;
+    const StrikeSlipFault hundred(
+        {.elements = 10, .kernel = kernels / "fault-kernel-10x10-3km.npy"});
+    const BatheOptions published{.first_stage = FirstStage::at_end};
+    EXPECT_NEAR(bathe(one, 0.5, published).mean_slip, 0.234268, 1e-6);
+    EXPECT_NEAR(bathe(one, 0.1, published).mean_slip, 0.229058, 1e-6);
+    EXPECT_NEAR(bathe(hundred, 0.5, published).mean_slip, 0.243671, 1e-6);
+    EXPECT_NEAR(bathe(hundred, 0.1, published).mean_slip, 0.238089, 1e-6);
+    // Its controller: 237.72 mm, and 237.67 with its own loosely solved stages.
+    const Rupture controlled = bathe(hundred, 0.05,
+                                     {.first_stage = FirstStage::at_end,
+                                      .controller = ClassicStep{.order = 1, .up = 1.8},
+                                      .estimate = ErrorEstimate::doubling,
+                                      .norm = FaultNorm::components});
+    EXPECT_NEAR(controlled.mean_slip, 0.23772, 1e-4);
+    EXPECT_GT(controlled.statistics.rejected, 0U);
+}
+
+TEST(FaultBathe, AveragedSchemeIsOfOrderTwoThroughAllArrests)
+{
+    const StrikeSlipFault fault({.elements = 10, .kernel = kernels / "fault-kernel-10x10-3km.npy"});
+    const double exact = 0.2370438;
+    for (const FaultBound bound : {FaultBound::implicit, FaultBound::extrapolated}) {
+        double before = 0;
+        for (const double step : {0.5, 0.25, 0.125, 0.0625}) {
+            const Rupture r = bathe(fault, step, {.bound = bound});
+            EXPECT_EQ(r.outcome, RuptureOutcome::at_rest);
+            EXPECT_EQ(r.statistics.arrests, 100U);
+            const double error = std::abs(r.mean_slip - exact);
+            // 4 for each halving, give or take where a step's end falls beside an arrest.
+            if (before > 0) {
+                EXPECT_NEAR(before / error, 4, 0.5) << step;
+            }
+            before = error;
+        }
+    }
+}
+
+TEST(FaultBathe, FreeEstimateControlsTheError)
+{
+    const StrikeSlipFault fault({.elements = 4});
+    const double exact = simulate(fault, {.t_end = 30, .step = 0.01}).mean_slip;
+    double before = 1;
+    for (const double rtol : {1e-1, 1e-2, 1e-3}) {
+        const Rupture r = bathe(fault, 0.05,
+                                {.controller = ErrorStep{.order = 3, .reject_above = 100},
+                                 .estimate = ErrorEstimate::embedded,
+                                 .rtol = rtol});
+        const double error = std::abs(r.mean_slip / exact - 1);
+        // At least half an order for each of the tolerance: the error falls with its power 2/3.
+        EXPECT_LT(error, before / 2) << rtol;
+        before = error;
+    }
+    EXPECT_LT(before, 1e-3);
+}
+
+TEST(FaultBathe, StepsBeyondConvexityAreReportedOrShortened)
+{
+    // Convex below 1.5 s; a constant step of 6 s is halved until its stages have solutions.
+    const Rupture r = bathe(StrikeSlipFault({.elements = 3}), 6);
+    EXPECT_GT(r.statistics.rejected, 0U);
+    EXPECT_TRUE(r.outcome == RuptureOutcome::at_rest || r.outcome == RuptureOutcome::reached_end ||
+                r.outcome == RuptureOutcome::not_converged);
+    EXPECT_TRUE(r.slip.allFinite());
+    // With the bound extrapolated every stage is convex.
+    const Rupture extrapolated =
+        bathe(StrikeSlipFault({.elements = 3}), 3, {.bound = FaultBound::extrapolated});
+    EXPECT_EQ(extrapolated.statistics.rejected, 0U);
+}
+
+TEST(FaultBathe, RefusesWrongOptions)
+{
+    const StrikeSlipFault fault;
+    const auto said = [&](const BatheOptions& options, double step = 0.1) {
+        return refusal([&] { (void)bathe(fault, step, options); });
+    };
+    EXPECT_TRUE(contains(said({}, 0), "step must be positive"));
+    EXPECT_TRUE(contains(said({.first_stage = FirstStage::switch_aware}), "averaged or at_end"));
+    EXPECT_TRUE(contains(said({.controller = HeuristicStep{}}), "estimate"));
+    EXPECT_TRUE(contains(said({.first_stage = FirstStage::at_end,
+                               .controller = ErrorStep{},
+                               .estimate = ErrorEstimate::embedded}),
+                         "averaged"));
+    EXPECT_TRUE(contains(said({.rtol = -1}), "rtol"));
 }
 
 }  // namespace

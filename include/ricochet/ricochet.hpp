@@ -52,6 +52,7 @@
 #include "ricochet/systems/detest_f4.hpp"
 #include "ricochet/systems/detest_f5.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
+#include "ricochet/systems/fault_bathe.hpp"
 #include "ricochet/systems/fault_kernel.hpp"
 #include "ricochet/systems/fault_rupture.hpp"
 #include "ricochet/systems/fault_stiffness.hpp"

@@ -304,7 +304,8 @@ private:
     {
         out_.outcome = outcome;
         const bool rests = outcome == RuptureOutcome::at_rest;
-        record_.finish(t_, rests ? last_stop_ : std::numeric_limits<double>::quiet_NaN(), now_);
+        record_.finish(t_, rests ? last_stop_ : std::numeric_limits<double>::quiet_NaN(), true,
+                       now_);
         auto& s = out_.statistics;
         s.evaluations = forces_.evaluations();
         s.products = forces_.product().count();

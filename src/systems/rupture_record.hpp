@@ -79,7 +79,8 @@ public:
     }
 
     /// @param rest_time  without units; NaN: something moves
-    void finish(double t, double rest_time, const FaultFields& fields)
+    /// @param located    whether that is more exact than the ends of steps
+    void finish(double t, double rest_time, bool located, const FaultFields& fields)
     {
         const bool rests = !std::isnan(rest_time);
         out_.t = rests ? options_.t_end : seconds(t);
@@ -87,7 +88,7 @@ public:
         out_.velocity = fields.velocity * fault_.velocity_unit();
         out_.mean_slip = fault_.mean(out_.slip);
         out_.rest_time = seconds(rest_time);
-        if (rests && fault_.size() == 1) out_.arrest_time = out_.rest_time;
+        if (rests && located && fault_.size() == 1) out_.arrest_time = out_.rest_time;
         if (rests && out_.times.back() < options_.t_end) {
             out_.times.push_back(options_.t_end);
             out_.mean_slips.push_back(out_.mean_slip);

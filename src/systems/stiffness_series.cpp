@@ -82,6 +82,16 @@ StiffnessSeries StiffnessSeries::within(const Function& f, Spectrum interval, do
     return some;
 }
 
+StiffnessSeries StiffnessSeries::combined(double constant, double slope, double factor) const
+{
+    StiffnessSeries out = *this;
+    for (double& c : out.c_) c *= factor;
+    if (out.c_.size() < 2) out.c_.resize(2);
+    out.c_[0] += constant + slope * 0.5 * (interval_.upper + interval_.lower);
+    out.c_[1] += slope * 0.5 * (interval_.upper - interval_.lower);
+    return out;
+}
+
 double StiffnessSeries::operator()(double eigenvalue) const noexcept
 {
     const double centre = 0.5 * (interval_.upper + interval_.lower);

@@ -23,6 +23,9 @@ public:
     [[nodiscard]] static StiffnessSeries within(const Function& f, Spectrum interval, double bound);
     static constexpr int most_terms = 400;
 
+    /// constant + slope x + factor p(x).
+    [[nodiscard]] StiffnessSeries combined(double constant, double slope, double factor) const;
+
     [[nodiscard]] int degree() const noexcept { return static_cast<int>(c_.size()) - 1; }
     [[nodiscard]] double operator()(double eigenvalue) const noexcept;
     /// The largest |p / f - 1| on the interval, from 64 samples for each of its terms.

@@ -14,7 +14,7 @@
 #include "../report.hpp"
 #include "../simulate.hpp"
 #include "entries.hpp"
-#include "ricochet/systems/fault_rupture.hpp"
+#include "ricochet/systems/fault_bathe.hpp"
 
 namespace ricochet::app {
 
@@ -67,17 +67,64 @@ void refuse_what_is_not_for_faults(const RunRequest& run)
         {run.stepper.has_value(), "--stepper"},
         {run.model.has_value(), "--model"},
         {run.atol.has_value(), "--atol"},
-        {run.event_tolerance.has_value(), "--event-tolerance"},
-        {run.controller.has_value(), "--controller"}};
+        {run.event_tolerance.has_value(), "--event-tolerance"}};
     for (const auto& [given, option] : options) {
         if (given) throw BadInput(fmt::format("{} is not for the system fault", option));
     }
     if (run.t_start.value_or(0) != 0) {
         throw BadInput(fmt::format("a fault starts at 0 s, got --t-start {}", *run.t_start));
     }
-    if (run.integrator && *run.integrator != "explicit") {
-        throw unknown("integrator of fault", *run.integrator, {"explicit"});
+}
+
+/// How the rupture is integrated, by name.
+struct Integration {
+    std::string integrator = "explicit";
+    std::string controller = "constant";
+    BatheOptions bathe{};  ///< unless explicit
+};
+
+Integration integration(const RunRequest& run)
+{
+    Integration out;
+    const std::vector<std::string_view> integrators{"explicit", "bathe", "bathe-published"};
+    const std::vector<std::string_view> controllers{"constant", "error", "heuristic", "pi",
+                                                    "filter"};
+    out.integrator = run.integrator.value_or(out.integrator);
+    out.controller = run.controller.value_or(out.controller);
+    const auto known = [](const auto& all, const std::string& name) {
+        return std::find(all.begin(), all.end(), name) != all.end();
+    };
+    if (!known(integrators, out.integrator)) {
+        throw unknown("integrator of fault", out.integrator, integrators);
     }
+    if (!known(controllers, out.controller)) {
+        throw unknown("controller", out.controller, controllers);
+    }
+    if (out.integrator == "explicit") {
+        if (run.controller)
+            throw BadInput("--controller is for --integrator bathe and bathe-published");
+        return out;
+    }
+    if (out.integrator == "bathe-published") out.bathe.first_stage = FirstStage::at_end;
+    if (out.controller == "constant") {
+        if (run.rtol) throw BadInput("--rtol needs a --controller that looks at errors");
+        return out;
+    }
+    if (run.rtol) out.bathe.rtol = *run.rtol;
+    if (out.controller == "error") {
+        if (out.integrator != "bathe") {
+            throw BadInput("--controller error is of the averaged scheme: --integrator bathe");
+        }
+        out.bathe.controller = ErrorStep{.order = 3, .reject_above = 100};
+        out.bathe.estimate = ErrorEstimate::embedded;
+        return out;
+    }
+    out.bathe.estimate = ErrorEstimate::doubling;
+    out.bathe.norm = FaultNorm::components;
+    if (out.controller == "heuristic") out.bathe.controller = HeuristicStep{};
+    if (out.controller == "pi") out.bathe.controller = FilteredStep::pi3333();
+    if (out.controller == "filter") out.bathe.controller = FilteredStep::h211b(4);
+    return out;
 }
 
 RuptureOptions options(const SystemEntry& system, const SimulateRequest& request)
@@ -129,8 +176,8 @@ Samples sampled(const Rupture& r, double t_end, std::size_t n)
 }
 
 std::string json(const SystemEntry& system, const std::vector<double>& values,
-                 const StrikeSlipFault& fault, const RuptureOptions& asked, const Rupture& r,
-                 const SimulateRequest& request, double seconds)
+                 const StrikeSlipFault& fault, const RuptureOptions& asked, const Integration& how,
+                 const Rupture& r, const SimulateRequest& request, double seconds)
 {
     Json parameters = Json::object();
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -139,7 +186,7 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
     const RuptureStatistics& s = r.statistics;
     Json out{{"system", system.name},
              {"parameters", parameters},
-             {"integrator", "explicit"},
+             {"integrator", how.integrator},
              {"outcome", ricochet::name(r.outcome)},
              {"t", r.t},
              {"mean_slip", r.mean_slip},
@@ -150,8 +197,6 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
              {"largest_slip", r.slip.maxCoeff()},
              {"kernel_factor", fault.factor()},
              {"longest_step", r.longest_step},
-             {"stable_step", r.stable_step},
-             {"rtol", asked.rtol},
              {"polynomial", {{"degree", s.degree}, {"error_bound", s.bound}}},
              {"statistics",
               {{"steps", s.steps},
@@ -161,6 +206,15 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
                {"arrests", s.arrests},
                {"restarts", s.restarts}}},
              {"memory_estimate", StrikeSlipFault::memory(fault.parameters())}};
+    if (how.integrator == "explicit") {
+        out["stable_step"] = r.stable_step;
+        out["rtol"] = asked.rtol;
+    } else {
+        out["controller"] = how.controller;
+        out["step"] = asked.step;
+        out["statistics"]["solves"] = s.solves;
+        out["statistics"]["iterations"] = s.iterations;
+    }
     if (request.kernel) out["kernel"] = request.kernel->string();
     if (request.samples) {
         const Samples samples = sampled(r, asked.t_end, *request.samples);
@@ -187,10 +241,11 @@ std::string text(const SystemEntry& system, const StrikeSlipFault& fault, const 
     if (!std::isnan(r.arrest_time)) out += fmt::format("{:<16}{:.6f} s\n", "arrest", r.arrest_time);
     if (!std::isnan(r.rest_time)) out += fmt::format("{:<16}{:.6f} s\n", "at rest", r.rest_time);
     out += fmt::format("ended at {} s: {}\n", r.t, describe(r.outcome));
-    out += fmt::format(
-        "{} steps of at most {:.4g} s (stable to {:.4g} s), {} rejected, {} force evaluations, {} "
-        "products with K\n",
-        s.steps, r.longest_step, r.stable_step, s.rejected, s.evaluations, s.products);
+    out += fmt::format("{} steps of at most {:.4g} s, {} rejected, {} products with K\n", s.steps,
+                       r.longest_step, s.rejected, s.products);
+    out += s.solves > 0 ? fmt::format("{} stages in {} Newton iterations\n", s.solves, s.iterations)
+                        : fmt::format("{} force evaluations; stable up to {:.4g} s\n",
+                                      s.evaluations, r.stable_step);
     out += fmt::format("sqrt(K) by a polynomial of degree {}, within {:.2g}\n{:.3g} s of time\n",
                        s.degree, s.bound, seconds);
     return out;
@@ -275,15 +330,20 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
 {
     refuse_what_is_not_for_faults(request.run);
     const std::vector<double> values = parameter_values(system, request.run.set);
-    const RuptureOptions asked = options(system, request);
+    const Integration how = integration(request.run);
+    RuptureOptions asked = options(system, request);
     validate(asked);
     if (request.csv) check_writable("--csv", *request.csv);
     if (request.plot) check_plot(*request.plot);
     const auto start = std::chrono::steady_clock::now();
     const StrikeSlipFault fault(parameters(values, request));
-    const Rupture r = ricochet::simulate(fault, asked);
+    const bool implicit = how.integrator != "explicit";
+    constexpr double usual = 0.125 / 0.8660254037844386;  // 0.125 s at 3 km
+    if (implicit && asked.step == 0) asked.step = usual * fault.time_unit();
+    const Rupture r =
+        implicit ? ricochet::simulate(fault, asked, how.bathe) : ricochet::simulate(fault, asked);
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    print(request.json ? json(system, values, fault, asked, r, request, taken.count())
+    print(request.json ? json(system, values, fault, asked, how, r, request, taken.count())
                        : text(system, fault, r, taken.count()));
     if (request.csv) {
         write_file(*request.csv, csv(sampled(r, asked.t_end, request.samples.value_or(1001))));

@@ -1,0 +1,63 @@
+// The rupture of a strike-slip fault by Bathe's implicit steps, for stiff variants, for comparison
+// with published runs, and for rules that choose the step.
+//
+//     const Rupture r = simulate(fault, {.t_end = 30, .step = 0.125}, BatheOptions{});
+//
+// A stage over g (a quarter or a third of the step) is the convex problem
+//
+//     A v + g b(s + g |v|) Sign(v)  contains  w,     A = 1 + g H + g^2 K
+//
+// whose stiffness is convex as long as g^2 times the steepest weakening is below the least
+// eigenvalue of A: steps up to 1.5 s at 3 km. It is solved by a semismooth Newton method: elements
+// slip forth, back or stick by where the proximal map puts them, and those that slip are
+// solved for by conjugate gradients. A is one polynomial in K.
+#pragma once
+
+#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/systems/fault_rupture.hpp"
+
+namespace ricochet {
+
+/// Where the strength of a stage is taken.
+enum class FaultBound {
+    implicit,  ///< at the path of the stage's end
+    /// at the path extrapolated with the velocity of its start: always convex, also of order 2
+    extrapolated,
+};
+
+/// How the errors of the fields become one number.
+enum class FaultNorm {
+    /// the larger of the velocity's and the slip's, root mean square over rtol of that of the
+    /// field itself, at least 1e-3 of the largest so far
+    fields,
+    /// root mean square over all components of error / (atol + rtol |component|), of velocity,
+    /// displacement from the unloaded state, and path, in units of 0.1 mm, as the published code
+    components,
+};
+
+struct BatheOptions {
+    FirstStage first_stage = FirstStage::averaged;  ///< or at_end, the published scheme: order 1
+    FaultBound bound = FaultBound::implicit;
+    /// The first step, or all of them, is `RuptureOptions::step`, positive.
+    StepController controller = ConstantStep{};
+    ErrorEstimate estimate = ErrorEstimate::none;
+    FaultNorm norm = FaultNorm::fields;
+    double rtol = 1e-3;
+    double atol = 1e-6;       ///< of FaultNorm::components
+    double h_max = 0;         ///< [s]; 0: a fifth of the run
+    double tolerance = 1e-7;  ///< residual of a stage, relative to its velocities
+    int max_iterations = 50;  ///< of Newton's method
+    int max_inner = 200;      ///< of conjugate gradients, in one of them
+};
+
+/// @throws std::invalid_argument naming the option.
+void validate(const BatheOptions& options);
+
+/// `RuptureOptions::rtol` is not used here. Rest is known to a step.
+/// @throws std::invalid_argument for what both `validate` refuse, and a bound of the polynomial
+/// that cannot be met.
+[[nodiscard]] Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
+                               const BatheOptions& bathe);
+
+}  // namespace ricochet
