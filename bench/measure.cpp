@@ -24,7 +24,8 @@ std::vector<Check> all_checks()
     for (const auto& part :
          {ricochet::bench::checks_of_part_1(), ricochet::bench::checks_of_part_2(),
           ricochet::bench::checks_of_part_3(), ricochet::bench::checks_of_part_4(),
-          ricochet::bench::checks_of_part_5(), ricochet::bench::checks_of_part_7()}) {
+          ricochet::bench::checks_of_part_5(), ricochet::bench::checks_of_part_6(),
+          ricochet::bench::checks_of_part_7()}) {
         checks.insert(checks.end(), part.begin(), part.end());
     }
     return checks;

@@ -38,6 +38,9 @@ struct Check {
 /// Set-valued motion.
 [[nodiscard]] std::vector<Check> checks_of_part_5();
 
+/// The learned time step and the strike-slip fault.
+[[nodiscard]] std::vector<Check> checks_of_part_6();
+
 /// Rate-and-state friction.
 [[nodiscard]] std::vector<Check> checks_of_part_7();
 

@@ -1,0 +1,17 @@
+// Checks of the strike-slip fault.
+#pragma once
+
+#include "measure.hpp"
+
+namespace ricochet::bench {
+
+[[nodiscard]] Measured rupture_one_element();
+[[nodiscard]] Measured rupture_published_kernels();
+[[nodiscard]] Measured repeat_published_scheme();
+[[nodiscard]] Measured observe_order_through_arrests();
+[[nodiscard]] Measured rupture_100();
+[[nodiscard]] Measured rupture_200();
+[[nodiscard]] Measured bathe_100();
+[[nodiscard]] Measured table_of_meshes();
+
+}  // namespace ricochet::bench
