@@ -24,6 +24,7 @@
 #include "files.hpp"
 #include "input.hpp"
 #include "inspect.hpp"
+#include "rate_and_state.hpp"
 #include "report.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "simulate.hpp"
@@ -136,14 +137,18 @@ void add_simulate(CLI::App& app, int& status)
         "Examples:\n"
         "  ricochet simulate bouncing-ball --set restitution=0.8 --plot ball.svg\n"
         "  ricochet simulate bouncing-ball --detector network --step 0.01 --json\n"
-        "  ricochet simulate thermostat --mode on --t-end 5\n\n"
+        "  ricochet simulate thermostat --mode on --t-end 5\n"
+        "  ricochet simulate spring-slider --set ratio=0.4 --plot stick-slip.svg\n\n"
         "Why a step is taken to hold no event:\n"
         "  proved    a bound, or the polynomial of the step (bernstein), excludes it\n"
         "  checked   the ends and the turning points of the guard were looked at (extremum)\n"
         "  gated     a calibrated network skipped the check, within its miss rate\n"
         "  assumed   only the ends were looked at (ends), or a network was believed\n"
         "A late event was found at a step after the one that held it.");
-    command.callback([&status, request] { status = simulate(*request); });
+    command.callback([&status, request] {
+        status = request->system == spring_slider_name ? simulate_spring_slider(*request)
+                                                       : simulate(*request);
+    });
 }
 
 void add_train(CLI::App& app, int& status)
@@ -245,8 +250,12 @@ void add_compare(CLI::App& app, int& status)
     command.footer(
         "Examples:\n"
         "  ricochet compare bouncing-ball\n"
-        "  ricochet compare thermostat --set low=19");
-    command.callback([&status, request] { status = compare(*request); });
+        "  ricochet compare thermostat --set low=19\n"
+        "  ricochet compare rate-and-state     (the tables of a published study; a minute)");
+    command.callback([&status, request] {
+        status = request->system == rate_and_state_name ? compare_rate_and_state(*request)
+                                                        : compare(*request);
+    });
 }
 
 /// A first word that is no command gets a sentence of its own.

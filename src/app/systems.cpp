@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "json_text.hpp"
+#include "rate_and_state.hpp"
 #include "registry.hpp"
 #include "report.hpp"
 
@@ -70,6 +71,7 @@ int list_systems(bool as_json)
     if (as_json) {
         Json all = Json::array();
         for (const SystemEntry& system : systems()) all.push_back(json(system));
+        all.push_back(json(spring_slider_entry()));
         print(json_text(all));
         return 0;
     }
@@ -78,6 +80,7 @@ int list_systems(bool as_json)
         if (!all.empty()) all += '\n';
         all += text(system);
     }
+    all += '\n' + text(spring_slider_entry());
     print(all);
     return 0;
 }
