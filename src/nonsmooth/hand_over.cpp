@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/event_hand_over.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
 
 #include <fmt/format.h>
 
@@ -53,6 +53,30 @@ std::string_view name(PhaseCause cause) noexcept
     return "unknown";
 }
 
+HandOverOptions hand_over_options(const Options& options)
+{
+    const auto refuse = [](bool given, std::string_view what) {
+        if (given) {
+            throw std::invalid_argument(
+                fmt::format("integrate: a run that may be handed over has no {}", what));
+        }
+    };
+    refuse(options.stop_at_event, "stop_at_event");
+    refuse(options.record_steps, "record_steps");
+    refuse(options.t_end < options.t_start, "backward direction");
+    HandOverOptions out;
+    out.t_start = options.t_start;
+    out.t_end = options.t_end;
+    out.rtol = options.rtol;
+    out.atol = options.atol;
+    out.h_max = options.h_max;
+    out.event_tolerance = options.event_tolerance;
+    out.sample_times = options.sample_times;
+    out.max_steps = std::min(options.max_steps, out.max_steps);
+    out.cancelled = options.cancelled;
+    return out;
+}
+
 namespace detail {
 
 HandOverOptions completed(HandOverOptions options, bool locate)
@@ -90,26 +114,18 @@ HandOverOptions completed(HandOverOptions options, bool locate)
     return options;
 }
 
-HandOverOptions hand_over_options(const Options& options)
+Options event_options(const HandOverOptions& options, double t, std::size_t samples,
+                      std::uint64_t steps)
 {
-    const auto refuse = [](bool given, std::string_view what) {
-        if (given) {
-            throw std::invalid_argument(
-                fmt::format("integrate: a run that may be handed over has no {}", what));
-        }
-    };
-    refuse(options.stop_at_event, "stop_at_event");
-    refuse(options.record_steps, "record_steps");
-    refuse(options.t_end < options.t_start, "backward direction");
-    HandOverOptions out;
-    out.t_start = options.t_start;
-    out.t_end = options.t_end;
-    out.rtol = options.rtol;
-    out.atol = options.atol;
-    out.h_max = options.h_max;
-    out.event_tolerance = options.event_tolerance;
-    out.sample_times = options.sample_times;
-    out.max_steps = std::min(options.max_steps, out.max_steps);
+    Options out{.t_start = t,
+                .t_end = options.t_end,
+                .rtol = options.rtol,
+                .atol = options.atol,
+                .h_max = options.h_max,
+                .event_tolerance = options.event_tolerance};
+    out.sample_times.assign(options.sample_times.begin() + static_cast<std::ptrdiff_t>(samples),
+                            options.sample_times.end());
+    out.max_steps = options.max_steps - steps;
     out.cancelled = options.cancelled;
     return out;
 }

@@ -23,11 +23,17 @@ namespace ricochet {
 
 /// A system as `TimeStepping` takes it.
 template <class System>
-concept Contacting = requires(const System& system, const Eigen::Matrix<double, System::coordinates, 1>& q,
-                              Eigen::Matrix<double, System::contacts, 1>& gaps) {
+concept Contacting = requires(const System& system,
+                              const Eigen::Matrix<double, System::coordinates, 1>& q,
+                              Eigen::Matrix<double, System::contacts, 1>& gaps)
+{
     system.gaps(q, gaps);
-    { system.restitution(0) } -> std::convertible_to<double>;
-    { system.friction(0) } -> std::convertible_to<double>;
+    {
+        system.restitution(0)
+        } -> std::convertible_to<double>;
+    {
+        system.friction(0)
+        } -> std::convertible_to<double>;
     System::tangents;
 };
 
@@ -85,12 +91,11 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t most_impacts = 200;  ///< in a hundredth of a step
-
     [[nodiscard]] static TimeSteppingOptions stepping_options(const HandOverOptions& options)
     {
         // A run of no length takes no step.
-        const double end = std::max(options.t_end, std::nextafter(options.t_start, options.t_start + 1));
+        const double end =
+            std::max(options.t_end, std::nextafter(options.t_start, options.t_start + 1));
         return {.t_start = options.t_start, .t_end = end, .step = options.set_valued.step};
     }
 
@@ -110,34 +115,21 @@ private:
         } catch (const std::invalid_argument&) {
             return touch_down(PhaseCause::stuck);  // behind a contact by more than rounding
         }
+        detail::ChatterWatch watch(run_.t, options_.set_valued.step / 100);
         bool chatters = false;
-        std::uint64_t mark = 0;
-        double marked = run_.t;
         while (!chatters && simulation->step()) {
-            const std::uint64_t impacts = simulation->run().statistics.events;
-            if (impacts < mark + most_impacts) continue;
-            chatters = simulation->t() - marked < options_.set_valued.step / 100;
-            mark = impacts;
-            marked = simulation->t();
+            chatters = watch(simulation->t(), simulation->run().statistics.events);
         }
         finish_flight(simulation->finish(), chatters);
     }
 
     [[nodiscard]] Options flight_options() const
     {
-        Options options{.t_start = run_.t,
-                        .t_end = options_.t_end,
-                        .rtol = options_.rtol,
-                        .atol = options_.atol,
-                        .h_max = options_.h_max,
-                        .event_tolerance = options_.event_tolerance};
+        Options options = detail::event_options(options_, run_.t, run_.trajectory.t.size(),
+                                                run_.statistics.event_driven.steps);
         if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
             options.step = options_.set_valued.step;
         }
-        options.sample_times.assign(options_.sample_times.begin() + next_sample(),
-                                    options_.sample_times.end());
-        options.max_steps = options_.max_steps - run_.statistics.event_driven.steps;
-        options.cancelled = options_.cancelled;
         return options;
     }
 
@@ -211,11 +203,6 @@ private:
     }
 
     // --- samples ---
-
-    [[nodiscard]] std::ptrdiff_t next_sample() const noexcept
-    {
-        return static_cast<std::ptrdiff_t>(run_.trajectory.t.size());
-    }
 
     /// On straight lines, which is as accurate as the steps are.
     void emit_samples(double t_before, const X& before)

@@ -42,9 +42,6 @@ struct MixedRun {
 
 namespace detail {
 
-/// @throws std::invalid_argument for options that a hand-over does not have.
-[[nodiscard]] HandOverOptions hand_over_options(const Options& options);
-
 template <class To, class From>
 [[nodiscard]] To converted_state(const From& from, To like)
 {
@@ -68,7 +65,7 @@ public:
         : system_(system),
           set_(system.set_valued()),
           options_(options),
-          hand_over_(detail::completed(detail::hand_over_options(options), false)),
+          hand_over_(detail::completed(hand_over_options(options), false)),
           stepping_(stepping),
           detector_(detector),
           locator_(locator)
@@ -102,8 +99,6 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t most_events = 200;  ///< in a hundredth of a set-valued step
-
     /// Why the inclusion is to go on; nothing if the run is over.
     [[nodiscard]] std::optional<PhaseCause> follow_events()
     {
@@ -120,15 +115,10 @@ private:
             if (run_.phases.size() == 1) throw;  // of the caller
             return PhaseCause::stuck;
         }
+        detail::ChatterWatch watch(run_.t, hand_over_.set_valued.step / 100);
         bool chatters = false;
-        std::uint64_t mark = 0;
-        double marked = run_.t;
         while (!chatters && simulation->step()) {
-            const std::uint64_t events = simulation->run().statistics.events;
-            if (events < mark + most_events) continue;
-            chatters = simulation->t() - marked < hand_over_.set_valued.step / 100;
-            mark = events;
-            marked = simulation->t();
+            chatters = watch(simulation->t(), simulation->run().statistics.events);
         }
         Run<X> done = simulation->finish();
         run_.t = done.t;
@@ -237,7 +227,7 @@ requires NotIntegrable<System, X> && Inclusion<System>
 [[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,
                                             const Options& options, const Stepping& stepping = {})
 {
-    return hand_over(system, StateOf<System>(w0), detail::hand_over_options(options), stepping);
+    return hand_over(system, StateOf<System>(w0), hand_over_options(options), stepping);
 }
 
 }  // namespace ricochet

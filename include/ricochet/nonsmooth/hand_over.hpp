@@ -26,11 +26,11 @@ namespace ricochet {
 
 enum class HandOverOutcome {
     reached_end,
-    not_converged,   ///< a set-valued stage could not be solved however short the step
-    step_underflow,  ///< no step above h_min met the tolerance
-    step_limit,      ///< `HandOverOptions::max_steps` steps were taken
-    non_finite,      ///< the motion is no longer finite
-    cancelled,       ///< `HandOverOptions::cancelled` was set
+    not_converged,    ///< a set-valued stage could not be solved however short the step
+    step_underflow,   ///< no step above h_min met the tolerance
+    step_limit,       ///< `HandOverOptions::max_steps` steps were taken
+    non_finite,       ///< the motion is no longer finite
+    cancelled,        ///< `HandOverOptions::cancelled` was set
     not_handed_over,  ///< a set-valued phase was due, and `HandOverOptions::events_only`
     released,         ///< no reaction is held any more, and `HandOverOptions::until_released`
 };
@@ -108,7 +108,39 @@ struct HandOverRun {
     StageReport failure;  ///< with `not_converged`: the residual, and whose law failed
 };
 
+/// From the options of `integrate`.
+/// @throws std::invalid_argument for those that a hand-over does not have: `stop_at_event`,
+/// `record_steps`, a run backward.
+[[nodiscard]] HandOverOptions hand_over_options(const Options& options);
+
 namespace detail {
+
+/// Of the event-driven phase that begins at t, after so many samples and steps.
+[[nodiscard]] Options event_options(const HandOverOptions& options, double t, std::size_t samples,
+                                    std::uint64_t steps);
+
+/// Whether events come so close upon one another that locating them does not pay: more than
+/// 200 within `span` [s].
+class ChatterWatch {
+public:
+    ChatterWatch(double t, double span) noexcept : marked_(t), span_(span) {}
+
+    /// At time t, after so many events of the phase.
+    [[nodiscard]] bool operator()(double t, std::uint64_t events) noexcept
+    {
+        if (events < mark_ + most_events) return false;
+        const bool chatters = t - marked_ < span_;
+        mark_ = events;
+        marked_ = t;
+        return chatters;
+    }
+
+private:
+    static constexpr std::uint64_t most_events = 200;
+    double marked_;
+    double span_;
+    std::uint64_t mark_ = 0;
+};
 
 /// The options as they will be used.
 /// @throws std::invalid_argument naming the option.
@@ -208,8 +240,7 @@ private:
         }
     }
 
-    [[nodiscard]] static PhaseCause cause_of(Mode mode) noexcept
-        requires branching
+    [[nodiscard]] static PhaseCause cause_of(Mode mode) noexcept requires branching
     {
         return mode == Modes::several ? PhaseCause::several : PhaseCause::no_flow;
     }
@@ -230,8 +261,7 @@ private:
         run_.phases.push_back({.from = run_.state.t, .set_valued = false, .cause = cause});
     }
 
-    void follow_events()
-        requires branching
+    void follow_events() requires branching
     {
         using X = typename Modes::State;
         X x;
@@ -242,21 +272,15 @@ private:
         } catch (const std::invalid_argument&) {
             return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
         }
+        detail::ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
         bool chatters = false;
         bool released = false;
-        std::uint64_t mark = 0;
-        double marked = run_.state.t;
-        while (simulation->step() && simulation->mode() < Modes::branch_modes) {
+        while (!chatters && !released && simulation->step() &&
+               simulation->mode() < Modes::branch_modes) {
             released = options_.until_released &&
                        is_released(Modes::branches_of(simulation->mode()), simulation->t(),
                                    Modes::vector(simulation->x()));
-            if (released) break;
-            const std::uint64_t events = simulation->run().statistics.events;
-            if (events < mark + most_events) continue;
-            chatters = simulation->t() - marked < options_.set_valued.step / 100;
-            if (chatters) break;
-            mark = events;
-            marked = simulation->t();
+            chatters = watch(simulation->t(), simulation->run().statistics.events);
         }
         finish_events(simulation->finish(), chatters);
         if (released && !set_valued_) end_with(HandOverOutcome::released);
@@ -264,20 +288,12 @@ private:
 
     [[nodiscard]] Options event_options() const
     {
-        Options options{.t_start = run_.state.t,
-                        .t_end = options_.t_end,
-                        .mode = run_.mode,
-                        .rtol = options_.rtol,
-                        .atol = options_.atol,
-                        .h_max = options_.h_max,
-                        .event_tolerance = options_.event_tolerance};
+        Options options = detail::event_options(options_, run_.state.t, run_.trajectory.t.size(),
+                                                run_.statistics.event_driven.steps);
+        options.mode = run_.mode;
         if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
             options.step = options_.set_valued.step;
         }
-        options.sample_times.assign(options_.sample_times.begin() + next_sample(),
-                                    options_.sample_times.end());
-        options.max_steps = options_.max_steps - run_.statistics.event_driven.steps;
-        options.cancelled = options_.cancelled;
         return options;
     }
 
@@ -395,8 +411,7 @@ private:
 
     /// Whether the branches are those of a mode that flows, and no y so near to zero that its
     /// sign is an accident.
-    [[nodiscard]] bool is_plain(bool switched)
-        requires branching
+    [[nodiscard]] bool is_plain(bool switched) requires branching
     {
         const auto& branches = motion_.branches();
         const State& now = motion_.state();
@@ -406,8 +421,8 @@ private:
 
     /// Whether every y of a reaction at a bound is farther from zero than errors reach.
     template <class Branches>
-    [[nodiscard]] bool are_clear(const Branches& branches, double t, const Vector& w) const
-        requires branching
+    [[nodiscard]] bool are_clear(const Branches& branches, double t,
+                                 const Vector& w) const requires branching
     {
         const Reaction y = modes_.observed(t, w);
         const double size = w.template lpNorm<Eigen::Infinity>();
@@ -419,14 +434,13 @@ private:
     }
 
     template <class Branches>
-    [[nodiscard]] bool is_released(const Branches& branches, double t, const Vector& w) const
-        requires branching
+    [[nodiscard]] bool is_released(const Branches& branches, double t,
+                                   const Vector& w) const requires branching
     {
         return !(branches.array() == Branch::inside).any() && are_clear(branches, t, w);
     }
 
-    void release()
-        requires branching
+    void release() requires branching
     {
         run_.state = motion_.state();
         auto branches = motion_.branches();
@@ -463,11 +477,6 @@ private:
 
     // --- samples ---
 
-    [[nodiscard]] std::ptrdiff_t next_sample() const noexcept
-    {
-        return static_cast<std::ptrdiff_t>(run_.trajectory.t.size());
-    }
-
     /// Within the last step, or at its start: by steps of their own.
     void emit_samples(bool at_start)
     {
@@ -482,8 +491,6 @@ private:
             run_.trajectory.x.push_back(inside ? sample_.w : now.w);
         }
     }
-
-    static constexpr std::uint64_t most_events = 200;  ///< in a hundredth of a set-valued step
 
     HandOverOptions options_;
     Modes modes_;

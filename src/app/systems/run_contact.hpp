@@ -38,14 +38,7 @@ template <class System, class Vector>
                                      const RunSettings& settings)
 {
     const Options& o = settings.options;
-    HandOverOptions options;
-    options.t_start = o.t_start;
-    options.t_end = o.t_end;
-    options.rtol = o.rtol;
-    options.atol = o.atol;
-    options.event_tolerance = o.event_tolerance;
-    options.sample_times = o.sample_times;
-    options.max_steps = o.max_steps;
+    HandOverOptions options = hand_over_options(o);
     options.set_valued.step = settings.set_valued->step;
     const auto run = hand_over(system, q, v, options);
     TimedRun out;
