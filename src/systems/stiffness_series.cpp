@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -52,33 +53,94 @@ StiffnessSeries::StiffnessSeries(const Function& f, Spectrum interval, int degre
 {
 }
 
+namespace {
+
+/// Values of T_0 .. T_degree at x.
+Eigen::VectorXd chebyshev_values(double x, int degree)
+{
+    Eigen::VectorXd t(degree + 1);
+    t[0] = 1;
+    if (degree > 0) t[1] = x;
+    for (int k = 2; k <= degree; ++k) t[k] = 2 * x * t[k - 1] - t[k - 2];
+    return t;
+}
+
+/// Remez's exchange: the coefficients whose largest relative error is least, from a few rounds.
+/// Empty where the points no longer alternate, as happens near rounding.
+std::vector<double> of_least_error(const StiffnessSeries::Function& f, const Spectrum& interval,
+                                   int degree)
+{
+    constexpr int rounds = 6;
+    const int unknowns = degree + 2;
+    const int samples = 32 * unknowns;
+    Eigen::MatrixXd basis(samples + 1, degree + 1);  // over f
+    std::vector<double> grid;
+    for (int j = 0; j <= samples; ++j) {
+        grid.push_back(std::cos(std::numbers::pi * j / samples));
+        basis.row(j) =
+            chebyshev_values(grid.back(), degree).transpose() / f(at(interval, grid.back()));
+    }
+    std::vector<int> points;
+    for (int i = 0; i < unknowns; ++i) points.push_back(i * samples / (unknowns - 1));
+    Eigen::VectorXd solution;
+    for (int round = 0; round < rounds; ++round) {
+        Eigen::MatrixXd system(unknowns, unknowns);
+        for (int i = 0; i < unknowns; ++i) {
+            system.row(i).head(degree + 1) = basis.row(points[static_cast<std::size_t>(i)]);
+            system(i, degree + 1) = i % 2 == 0 ? 1 : -1;
+        }
+        solution = system.partialPivLu().solve(Eigen::VectorXd::Ones(unknowns));
+        const Eigen::VectorXd error = (basis * solution.head(degree + 1)).array() - 1;
+        // The largest error between two changes of its sign.
+        std::vector<int> extrema{0};
+        for (int j = 1; j <= samples; ++j) {
+            int& last = extrema.back();
+            if (error[j] * error[last] < 0) {
+                extrema.push_back(j);
+            } else if (std::abs(error[j]) > std::abs(error[last])) {
+                last = j;
+            }
+        }
+        while (static_cast<int>(extrema.size()) > unknowns) {
+            const bool first = std::abs(error[extrema.front()]) < std::abs(error[extrema.back()]);
+            extrema.erase(first ? extrema.begin() : extrema.end() - 1);
+        }
+        if (static_cast<int>(extrema.size()) < unknowns) return {};
+        points = std::move(extrema);
+    }
+    return {solution.data(), solution.data() + degree + 1};
+}
+
+}  // namespace
+
 StiffnessSeries StiffnessSeries::within(const Function& f, Spectrum interval, double bound)
 {
-    StiffnessSeries all(f, interval, most_terms);
+    const StiffnessSeries all(f, interval, most_terms);
     StiffnessSeries some;
     some.interval_ = all.interval_;
-    // Errors fall with the degree: bisection between what is too few and what is enough.
-    const auto error_of = [&](int degree) {
+    const auto meets = [&](int degree) {
         some.c_.assign(all.c_.begin(), all.c_.begin() + degree + 1);
-        return some.relative_error(f);
+        return some.relative_error(f) <= bound;
     };
+    const auto meets_at_best = [&](int degree) {
+        some.c_ = of_least_error(f, all.interval_, degree);
+        return (!some.c_.empty() && some.relative_error(f) <= bound) || meets(degree);
+    };
+    // Errors fall with the degree: bisection between what is too few and what is enough.
     int enough = 1;
-    while (enough < most_terms && !(error_of(enough) <= bound)) {
-        enough = std::min(2 * enough, most_terms);
-    }
-    const double reached = error_of(enough);
-    if (!(reached <= bound)) {
+    while (enough < most_terms && !meets(enough)) enough = std::min(2 * enough, most_terms);
+    if (!meets(enough)) {
         throw std::invalid_argument(fmt::format(
             "a polynomial of degree {} in the stiffness is off by {:.3g}, relatively; the bound "
             "asked for, {:.3g}, cannot be met",
-            enough, reached, bound));
+            enough, some.relative_error(f), bound));
     }
-    int too_few = enough == 1 ? 0 : enough / 2;
+    int too_few = 0;
     while (enough - too_few > 1) {
         const int middle = (enough + too_few) / 2;
-        (error_of(middle) <= bound ? enough : too_few) = middle;
+        (meets_at_best(middle) ? enough : too_few) = middle;
     }
-    (void)error_of(enough);
+    (void)meets_at_best(enough);
     return some;
 }
 

@@ -17,8 +17,8 @@ public:
     StiffnessSeries() = default;
     /// The first `degree` + 1 terms of the series of f on `interval`.
     StiffnessSeries(const Function& f, Spectrum interval, int degree);
-    /// The least degree for which p is within `bound` of f, relative to f, which is positive
-    /// on the interval.
+    /// The least degree for which a polynomial is found within `bound` of f, relative to f,
+    /// which is positive on the interval: the best one, by Remez's exchange, or the series.
     /// @throws std::invalid_argument where none up to `most_terms` is.
     [[nodiscard]] static StiffnessSeries within(const Function& f, Spectrum interval, double bound);
     static constexpr int most_terms = 400;
