@@ -68,6 +68,7 @@
 #include "ricochet/systems/opaque.hpp"
 #include "ricochet/systems/pendulum.hpp"
 #include "ricochet/systems/planar_arm.hpp"
+#include "ricochet/systems/rate_state_slider.hpp"
 #include "ricochet/systems/rolling_ball.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 #include "ricochet/systems/stick_slip.hpp"
