@@ -113,11 +113,14 @@ struct OwnModel {
     bool any_step;          ///< else it is for one step only
 };
 
+struct CompareRequest;
 struct SimulateRequest;
 struct SystemEntry;
 
 /// `ricochet simulate` of a system that has a command of its own.
 using OwnSimulation = int (*)(const SystemEntry& system, const SimulateRequest& request);
+/// `ricochet compare` of such a system.
+using OwnComparison = int (*)(const SystemEntry& system, const CompareRequest& request);
 
 struct SystemEntry {
     std::string_view name;
@@ -170,6 +173,7 @@ struct SystemEntry {
 
     /// It is simulated by this, and `start` and `run` are null; else null.
     OwnSimulation simulate = nullptr;
+    OwnComparison compare = nullptr;
 };
 
 [[nodiscard]] const std::vector<SystemEntry>& systems();

@@ -14,6 +14,7 @@
 #include "../report.hpp"
 #include "../simulate.hpp"
 #include "entries.hpp"
+#include "fault.hpp"
 #include "ricochet/systems/fault_bathe.hpp"
 
 namespace ricochet::app {
@@ -29,33 +30,6 @@ double whole(std::string_view name, double value)
         throw BadInput(fmt::format("{} of fault must be a whole number, got {}", name, value));
     }
     return value;
-}
-
-/// In the order of the entry's.
-StrikeSlipFault::Parameters parameters(const std::vector<double>& p, const SimulateRequest& request)
-{
-    constexpr double most = 1e9;  // far beyond any memory
-    StrikeSlipFault::Parameters out{
-        .elements = static_cast<int>(std::min(whole("elements", p[0]), most)),
-        .side = p[1],
-        .shear_modulus = p[2],
-        .poisson = p[3],
-        .density = p[4],
-        .damping = p[5],
-        .stress_gradient = p[6],
-        .residual_friction = p[7],
-        .friction_drop = p[8],
-        .slip_distance = p[9],
-        .overload = p[10],
-        .medium =
-            whole("half_space", p[11]) != 0 ? FaultMedium::half_space : FaultMedium::full_space,
-        .mesh = whole("tip_corrected", p[12]) != 0 ? FaultMesh::tip_corrected : FaultMesh::plain,
-        .memory_limit = p[13] * mib};
-    if (request.kernel) out.kernel = *request.kernel;
-    if (request.kernel && out.medium == FaultMedium::half_space) {
-        throw BadInput("--kernel stands for the medium: half_space must be 0 with it");
-    }
-    return out;
 }
 
 void refuse_what_is_not_for_faults(const RunRequest& run)
@@ -336,7 +310,7 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
     if (request.csv) check_writable("--csv", *request.csv);
     if (request.plot) check_plot(*request.plot);
     const auto start = std::chrono::steady_clock::now();
-    const StrikeSlipFault fault(parameters(values, request));
+    const StrikeSlipFault fault(fault_parameters(values, request.kernel));
     const bool implicit = how.integrator != "explicit";
     constexpr double usual = 0.125 / 0.8660254037844386;  // 0.125 s at 3 km
     if (implicit && asked.step == 0) asked.step = usual * fault.time_unit();
@@ -353,6 +327,33 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
 }
 
 }  // namespace
+
+StrikeSlipFault::Parameters fault_parameters(const std::vector<double>& p,
+                                             const std::optional<std::filesystem::path>& kernel)
+{
+    constexpr double most = 1e9;  // far beyond any memory
+    StrikeSlipFault::Parameters out{
+        .elements = static_cast<int>(std::min(whole("elements", p[0]), most)),
+        .side = p[1],
+        .shear_modulus = p[2],
+        .poisson = p[3],
+        .density = p[4],
+        .damping = p[5],
+        .stress_gradient = p[6],
+        .residual_friction = p[7],
+        .friction_drop = p[8],
+        .slip_distance = p[9],
+        .overload = p[10],
+        .medium =
+            whole("half_space", p[11]) != 0 ? FaultMedium::half_space : FaultMedium::full_space,
+        .mesh = whole("tip_corrected", p[12]) != 0 ? FaultMesh::tip_corrected : FaultMesh::plain,
+        .memory_limit = p[13] * mib};
+    if (kernel) out.kernel = *kernel;
+    if (kernel && out.medium == FaultMedium::half_space) {
+        throw BadInput("--kernel stands for the medium: half_space must be 0 with it");
+    }
+    return out;
+}
 
 SystemEntry fault_entry()
 {
@@ -439,6 +440,7 @@ SystemEntry fault_entry()
         .start = nullptr,
         .run = nullptr,
         .simulate = simulate_fault,
+        .compare = compare_fault,
     };
 }
 
