@@ -229,6 +229,38 @@ TEST(FrictionModels, HaveTheDerivativesTheySay)
     check_model(general);
 }
 
+/// Half the gradient of the sum of squares along random directions, against differences.
+void check_sum(learn::detail::FrictionModel& model)
+{
+    auto histories = make_histories(2, 8);
+    learn::Random random(5);
+    Eigen::VectorXd p(static_cast<Eigen::Index>(model.size()));
+    model.start(p, 0.5, 0.02, random);
+    const std::vector<const FrictionHistory*> all{&histories[0], &histories[1]};
+    Eigen::MatrixXd normal(p.size(), p.size());
+    Eigen::VectorXd gradient(p.size());
+    const double sum = learn::detail::sum_of_squares(model, all, p, &normal, &gradient);
+    EXPECT_NEAR((normal - normal.transpose()).norm(), 0, 1e-12 * normal.norm());
+    for (int k = 0; k < 6; ++k) {
+        Eigen::VectorXd direction(p.size());
+        for (double& d : direction) d = random.uniform(-1, 1);
+        const auto along = [&](double s) {
+            return learn::detail::sum_of_squares(model, all, p + s * direction, nullptr, nullptr);
+        };
+        // Differences of order four with a step of 1e-3 in parameters of order one.
+        EXPECT_NEAR(central(along, 0, 1e-3) / 2, gradient.dot(direction),
+                    1e-7 * (gradient.norm() * direction.norm() + sum));
+    }
+}
+
+TEST(TrainFriction, GradientIsThatOfTheComputedFriction)
+{
+    learn::detail::AdditiveModel additive(8, 7, 7, 2);
+    check_sum(additive);
+    learn::detail::GeneralModel general(6, 3, 4);
+    check_sum(general);
+}
+
 TEST(TrainFriction, FindsAStateThatItIsNotTold)
 {
     const auto histories = make_histories(4, 21);

@@ -6,9 +6,12 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "../friction/fast_tanh.hpp"
 #include "ricochet/friction/additive_pair.hpp"
+#include "ricochet/friction/histories.hpp"
 #include "ricochet/learn/random.hpp"
 
 namespace ricochet::learn::detail {
@@ -393,5 +396,10 @@ private:
     std::vector<double> w_, p_, q_, r_;
     double offset_ = 0, alpha_ = 0;
 };
+
+/// The sum over histories of the square of the relative error at the parameters p, and,
+/// where they are not null, J^T J and half of its gradient, J^T r.
+double sum_of_squares(FrictionModel& model, const std::vector<const FrictionHistory*>& histories,
+                      const Eigen::VectorXd& p, Eigen::MatrixXd* normal, Eigen::VectorXd* gradient);
 
 }  // namespace ricochet::learn::detail

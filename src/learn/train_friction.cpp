@@ -18,6 +18,7 @@ namespace ricochet::learn {
 namespace {
 
 using detail::FrictionModel;
+using detail::sum_of_squares;
 
 [[noreturn]] void refuse(const std::string& what)
 {
@@ -168,9 +169,12 @@ double norm(const std::vector<double>& x)
     return std::sqrt(square);
 }
 
-/// The sum over histories of the square of the relative error, and its derivatives.
-double sum_of_squares(FrictionModel& model, const std::vector<const FrictionHistory*>& histories,
-                      const Eigen::VectorXd& p, Eigen::MatrixXd* normal, Eigen::VectorXd* gradient)
+}  // namespace
+
+double detail::sum_of_squares(FrictionModel& model,
+                              const std::vector<const FrictionHistory*>& histories,
+                              const Eigen::VectorXd& p, Eigen::MatrixXd* normal,
+                              Eigen::VectorXd* gradient)
 {
     model.set(p);
     if (normal != nullptr) normal->setZero(p.size(), p.size());
@@ -202,6 +206,8 @@ double sum_of_squares(FrictionModel& model, const std::vector<const FrictionHist
     }
     return sum;
 }
+
+namespace {
 
 void check(const std::vector<FrictionHistory>& histories, const FrictionTrainingOptions& o)
 {
