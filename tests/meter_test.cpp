@@ -212,6 +212,63 @@ TEST(Metered, GoesOnAskingWhatPays)
               static_cast<double>(planned.statistics.guard_calls));
 }
 
+template <class Stepping>
+void expect_same_events_while_ways_change(const Shuttle& system, const Options& options)
+{
+    const Foreseen gated(horizon_gate(0.05), unchecked);
+    const auto exact = integrate(system, at_centre, options, Stepping{});
+    ASSERT_GT(exact.statistics.events, 20U);
+    const auto checked =
+        run_with<Stepping>(system, options, Metered(gated, {.decision = Decision::every_step}));
+    expect_same(exact, checked.run);
+    EXPECT_EQ(checked.run.statistics.network_calls, 0U);
+    EXPECT_EQ(checked.run.statistics.checks_put_off, 0U);
+    EXPECT_GE(checked.run.statistics.guard_calls, exact.statistics.steps);
+    // Looks for nothing, and all the time for trials: no way is left for long.
+    MeterOptions restless = counted(0, 0);
+    restless.trials = 1;
+    for (const std::uint64_t piece : {1U, 7U, 50U}) {
+        restless.piece = piece;
+        const auto changing = run_with<Stepping>(system, options, Metered(gated, restless));
+        expect_same(exact, changing.run);
+        EXPECT_GT(changing.meter.checking, 0) << piece;
+        EXPECT_GT(changing.run.statistics.checks_put_off, 0U) << piece;
+    }
+}
+
+TEST(Metered, EventsStayTheSameWhereEveryStepIsCheckedForAWhile)
+{
+    // A bound four times too large makes stretches be taken back.
+    expect_same_events_while_ways_change<Fixed>(Shuttle{.loose = 4}, fifty_seconds);
+    expect_same_events_while_ways_change<ErrorControlled<Dopri5>>(
+        Shuttle{.loose = 4}, {.t_end = 50, .rtol = 1e-9, .atol = 1e-9, .h_max = 0.02});
+}
+
+TEST(Metered, PlanningIsLeftWhereItCostsMoreThanItSaves)
+{
+    const MeterOptions options = counted(1e-7, 1e-6);
+    // Calls of the guard per step: one if every step is checked; planned, ten, or a tenth.
+    for (const double planned : {10.0, 0.1}) {
+        detail::Meter meter(options, 1);
+        Statistics counts;
+        double calls = 0;
+        std::uint64_t checked = 0;
+        for (; counts.steps < 100 * options.piece; ++counts.steps) {
+            calls += meter.checks() ? 1 : planned;
+            checked += meter.checks() ? 1 : 0;
+            counts.guard_calls = static_cast<std::uint64_t>(calls);
+            meter.look_back(counts);
+        }
+        EXPECT_EQ(meter.reading().checks, planned > 1);
+        // Of the first 8 pieces half are planned in any case, and trials are few.
+        if (planned > 1) {
+            EXPECT_GT(checked, 85 * options.piece);
+        } else {
+            EXPECT_EQ(checked, 0U);  // a check alone costs more than a planned step
+        }
+    }
+}
+
 TEST(Metered, MeasuresWhatThingsCostAndKeepsTheEvents)
 {
     const auto planned =

@@ -13,8 +13,13 @@ namespace {
 
 /// Weight of what is known, at every further piece: some 50 pieces are remembered.
 constexpr double memory = 0.98;
-/// Pieces of both ways before one is believed to be the better one.
-constexpr std::uint64_t fewest = 6;
+/// Pieces of two ways before one is believed to be the better one.
+constexpr std::uint64_t fewest = 4;
+/// Of what a step costs where checks are planned, the least that is left where they are not.
+constexpr double least_step = 0.5;
+/// Of a piece in the best way, what each of the first pieces in which every step is checked may
+/// cost more. Events make pieces uneven: with less, most such pieces ended at their first event.
+constexpr double first_excess = 0.25;
 /// Pieces between trials, at most.
 constexpr std::uint64_t longest_wait = 64;
 /// Answers that a run may spend before it is long enough to have a share for trials.
@@ -41,7 +46,7 @@ void validate(const MeterOptions& options)
     if (options.piece == 0) refuse("piece", 0, "at least 1 step");
 }
 
-void Meter::Way::add(double more_steps, double more_cost) noexcept
+void Meter::Account::add(double more_steps, double more_cost) noexcept
 {
     const double aside = pieces > 0 ? more_cost - mean() * more_steps : 0;
     steps = memory * steps + more_steps;
@@ -50,63 +55,100 @@ void Meter::Way::add(double more_steps, double more_cost) noexcept
     ++pieces;
 }
 
-Meter::Meter(const MeterOptions& options)
+Meter::Meter(const MeterOptions& options, std::size_t planned_guards)
     : options_((validate(options), options)),
+      planned_guards_(static_cast<double>(planned_guards)),
       decides_(options.decision == MeterOptions::Decision::measured ||
                options.decision == MeterOptions::Decision::counted),
       samples_(options.decision != MeterOptions::Decision::counted),
-      asks_(options.decision == MeterOptions::Decision::always),
+      best_(first_way()),
+      way_(best_),
       next_steps_(options.piece)
 {
     if (!samples_) {
         guard_.set(options.guard);
         network_.set(options.network);
-        step_.set(options.step);
+        checked_step_.set(options.step);
+        planned_step_.set(options.step);
     }
     if (decides_ && samples_) began_ = Clock::now();
+}
+
+Meter::Way Meter::first_way() const noexcept
+{
+    using Decision = MeterOptions::Decision;
+    if (options_.decision == Decision::always) return ask;
+    return planned_guards_ > 0 && options_.decision != Decision::every_step ? plan : check;
+}
+
+bool Meter::has_way(Way way) const noexcept
+{
+    return way != plan || planned_guards_ > 0;
+}
+
+SampledCost& Meter::step_of(Way way) noexcept
+{
+    return way == check || planned_guards_ == 0 ? checked_step_ : planned_step_;
+}
+
+/// Without planning a step may be cheaper, but not by any factor.
+double Meter::step_cost(Way way) const noexcept
+{
+    if (way != check && planned_guards_ > 0) return planned_step_.value();
+    const double known = checked_step_.value();
+    return known > 0 ? known : least_step * planned_step_.value();
 }
 
 double Meter::cost_of(const Counts& piece) const noexcept
 {
     return piece.looks * guard_.value() + piece.asked * network_.value() +
-           piece.work * step_.value();
+           piece.work * step_cost(way_);
 }
 
-double Meter::allowance() const noexcept
+double Meter::allowance(Way way) const noexcept
 {
-    return options_.trials * total_ + first_answers * network_.value() - spent_;
+    const double share = options_.trials * total_ - spent_;
+    if (way == ask) return share + first_answers * network_.value();
+    const bool known = way != check || of(way).pieces >= fewest;
+    const double piece = of(best_).mean() * static_cast<double>(options_.piece);
+    return known ? share : std::max(share, 0.0) + first_excess * piece;
 }
 
 /// Once it is known what a piece of trial costs in vain, there must be as much to spend.
-bool Meter::may_try() const noexcept
+bool Meter::may_try(Way way) const noexcept
 {
-    if (asking_.pieces == 0) return true;
-    const double excess = asking_.mean() - not_asking_.mean();
-    return allowance() > std::max(excess, 0.0) * static_cast<double>(options_.piece);
+    const Account& account = of(way);
+    if (way == check && account.pieces == 0) {
+        // The first pieces, before anything is in a cache, say little.
+        const double least = planned_guards_ * guard_.value() + step_cost(way);
+        return of(best_).pieces >= fewest && least < of(best_).mean();
+    }
+    if (account.pieces == 0) return true;
+    const double excess = account.mean() - of(best_).mean();
+    return allowance(way) > std::max(excess, 0.0) * static_cast<double>(options_.piece);
 }
 
 void Meter::consider(const Statistics& counts)
 {
     const Counts now{.steps = static_cast<double>(counts.steps),
                      .work = static_cast<double>(counts.steps + counts.repeated_steps),
-                     .looks = static_cast<double>(looks_),
+                     .looks = static_cast<double>(counts.guard_calls),
                      .asked = static_cast<double>(asked_)};
     const Counts piece{.steps = now.steps - then_.steps,
                        .work = now.work - then_.work,
                        .looks = now.looks - then_.looks,
                        .asked = now.asked - then_.asked};
+    next_check_ = counts.guard_calls + asked_ + 4;
     if (counts.steps < next_steps_) {
         // A trial that has become too dear ends here.
-        next_check_ = looks_ + asked_ + 4;
-        const double excess = cost_of(piece) - not_asking_.mean() * std::max(piece.steps, 0.0);
-        if (excess <= allowance() && asked_ < most_asked_) return;
+        const double excess = cost_of(piece) - of(best_).mean() * std::max(piece.steps, 0.0);
+        if (excess <= allowance(way_) && asked_ < most_asked_) return;
     }
     if (samples_) sample_step(piece);
     close_piece(piece, cost_of(piece));
     choose_next();
     then_ = now;
     next_steps_ = counts.steps + options_.piece;
-    next_check_ = looks_ + asked_ + 4;
 }
 
 /// What is left of the time of a piece, over its steps.
@@ -116,56 +158,80 @@ void Meter::sample_step(const Counts& piece)
     const double spent = std::chrono::duration<double>(now - began_).count();
     began_ = now;
     const double rest = spent - piece.looks * guard_.value() - piece.asked * network_.value();
-    if (piece.work > 0) step_.add(std::max(rest, 0.0) / piece.work);
+    const double enough = 0.25 * static_cast<double>(options_.piece);
+    if (piece.work >= enough) step_of(way_).add(std::max(rest, 0.0) / piece.work);
 }
 
 void Meter::close_piece(const Counts& piece, double cost)
 {
     total_ += cost;
-    if (on_trial_) {
-        spent_ = std::max(spent_ + cost - not_asking_.mean() * std::max(piece.steps, 0.0), 0.0);
+    if (way_ != best_) {
+        spent_ = std::max(spent_ + cost - of(best_).mean() * std::max(piece.steps, 0.0), 0.0);
     }
     // A trial that brought the run no further still has its cost.
-    (asks_ ? asking_ : not_asking_).add(std::max(piece.steps, 1.0), cost);
+    of(way_).add(std::max(piece.steps, 1.0), cost);
+}
+
+/// The cheapest way that is well enough known. To ask has to be better beyond doubt.
+Meter::Way Meter::find_best() const noexcept
+{
+    Way best = best_;
+    if (of(best).pieces < fewest) return best;
+    for (const Way way : all_ways) {
+        if (way == best || of(way).pieces < fewest) continue;
+        const double noise = std::hypot(of(way).error(), of(best).error());
+        const double doubt = best == ask ? 0 : way == ask ? 2 * noise : noise;
+        if (of(best).mean() - of(way).mean() > doubt) best = way;
+    }
+    return best;
+}
+
+/// The best way, or another one if it is its turn.
+Meter::Way Meter::next_way() noexcept
+{
+    Way next = best_;
+    for (const Way way : all_ways) {
+        if (way == best_ || !has_way(way)) continue;
+        Account& account = of(way);
+        const bool due = ++account.waited > account.wait;
+        if (due && next == best_ && may_try(way)) next = way;
+    }
+    if (next != best_) of(next).waited = 0;
+    return next;
 }
 
 void Meter::choose_next()
 {
-    if (asking_.pieces >= fewest && not_asking_.pieces >= fewest) {
-        const double noise = std::hypot(asking_.error(), not_asking_.error());
-        const double gain = not_asking_.mean() - asking_.mean();
-        const bool paid = pays_;
-        pays_ = gain > (paid ? 0 : 2 * noise);
-        if (pays_ != paid) {
-            wait_ = 1;
-        } else if (waited_ == 0) {
-            wait_ = std::min(2 * wait_, longest_wait);
-        }
+    const Way best = find_best();
+    if (best != best_) {
+        for (Account& account : accounts_) account.wait = 1;
+    } else if (way_ != best_ && of(way_).pieces >= fewest && of(best_).pieces >= fewest) {
+        of(way_).wait = std::min(2 * of(way_).wait, longest_wait);
     }
-    // The way that is not the better one has its turn after `wait_` pieces.
-    bool other = ++waited_ > wait_;
-    if (!pays_ && !may_try()) other = false;
-    if (other) waited_ = 0;
-    asks_ = pays_ != other;
-    on_trial_ = asks_ && !pays_;
+    best_ = best;
+    way_ = next_way();
     most_asked_ = std::numeric_limits<std::uint64_t>::max();
-    if (on_trial_) {
+    if (way_ == ask && best_ != ask) {
         const double answer = network_.value();
-        const double most = answer > 0 ? allowance() / answer : first_answers;
+        const double most = answer > 0 ? allowance(ask) / answer : first_answers;
         if (most < 1e9) most_asked_ = asked_ + static_cast<std::uint64_t>(std::max(most, 1.0));
     }
 }
 
 MeterReading Meter::reading() const noexcept
 {
+    const auto mean = [this](Way way) { return of(way).pieces > 0 ? of(way).mean() : 0; };
+    const Way base = best_ != ask ? best_ : planned_guards_ > 0 ? plan : check;
     return {.guard = guard_.value(),
             .network = network_.value(),
-            .step = step_.value(),
+            .step = step_cost(best_),
             .asked = asked_,
             .cleared = cleared_,
-            .asking = asking_.pieces > 0 ? asking_.mean() : 0,
-            .not_asking = not_asking_.pieces > 0 ? not_asking_.mean() : 0,
-            .pays = pays_};
+            .asking = mean(ask),
+            .not_asking = mean(base),
+            .checking = mean(check),
+            .pays = best_ == ask,
+            .checks = best_ == check};
 }
 
 }  // namespace ricochet::detail

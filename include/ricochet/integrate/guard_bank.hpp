@@ -135,6 +135,18 @@ public:
         }
     }
 
+    /// All guards take part in the steps from here on. `sampled`: their values are known.
+    template <class Step>
+    void wake_all(const Step& step, double scale, std::uint64_t& calls, bool sampled)
+    {
+        if (!sampled) sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
+        sample_rates(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, rate0_);
+        for (std::size_t i = 0; i < size(); ++i) {
+            records_[i].asleep = false;
+            arm(i, records_[i].side);
+        }
+    }
+
     /// Samples all guards at the end of a step.
     template <class Step>
     void sample_end(const Step& step, std::uint64_t& calls)
@@ -402,8 +414,21 @@ private:
     void sample(Mode mode, double t, const X& x, const X& dxdt, double scale, std::uint64_t& calls,
                 Doubles& g, Doubles& rates)
     {
+        sample_values(mode, t, x, calls, g);
+        sample_rates(mode, t, x, dxdt, scale, calls, rates);
+    }
+
+    void sample_values(Mode mode, double t, const X& x, std::uint64_t& calls, Doubles& g)
+    {
         call_guards(*system_, mode, t, x, all(g));
         calls += size();
+    }
+
+    void sample_rates([[maybe_unused]] Mode mode, [[maybe_unused]] double t,
+                      [[maybe_unused]] const X& x, [[maybe_unused]] const X& dxdt,
+                      [[maybe_unused]] double scale, [[maybe_unused]] std::uint64_t& calls,
+                      [[maybe_unused]] Doubles& rates)
+    {
         if constexpr (Detector::uses_rates) {
             if constexpr (RatesTogether<System, X>) {
                 rates_together(mode, t, x, dxdt, rates);

@@ -85,7 +85,7 @@ public:
             std::size_t guards)
         : system_(&system),
           detector_(detector),
-          meter_(MeterOf<Detector>::make(detector)),
+          meter_(MeterOf<Detector>::make(detector, guards)),
           backward_(backward),
           steps_(detector.longest(), like),
           looks_(guards),
@@ -101,6 +101,11 @@ public:
 
     /// Whether nothing need be looked at until the time `end`.
     [[nodiscard]] bool covers(double end) const noexcept { return end <= limit_; }
+
+    /// Whether planning is known to cost more than it saves, so that the exact detector is to
+    /// look at every step. Stretches are closed first.
+    [[nodiscard]] bool steps_aside() const noexcept { return meter_.checks() && !in_stretch(); }
+    void look_back(const Statistics& counts) { meter_.look_back(counts); }
 
     /// Every guard has just been armed at the start of the step, and sampled there.
     template <class Step>

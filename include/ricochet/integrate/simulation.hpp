@@ -474,10 +474,24 @@ private:
         }
     }
 
+    /// One step with a look at its end, where planning does not pay.
+    void advance_with_check(double remaining)
+    {
+        if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
+        watching_ = newly_armed_ = true;
+        planner_.look_back(run_.statistics);
+        if (!take_step(remaining)) return;
+        if (handle_events()) return;
+        pass();
+    }
+
     void advance_by_plan(double remaining, const Advance& how)
     {
+        if constexpr (Metering<Detector>) {
+            if (planner_.steps_aside()) return advance_with_check(remaining);
+        }
         if (newly_armed_) {
-            newly_armed_ = false;
+            newly_armed_ = watching_ = false;
             planner_.begin(step_, bank_);
         }
         const double proposed = h_next_;
@@ -1068,6 +1082,7 @@ private:
         if constexpr (Moded<System, X>) enable_guards();
         bank_.await_nobody();
         newly_armed_ = true;
+        watching_ = false;
         last_h_ = h_next_;
         bank_.sample_start(step_, calls(), h_next_);
         for (std::size_t i = 0; i < bank_.size(); ++i) {
@@ -1431,7 +1446,8 @@ private:
     [[no_unique_address]] Planner planner_;
     double h_next_ = 0;
     double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
-    bool newly_armed_ = true;  ///< nothing is planned yet
+    bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
+    bool watching_ = false;    ///< with their rates: every step is checked
     std::size_t careful_steps_ = 0;  ///< without looking ahead
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
