@@ -159,6 +159,33 @@ TEST_F(App, AGateIsTrustedByNameOnly)
                    {"thermostat", "pendulum"});
 }
 
+TEST_F(App, GateTrainingIsInterruptedWhileItSamples)
+{
+    const Words words{"train",   "thermostat",       "--kind",       "gate",
+                      "--out",   "gate.safetensors", "--states",     "4000",
+                      "--fresh", "100000000",        "--iterations", "500"};
+    const fs::path err = work().parent_path() / "err";
+    for (const bool training_began : {false, true}) {
+        fs::remove(err);
+        const pid_t child = start(words);
+        const std::string line = training_began ? "testing:" : "sampling:";
+        const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+        while (content(err).find(line) == std::string::npos &&
+               std::chrono::steady_clock::now() < deadline) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+        const auto then = std::chrono::steady_clock::now();
+        kill(child, training_began ? SIGTERM : SIGINT);
+        const Result interrupted = wait_for(child);
+        EXPECT_EQ(interrupted.status, 1);
+        // A hundred million events would take hours.
+        EXPECT_LT(std::chrono::steady_clock::now() - then, std::chrono::seconds(10));
+        const char* sentence = training_began ? "--resume" : "nothing is kept";
+        EXPECT_NE(interrupted.err.find(sentence), std::string::npos) << interrupted.err;
+        EXPECT_EQ(files(), training_began ? Words{"gate.safetensors.checkpoint"} : Words{});
+    }
+}
+
 TEST_F(App, InterruptedGateTrainingLosesNothing)
 {
     const Words words = train_gate({"--iterations", "2000"});

@@ -97,6 +97,12 @@ GateTraining quick()
     return training;
 }
 
+/// Of a progress report: states are not being sampled, nor events compared.
+bool trains(const Progress& progress)
+{
+    return progress.stage == "training";
+}
+
 std::string refusal(const std::function<void()>& act)
 {
     try {
@@ -206,13 +212,65 @@ TEST(TrainGate, StopsWhenItIsToldAndKeepsTheBest)
     training.validation_events = 40;
     training.fresh_events = 0;
     std::size_t calls = 0;
-    const TrainedGate trained = train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
-                                           [&](const Progress&) { return ++calls < 2; });
+    const TrainedGate trained =
+        train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
+                   [&](const Progress& progress) { return !trains(progress) || ++calls < 2; });
     EXPECT_EQ(trained.report.outcome, TrainingOutcome::stopped);
     EXPECT_EQ(calls, 2U);
     EXPECT_EQ(trained.report.iterations, 400U);
     EXPECT_EQ(trained.model.calibration.events, 0U);
     EXPECT_NO_THROW(Gate gate(trained.model));
+}
+
+TEST(TrainGate, StopsAtOnceWhileStatesAreSampled)
+{
+    GateTraining training = quick();
+    training.events = 1'000'000;  // some hours
+    std::size_t calls = 0;
+    const TrainedGate trained =
+        train_gate(Table{}, on_the_table(), Fixed{}, {}, training, [&](const Progress& progress) {
+            EXPECT_EQ(progress.stage, "sampling");
+            EXPECT_EQ(progress.total, 1'000'000U);
+            return ++calls < 3;
+        });
+    EXPECT_EQ(calls, 3U);
+    EXPECT_EQ(trained.report.outcome, TrainingOutcome::stopped);
+    EXPECT_EQ(trained.report.iterations, 0U);
+    EXPECT_TRUE(trained.model.layers.empty());
+}
+
+TEST(TrainGate, StoppedBetweenRoundsOrWhileTestedItIsResumedToTheSameBits)
+{
+    const auto file = std::filesystem::temp_directory_path() /
+                      ("ricochet-gate-stage-" + std::to_string(getpid()) + ".checkpoint");
+    GateTraining training = quick();
+    training.events = 60;
+    training.validation_events = 40;
+    training.fresh_events = 40;
+    training.iterations = 200;
+    training.evaluate_every = 100;
+    const auto whole = train_gate(Table{}, on_the_table(), Fixed{}, {}, training);
+    training.checkpoint = file;
+    for (const std::string stage : {"sampling", "testing"}) {
+        std::filesystem::remove(file);
+        training.resume = false;
+        bool trained = false;
+        std::size_t stops = 0;
+        const auto part = train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
+                                     [&](const Progress& progress) {
+                                         trained = trained || trains(progress);
+                                         const bool stop = trained && progress.stage == stage;
+                                         stops += stop ? 1 : 0;
+                                         return !stop;
+                                     });
+        EXPECT_EQ(stops, 1U) << stage;
+        EXPECT_EQ(part.report.outcome, TrainingOutcome::stopped) << stage;
+        EXPECT_EQ(part.model.calibration.events, 0U);
+        training.resume = true;
+        const auto rest = train_gate(Table{}, on_the_table(), Fixed{}, {}, training);
+        EXPECT_EQ(to_safetensors(rest.model), to_safetensors(whole.model)) << stage;
+    }
+    std::filesystem::remove(file);
 }
 
 TEST(TrainGate, InterruptedAnywhereItIsResumedToTheSameBits)
@@ -233,14 +291,18 @@ TEST(TrainGate, InterruptedAnywhereItIsResumedToTheSameBits)
         std::filesystem::remove(file);
         std::size_t calls = 0;
         training.resume = false;
-        const auto part = train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
-                                     [&](const Progress&) { return ++calls < stop; });
+        const auto part = train_gate(
+            Table{}, on_the_table(), Fixed{}, {}, training,
+            [&](const Progress& progress) { return !trains(progress) || ++calls < stop; });
         ASSERT_EQ(part.report.outcome, TrainingOutcome::stopped) << stop;
         EXPECT_EQ(part.report.trial.events, 0U);
         training.resume = true;
         const std::size_t before = calls;
         const auto rest = train_gate(Table{}, on_the_table(), Fixed{}, {}, training,
-                                     [&](const Progress&) { return ++calls > 0; });
+                                     [&](const Progress& progress) {
+                                         calls += trains(progress) ? 1 : 0;
+                                         return true;
+                                     });
         EXPECT_EQ(to_safetensors(rest.model), to_safetensors(whole.model)) << stop;
         EXPECT_EQ(rest.report.iterations, whole.report.iterations);
         EXPECT_EQ(rest.report.trial.gated_calls, whole.report.trial.gated_calls);

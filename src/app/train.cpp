@@ -60,6 +60,12 @@ public:
     void show(const learn::Progress& progress)
     {
         const double now = progress.seconds;
+        if (progress.stage != stage_) {
+            stage_ = progress.stage;
+            started_ = false;
+            tenth_ = 100;
+            drawn_.reset();
+        }
         if (!started_) {
             first_iteration_ = progress.iteration;
             first_seconds_ = now;
@@ -73,9 +79,11 @@ public:
                      : std::string("starting");
         const std::size_t percent =
             progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
-        const std::string figures =
-            fmt::format("{:>3} %  {} of {}  {}  loss {:.2e}  {:.0f} iterations/s", percent,
-                        progress.iteration, progress.total, left, progress.loss, rate);
+        std::string figures =
+            fmt::format("{:>3} %  {} of {}  {}", percent, progress.iteration, progress.total, left);
+        figures += stage_ == learn::Progress{}.stage
+                       ? fmt::format("  loss {:.2e}  {:.0f} iterations/s", progress.loss, rate)
+                       : fmt::format(" events  {}", stage_);
         if (terminal_) {
             const bool last = progress.iteration == progress.total;
             if (drawn_ && now - *drawn_ < redraw_every && !last) return;
@@ -87,7 +95,7 @@ public:
             fmt::print(stderr, "\r{}\x1b[K", line.substr(0, columns() - 1));
             std::fflush(stderr);
         } else if (percent / 10 != tenth_) {
-            fmt::print(stderr, "training: {}\n", figures);
+            fmt::print(stderr, "{}: {}\n", stage_, figures);
         }
         tenth_ = percent / 10;
     }
@@ -111,6 +119,7 @@ private:
 
     bool terminal_ = isatty(STDERR_FILENO) == 1;
     std::optional<double> drawn_{};  ///< [s] when
+    std::string_view stage_;
     bool started_ = false;
     std::size_t first_iteration_ = 0;
     double first_seconds_ = 0;
@@ -164,7 +173,7 @@ auto run_training(const Train& train, const TrainingRequest& request,
     bool started = false;
     try {
         return train(request, [&](const learn::Progress& now) {
-            started = true;
+            started = started || now.stage == learn::Progress{}.stage;
             return progress(now);
         });
     } catch (const std::runtime_error& error) {
@@ -235,9 +244,14 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     const learn::GateReport& report = trained.report;
     if (report.outcome == learn::TrainingOutcome::stopped) {
         // What it misses has not been measured: no model yet.
-        fmt::print(stderr,
-                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
-                   training.checkpoint.string());
+        if (report.iterations > 0 || training.resume) {
+            fmt::print(stderr,
+                       "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+                       training.checkpoint.string());
+        } else {
+            fmt::print(stderr,
+                       "ricochet: interrupted before the training began; nothing is kept\n");
+        }
         return 1;
     }
     const bool sound =

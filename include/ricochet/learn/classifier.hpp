@@ -59,6 +59,8 @@ struct Progress {
     double loss = 0;         ///< mean binary cross entropy on the validation set
     std::size_t misses = 0;  ///< validation events with a negative logit
     double seconds = 0;      ///< elapsed, earlier parts of a resumed training included
+    /// Anything else than "training": before or after it, with events for iterations.
+    std::string_view stage = "training";
 };
 
 /// Draws a bar, or returns false to stop the training; the best so far is kept.

@@ -25,6 +25,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -120,10 +121,14 @@ class GateRuns {
 
 public:
     /// Keeps a reference to the system. `options`: tolerances and event settings; times, step
-    /// and recording are set here.
+    /// and recording are set here. `progress` is called every few steps, and may stop the runs.
     GateRuns(const System& system, Starts<X> starts, const Options& options,
-             const GateTraining& training)
-        : system_(&system), starts_(std::move(starts)), options_(options), training_(training)
+             const GateTraining& training, ProgressCallback progress = {})
+        : system_(&system),
+          starts_(std::move(starts)),
+          options_(options),
+          training_(training),
+          progress_(std::move(progress))
     {
         check(training, fixed_step);
         options_.sample_times.clear();
@@ -131,6 +136,9 @@ public:
         options_.record_events = true;
         options_.stop_at_event = false;
     }
+
+    /// Stopped by the callback: what was asked for is not complete.
+    [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
     /// States of runs with so many events in all. Of states without an event within reach about
     /// as many are kept as make `states` in all, each with its weight.
@@ -144,7 +152,8 @@ public:
                                      ? training_.most_steps
                                      : std::min(training_.most_steps, 2 * states);
         near_.clear();
-        while (out.events < events && out.steps < most) {
+        begin_stage("sampling", events);
+        while (out.events < events && out.steps < most && !stopped_) {
             Exact run = start(random);
             follow(run, out, share, random);
             if (out.events == 0 && out.steps > 2'000'000) break;  // there are none
@@ -157,7 +166,7 @@ public:
                                             static_cast<double>(out.events + 1));
             share = std::clamp(static_cast<double>(states) / expected, 1e-4, 1.0);
         }
-        if (out.events == 0 && training_.kind == GateKind::horizon) {
+        if (out.events == 0 && training_.kind == GateKind::horizon && !stopped_) {
             detail::throw_no_events(out.steps);
         }
         return out;
@@ -193,11 +202,12 @@ public:
     {
         Random random(seed);
         const Planned<> planned({.longest_stretch = 16, .check_bounds = true});
-        for (std::size_t done = 0; done < steps;) {
+        begin_stage("checking bounds", 0);
+        for (std::size_t done = 0; done < steps && !stopped_;) {
             const Exact exact = start(random);
             Simulation<System, X, Stepping, Planned<>> run(*system_, exact.x(), options_used_,
                                                            Stepping{}, planned);
-            while (run.advance()) {
+            while (run.advance() && goes_on(0)) {
             }
             const Run<X> followed = run.finish();
             done += static_cast<std::size_t>(followed.statistics.steps) + 1;
@@ -217,13 +227,15 @@ public:
         Random random(seed);
         GateTrial trial;
         const double before = detail::processor_seconds();
-        while (trial.events < events && trial.steps < training_.most_steps) {
+        begin_stage("testing", events);
+        while (trial.events < events && trial.steps < training_.most_steps && !stopped_) {
             std::optional<Exact> exact(start(random));
             Options options = options_used_;
             std::optional<Gated> gated(std::in_place, *system_, exact->x(), options, Stepping{},
                                        detector);
             for (;;) {
-                const bool same = next_event_is_same(*exact, *gated);
+                const bool same = next_event_is_same(*exact, *gated, trial.events);
+                if (stopped_) break;
                 const bool ended = exact->ended();
                 const double t = exact->t();
                 const X x = exact->x();
@@ -251,6 +263,28 @@ private:
         double value;
         double weight;
     };
+
+    /// What the callback is told of the runs to come.
+    void begin_stage(std::string_view stage, std::size_t events)
+    {
+        stage_ = stage;
+        wanted_ = events;
+    }
+
+    /// Asks the callback, at every 64th call. False: the runs are to stop.
+    [[nodiscard]] bool goes_on(std::uint64_t events)
+    {
+        if (!progress_ || stopped_ || ++asked_ % 64 != 1) return !stopped_;
+        const auto done = static_cast<std::size_t>(events);
+        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begun_;
+        stopped_ = !progress_({.iteration = std::min(done, wanted_),
+                               .total = wanted_,
+                               .loss = std::numeric_limits<double>::quiet_NaN(),
+                               .misses = 0,
+                               .seconds = spent.count(),
+                               .stage = stage_});
+        return !stopped_;
+    }
 
     [[nodiscard]] Exact start(Random& random)
     {
@@ -288,7 +322,7 @@ private:
         out.width = width_;
         pending_.clear();
         std::size_t seen = run.run().events.size();
-        while (!run.ended()) {
+        while (!run.ended() && goes_on(out.events)) {
             remember(run, out);
             if (!run.step()) break;
             ++out.steps;
@@ -390,6 +424,7 @@ private:
         if (near_.empty() || training_.neighbours == 0) return;
         const std::size_t wanted = std::min(near_.size(), training_.states / 8);
         for (std::size_t n = 0; n < wanted * training_.neighbours; ++n) {
+            if (!goes_on(wanted_)) return;
             const RunStart<X>& from = near_[random.below(near_.size())];
             RunStart<X> moved = from;
             const double size = random.log_uniform(1e-4, 3e-2);
@@ -432,12 +467,14 @@ private:
         remember(run, nowhere);
     }
 
-    /// Takes both to their next event; whether it is the same.
+    /// Takes both to their next event, after `seen` of them in earlier runs; whether it is the
+    /// same.
     template <class Gated>
-    [[nodiscard]] static bool next_event_is_same(Exact& exact, Gated& gated)
+    [[nodiscard]] bool next_event_is_same(Exact& exact, Gated& gated, std::uint64_t seen)
     {
         const std::size_t before = exact.run().events.size();
-        while (exact.run().events.size() == before && exact.advance()) {
+        while (exact.run().events.size() == before && exact.step()) {
+            if (!goes_on(seen + before)) return false;
         }
         while (gated.run().events.size() == before && gated.advance()) {
         }
@@ -483,10 +520,18 @@ private:
     std::size_t width_ = 0;
     std::deque<Pending> pending_;
     std::vector<RunStart<X>> near_;  ///< states shortly before fatal events
+    ProgressCallback progress_;
+    std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+    std::string_view stage_;
+    std::size_t wanted_ = 0;  ///< events of this stage
+    std::uint64_t asked_ = 0;
+    bool stopped_ = false;
 };
 
 /// Trains a gate on runs of `system`, and measures what it misses on fresh ones, unless it was
-/// stopped. With a checkpoint a training that was stopped is resumed to the same bits.
+/// stopped. With a checkpoint a training that was stopped is resumed to the same bits. The
+/// callback is asked while states are sampled and events compared, too; if it stops the training
+/// before its first iteration, the model is empty.
 ///
 /// @param options  tolerances of the runs; times and steps come from `training`
 /// @throws std::invalid_argument if an option is outside its range, the recipe does not fit the
@@ -501,7 +546,12 @@ template <class System, class X, class Stepping>
                                      const ProgressCallback& progress = {})
 {
     const auto begin = std::chrono::steady_clock::now();
-    GateRuns<System, X, Stepping> runs(system, starts, options, training);
+    GateRuns<System, X, Stepping> runs(system, starts, options, training, progress);
+    TrainedGate trained;
+    const auto stop = [&] {
+        trained.report.outcome = TrainingOutcome::stopped;
+        return trained;
+    };
     if (training.kind == GateKind::level) {
         if constexpr (Bounded<System, X>) {
             runs.check_bounds(20'000, training.seed + 5'000'003);
@@ -512,6 +562,7 @@ template <class System, class X, class Stepping>
     GateSamples first = runs.sample(training.events, training.states, training.seed);
     GateSamples second =
         runs.sample(training.validation_events, training.states / 4, training.seed + 1'000'003);
+    if (runs.stopped()) return stop();
     GateTrainer trainer(training, std::move(first), std::move(second));
     const auto complete = [&] {
         Model model = trainer.model();
@@ -527,11 +578,15 @@ template <class System, class X, class Stepping>
         if (round + 1 == training.rounds) break;
         const std::size_t events =
             training.hard_events > 0 ? training.hard_events : training.events;
-        trainer.add(runs.hard(Gate(complete()), events, training.seed + 2'000'003 * (round + 2)));
+        const GateSamples hard =
+            runs.hard(Gate(complete()), events, training.seed + 2'000'003 * (round + 2));
+        if (runs.stopped()) break;
+        trainer.add(hard);
     }
-    TrainedGate trained{.model = complete(), .report = trainer.report()};
+    trained = {.model = complete(), .report = trainer.report()};
     trained.report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (runs.stopped()) return stop();
     if (training.fresh_events == 0 || trained.report.outcome == TrainingOutcome::stopped) {
         return trained;
     }
@@ -543,6 +598,7 @@ template <class System, class X, class Stepping>
     } else if constexpr (Bounded<System, X>) {
         trial = runs.compare(CalibratedBounds(gate), training.fresh_events, fresh);
     }
+    if (runs.stopped()) return stop();
     if (trial.events > 0) {
         trained.model.calibration = {.events = trial.events,
                                      .misses = trial.misses,
