@@ -76,7 +76,7 @@ private:
         if (stage.g != g_) {
             g_ = stage.g;
             const double damping = 2 * fault_.parameters().damping;
-            a_ = forces_.root_of_stiffness().combined(1, g_ * g_, damping * g_);
+            a_.combine(forces_.root_of_stiffness(), 1, g_ * g_, damping * g_);
         }
         forces_.product()(stage.slip, rhs_);
         const double start = 1 + fault_.parameters().overload;
@@ -274,7 +274,7 @@ private:
         stage_.slip = n.slip + stage_.g * n.velocity;
         stage_.path = n.path + stage_.g * n.velocity.cwiseAbs();
         stage_.at_path = n.path + (h / 2) * n.velocity.cwiseAbs();
-        middle.velocity = onwards(n.velocity, (h / 2) * from.acceleration);
+        guess(n.velocity, n.velocity + (h / 2) * from.acceleration, middle.velocity);
         if (!solve(middle)) return false;
 
         FaultFields& e = to.fields;
@@ -283,20 +283,20 @@ private:
         stage_.slip = (4 * middle.slip - n.slip) / 3;
         stage_.path = (4 * middle.path - n.path) / 3;
         stage_.at_path = middle.path + (h / 2) * middle.velocity.cwiseAbs();
-        e.velocity = onwards(middle.velocity, middle.velocity - n.velocity);
+        guess(middle.velocity, 2 * middle.velocity - n.velocity, e.velocity);
         if (!solve(e)) return false;
         to.acceleration = (3 * e.velocity - 4 * middle.velocity + n.velocity) / h;
         return true;
     }
 
-    /// v + dv, where that does not turn; a guess.
-    static VectorXd onwards(const VectorXd& v, const VectorXd& dv)
+    /// `extrapolated`, but 0 where that has turned.
+    template <class Expression>
+    static void guess(const VectorXd& v, const Expression& extrapolated, VectorXd& out)
     {
-        VectorXd out = v + dv;
         for (Index i = 0; i < v.size(); ++i) {
-            if (out[i] * v[i] < 0) out[i] = 0;
+            const double value = extrapolated.coeff(i);
+            out[i] = value * v[i] < 0 ? 0 : value;
         }
-        return out;
     }
 
     bool solve(FaultFields& to)

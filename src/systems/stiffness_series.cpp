@@ -144,14 +144,14 @@ StiffnessSeries StiffnessSeries::within(const Function& f, Spectrum interval, do
     return some;
 }
 
-StiffnessSeries StiffnessSeries::combined(double constant, double slope, double factor) const
+void StiffnessSeries::combine(const StiffnessSeries& p, double constant, double slope,
+                              double factor)
 {
-    StiffnessSeries out = *this;
-    for (double& c : out.c_) c *= factor;
-    if (out.c_.size() < 2) out.c_.resize(2);
-    out.c_[0] += constant + slope * 0.5 * (interval_.upper + interval_.lower);
-    out.c_[1] += slope * 0.5 * (interval_.upper - interval_.lower);
-    return out;
+    interval_ = p.interval_;
+    c_.resize(std::max<std::size_t>(p.c_.size(), 2));
+    for (std::size_t k = 0; k < c_.size(); ++k) c_[k] = k < p.c_.size() ? factor * p.c_[k] : 0;
+    c_[0] += constant + slope * 0.5 * (interval_.upper + interval_.lower);
+    c_[1] += slope * 0.5 * (interval_.upper - interval_.lower);
 }
 
 double StiffnessSeries::operator()(double eigenvalue) const noexcept

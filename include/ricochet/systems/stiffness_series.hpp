@@ -23,8 +23,8 @@ public:
     [[nodiscard]] static StiffnessSeries within(const Function& f, Spectrum interval, double bound);
     static constexpr int most_terms = 400;
 
-    /// constant + slope x + factor p(x).
-    [[nodiscard]] StiffnessSeries combined(double constant, double slope, double factor) const;
+    /// Becomes constant + slope x + factor p(x), in the memory that it has.
+    void combine(const StiffnessSeries& p, double constant, double slope, double factor);
 
     [[nodiscard]] int degree() const noexcept { return static_cast<int>(c_.size()) - 1; }
     [[nodiscard]] double operator()(double eigenvalue) const noexcept;
