@@ -18,6 +18,7 @@
 #include "input.hpp"
 #include "json_text.hpp"
 #include "report.hpp"
+#include "ricochet/learn/checkpoint.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "timing.hpp"
 
@@ -79,19 +80,22 @@ public:
                      : std::string("starting");
         const std::size_t percent =
             progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
-        std::string figures =
-            fmt::format("{:>3} %  {} of {}  {}", percent, progress.iteration, progress.total, left);
-        figures += stage_ == learn::Progress{}.stage
-                       ? fmt::format("  loss {:.2e}  {:.0f} iterations/s", progress.loss, rate)
-                       : fmt::format(" events  {}", stage_);
+        const bool trains = stage_ == learn::Progress{}.stage;
+        // What has just begun may be refused, and some stages have no measure.
+        if (!trains && (progress.total == 0 || (!terminal_ && percent < 10))) return;
+        const std::string figures =
+            fmt::format("{:>3} %  {} of {}{}  {}", percent, progress.iteration, progress.total,
+                        trains ? "" : " events", left) +
+            (trains ? fmt::format("  loss {:.2e}  {:.0f} iterations/s", progress.loss, rate) : "");
         if (terminal_) {
             const bool last = progress.iteration == progress.total;
             if (drawn_ && now - *drawn_ < redraw_every && !last) return;
             drawn_ = now;
             constexpr std::size_t width = 20;
             const std::size_t full = width * percent / 100;
-            const std::string line = fmt::format("[{}{}] {}", std::string(full, '#'),
-                                                 std::string(width - full, '.'), figures);
+            const std::string line =
+                fmt::format("[{}{}] {}{}", std::string(full, '#'), std::string(width - full, '.'),
+                            figures, trains ? "" : fmt::format("  {}", stage_));
             fmt::print(stderr, "\r{}\x1b[K", line.substr(0, columns() - 1));
             std::fflush(stderr);
         } else if (percent / 10 != tenth_) {
@@ -232,6 +236,8 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     const InterruptWatch watch;
     const auto train_it = [&](const TrainingRequest& wanted,
                               const learn::ProgressCallback& progress) {
+        // A checkpoint that cannot be read is refused before states are sampled.
+        if (wanted.resume) (void)learn::load_gate_checkpoint(wanted.checkpoint);
         return train_system_gate(system, wanted, progress);
     };
     const learn::TrainedGate trained =
