@@ -39,7 +39,7 @@ void add_other_times(std::vector<MeteredRow>& rows)
     time_metered<Controlled>(rows, "256 zones, dopri5", zones, free_steps(60), 0.1, 0.2);
     for (const double level : {1.3, 1.55}) {
         time_metered<Fixed>(rows, fmt::format("eigenvalue, level {}", level),
-                            LeastEigenvalue({.level = level}), {.t_end = 20, .step = 1e-3}, 1e-3,
+                            LeastEigenvalue({.level = level}), {.t_end = 60, .step = 1e-3}, 1e-3,
                             0.1);
     }
 }
