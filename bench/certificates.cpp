@@ -1,15 +1,12 @@
 // What certificates cost, and how much they clear: a ball in a cavern, a planar arm of two,
 // three and four joints among few obstacles, and a smallest eigenvalue under four loads.
 //
-//     ricochet_certificates [--scene NAME] [--models DIR] [--iterations N]
-//
 // Networks are trained here, on the distance, unless DIR holds them. For each scene: shape, boxes
 // and seconds (wall and processor) of the proof, the estimate that was made before it, the share
 // of the states beyond a tenth of the scene's scale that are cleared, and the lowest logit in a
 // million adversarially searched states within the margin, which must not be below the threshold.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "certificates.hpp"
 #include "ricochet/learn/adam.hpp"
 #include "ricochet/learn/certify.hpp"
 #include "ricochet/learn/random.hpp"
@@ -273,8 +271,15 @@ double cleared_share(const Scene& scene, const Model& model)
     return static_cast<double>(cleared) / static_cast<double>(beyond);
 }
 
-bool measure(const Scene& scene, const std::filesystem::path& models, std::size_t iterations,
-             const learn::CertifyOptions& given)
+struct Proof {
+    bool holds = false;  ///< proved, and no searched state contradicts it
+    double seconds = 0;  ///< of wall time, all of it
+    double boxes = 0;    ///< examined, over the estimate made before
+    double share = 0;    ///< of the states beyond `far` that are cleared
+};
+
+Proof measure(const Scene& scene, const std::filesystem::path& models, std::size_t iterations,
+              const learn::CertifyOptions& given)
 {
     const std::filesystem::path file = models / (scene.name + ".safetensors");
     Model model;
@@ -290,9 +295,11 @@ bool measure(const Scene& scene, const std::filesystem::path& models, std::size_
     learn::CertifyOptions options = given;
     options.margin = scene.margin;
     const std::clock_t start = std::clock();
+    double estimated = 0;
     const learn::CertifiedModel out =
         learn::certify(model, scene.problem, options, [&](const learn::CertifyProgress& now) {
             if (now.boxes == 0) {
+                estimated = now.estimate.boxes;
                 fmt::print("{}: threshold {:.4f}, estimate {:.3g} boxes (+- {:.0f} %), {:.2f} s\n",
                            scene.name, now.threshold, now.estimate.boxes, 100 * now.estimate.error,
                            now.estimate.seconds);
@@ -307,12 +314,14 @@ bool measure(const Scene& scene, const std::filesystem::path& models, std::size_
         const learn::Estimate& e = out.report.estimates.back();
         fmt::print("{}: estimate {:.3g} boxes, {:.1f} s, {:.3g} unproved\n", scene.name, e.boxes,
                    e.seconds, e.unproved);
-        return false;
+        return {.seconds = out.report.seconds};
     }
+    double boxes = 0;
     for (const CertificateLevel& level : out.report.levels) {
         fmt::print("{}: guard > {} below {:.4f}: {} boxes, {:.2f} s, {} unproved\n", scene.name,
                    level.margin, level.threshold, level.boxes, level.seconds,
                    level.unproved.size());
+        boxes += static_cast<double>(level.boxes);
     }
     const double share = cleared_share(scene, out.model);
     const learn::LowestLogit worst =
@@ -323,35 +332,45 @@ bool measure(const Scene& scene, const std::filesystem::path& models, std::size_
         "{:.4f}, {}\n",
         scene.name, 100 * share, scene.far, worst.logit,
         holds ? "above the threshold" : "BELOW THE THRESHOLD");
-    return holds && share >= 0.8;
+    return {
+        .holds = holds, .seconds = out.report.seconds, .boxes = boxes / estimated, .share = share};
+}
+
+std::vector<Scene> scenes()
+{
+    return {cavern(), arm<2>(), arm<3>(), arm<4>(), eigenvalue()};
 }
 
 }  // namespace
-}  // namespace ricochet::bench
 
-int main(int count, char** arguments)
+bool certify_scenes(const std::string& only, const std::string& models, std::size_t iterations,
+                    const learn::CertifyOptions& options)
 {
-    using namespace ricochet;
-    using namespace ricochet::bench;
-    CLI::App app("Measure certificates", "ricochet_certificates");
-    std::string only;
-    std::string models;
-    std::size_t iterations = 0;
-    learn::CertifyOptions options;
-    app.add_option("--scene", only, "cavern, arm2, arm3, arm4 or eigenvalue; default: all");
-    app.add_option("--models", models, "directory where networks are kept");
-    app.add_option("--iterations", iterations, "of the training");
-    app.add_option("--limit", options.limit, "[s]");
-    app.add_option("--levels", options.levels, "of each certificate");
-    app.add_option("--closest", options.closest, "as in CertifyOptions");
-    app.add_option("--threads", options.threads, "default 2");
-    CLI11_PARSE(app, count, arguments);
     bool good = true;
-    for (const auto& make : {&cavern, &arm<2>, &arm<3>, &arm<4>, &eigenvalue}) {
-        const Scene scene = make();
-        if (only.empty() || only == scene.name) {
-            good = measure(scene, models, iterations, options) && good;
-        }
+    for (const Scene& scene : scenes()) {
+        if (!only.empty() && only != scene.name) continue;
+        const Proof proof = measure(scene, models, iterations, options);
+        good = good && proof.holds && proof.share >= 0.8;
     }
-    return good ? 0 : 1;
+    return good;
 }
+
+Measured prove_scenes()
+{
+    Measured out{.pass = true, .text = ""};
+    for (const Scene& scene : scenes()) {
+        const double allowed = scene.dimension == 2 ? 1 : scene.dimension == 3 ? 10 : 300;
+        const Proof proof = measure(scene, "", 0, {.threads = 2});
+        const bool good = proof.holds && proof.seconds <= allowed && proof.share >= 0.8 &&
+                          proof.boxes >= 0.5 && proof.boxes <= 2;
+        out.pass = out.pass && good;
+        out.details.push_back(
+            fmt::format("{}, {}-D: {:.2f} s of {}, clears {:.1f} %, boxes {:.2f} of the estimate{}",
+                        scene.name, scene.dimension, proof.seconds, allowed, 100 * proof.share,
+                        proof.boxes, proof.holds ? "" : ", NOT PROVED OR CONTRADICTED"));
+    }
+    out.text = fmt::format("{} scenes, each with 1e6 searched states", out.details.size());
+    return out;
+}
+
+}  // namespace ricochet::bench

@@ -1,7 +1,9 @@
 // What skipping the checks of dear guards must show.
 #include <vector>
 
+#include "certificates.hpp"
 #include "measure.hpp"
+#include "measure_gates.hpp"
 
 namespace ricochet::bench {
 
@@ -71,6 +73,30 @@ std::vector<Check> checks_of_part_4()
          .sentence = "the verified gate with random, hostile and NaN weights, in every scene",
          .target = "the events of a look at every step, bit for bit",
          .run = same_events_whatever_the_weights},
+        {.part = 4,
+         .id = "gate-arm4",
+         .sentence = "boolean black box on an arm of 4 joints: a horizon gate trained here",
+         .target = ">= 4x fewer calls than every step, >= 1.5x than every k without a miss, no "
+                   "miss in 30000 fresh events",
+         .run = [] { return gate_black_box_4(); }},
+        {.part = 4,
+         .id = "gate-arm6",
+         .sentence = "the same on an arm of 6 joints among 40 obstacles",
+         .target = "reported",
+         .run = [] { return gate_black_box_6(3'000); },
+         .required = false},
+        {.part = 4,
+         .id = "gate-no-bounds",
+         .sentence = "a valued guard without bounds: slope skip, every k, a horizon gate",
+         .target = "the better reported, with what each misses",
+         .run = [] { return gate_without_bounds(3'000); },
+         .required = false},
+        {.part = 4,
+         .id = "certificates",
+         .sentence = "networks of cavern, arms and eigenvalue proved over their boxes, 2 threads",
+         .target = "2-D <= 1 s, 3-D <= 10 s, 4-D <= 300 s; >= 80 % of the far states cleared; no "
+                   "violation; estimate within 2x",
+         .run = prove_scenes},
     };
 }
 

@@ -88,7 +88,8 @@ void expect_same(const PlanRun& exact, const PlanRun& planned)
 /// Runs with the exact detector, and planned with and without looking ahead. Returns the
 /// planned run that looks ahead.
 template <class Stepping, class Exact = Extremum, class System>
-PlanRun expect_planned_same(const System& system, const X& start, const Options& options)
+PlanRun expect_planned_same(const System& system, const X& start, const Options& options,
+                            bool check_bounds = true)
 {
     const auto exact = integrate(system, start, options, Stepping{}, Exact{});
     for (const std::size_t longest : {1u, 3u, 64u}) {
@@ -96,7 +97,7 @@ PlanRun expect_planned_same(const System& system, const X& start, const Options&
         PlannerOptions plan;
         plan.longest_stretch = longest;
         plan.two_ended = longest > 1;
-        plan.check_bounds = true;
+        plan.check_bounds = check_bounds;
         const auto planned =
             integrate(system, start, options, Stepping{}, Planned<Exact>(plan, Exact{}));
         expect_same(exact, planned);
@@ -552,11 +553,11 @@ TEST(Planned, BoundsThatAreNoneCoverNothing)
             hostile.speed = bad;
             hostile.acceleration = room.gravity;
             hostile.below = below;
-            auto run = expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01});
+            auto run = expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01}, false);
             EXPECT_EQ(run.statistics.evidence.proved, 0u);
             hostile.speed = 10;
             hostile.acceleration = bad;
-            run = expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01});
+            run = expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01}, false);
             EXPECT_EQ(run.statistics.evidence.proved, 0u);
         }
     }
@@ -627,7 +628,7 @@ TEST(Planned, AnUpperBoundSavesLooksBelowTheSurfaceAndKeepsTheEvents)
     const Options options{.t_end = 60, .step = 0.01};
     OutsideWithBound bounded;
     bounded.above = 0.02;
-    const auto run = expect_planned_same<Fixed>(bounded, start, options);
+    const auto run = expect_planned_same<Fixed>(bounded, start, options, false);
     EXPECT_GT(run.events.size(), 4u);
     const auto without = integrate(Outside{}, start, options, Fixed{}, Planned{});
     ASSERT_EQ(run.events.size(), without.events.size());
@@ -668,7 +669,7 @@ TEST(Planned, ALowerBoundSavesLooksAndKeepsTheEvents)
         X start;
         const Room room = random_room(random, start);
         const Options options{.t_end = 5, .step = 0.002};
-        const auto run = expect_planned_same<Fixed>(TabulatedRoom{room}, start, options);
+        const auto run = expect_planned_same<Fixed>(TabulatedRoom{room}, start, options, false);
         EXPECT_GT(run.statistics.bound_calls, 0u);
         with += run.statistics.guard_calls;
         without += integrate(room, start, options, Fixed{}, Planned{}).statistics.guard_calls;
@@ -906,6 +907,85 @@ TEST(SlopeSkip, FindsWhatIsApproachedSmoothly)
     const auto run = integrate(room, start, options, Fixed{}, SlopeSkip(0.25, 40));
     expect_same(exact, run);
     EXPECT_LT(run.statistics.guard_calls, exact.statistics.guard_calls / 10);
+}
+
+// --- bounds that cover the rest of the run ---
+
+/// A ball that falls from 10 m at 9.81 m/s^2, with whatever it promises.
+struct Promising {
+    using State = std::array<double, 2>;
+    double speed = 0;         ///< added to |v|
+    double acceleration = 0;  ///< that it admits
+    double stretch = 1;       ///< the Lipschitz constant
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -9.81}; }
+    [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+    void reset(double, State& x) const { x = {0, -0.9 * x[1]}; }
+    [[nodiscard]] double speed_bound(double, const State& x) const
+    {
+        return std::fabs(x[1]) + speed;
+    }
+    [[nodiscard]] double acceleration_bound(double, const State&) const { return acceleration; }
+    [[nodiscard]] double lipschitz() const { return stretch; }
+};
+
+Run<std::array<double, 2>> promised(const Promising& ball, bool check, double t_end = 8)
+{
+    PlannerOptions options;
+    options.check_bounds = check;
+    return integrate(ball, {10, 0}, {.t_end = t_end, .step = 0.01}, FixedStep<Rk4>{},
+                     Planned<>(options));
+}
+
+TEST(PlannedBounds, OneThatCoversTheRestOfTheRunIsNamedAllTheSame)
+{
+    // At rest and without acceleration the guard would never change. At 8 s the ball, which
+    // nobody has seen fall, would be 300 m below the floor.
+    for (const bool check : {false, true}) {
+        for (const Promising& ball :
+             {Promising{}, Promising{.acceleration = 9.81, .stretch = 0},
+              Promising{.acceleration = 9.81, .stretch = 1e-3}, Promising{.speed = 0.1}}) {
+            const auto run = promised(ball, check);
+            EXPECT_EQ(run.outcome, Outcome::wrong_bound) << check;
+            ASSERT_TRUE(run.wrong_bound.has_value());
+            EXPECT_EQ(run.wrong_bound->guard, 0u);
+            EXPECT_GT(run.wrong_bound->value_then - run.wrong_bound->value,
+                      run.wrong_bound->allowed);
+            // Sampled in every 64th step; else seen when it is over.
+            EXPECT_LT(run.t, check ? 2.5 : 8.1);
+        }
+        EXPECT_EQ(promised({.acceleration = 9.81}, check).outcome, Outcome::reached_end);
+        EXPECT_EQ(promised({.acceleration = 9.81}, check).events.size(), 3u);
+    }
+}
+
+TEST(PlannedBounds, ThoseThatAreNoBoundsCoverNothingAndAreNamedIfChecked)
+{
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const Promising& ball : {Promising{.acceleration = -1}, Promising{.acceleration = nan},
+                                  Promising{.speed = nan, .acceleration = 9.81},
+                                  Promising{.acceleration = 9.81, .stretch = -1}}) {
+        EXPECT_EQ(promised(ball, false).events.size(), 3u);
+        EXPECT_EQ(promised(ball, true).outcome, Outcome::wrong_bound);
+    }
+}
+
+/// The same of which only the sign is known: bounds say nothing of it, and are not asked.
+struct PromisingSign : Promising {
+    [[nodiscard]] bool guard(double, const State& x) const { return x[0] > 0; }
+};
+
+TEST(PlannedBounds, ThoseOfABooleanGuardAreNotAsked)
+{
+    for (const bool check : {false, true}) {
+        PlannerOptions options;
+        options.check_bounds = check;
+        PromisingSign ball;
+        ball.acceleration = 9.81;
+        const auto run = integrate(ball, {10, 0}, {.t_end = 8, .step = 0.01}, FixedStep<Rk4>{},
+                                   Planned<>(options));
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_EQ(run.events.size(), 3u);
+    }
 }
 
 }  // namespace

@@ -40,9 +40,11 @@ struct PlannerOptions {
     /// Bounds are of the motion, steps have errors: every bound is taken larger by this
     /// fraction. At least 0.
     double margin = 0.01;
-    /// Compare bounds with the values of the guard as they are taken, and every eighth lower
-    /// bound that is relied on with one taken for that; a wrong one ends the run as
-    /// `Outcome::wrong_bound`.
+    /// Compare bounds with the values of the guard as they are taken, with one taken for that at
+    /// every eighth lower bound that is relied on and in every 64th step without a look; one
+    /// that is wrong, negative or no number ends the run as `Outcome::wrong_bound`. Without this,
+    /// too, a guard that is found beyond its surface where a bound has excluded it does, at the
+    /// end of the run at the latest.
 #ifdef NDEBUG
     bool check_bounds = false;
 #else

@@ -243,6 +243,31 @@ public:
         find_limit();
     }
 
+    /// One of the sleeping guards, each in its turn, at the end of the step in hand: of every
+    /// 64th step without a look, and only if bounds are checked.
+    template <class Step>
+    void sample_sleeper(const Step& step, Bank& bank, Statistics& counts)
+    {
+        if constexpr (bounded) {
+            if (!detector_.checks_bounds() || ++covered_ % 64 != 0 || bank.size() == 0) return;
+            const std::size_t i = covered_ / 64 % bank.size();
+            const double t = step.time(step.h());
+            watch_sleeper(i, t, step.x1(), step.mode(), bank, counts);
+        }
+    }
+
+    /// A last look at the guards that sleep when the run ends, at the start of the step: one
+    /// that is beyond its surface was covered by a wrong bound.
+    template <class Step>
+    void look_last(const Step& step, Bank& bank, Statistics& counts)
+    {
+        if constexpr (bounded) {
+            for (std::size_t i = 0; i < bank.size(); ++i) {
+                watch_sleeper(i, step.time(0), step.x0(), step.mode(), bank, counts);
+            }
+        }
+    }
+
     /// Adds what gates were asked since the last time.
     void add_counts(Statistics& counts) noexcept
     {
@@ -327,14 +352,19 @@ private:
 
     // --- bounds ---
 
-    /// The guard's bounds at a look.
-    [[nodiscard]] GuardBound bound(std::size_t i, const Look& look, Mode mode, Side side) const
+    /// The guard's bounds at a look. One that is negative or no number covers nothing, and is
+    /// named if bounds are checked.
+    [[nodiscard]] GuardBound bound(std::size_t i, const Look& look, Mode mode, Side side)
     {
         GuardBound at{.distance = sign_of(side) * look.value, .speed = 0, .acceleration = 0};
         if constexpr (bounded) {
             const double l = call_lipschitz(*system_, i);
             at.speed = l * call_speed_bound(*system_, i, mode, look.t, *look.x);
             at.acceleration = l * call_acceleration_bound(*system_, i, mode, look.t, *look.x);
+            if (detector_.checks_bounds() && !(at.speed >= 0 && at.acceleration >= 0) && !wrong_) {
+                blame(i, look, look,
+                      at.speed >= 0 ? at.acceleration : at.speed);
+            }
         }
         return at;
     }
@@ -359,7 +389,8 @@ private:
     [[nodiscard]] double horizon([[maybe_unused]] const Look& at, [[maybe_unused]] Mode mode)
     {
         if constexpr (requires { detector_.horizon(*system_, mode, at.t, *at.x); }) {
-            if (!meter_.asks()) return 0;
+            // Gates have learned what comes, not what was.
+            if (backward_ || !meter_.asks()) return 0;
             const auto answer =
                 meter_.time_network([&] { return detector_.horizon(*system_, mode, at.t, *at.x); });
             ++asked_;
@@ -590,6 +621,7 @@ private:
     void check_change(std::size_t i, const Look& from, const Look& to, const Bank& bank)
     {
         if (!bounded || !detector_.checks_bounds() || !from.exact || !to.exact) return;
+        if (bank[i].info.boolean) return;  // its values are those of a sign
         blame_change(i, from, to, bank);
     }
 
@@ -611,7 +643,11 @@ private:
             2 * band(bank, i, from.value, to.value);
         const double change = to.value - from.value;
         const bool wrong = from.exact ? std::fabs(change) > allowed : change < -allowed;
-        if (!wrong || wrong_) return;
+        if (wrong && !wrong_) blame(i, from, to, allowed);
+    }
+
+    void blame(std::size_t i, const Look& from, const Look& to, double allowed)
+    {
         wrong_ = {.guard = i,
                   .lower_bound = false,
                   .upper_bound = false,
@@ -621,6 +657,26 @@ private:
                   .since = clock(from.time),
                   .value_then = from.value,
                   .allowed = allowed};
+    }
+
+    /// A guard that sleeps cannot be beyond its surface, whatever bounds say of it there.
+    void watch_sleeper(std::size_t i, double t, const X& x, Mode mode, const Bank& bank,
+                       Statistics& counts)
+    {
+        if (wrong_ || !bank[i].enabled || never_sleeps(bank[i])) return;
+        const Look from = last_look(i);
+        Look now{.time = clock(t), .t = t, .x = &x};
+        if (!(now.time > from.time)) return;
+        now.value = value_at(i, now.time, t, x, mode, bank, counts);
+        now.bound = bound(i, now, mode, bank[i].side);
+        const double tau = now.time - from.time;
+        if (detector_.checks_bounds()) check_bound(i, now, mode, bank);
+        if (wrong_) return;
+        if (now.bound.distance < -band(bank, i, from.value, now.value)) {
+            blame(i, from, now, (from.bound.speed + 0.5 * from.bound.acceleration * tau) * tau);
+        } else {
+            check_change(i, from, now, bank);
+        }
     }
 
     /// Whether an exact value contradicts the bound that would have stood in for it. Beyond the
@@ -670,6 +726,7 @@ private:
     double hoped_ = infinity;
     double failing_value_ = 0;
     std::uint64_t lower_bounds_used_ = 0;
+    std::uint64_t covered_ = 0;  ///< steps that no guard was looked at in
     std::uint64_t asked_ = 0;    ///< calls of a gate
     std::uint64_t outside_ = 0;  ///< of its domain
     std::optional<WrongBound<X>> wrong_;

@@ -421,7 +421,7 @@ private:
     void advance_one([[maybe_unused]] const Advance& how)
     {
         const double remaining = step_.until(options_.t_end);
-        if (!(remaining > 0)) return end(Outcome::reached_end);
+        if (!(remaining > 0)) return reach_end();
         if (run_.statistics.steps == options_.max_steps) return end(Outcome::step_limit);
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
             if (is_tentative()) take_back();
@@ -437,6 +437,15 @@ private:
             }
             pass();
         }
+    }
+
+    void reach_end()
+    {
+        if constexpr (puts_off) {
+            planner_.look_last(step_, bank_, run_.statistics);
+            if (planner_.wrong()) return name_wrong_bound();
+        }
+        end(Outcome::reached_end);
     }
 
     /// The step stands, with a time event at its end if one is due.
@@ -508,6 +517,8 @@ private:
         const double t = step_.time(step_.h());
         const double ends = backward_ ? -t : t;
         if (planner_.covers(ends)) {
+            planner_.sample_sleeper(step_, bank_, run_.statistics);
+            if (planner_.wrong()) return name_wrong_bound();
             count_put_off(1);
             return pass();
         }

@@ -1,4 +1,7 @@
+#include <algorithm>
+
 #include "../any_system.hpp"
+#include "../model_lookup.hpp"
 #include "entries.hpp"
 #include "ricochet/systems/least_eigenvalue.hpp"
 
@@ -28,6 +31,15 @@ TimedRun run(const RunSettings& settings, int repeats)
 {
     return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
                    repeats);
+}
+
+/// Proofs ask for bounds over many boxes: a table repays itself.
+learn::GuardProblem guard_problem(const Model& model)
+{
+    std::vector<double> p = parameters_of(find_system(LeastEigenvalue::name), model);
+    p[table] = std::max(p[table], 16.0);
+    const LeastEigenvalue made = system(p);
+    return learn::guard_problem(made, model, made.start());
 }
 
 }  // namespace
@@ -64,6 +76,7 @@ SystemEntry eigenvalue_entry()
         .t_end = 40,
         .start = start,
         .run = run,
+        .guard_problem = guard_problem,
     };
 }
 
