@@ -141,6 +141,11 @@ void choose_gate(const SystemEntry& system, const RunRequest& request, RunSettin
                         found.file.string(), found.model.kind));
     }
     settings.model = std::move(found.file);
+    // What an unverified gate may miss is known of such steps alone.
+    if (settings.detector == DetectorKind::calibrated && !settings.fixed_step) {
+        settings.options.h_min = found.model.step_min;
+        settings.options.h_max = found.model.step_max;
+    }
     settings.gate = std::move(found.model);
 }
 
