@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <limits>
 
 #include "random_contacts.hpp"
 #include "ricochet/nonsmooth/contact_problem.hpp"
@@ -128,12 +129,75 @@ TEST(ContactSolver, RandomProblemsAreSolvedOrReported)
             const auto c = i / problem.components * problem.components;
             const double unit =
                 std::sqrt(problem.w.diagonal().segment(c, problem.components).mean());
-            size = std::max({size, std::abs(p[i]) * unit, std::abs(problem.q[i]) / unit});
+            size = std::max(size, std::abs(problem.q[i]) / unit);
         }
         expect_law_holds(problem, p, 1.1e-10 * size);
     }
     // Sliding with much friction may have no solution, or none that is found.
     EXPECT_GE(converged, problems * 95 / 100);
+}
+
+// A unit mass in a corner: a floor and a wall, each the other's tangent. Where both
+// stop the approach, p = 2 / (1 - friction) in each, which diverges towards friction 1.
+TEST(ContactSolver, ACornerWithoutASolutionIsReported)
+{
+    Eigen::Matrix<double, 4, 2> h;
+    h << 0, 1, 1, 0, 1, 0, 0, 1;
+    const Eigen::MatrixXd w = h * h.transpose();
+    Eigen::VectorXd q = h * Eigen::Vector2d(-1, -1);
+    q[0] *= 2, q[2] *= 2;  // restitution 1
+    ContactSolver solver;
+    for (const double friction : {0.0, 0.5, 0.9, 0.99}) {
+        const std::array both = {friction, friction};
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(4);
+        ASSERT_TRUE(solver.solve(w, q, both, 2, p).converged) << friction;
+        // A defect of 2e-10 of velocity, divided by 1 - friction.
+        EXPECT_NEAR(p[0], 2 / (1 - friction), 4e-10 / (1 - friction)) << friction;
+    }
+    for (const double friction : {1.0, 2.0}) {
+        const std::array both = {friction, friction};
+        // From rest, and from where every defect of velocity is small beside the impulse.
+        for (const double start : {0.0, 5e12, 1e300}) {
+            Eigen::VectorXd p = Eigen::VectorXd::Constant(4, start);
+            const ContactReport report = solver.solve(w, q, both, 2, p);
+            EXPECT_FALSE(report.converged) << friction;
+            EXPECT_GT(report.residual, 1e-3) << friction;
+        }
+    }
+}
+
+TEST(ContactSolver, OneContactIsClosedToRounding)
+{
+    std::mt19937 random(11);
+    std::normal_distribution<double> normal;
+    ContactSolver solver;
+    int sticking = 0;
+    int sliding = 0;
+    for (int trial = 0; trial < 500; ++trial) {
+        const Eigen::Matrix2d a = Eigen::Matrix2d::NullaryExpr([&] { return normal(random); });
+        const Eigen::MatrixXd w = a * a.transpose() + Eigen::Matrix2d::Identity();
+        const Eigen::VectorXd q = Eigen::Vector2d(-std::abs(normal(random)), normal(random));
+        // Unique as long as friction |W_nt| < W_nn.
+        const std::array friction = {0.9 * std::min(1.0, w(0, 0) / std::abs(w(0, 1)))};
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(2);
+        const ContactReport report = solver.solve(w, q, friction, 2, p);
+        ASSERT_TRUE(report.converged);
+        EXPECT_EQ(report.iterations, 0);
+        const Eigen::VectorXd u = w * p + q;
+        // Each product rounds once: a few units of the largest term.
+        const double rounding = 8e-16 * (w.norm() * p.norm() + q.norm());
+        const bool sticks = std::abs(p[1]) < friction[0] * p[0] * (1 - 1e-12);
+        EXPECT_NEAR(u[0], 0, sticks ? rounding * w.norm() : rounding);
+        EXPECT_LE(std::abs(p[1]), friction[0] * p[0] * (1 + 1e-15));
+        if (sticks) {
+            EXPECT_NEAR(u[1], 0, rounding * w.norm());
+        } else {
+            EXPECT_LE(p[1] * u[1], rounding);
+        }
+        ++(sticks ? sticking : sliding);
+    }
+    EXPECT_GT(sticking, 50);
+    EXPECT_GT(sliding, 50);
 }
 
 TEST(ContactSolver, AStartAtTheSolutionTakesNoIteration)
@@ -161,6 +225,8 @@ TEST(ContactSolver, WrongInputIsRefused)
     Eigen::VectorXd p = q;
     const std::array negative = {-0.1};
     const std::array fine = {0.1};
+    const std::array infinite = {std::numeric_limits<double>::infinity()};
+    EXPECT_THROW(solver.solve(w, q, infinite, 2, p), std::invalid_argument);
     EXPECT_THROW(solver.solve(w, q, negative, 2, p), std::invalid_argument);
     EXPECT_THROW(solver.solve(w, q, fine, 3, p), std::invalid_argument);
     EXPECT_THROW(solver.solve(w, q, fine, 4, p), std::invalid_argument);

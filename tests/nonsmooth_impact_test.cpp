@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "ricochet/nonsmooth/time_stepping.hpp"
@@ -162,6 +164,105 @@ TEST(TimeStepping, TheWoodpeckerClimbsDownInACycle)
     EXPECT_GT(period, 0.12);
     EXPECT_LT(period, 0.17);
     EXPECT_LT(heights[n - 1], heights[n - 2] - 1e-3);
+}
+
+/// A unit mass in a corner of a floor and a wall, each the other's tangent.
+struct Corner {
+    static constexpr int coordinates = 2;
+    static constexpr int contacts = 2;
+    static constexpr int tangents = 1;
+    using V = Eigen::Vector2d;
+    double mu = 1;
+    double e = 1;
+    double broken_from = 10;  ///< [s], without a force from then on
+    static void mass(const V&, Eigen::Matrix2d& m) { m.setIdentity(); }
+    void force(double t, const V&, const V&, V& f) const
+    {
+        f << 0, t < broken_from ? -1.0 : std::nan("");
+    }
+    static void gaps(const V& q, V& g) { g << q[1], q[0]; }
+    static void directions(const V&, Eigen::Matrix<double, 4, 2>& h)
+    {
+        h << 0, 1, 1, 0, 1, 0, 0, 1;
+    }
+    [[nodiscard]] double restitution(int) const { return e; }
+    [[nodiscard]] double friction(int c) const { return c == 0 ? mu : 0; }
+};
+
+/// With friction on both sides.
+struct RoughCorner : Corner {
+    [[nodiscard]] double friction(int) const { return mu; }
+};
+
+TEST(TimeStepping, AnImpactWithoutASolutionEndsTheRunAndMakesNoEnergy)
+{
+    for (const double mu : {1.0, 2.0}) {
+        RoughCorner corner;
+        corner.mu = mu;
+        TimeStepping<RoughCorner> motion(corner, {0, 0}, {-1, -1}, {.t_end = 1, .step = 0.01});
+        EXPECT_EQ(motion.run(), SetValuedOutcome::not_converged);
+        EXPECT_EQ(motion.state().t, 0);
+        EXPECT_EQ(motion.state().v, Eigen::Vector2d(-1, -1));
+        EXPECT_GT(motion.failure().residual, 1e-3);
+        EXPECT_TRUE(std::isfinite(motion.failure().residual));
+    }
+}
+
+TEST(TimeStepping, AForceThatIsNotFiniteEndsTheRunWithWhatWasComputed)
+{
+    for (const double height : {0.0, 5.0}) {  // in contact, in flight
+        TimeStepping<Corner> motion({.e = 0, .broken_from = 0.5}, {1, height}, {0, 0},
+                                    {.t_end = 1, .step = 0.01});
+        EXPECT_EQ(motion.run(), SetValuedOutcome::not_converged);
+        // Steps are halved ten times on the way there.
+        EXPECT_GT(motion.state().t, 0.48);
+        EXPECT_LT(motion.state().t, 0.51);
+        EXPECT_TRUE(motion.state().q.allFinite());
+        EXPECT_TRUE(std::isinf(motion.failure().residual));
+    }
+}
+
+TEST(TimeStepping, ARunOfNoLengthIsOver)
+{
+    TimeStepping<Ball1d> motion({}, Ball1d::V(1.0), Ball1d::V(0.0),
+                                {.t_start = 2, .t_end = 2, .step = 0.1});
+    int seen = 0;
+    EXPECT_EQ(motion.run([&](const auto&) { ++seen; }), SetValuedOutcome::reached_end);
+    EXPECT_EQ(seen, 1);
+    EXPECT_EQ(motion.state().t, 2);
+    EXPECT_EQ(motion.state().q[0], 1);
+    EXPECT_EQ(motion.statistics().steps, 0U);
+    EXPECT_THROW((TimeStepping<Ball1d>({}, Ball1d::V(1.0), Ball1d::V(0.0),
+                                       {.t_start = 2, .t_end = 1.9, .step = 0.1})),
+                 std::invalid_argument);
+}
+
+template <class Call>
+std::string refusal(const Call& call)
+{
+    try {
+        call();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+TEST(TimeStepping, ARefusalSaysWhatIsWrongAndNamesTheContact)
+{
+    const auto start = [](Eigen::Vector2d q, Eigen::Vector2d v, double mu) {
+        return refusal([&] { TimeStepping<Corner>({.mu = mu}, q, v, {.t_end = 1, .step = 0.1}); });
+    };
+    const double nan = std::nan("");
+    const auto has = [](const std::string& text, const char* part) {
+        return text.find(part) != std::string::npos;
+    };
+    EXPECT_EQ(start({1, 1}, {0, 0}, 1), "accepted");
+    EXPECT_PRED2(has, start({nan, 1}, {0, 0}, 1), "position is not finite");
+    EXPECT_PRED2(has, start({1, 1}, {0, nan}, 1), "velocity is not finite");
+    EXPECT_PRED2(has, start({-0.25, 1}, {0, 0}, 1), "the gap of contact 1 is -0.25");
+    EXPECT_PRED2(has, start({1, 1}, {0, 0}, std::numeric_limits<double>::infinity()),
+                 "contact 0: friction must be finite, zero or positive, got inf");
 }
 
 TEST(TimeStepping, RefusesAStartInsideAnObstacleAndWrongCoefficients)

@@ -9,6 +9,48 @@
 
 namespace ricochet {
 
+namespace {
+
+/// One contact with one tangent: at rest, stick or slip. Unique where friction |W_nt| < W_nn.
+bool close_in_plane(const Eigen::Matrix3d& w, const Eigen::Vector3d& q, double friction,
+                    Eigen::Vector3d& p)
+{
+    const double determinant = w(0, 0) * w(1, 1) - w(0, 1) * w(1, 0);
+    if (determinant > 0) {
+        p[0] = (w(0, 1) * q[1] - w(1, 1) * q[0]) / determinant;
+        p[1] = (w(1, 0) * q[0] - w(0, 0) * q[1]) / determinant;
+        if (std::abs(p[1]) <= friction * p[0]) return true;
+    }
+    for (const double sign : {1.0, -1.0}) {
+        p[0] = -q[0] / (w(0, 0) - sign * friction * w(0, 1));
+        p[1] = -sign * friction * p[0];
+        if (sign * (q[1] + w(1, 0) * p[0] + w(1, 1) * p[1]) >= 0) return true;
+    }
+    return false;
+}
+
+/// The impulse of one contact where its solution is unique and written in closed form.
+bool close_form(const Eigen::Matrix3d& w, const Eigen::Vector3d& q, double friction, int tangents,
+                Eigen::Vector3d& p)
+{
+    p.setZero();
+    const double coupling = std::hypot(w(0, 1), tangents == 2 ? w(0, 2) : 0);
+    if (!(friction * coupling < w(0, 0))) return false;
+    if (q[0] >= 0) return true;
+    p[0] = -q[0] / w(0, 0);
+    if (friction == 0) return true;
+    if (tangents == 1) return close_in_plane(w, q, friction, p);
+    if (coupling != 0 || w(1, 2) != 0 || w(1, 1) != w(2, 2) || !(w(1, 1) > 0)) return false;
+    const double holding = std::hypot(q[1], q[2]) / w(1, 1);
+    const double bound = friction * p[0];
+    const double share = holding > bound ? bound / holding : 1;
+    p[1] = -share * q[1] / w(1, 1);
+    p[2] = -share * q[2] / w(1, 1);
+    return true;
+}
+
+}  // namespace
+
 ContactSolver::ContactSolver(const ContactOptions& options) : options_(options)
 {
     if (!(options.tolerance > 0)) {
@@ -34,7 +76,7 @@ void ContactSolver::scale(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,
     for (const double coefficient : friction) {
         if (!(coefficient >= 0) || !std::isfinite(coefficient)) {
             throw std::invalid_argument(fmt::format(
-                "ContactSolver: friction must be zero or positive, got {}", coefficient));
+                "ContactSolver: friction must be finite, zero or positive, got {}", coefficient));
         }
     }
     if (!w.allFinite() || !q.allFinite()) {
@@ -71,10 +113,9 @@ void ContactSolver::defects(const Eigen::VectorXd& p, Eigen::VectorXd& f)
 
 double ContactSolver::measure(const Eigen::VectorXd& p, const Eigen::VectorXd& f) const
 {
-    const double size = std::max(p.lpNorm<Eigen::Infinity>(), q_.lpNorm<Eigen::Infinity>());
+    const double size = q_.lpNorm<Eigen::Infinity>();
     const double worst = f.lpNorm<Eigen::Infinity>();
-    if (!std::isfinite(worst) || !std::isfinite(size))
-        return std::numeric_limits<double>::infinity();
+    if (!p.allFinite() || !std::isfinite(worst)) return std::numeric_limits<double>::infinity();
     return size > 0 ? worst / size : worst;
 }
 
@@ -216,9 +257,36 @@ ContactReport ContactSolver::solve(const Eigen::MatrixXd& w, const Eigen::Vector
         throw std::invalid_argument(fmt::format(
             "ContactSolver: the impulses must have {} components, got {}", q.size(), p.size()));
     }
-    p_ = p.cwiseQuotient(units_);
-    if (!p_.allFinite()) p_.setZero();
     ContactReport report;
+    if (friction.size() == 1) {
+        Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
+        Eigen::Vector3d free = Eigen::Vector3d::Zero();
+        Eigen::Vector3d closed;
+        one.topLeftCorner(components, components) = w;
+        free.head(components) = q;
+        if (close_form(one, free, friction[0], components - 1, closed)) {
+            trial_ = closed.head(components);
+            report = residual(w, q, friction, components, trial_);
+            if (report.converged) {
+                p = trial_;
+                return report;
+            }
+        }
+    }
+    iterate(p, report);
+    const int iterations = report.iterations;
+    const int sweeps = report.sweeps;
+    report = residual(w, q, friction, components, p);
+    report.iterations = iterations;
+    report.sweeps = sweeps;
+    return report;
+}
+
+void ContactSolver::iterate(Eigen::VectorXd& p, ContactReport& report)
+{
+    p_ = p.cwiseQuotient(units_);
+    // Without a velocity nothing has to act, and nothing is there to measure defects by.
+    if (!p_.allFinite() || q_.isZero(0)) p_.setZero();
     bool solved = newton(report);
     // Sweeps, ever more of them between the attempts of Newton's method.
     for (int batch = 5; !solved && report.sweeps < options_.max_sweeps; batch = 2 * batch) {
@@ -230,13 +298,10 @@ ContactReport ContactSolver::solve(const Eigen::MatrixXd& w, const Eigen::Vector
         solved = newton(report);
     }
     p = units_.cwiseProduct(p_);
-    const int iterations = report.iterations;
-    const int sweeps = report.sweeps;
-    report = residual(w, q, friction, components, p);
-    report.iterations = iterations;
-    report.sweeps = sweeps;
-    report.converged = report.residual <= options_.tolerance;
-    return report;
+    // Newton's method leaves what its regularisation costs; one factor puts the normal velocity
+    // of a single contact right.
+    const double stop = friction_.size() == 1 && p_[0] > 0 ? w_.row(0).dot(p_) : 0;
+    if (solved && stop > 0) p *= -q_[0] / stop;
 }
 
 ContactReport ContactSolver::residual(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,

@@ -21,8 +21,10 @@ namespace ricochet {
 
 struct ContactReport {
     bool converged = false;
-    /// The largest defect over the contacts, in units in which W has a unit diagonal in each
-    /// contact, as a fraction of the largest of the components of q and p in these units.
+    /// The largest defect over the contacts, of velocity or impulse, in units in which W has a
+    /// unit diagonal in each contact, as a fraction of the largest component of q in these
+    /// units. Not of p: where there is no solution p grows without bound, and every defect
+    /// would be small beside it.
     double residual = 0;
     int iterations = 0;  ///< of Newton's method, in all its attempts
     int sweeps = 0;      ///< over the contacts, one by one
@@ -38,7 +40,8 @@ struct ContactOptions {
 /// Solves contact problems of up to a number of components without allocating, once its
 /// memory has grown to their size.
 ///
-/// First by a semismooth Newton method on the projections
+/// A single contact in closed form, where its solution is unique and needs no iteration. Else
+/// first by a semismooth Newton method on the projections
 ///
 ///     p_n = max(0, p_n - rho u_n),   p_t = P(|.| <= friction p_n)(p_t - rho u_t)
 ///
@@ -54,7 +57,7 @@ public:
     /// Improves `p`, the start of the iteration: the impulses of the step before, or zero.
     ///
     /// @throws std::invalid_argument where the sizes do not fit, `components` is neither 2 nor
-    /// 3, a coefficient of friction is negative or something is not finite.
+    /// 3, a coefficient of friction is negative or infinite, or something is not finite.
     ContactReport solve(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,
                         std::span<const double> friction, int components, Eigen::VectorXd& p);
 
@@ -69,6 +72,7 @@ private:
     void defects(const Eigen::VectorXd& p, Eigen::VectorXd& f);
     [[nodiscard]] double measure(const Eigen::VectorXd& p, const Eigen::VectorXd& f) const;
     [[nodiscard]] bool newton(ContactReport& report);
+    void iterate(Eigen::VectorXd& p, ContactReport& report);
     void jacobian(const Eigen::VectorXd& p);
     void sweep(double relaxation);
     void solve_contact(Eigen::Index c, double relaxation);

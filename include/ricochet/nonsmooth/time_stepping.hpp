@@ -17,7 +17,7 @@
 //     directions(q, H)           for each contact the row of its gap's rate, then those of
 //                                its tangential velocities
 //     restitution(c)             Newton's coefficient, in [0, 1]
-//     friction(c)                Coulomb's, zero or positive
+//     friction(c)                Coulomb's, finite, zero or positive
 #pragma once
 
 #include <Eigen/Dense>
@@ -25,6 +25,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -40,8 +41,18 @@ struct TimeSteppingOptions {
     ContactOptions contacts{};
 };
 
+/// A run of no length is accepted.
+///
 /// @throws std::invalid_argument naming the option.
 void validate(const TimeSteppingOptions& options);
+
+namespace detail {
+
+/// @throws std::invalid_argument naming the contact where a coefficient is out of range or the
+/// gap is negative by more than `room` [m], or no number.
+void check_contact(int contact, double restitution, double friction, double gap, double room);
+
+}  // namespace detail
 
 struct TimeSteppingStatistics {
     std::uint64_t steps = 0;
@@ -82,36 +93,27 @@ public:
     };
 
     /// @throws std::invalid_argument for options, a matrix that is not positive definite,
-    /// coefficients out of range, a start inside an obstacle by more than rounding.
+    /// coefficients out of range, a start that is not finite or inside an obstacle by more than
+    /// rounding.
     TimeStepping(const System& system, const Vector& q, const Vector& v,
                  const TimeSteppingOptions& options)
         : system_(system), options_(options), solver_(options.contacts)
     {
         validate(options);
-        state_ = {options.t_start, q, v, Impulses::Zero()};
-        Gaps gaps;
-        system_.gaps(q, gaps);
-        for (int c = 0; c < C; ++c) {
-            if (!(system_.restitution(c) >= 0 && system_.restitution(c) <= 1)) {
-                detail::refuse_inclusion("restitution must lie in [0, 1], got",
-                                         system_.restitution(c));
-            }
-            if (!(system_.friction(c) >= 0)) {
-                detail::refuse_inclusion("friction must be zero or positive, got",
-                                         system_.friction(c));
-            }
-            if (!(gaps[c] >= -1e-12 * (1 + q.norm()))) {
-                detail::refuse_inclusion("the initial state is inside an obstacle: a gap is",
-                                         gaps[c]);
-            }
-        }
+        if (!q.allFinite()) detail::refuse_inclusion("the initial position is not finite");
         if (!v.allFinite()) detail::refuse_inclusion("the initial velocity is not finite");
+        system_.gaps(q, gaps_);
+        for (int c = 0; c < C; ++c) {
+            detail::check_contact(c, system_.restitution(c), system_.friction(c), gaps_[c],
+                                  1e-12 * (1 + q.norm()));
+        }
         system_.mass(q, mass_);
-        if (Eigen::LLT<Square>(mass_).info() != Eigen::Success) {
+        if (!mass_.allFinite() || Eigen::LLT<Square>(mass_).info() != Eigen::Success) {
             detail::refuse_inclusion("the mass matrix is not positive definite");
         }
         friction_.reserve(C);
         closed_.reserve(C);
+        restart(options.t_start, q, v);
     }
 
     /// Goes on from (t, q, v), where an integrator of free flight hands over.
@@ -124,7 +126,8 @@ public:
     [[nodiscard]] const State& state() const noexcept { return state_; }
     [[nodiscard]] const TimeSteppingStatistics& statistics() const noexcept { return statistics_; }
     [[nodiscard]] SetValuedOutcome outcome() const noexcept { return outcome_; }
-    /// The contact problem that ended the run as `not_converged`.
+    /// The contact problem that ended the run as `not_converged`; its residual is infinite and
+    /// its contact -1 where a force, a gap, a direction or the velocity was not finite.
     [[nodiscard]] const ContactReport& failure() const noexcept { return failure_; }
 
     SetValuedOutcome advance()
@@ -153,6 +156,7 @@ public:
     SetValuedOutcome run(const Observer& observer)
     {
         observer(std::as_const(state_));
+        if (outcome_ != SetValuedOutcome::running) return outcome_;
         while (advance() == SetValuedOutcome::running) observer(std::as_const(state_));
         if (outcome_ == SetValuedOutcome::reached_end) observer(std::as_const(state_));
         return outcome_;
@@ -171,18 +175,27 @@ private:
         system_.gaps(middle_, gaps_);
         factor_.compute(mass_);
         velocity_ = state_.v + h * factor_.solve(force_);
+        if (factor_.info() != Eigen::Success || !velocity_.allFinite() || gaps_.hasNaN()) {
+            return fail_finite();
+        }
         closed_.clear();
         for (int c = 0; c < C; ++c) {
             if (gaps_[c] <= 0) closed_.push_back(c);
         }
         impulse_.setZero();
         if (!closed_.empty() && !collide()) return false;
-        if (!velocity_.allFinite() || factor_.info() != Eigen::Success) return false;
+        if (!velocity_.allFinite()) return fail_finite();
         state_.v = velocity_;
         state_.q = middle_ + (h / 2) * velocity_;
         state_.t += h;
         state_.impulse = impulse_;
         return true;
+    }
+
+    bool fail_finite()
+    {
+        failure_ = {.residual = std::numeric_limits<double>::infinity()};
+        return false;
     }
 
     bool collide()
@@ -206,6 +219,7 @@ private:
             q_[row] += system_.restitution(closed_[k]) * h_.row(row).dot(state_.v);
             p_.segment(row, D) = state_.impulse.segment(closed_[k] * D, D);
         }
+        if (!w_.allFinite() || !q_.allFinite()) return fail_finite();
         const ContactReport report = solver_.solve(w_, q_, friction_, D, p_);
         statistics_.iterations += static_cast<std::uint64_t>(report.iterations);
         statistics_.sweeps += static_cast<std::uint64_t>(report.sweeps);
