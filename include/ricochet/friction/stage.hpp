@@ -166,7 +166,7 @@ struct StageEquation {
     double xi = 0;            ///< xi^
 };
 
-struct StageReport {
+struct FrictionStageReport {
     int iterations = 0;   ///< evaluations of friction and state
     double residual = 0;  ///< |c V + N f - F| over the sum of their sizes
     bool solved = false;
@@ -175,7 +175,7 @@ struct StageReport {
 
 struct StageSolution {
     double v = 0, xi = 0, friction = 0;
-    StageReport report{};
+    FrictionStageReport report{};
 };
 
 namespace detail {

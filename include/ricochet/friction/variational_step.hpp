@@ -129,7 +129,7 @@ public:
     }
 
 private:
-    static void note(const StageReport& stage, StepReport& step) noexcept
+    static void note(const FrictionStageReport& stage, StepReport& step) noexcept
     {
         step.iterations += stage.iterations;
         step.most_iterations = std::max(step.most_iterations, stage.iterations);
