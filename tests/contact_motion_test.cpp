@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <string>
 
 #include "ricochet/nonsmooth/contact_motion.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
@@ -127,8 +129,75 @@ TEST(ContactMotion, StopsAfterSoManySteps)
     EXPECT_LT(run.t, 2);
 }
 
+/// A particle between two walls without friction; its mass matrix couples both coordinates.
+struct Shuttle {
+    static constexpr int coordinates = 2;
+    static constexpr int contacts = 2;
+    static constexpr int tangents = 1;
+    using V = Eigen::Vector2d;
+    static void mass(const V&, Eigen::Matrix2d& m) { m << 1.3, 0.4, 0.4, 0.7; }
+    static void force(double, const V&, const V&, V& f) { f.setZero(); }
+    static void gaps(const V& q, V& g) { g << q[1], 1 - q[1]; }
+    static void directions(const V&, Eigen::Matrix<double, 4, 2>& h)
+    {
+        h << 0, 1, 1, 0, 0, -1, 1, 0;
+    }
+    static double restitution(int) { return 1; }
+    static double friction(int) { return 0; }
+};
+
+TEST(ContactMotion, ElasticImpactsKeepTheEnergyToRounding)
+{
+    const auto run = hand_over(Shuttle(), {0, 0.5}, {0.3, 1}, {.t_end = 200});
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_GT(run.events.size(), 100U);
+    Eigen::Matrix2d m;
+    Shuttle::mass({}, m);
+    const auto energy = [&](const auto& x) {
+        const Eigen::Vector2d v(x[2], x[3]);
+        return v.dot(m * v) / 2;
+    };
+    const double start = energy(FreeFlight<Shuttle>::state({0, 0.5}, {0.3, 1}));
+    // Some ten operations of an impact round, each by at most 1.1e-16.
+    for (const auto& impact : run.events) {
+        EXPECT_NEAR(energy(impact.after), energy(impact.before), 2e-15 * start) << impact.t;
+    }
+    EXPECT_NEAR(energy(run.x), start, 2e-15 * start * static_cast<double>(run.events.size()));
+}
+
+TEST(ContactMotion, AForceThatIsNotFiniteInContactEndsTheRun)
+{
+    const auto run = hand_over(Ball{.lift = std::nan(""), .lift_at = 1}, {0, 0}, {0, 0},
+                               {.t_end = 2, .set_valued = {.step = 1e-2}});
+    EXPECT_EQ(run.outcome, HandOverOutcome::non_finite);
+    EXPECT_GT(run.t, 0.98);
+    EXPECT_LT(run.t, 1.01);
+    EXPECT_TRUE(std::isfinite(run.x[1]));
+}
+
+TEST(ContactMotion, ARunOfNoLengthIsOver)
+{
+    for (const double height : {0.0, 1.0}) {
+        const auto run =
+            hand_over(Ball{}, {0, height}, {0, 0}, {.t_start = 1, .t_end = 1, .sample_times = {1}});
+        EXPECT_EQ(run.outcome, HandOverOutcome::reached_end);
+        EXPECT_EQ(run.t, 1);
+        ASSERT_EQ(run.trajectory.t.size(), 1U);
+        EXPECT_EQ(run.trajectory.x[0][1], height);
+    }
+}
+
 TEST(ContactMotion, RefusesAStartInsideAnObstacle)
 {
+    EXPECT_THROW((void)hand_over(Ball{.mu = std::numeric_limits<double>::infinity()}, {0, 1},
+                                 {0, 0}, {.t_end = 1}),
+                 std::invalid_argument);
+    try {
+        (void)hand_over(Ball{}, {0, std::nan("")}, {0, 0}, {.t_end = 1});
+        ADD_FAILURE() << "accepted";
+    } catch (const std::invalid_argument& error) {
+        EXPECT_NE(std::string(error.what()).find("not finite"), std::string::npos);
+    }
     EXPECT_THROW((void)hand_over(Ball{}, {0, -0.1}, {0, 0}, {.t_end = 1}), std::invalid_argument);
     EXPECT_THROW((void)hand_over(Ball{.mu = -1}, {0, 1}, {0, 0}, {.t_end = 1}),
                  std::invalid_argument);

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -57,7 +58,7 @@ struct ContactRun {
     std::vector<Phase> phases;
     Trajectory<X> trajectory;  ///< at the sample times
     ContactStatistics statistics;
-    ContactReport failure;  ///< with `not_converged`
+    ContactReport failure;  ///< with `not_converged`, and `non_finite` in contact
 };
 
 /// Of `HandOverOptions` those of the event-driven phases count, and `set_valued.step` as the
@@ -93,10 +94,8 @@ public:
 private:
     [[nodiscard]] static TimeSteppingOptions stepping_options(const HandOverOptions& options)
     {
-        // A run of no length takes no step.
-        const double end =
-            std::max(options.t_end, std::nextafter(options.t_start, options.t_start + 1));
-        return {.t_start = options.t_start, .t_end = end, .step = options.set_valued.step};
+        return {
+            .t_start = options.t_start, .t_end = options.t_end, .step = options.set_valued.step};
     }
 
     void end_with(HandOverOutcome outcome)
@@ -176,7 +175,7 @@ private:
             open = is_open() ? open + 1 : 0;
             if (outcome == SetValuedOutcome::not_converged) run_.failure = steps_.failure();
             if (outcome != SetValuedOutcome::running) {
-                end_with(detail::in_hand_over(outcome));
+                end_with(stepping_outcome(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
                 end_with(HandOverOutcome::cancelled);
             } else if (run_.statistics.event_driven.steps + steps_.statistics().steps >=
@@ -190,6 +189,13 @@ private:
         if (ended_) return;
         ++run_.statistics.to_flight;
         run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = PhaseCause::released});
+    }
+
+    [[nodiscard]] HandOverOutcome stepping_outcome(SetValuedOutcome outcome) const
+    {
+        const bool failed = outcome == SetValuedOutcome::not_converged;
+        if (failed && std::isinf(run_.failure.residual)) return HandOverOutcome::non_finite;
+        return detail::in_hand_over(outcome);
     }
 
     /// Whether no contact pushed in the last step, and all are open after it.

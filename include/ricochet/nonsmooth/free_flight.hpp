@@ -17,7 +17,9 @@
 
 namespace ricochet {
 
-/// State x = (q, v). An impact allocates memory; flight does not.
+/// State x = (q, v). An impact allocates memory; flight does not. That of one contact without
+/// friction, or with one tangent, is a closed form: at restitution 1 it keeps the energy to
+/// rounding.
 template <class System>
 class FreeFlight {
 public:
@@ -114,7 +116,9 @@ public:
         }
         Eigen::VectorXd p = Eigen::VectorXd::Zero(count * D);
         ContactSolver solver(contacts_);
-        if (!solver.solve(h * lever, u, friction, D, p).converged) return;
+        const Eigen::MatrixXd w = h * lever;
+        if (!w.allFinite() || !u.allFinite()) return;
+        if (!solver.solve(w, u, friction, D, p).converged) return;
         v += lever * p;
         Eigen::Map<Vector>(x.data() + N) = v;
     }
