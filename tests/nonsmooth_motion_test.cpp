@@ -623,6 +623,7 @@ TEST(BadInput, IsRefusedWithASentence)
     EXPECT_THROW(with({.t_end = 1, .step = 0.1, .controller = HeuristicStep{}})(),
                  std::invalid_argument);
     EXPECT_THROW(with({.t_end = 1, .step = 0.1, .scheme = {.theta = 0}})(), std::invalid_argument);
+    EXPECT_THROW(with({.t_end = 1, .step = 0.1, .h_min = 0.2})(), std::invalid_argument);
     EXPECT_THROW(with({.t_end = 1,
                        .step = 0.1,
                        .controller = ErrorStep{},
@@ -632,6 +633,67 @@ TEST(BadInput, IsRefusedWithASentence)
     SetValuedMotion<SlidingMode> motion(SlidingMode(), one(1), {.t_end = 1, .step = 0.1});
     EXPECT_THROW(motion.restart({0, one(1), one(3)}), std::invalid_argument);
     EXPECT_NO_THROW(motion.restart({0, one(1), one(-2)}));
+}
+
+TEST(Doubling, KeepsTheTwoHalfStepsWhereSwitchesAreLocated)
+{
+    // One step of backward Euler is 1 / (1 - z), two of half the length 1 / (1 - z / 2)^2.
+    const std::complex<double> z(0, 0.1);
+    SetValuedMotion<Spiral> motion(Spiral{}, {1, 1},
+                                   {.t_end = 1,
+                                    .step = 0.1,
+                                    .controller = ErrorStep{},
+                                    .estimate = ErrorEstimate::doubling,
+                                    .rtol = 0.1,
+                                    .error_order = 1,
+                                    .switches = Switches::located,
+                                    .scheme = {.scheme = Scheme::backward_euler}});
+    ASSERT_EQ(motion.advance(), SetValuedOutcome::running);
+    ASSERT_EQ(motion.state().t, 0.1);
+    const auto exact = std::complex<double>(1, 1) / ((1.0 - z / 2.0) * (1.0 - z / 2.0));
+    EXPECT_NEAR(motion.state().w[0], exact.real(), 1e-14);
+    EXPECT_NEAR(motion.state().w[1], exact.imag(), 1e-14);
+}
+
+/// Pushed by a constant force, with a set of two reactions that is no box.
+template <class Set>
+struct Pushed {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 2;
+    Set set;
+    Eigen::Vector2d force{0, 0};
+    void smooth(double, const Eigen::Vector2d&, Eigen::Vector2d& f) const { f = force; }
+    Set reaction_set(double, const Eigen::Vector2d&) const { return set; }
+};
+
+template <class Set>
+Eigen::Vector2d first_reaction(const Set& set, const Eigen::Vector2d& force,
+                               const Eigen::Vector2d& start)
+{
+    const Pushed<Set> system{set, force};
+    return SetValuedMotion<Pushed<Set>>(system, start, {.t_end = 1, .step = 0.1}).state().reaction;
+}
+
+TEST(Start, IsRefusedWhereNoReactionOfAConeOpposesIt)
+{
+    const FrictionCone<2> cone(0.5);
+    const Eigen::Vector2d push(1, -1);
+    // -y must be normal to the cone: y in its dual, y0 >= |y1| / 2.
+    for (const Eigen::Vector2d& start : {Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, 1),
+                                        Eigen::Vector2d(1, 2.01), Eigen::Vector2d(1, -3)}) {
+        EXPECT_THROW((void)first_reaction(cone, push, start), std::invalid_argument) << start;
+    }
+    EXPECT_EQ(first_reaction(cone, push, {1, 0.5}), Eigen::Vector2d(0, 0));
+    // At the apex the rest of the push that the cone cannot take: P(-push).
+    const Eigen::Vector2d apex = first_reaction(cone, {-2, 0.5}, {0, 0});
+    EXPECT_NEAR((apex - Eigen::Vector2d(2, -0.5)).norm(), 0, 1e-12);
+
+    const double infinity = std::numeric_limits<double>::infinity();
+    EXPECT_THROW((void)first_reaction(Ball<2>(infinity), push, {1, 0}), std::invalid_argument);
+    EXPECT_NEAR((first_reaction(Ball<2>(2), push, {3, 4}) - Eigen::Vector2d(-1.2, -1.6)).norm(), 0,
+                1e-8);
+    EXPECT_NEAR((first_reaction(Ball<2>(2), push, {3e-9, 4e-9}) - Eigen::Vector2d(-1.2, -1.6)).norm(),
+                0, 1e-8);
 }
 
 // f escapes to infinity at t = 1 and is no number beyond.

@@ -156,5 +156,22 @@ TEST(ConvexSets, EmptySetsSaySo)
     EXPECT_TRUE(fault_of(TwoPoints{}).empty());  // does not say
 }
 
+TEST(ConvexSets, AFaultTellsWhatIsEmptyFromWhatIsNoNumber)
+{
+    const double nan = std::nan("");
+    const auto says = [](std::string_view fault, std::string_view what) {
+        return fault.find(what) != std::string_view::npos;
+    };
+    EXPECT_TRUE(says(IntervalSet(1, -1).fault(), "empty"));
+    EXPECT_TRUE(says(IntervalSet(nan, 1).fault(), "not a number"));
+    EXPECT_TRUE(says(Box<2>({-1, 1}, {1, -1}).fault(), "empty"));
+    EXPECT_TRUE(says(Box<2>({-1, -1}, {1, nan}).fault(), "not a number"));
+    EXPECT_TRUE(says(Ball<2>(-1).fault(), "negative"));
+    EXPECT_TRUE(says(Ball<2>(nan).fault(), "not a number"));
+    EXPECT_TRUE(says(FrictionCone<2>(-1).fault(), "negative"));
+    EXPECT_TRUE(says(FrictionCone<2>(nan).fault(), "not a number"));
+    EXPECT_EQ(IntervalSet::half_line().fault(), "");
+}
+
 }  // namespace
 }  // namespace ricochet

@@ -50,6 +50,7 @@ void validate(const SetValuedOptions& options)
             options.atol + options.rtol);
     require(options.error_order >= 1, "error_order must be at least 1", options.error_order);
     require(options.h_min >= 0, "h_min must be zero or positive", options.h_min);
+    require(options.h_min <= options.step, "h_min must not be above step", options.h_min);
     require(options.h_max > options.h_min, "h_max must be above h_min", options.h_max);
     const bool constant = std::holds_alternative<ConstantStep>(options.controller);
     if (!constant && options.estimate == ErrorEstimate::none) {

@@ -67,6 +67,25 @@ void clamp_derivative(const Box& box, std::span<const double> z, std::span<doubl
     }
 }
 
+/// What is wrong with an interval, nothing if it is one.
+[[nodiscard]] constexpr std::string_view interval_fault(double lower, double upper) noexcept
+{
+    if (lower <= upper) return "";
+    return lower > upper ? "is empty: a lower bound lies above the upper one"
+                         : "has a bound that is not a number";
+}
+
+/// The first component of a box whose interval is empty or has a bound that is not a number;
+/// -1 if none has.
+template <BoxSet Box>
+[[nodiscard]] constexpr int faulty_interval(const Box& box) noexcept
+{
+    for (std::size_t i = 0; i < static_cast<std::size_t>(box.dimension()); ++i) {
+        if (!(box.lower(i) <= box.upper(i))) return static_cast<int>(i);
+    }
+    return -1;
+}
+
 }  // namespace detail
 
 /// [lower, upper], either of which may be infinite. As a set of reactions: a relay
@@ -101,7 +120,7 @@ public:
     }
     [[nodiscard]] constexpr std::string_view fault() const noexcept
     {
-        return lower_ <= upper_ ? "" : "is empty: the lower bound lies above the upper one";
+        return detail::interval_fault(lower_, upper_);
     }
 
 private:
@@ -132,9 +151,8 @@ public:
     [[nodiscard]] constexpr std::string_view fault() const noexcept
     {
         for (std::size_t i = 0; i < N; ++i) {
-            if (!(lower_[i] <= upper_[i])) {
-                return "is empty: a lower bound lies above the upper one";
-            }
+            const std::string_view fault = detail::interval_fault(lower_[i], upper_[i]);
+            if (!fault.empty()) return fault;
         }
         return "";
     }
@@ -199,7 +217,8 @@ public:
 
     [[nodiscard]] constexpr std::string_view fault() const noexcept
     {
-        return radius_ >= 0 ? "" : "is empty: its radius is negative";
+        if (radius_ >= 0) return "";
+        return radius_ < 0 ? "is empty: its radius is negative" : "has a radius that is not a number";
     }
 
 private:
@@ -280,7 +299,9 @@ public:
 
     [[nodiscard]] constexpr std::string_view fault() const noexcept
     {
-        return friction_ >= 0 ? "" : "has a negative coefficient of friction";
+        if (friction_ >= 0) return "";
+        return friction_ < 0 ? "has a negative coefficient of friction"
+                             : "has a coefficient of friction that is not a number";
     }
 
 private:

@@ -35,6 +35,23 @@ struct SelectionProblem {
     }
 };
 
+/// Whether -y is in the normal cone of the set at r, to a millionth: r = P(r - rho y), with
+/// rho y of the size of r. Where no reaction opposes y, inside an obstacle, the r of an
+/// approximate problem is finite all the same, and off by its own size.
+template <ConvexSet Set, class Reaction>
+[[nodiscard]] bool opposes(const Set& set, const Reaction& r, const Reaction& y,
+                           const Reaction& rate, double mean)
+{
+    const double length = y.template lpNorm<Eigen::Infinity>();
+    if (length == 0) return true;
+    double size = r.template lpNorm<Eigen::Infinity>();
+    if (mean > 0) size += rate.template lpNorm<Eigen::Infinity>() / mean;
+    if (size == 0) size = 1;
+    Reaction z = r - (size / length) * y;
+    set.project(span_of(z), span_of(z));
+    return (z - r).template lpNorm<Eigen::Infinity>() <= 1e-6 * size;
+}
+
 }  // namespace detail
 
 /// The reaction that the motion takes from (t, w): where y is not zero the one point of
@@ -152,7 +169,7 @@ template <Inclusion System>
             reaction = z;
             if (moved <= 1e-15 * (1 + reaction.template lpNorm<Eigen::Infinity>())) break;
         }
-        if (!reaction.allFinite()) {
+        if (!reaction.allFinite() || !detail::opposes(set, reaction, y, rate, mean)) {
             detail::refuse_inclusion("the initial state needs an infinite reaction");
         }
     }

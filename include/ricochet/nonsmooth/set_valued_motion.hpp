@@ -145,6 +145,8 @@ public:
     [[nodiscard]] CompositeStep<System>& stepper() noexcept { return step_; }
     /// The branches of the state, kept where switches are located.
     [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
+    /// Whether changes are located from now on, where the options ask for it.
+    void locate_switches(bool locate) noexcept { locates_ = locate; }
     /// The change that was located last.
     struct Switch {
         std::size_t reaction = 0;
@@ -283,7 +285,9 @@ private:
         }
         if (!std::isfinite(scaled_error_)) report.converged = false;
         if constexpr (CompositeStep<System>::box) {
-            if (options_.switches == Switches::located) return end_at_switch(h, report);
+            if (options_.switches == Switches::located && locates_) {
+                return end_at_switch(h, report);
+            }
         }
         return report;
     }
@@ -324,7 +328,10 @@ private:
             // Out and back again within the step? The middle stage would show it.
             const double middle = step_.slack(step_.middle(), start_branches_);
             if (middle >= 0) {
-                trial_ = half_;
+                // The two half steps of `doubling` are better than the one that was looked at.
+                const bool keep = options_.estimate == ErrorEstimate::doubling &&
+                                  step_.slack(trial_, start_branches_) >= 0;
+                if (!keep) trial_ = half_;
                 return whole;
             }
             high = h / 2;
@@ -445,6 +452,7 @@ private:
     double remainder_ = 0;
     double scaled_error_ = 0;
     bool holds_length_ = true;
+    bool locates_ = true;
     bool switched_ = false;
 };
 

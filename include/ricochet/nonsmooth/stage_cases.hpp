@@ -55,7 +55,9 @@ template <class System>
     for (int iteration = 1; iteration <= options.max_iterations; ++iteration) {
         const auto& factor = scratch.factor(stage, w);
         const auto set = m.system().reaction_set(stage.t, w);
-        if (!fault_of(set).empty()) return {.iterations = iteration, .set = 0};
+        if (!fault_of(set).empty()) {
+            return {.iterations = iteration, .set = std::max(0, faulty_interval(set))};
+        }
         for (Eigen::Index i = 0; i < reaction.size(); ++i) {
             inequality.lower[i] = set.lower(static_cast<std::size_t>(i));
             inequality.upper[i] = set.upper(static_cast<std::size_t>(i));
