@@ -166,6 +166,20 @@ TEST(ContactSolver, ACornerWithoutASolutionIsReported)
     }
 }
 
+TEST(ContactSolver, RegularContactsAreSolvedToRounding)
+{
+    // The corner without friction: each velocity is exchanged, p = (2, 0, 2, 0).
+    Eigen::Matrix<double, 4, 2> h;
+    h << 0, 1, 1, 0, 1, 0, 0, 1;
+    Eigen::VectorXd q = h * Eigen::Vector2d(-1, -1);
+    q[0] *= 2, q[2] *= 2;
+    const std::array none = {0.0, 0.0};
+    Eigen::VectorXd p = Eigen::VectorXd::Zero(4);
+    ContactSolver solver;
+    ASSERT_TRUE(solver.solve(h * h.transpose(), q, none, 2, p).converged);
+    EXPECT_LT((p - Eigen::Vector4d(2, 0, 2, 0)).lpNorm<Eigen::Infinity>(), 2e-15);
+}
+
 TEST(ContactSolver, OneContactIsClosedToRounding)
 {
     std::mt19937 random(11);

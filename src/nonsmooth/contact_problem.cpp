@@ -161,6 +161,15 @@ void ContactSolver::jacobian(const Eigen::VectorXd& p)
     }
 }
 
+/// Once more with the last factors: what their regularisation left goes to rounding.
+void ContactSolver::polish()
+{
+    direction_ = -lu_.solve(f_);
+    best_ = trial_ + direction_;
+    defects(best_, f_trial_);
+    if (f_trial_.lpNorm<Eigen::Infinity>() < f_.lpNorm<Eigen::Infinity>()) trial_.swap(best_);
+}
+
 /// From p_; true and p_ the solution, or false and p_ as it was, unless improved.
 bool ContactSolver::newton(ContactReport& report)
 {
@@ -169,6 +178,7 @@ bool ContactSolver::newton(ContactReport& report)
     for (int iteration = 0;; ++iteration) {
         report.residual = measure(trial_, f_);
         if (report.residual <= options_.tolerance) {
+            if (iteration > 0) polish();
             p_ = trial_;
             return true;
         }

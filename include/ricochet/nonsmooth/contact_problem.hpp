@@ -72,6 +72,7 @@ private:
     void defects(const Eigen::VectorXd& p, Eigen::VectorXd& f);
     [[nodiscard]] double measure(const Eigen::VectorXd& p, const Eigen::VectorXd& f) const;
     [[nodiscard]] bool newton(ContactReport& report);
+    void polish();
     void iterate(Eigen::VectorXd& p, ContactReport& report);
     void jacobian(const Eigen::VectorXd& p);
     void sweep(double relaxation);
