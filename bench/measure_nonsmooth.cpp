@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -413,6 +414,22 @@ Measured grow_energy()
     return out;
 }
 
+namespace {
+
+/// A unit mass in a corner with friction 1 and restitution 1: there is no solution.
+bool corner_is_reported()
+{
+    Eigen::Matrix<double, 4, 2> h;
+    h << 0, 1, 1, 0, 1, 0, 0, 1;
+    Eigen::VectorXd q = h * Eigen::Vector2d(-1, -1);
+    q[0] *= 2, q[2] *= 2;
+    Eigen::VectorXd p = Eigen::VectorXd::Zero(4);
+    const std::array friction = {1.0, 1.0};
+    return !ContactSolver().solve(h * h.transpose(), q, friction, 2, p).converged;
+}
+
+}  // namespace
+
 Measured solve_contacts()
 {
     testing_support::RandomContacts problem(7);
@@ -428,8 +445,11 @@ Measured solve_contacts()
         converged += report.converged;
         honest += report.converged == (report.residual <= 1e-10) && report.sweeps <= 300;
     }
-    return {.pass = honest == problems,
-            .text = fmt::format("{} of {} to 1e-10, the others reported", converged, problems)};
+    const bool corner = corner_is_reported();
+    return {.pass = honest == problems && corner,
+            .text = fmt::format("{} of {} to 1e-10 of q, the others reported; a corner without a "
+                                "solution {}",
+                                converged, problems, corner ? "reported" : "called solved")};
 }
 
 }  // namespace ricochet::bench
