@@ -299,6 +299,130 @@ TEST(HandOver, EventDrivenRunsGoOnFromTheirEnd)
     EXPECT_LE((rest.state.w - exact.final).norm(), 1e-10);
 }
 
+// --- infinite bounds, sets that become empty ---
+
+/// w' = force + r with whatever set.
+template <class Set>
+struct Pushed {
+    static constexpr int state_size = 1;
+    static constexpr int reaction_size = 1;
+    double force = 0;
+    Set set;
+    void smooth(double, const One&, One& f) const { f[0] = force; }
+    IntervalSet reaction_set(double t, const One&) const { return set(t); }
+};
+
+template <class Set>
+Pushed<Set> pushed(double force, const Set& set)
+{
+    return {force, set};
+}
+
+TEST(HandOver, AHalfLineHoldsToTheEnd)
+{
+    const auto system = pushed(-1, [](double) { return IntervalSet::half_line(); });
+    const auto run = hand_over(system, one(1), {.t_end = 3});
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.events[0].kind, EventKind::stick);
+    EXPECT_NEAR(run.events[0].t, 1, 1e-12);
+    EXPECT_EQ(run.state.w[0], 0);
+    EXPECT_NEAR(run.state.reaction[0], 1, 1e-15);
+    EXPECT_EQ(run.phases.size(), 1u);
+}
+
+TEST(HandOver, AReactionWithoutBoundsHoldsInOnePhase)
+{
+    const double infinity = std::numeric_limits<double>::infinity();
+    const auto system = pushed(-5, [=](double) { return IntervalSet::symmetric(infinity); });
+    const auto run = hand_over(system, one(0), {.t_end = 3});
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    EXPECT_EQ(run.state.w[0], 0);
+    EXPECT_NEAR(run.state.reaction[0], 5, 1e-14);
+    EXPECT_EQ(run.phases.size(), 1u);
+}
+
+template <class Set>
+void expect_empty_at_one_half(double start, const Set& set)
+{
+    const auto run = hand_over(pushed(0.1, set), one(start), {.t_end = 1});
+    EXPECT_EQ(run.outcome, HandOverOutcome::not_converged);
+    // Steps of 1e-3 end within one of the time, events where the set changes.
+    EXPECT_NEAR(run.state.t, 0.5, 2e-3);
+    EXPECT_EQ(run.failure.set, 0);
+}
+
+TEST(HandOver, ASetThatBecomesEmptyEndsTheRun)
+{
+    for (const double start : {0.0, 5.0, -5.0}) {
+        expect_empty_at_one_half(
+            start, [](double t) { return t < 0.5 ? IntervalSet(-1, 1) : IntervalSet(1, -1); });
+        expect_empty_at_one_half(start,
+                                 [](double t) { return IntervalSet::symmetric(1 - 2 * t); });
+    }
+    const auto run = hand_over(
+        pushed(0.1, [](double t) { return IntervalSet::symmetric(t < 0.5 ? 1 : std::nan("")); }),
+        one(5), {.t_end = 1});
+    EXPECT_EQ(run.outcome, HandOverOutcome::non_finite);
+    EXPECT_LE(run.state.t, 0.5);
+}
+
+/// Two relays, of which the second loses its set at t = 0.5.
+struct SecondVanishes : TwinRelays {
+    static void smooth(double, const Eigen::Vector2d&, Eigen::Vector2d& f) { f.setZero(); }
+    static Box<2> reaction_set(double t, const Eigen::Vector2d&)
+    {
+        return Box<2>({-1, -1}, {1, t < 0.5 ? 1.0 : -2.0});
+    }
+};
+
+TEST(HandOver, NamesTheReactionWhoseSetIsEmpty)
+{
+    const auto run = hand_over(SecondVanishes{}, Eigen::Vector2d(3, 3), {.t_end = 1});
+    EXPECT_EQ(run.outcome, HandOverOutcome::not_converged);
+    EXPECT_NEAR(run.state.t, 0.5, 1e-9);
+    EXPECT_EQ(run.failure.set, 1);
+    EXPECT_NEAR(run.state.w[0], 2.5, 1e-8);
+}
+
+// --- chattering ---
+
+/// x'' = -sign x: a period of 4 |v|, however small v is at x = 0.
+struct RelayTwoIntegrationsAway {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 1;
+    static void smooth(double, const Eigen::Vector2d& w, Eigen::Vector2d& f) { f << w[1], 0; }
+    static IntervalSet reaction_set(double, const Eigen::Vector2d&)
+    {
+        return IntervalSet::symmetric(1);
+    }
+    static void act(Eigen::Vector2d& g) { g << 0, 1; }
+};
+
+TEST(HandOver, ChatteringIsSteppedOver)
+{
+    const auto run =
+        hand_over(RelayTwoIntegrationsAway{}, Eigen::Vector2d(0, 1e-8), {.t_end = 1});
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_GE(run.phases.size(), 2u);
+    EXPECT_EQ(run.phases[1].cause, PhaseCause::chattering);
+    // A thousand steps of 1e-3, and a few hundred switches before each set-valued phase; the
+    // patience of these phases doubles, so that a run of a thousand steps has few.
+    EXPECT_LE(run.phases.size(), 16u);
+    EXPECT_LE(run.statistics.set_valued.attempted, 1100u);
+    EXPECT_LE(run.state.w.norm(), 1e-7);
+}
+
+TEST(HandOver, StepsOfBothKindsCountTowardsTheLimit)
+{
+    const auto run = hand_over(RelayTwoIntegrationsAway{}, Eigen::Vector2d(0, 1e-8),
+                               {.t_end = 1, .max_steps = 700});
+    EXPECT_EQ(run.outcome, HandOverOutcome::step_limit);
+    EXPECT_LE(run.statistics.event_driven.steps + run.statistics.set_valued.attempted, 700u);
+    EXPECT_EQ(hand_over(SlidingMode{}, one(0.15), {.t_end = 1, .max_steps = 0}).outcome,
+              HandOverOutcome::step_limit);
+}
+
 // --- ends and bad input ---
 
 TEST(HandOver, EndsAtOnceWhereItStarts)

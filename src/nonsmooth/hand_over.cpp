@@ -24,8 +24,8 @@ std::string_view describe(HandOverOutcome outcome) noexcept
     switch (outcome) {
         case HandOverOutcome::reached_end: return "the run reached its end";
         case HandOverOutcome::not_converged:
-            return "a set-valued stage has no solution that the solver could find; try another "
-                   "stage method or a looser tolerance";
+            return "a set is empty, or a set-valued stage has no solution that the solver could "
+                   "find; look at the bounds, try another stage method or a looser tolerance";
         case HandOverOutcome::step_underflow: return "step fell below h_min; loosen rtol";
         case HandOverOutcome::step_limit: return "max_steps steps were taken; allow more";
         case HandOverOutcome::non_finite:

@@ -48,11 +48,14 @@ template <class System>
 concept Branching = Inclusion<System> && detail::has_branch_modes<System>();
 
 /// The hybrid system. Digit i to base 3 of a mode is the branch of reaction i: 0 lower (y > 0),
-/// 1 inside (held), 2 upper. Two more modes say that the motion cannot go on by itself:
-/// `several`, where changes coincide and rates do not tell what follows, and `no_flow`, where
-/// the held reactions are not determined by y' = 0. There nothing moves.
+/// 1 inside (held), 2 upper. Three more modes say that the motion cannot go on by itself:
+/// `several`, where changes coincide and rates do not tell what follows, `no_flow`, where
+/// the held reactions are not determined by y' = 0, and `empty`, where a lower bound lies above
+/// the upper one. There nothing moves.
 ///
-/// There are four guards per reaction, 4 i + kind: y, -y, reaction - lower, upper - reaction.
+/// There are four guards per reaction, 4 i + kind: y, -y, reaction - lower, upper - reaction, an
+/// infinite bound being far away always; and 4 M + i, 1 where the bounds of reaction i make an
+/// interval and -1 where they do not.
 ///
 /// A bound that depends on y must be smooth a little beyond y = 0 on its side. Where
 /// that of `reaction_set` is not, as with F(|y|), the system declares
@@ -70,11 +73,13 @@ public:
     using Branches = Eigen::Matrix<Branch, M, 1>;
 
     static constexpr bool forward_only = true;
-    static constexpr std::size_t guard_count = 4 * static_cast<std::size_t>(M);
+    static constexpr std::size_t guard_count = 5 * static_cast<std::size_t>(M);
+    static constexpr std::size_t first_set_guard = 4 * static_cast<std::size_t>(M);
     static constexpr std::size_t branch_modes = M == 1 ? 3 : M == 2 ? 9 : M == 3 ? 27 : 81;
-    static constexpr std::size_t mode_count = branch_modes + 2;
+    static constexpr std::size_t mode_count = branch_modes + 3;
     static constexpr Mode several = branch_modes;
     static constexpr Mode no_flow = branch_modes + 1;
+    static constexpr Mode empty = branch_modes + 2;
 
     /// @throws std::invalid_argument for matrices that `InclusionMatrices` refuses.
     explicit BranchModes(const System& system) : matrices_(system)
@@ -122,13 +127,14 @@ public:
         constexpr std::array<std::string_view, 4> names{"y falls to zero", "y rises to zero",
                                                         "lower bound", "upper bound"};
         GuardInfo info;
-        info.name = names[which % 4];
-        info.unilateral = which % 4 < 2;
+        info.name = which < first_set_guard ? names[which % 4] : "the set is not empty";
+        info.unilateral = which < first_set_guard && which % 4 < 2;
         return info;
     }
     [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
     {
         if (mode >= branch_modes) return false;
+        if (which >= first_set_guard) return true;
         const Branch at = branch(which / 4, mode);
         if (which % 4 == 0) return at == Branch::lower;
         if (which % 4 == 1) return at == Branch::upper;
@@ -169,6 +175,15 @@ public:
     {
         const auto i = static_cast<Eigen::Index>(which / 4);
         const Vector w = vector(x);
+        if (which >= first_set_guard) {
+            const auto set = matrices_.system().reaction_set(t, w);
+            const std::size_t k = which - first_set_guard;
+            if (set.lower(k) <= set.upper(k)) return 1;
+            // Beyond y = 0, where the branch ends, bounds that depend on y need not be any.
+            const double y = observed(t, w)[static_cast<Eigen::Index>(k)];
+            const Branch at = branch(k, mode);
+            return (at == Branch::lower && y < 0) || (at == Branch::upper && y > 0) ? 1 : -1;
+        }
         if (which % 4 < 2) {
             const double y = observed(t, w)[i];
             return which % 4 == 0 ? y : -y;
@@ -179,6 +194,7 @@ public:
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const State& x,
                                     const State& dxdt) const
     {
+        if (which >= first_set_guard) return 0;
         const Vector w = vector(x);
         const Vector dwdt = vector(dxdt);
         if (which % 4 < 2) {
@@ -196,7 +212,9 @@ public:
         int left = 0;
         int arrived = 0;
         Branches held = branches;
+        Vector w = vector(x);
         for (const std::size_t which : fired) {
+            if (which >= first_set_guard) return empty;
             const auto i = static_cast<Eigen::Index>(which / 4);
             if (which % 4 < 2) {
                 held[i] = Branch::inside;
@@ -206,9 +224,9 @@ public:
                 ++left;
             }
         }
-        Vector w = vector(x);
         hold(held, t, w);
         Eigen::Map<Vector>(x.data()) = w;
+        if (faulty(t, w) >= 0) return empty;
         if (left + arrived > 1 && left > 0) return several;
         if (left == 1) return checked(mode_of(branches));
         return settle(held, t, w);
@@ -258,6 +276,12 @@ public:
         y = matrices_.observe().lazyProduct(w);
         if constexpr (moves) y -= offset(t);
         return y;
+    }
+
+    /// The first reaction whose bounds make no interval; -1 if all do.
+    [[nodiscard]] int faulty(double t, const Vector& w) const
+    {
+        return detail::faulty_interval(matrices_.system().reaction_set(t, w));
     }
 
     [[nodiscard]] static Vector vector(const State& x)
@@ -383,9 +407,11 @@ private:
     [[nodiscard]] double slack(std::size_t which, Mode mode, double t, const Vector& w) const
     {
         const auto i = static_cast<Eigen::Index>(which / 4);
+        const bool below = which % 4 == 2;
+        const double limit = bound(t, w, i, below ? Branch::lower : Branch::upper);
+        if (std::isinf(limit)) return (limit < 0) == below ? 1 : -1;
         const double r = reaction(mode, t, w)[i];
-        return which % 4 == 2 ? r - bound(t, w, i, Branch::lower)
-                              : bound(t, w, i, Branch::upper) - r;
+        return below ? r - limit : limit - r;
     }
 
     /// y', and zero where rounding decides its sign: the bending of a motion that is tangent
@@ -412,6 +438,7 @@ private:
         const double here = slack(which, mode, t, w);
         const double lower = bound(t, w, i, Branch::lower);
         const double upper = bound(t, w, i, Branch::upper);
+        if (std::isinf(which % 4 == 2 ? lower : upper)) return 0;
         const double width = upper - lower;
         const double size = std::isfinite(width) ? width : std::max(std::abs(here), 1.0);
         if (!(size > 0)) return 0;

@@ -26,7 +26,7 @@ namespace ricochet {
 
 enum class HandOverOutcome {
     reached_end,
-    not_converged,    ///< a set-valued stage could not be solved however short the step
+    not_converged,    ///< a set is empty, or a stage could not be solved however short the step
     step_underflow,   ///< no step above h_min met the tolerance
     step_limit,       ///< `HandOverOptions::max_steps` steps were taken
     non_finite,       ///< the motion is no longer finite
@@ -81,7 +81,7 @@ struct HandOverOptions {
     SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
 
     std::vector<double> sample_times{};  ///< ascending
-    std::uint64_t max_steps = 100'000'000;
+    std::uint64_t max_steps = 100'000'000;  ///< of both kinds, attempts included
     const std::atomic<bool>* cancelled = nullptr;
 };
 
@@ -105,7 +105,7 @@ struct HandOverRun {
     std::vector<Phase> phases;
     Trajectory<Vector> trajectory;  ///< at the sample times
     HandOverStatistics statistics;
-    StageReport failure;  ///< with `not_converged`: the residual, and whose law failed
+    StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
 };
 
 /// From the options of `integrate`.
@@ -251,6 +251,11 @@ private:
         ended_ = true;
     }
 
+    [[nodiscard]] std::uint64_t steps_taken() const noexcept
+    {
+        return run_.statistics.event_driven.steps + motion_.statistics().attempted;
+    }
+
     // --- event-driven ---
 
     void go_by_events(Mode mode, PhaseCause cause)
@@ -263,6 +268,7 @@ private:
 
     void follow_events() requires branching
     {
+        if (steps_taken() >= options_.max_steps) return end_with(HandOverOutcome::step_limit);
         using X = typename Modes::State;
         X x;
         Eigen::Map<Vector>(x.data()) = run_.state.w;
@@ -289,7 +295,7 @@ private:
     [[nodiscard]] Options event_options() const
     {
         Options options = detail::event_options(options_, run_.state.t, run_.trajectory.t.size(),
-                                                run_.statistics.event_driven.steps);
+                                                steps_taken());
         options.mode = run_.mode;
         if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
             options.step = options_.set_valued.step;
@@ -301,7 +307,9 @@ private:
     void finish_events(Run<X>&& done, bool chatters)
     {
         if (run_.events.empty()) run_.events.reserve(done.events.size());
-        for (const Event<X>& event : done.events) run_.events.push_back(converted(event));
+        for (const Event<X>& event : done.events) {
+            if (event.mode_after != Modes::empty) run_.events.push_back(converted(event));
+        }
         for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
             run_.trajectory.t.push_back(done.trajectory.t[i]);
             run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
@@ -310,6 +318,7 @@ private:
         Vector& w = run_.state.w;
         run_.state.t = done.t;
         w = Modes::vector(done.x);
+        if (done.mode == Modes::empty) return end_with_empty_set();
         if (done.mode >= Modes::branch_modes) {
             return go_by_steps(cause_of(done.mode));
         }
@@ -325,6 +334,12 @@ private:
         run_.mode = done.mode;
         if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
         end_with(detail::in_hand_over(done.outcome));
+    }
+
+    void end_with_empty_set()
+    {
+        run_.failure.set = modes_.faulty(run_.state.t, run_.state.w);
+        end_with(HandOverOutcome::not_converged);
     }
 
     template <class X>
@@ -361,8 +376,14 @@ private:
             const double lasted = run_.phases.empty() ? std::numeric_limits<double>::infinity()
                                                       : run_.state.t - run_.phases.back().from;
             const bool at_once = lasted < 10 * options_.set_valued.step;
-            patience_ = at_once ? std::min(2 * patience_, std::uint64_t{1} << 20) : 1;
+            patience_ = at_once ? std::min(2 * patience_, most_patience) : 1;
             run_.mode = Modes::several;
+            chatters_ = cause == PhaseCause::chattering;
+            motion_.locate_switches(!chatters_);
+            if (chatters_) {
+                patience_ = chatter_patience_;
+                chatter_patience_ = std::min(2 * chatter_patience_, most_patience);
+            }
         }
         if (options_.events_only) return end_with(HandOverOutcome::not_handed_over);
         set_valued_ = true;
@@ -381,6 +402,7 @@ private:
     {
         const double from = motion_.state().t;
         emit_samples(true);
+        auto branches = motion_.branches();
         for (std::uint64_t steps = 1; !ended_; ++steps) {
             const std::uint64_t switches = motion_.statistics().switches;
             const SetValuedOutcome outcome = motion_.advance();
@@ -392,6 +414,14 @@ private:
                 end_with(detail::in_hand_over(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
                 end_with(HandOverOutcome::cancelled);
+            } else if (steps_taken() >= options_.max_steps) {
+                end_with(HandOverOutcome::step_limit);
+            }
+            // Over switches that are not located: as many steps without any as patience asks for.
+            if (chatters_ && motion_.branches() != branches) {
+                branches = motion_.branches();
+                steps = 0;
+                continue;
             }
             if constexpr (branching) {
                 if (!ended_ && options_.until_released &&
@@ -497,7 +527,10 @@ private:
     SetValuedMotion<System> motion_;
     State sample_;
     HandOverRun<System> run_;
+    static constexpr std::uint64_t most_patience = std::uint64_t{1} << 20;
     std::uint64_t patience_ = 1;
+    std::uint64_t chatter_patience_ = 10;  // by trial; 1 hands back amid the chattering
+    bool chatters_ = false;
     bool set_valued_ = false;
     bool keeps_reaction_ = false;
     bool ended_ = false;

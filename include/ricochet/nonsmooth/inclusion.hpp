@@ -26,8 +26,8 @@
 //     mass(A)                          A, constant; the unit matrix
 //     observe(E)                       E; selects the first components
 //     act(G)                           G; the transpose of E
-//     offset(t, s)                     s(t), the motion of what y is relative to; zero
-//     offset_rate(t, s)                its rate; a difference without it
+//     offset(t, s)                     s(t), continuous, the motion of what y is relative to; zero
+//     offset_rate(t, s)                its rate; a difference without it, wrong beside a kink
 //     branch_bound(t, w, i, branch)    a bound that goes on smoothly beyond y = 0, see
 //                                      branch_modes.hpp
 //     bound_gradient(t, w, i, g)       d upper_i / dw of a BoxSet of symmetric intervals
