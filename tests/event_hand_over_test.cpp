@@ -84,6 +84,26 @@ TEST(EventHandOver, StickSlipIsGivenBackAtEverySlip)
     EXPECT_NEAR(run.x[0], alone.state.w[0], 1e-6);
 }
 
+TEST(EventHandOver, StepsOfAllPhasesCountTowardsTheLimit)
+{
+    const Belt belt{FrictionInclusion(
+        {.belt_speed = 0.2, .friction = 1, .weakening = 3, .law = FrictionLaw::hyperbolic})};
+    const auto with = [&](std::uint64_t most) {
+        return integrate(belt, Belt::State{0, 0.2},
+                         {.t_end = 40, .rtol = 1e-11, .atol = 1e-12, .max_steps = most});
+    };
+    const auto taken = [](const auto& run) {
+        return run.statistics.event_driven.steps + run.statistics.set_valued.attempted;
+    };
+    const std::uint64_t all = taken(with(1'000'000));
+    // The last of three quarters of the steps is far behind the first hand-over.
+    const auto run = with(all * 3 / 4);
+    EXPECT_EQ(run.outcome, HandOverOutcome::step_limit);
+    EXPECT_GT(run.phases.size(), 2U);
+    EXPECT_LE(taken(run), all * 3 / 4);
+    EXPECT_EQ(with(all + 1).outcome, HandOverOutcome::reached_end);
+}
+
 /// With modes, whose reset leads from one field into the other and back: endless at one instant.
 struct Relay {
     using State = Eigen::Matrix<double, 1, 1>;

@@ -8,7 +8,14 @@
 // `integrate` then follows its events while they lead on. Where they do not (switchings that
 // accumulate or chatter, a motion that presses on its guard, resets that contradict one another)
 // the inclusion takes over, by hand_over.hpp, and gives back where none of its reactions is held
-// any more. Inclusions without events of their own are handed to hand_over.hpp at once.
+// any more.
+//
+// The guard where a motion may come to rest must be `unilateral`, or of `either` direction and
+// without modes: only then is a motion that presses on its surface an event again at once, and
+// what follows recognised. A guard that waits for an edge lets that motion pass, and the
+// inclusion is never asked.
+//
+// Inclusions without events of their own are handed to hand_over.hpp at once.
 #pragma once
 
 #include <algorithm>
@@ -102,11 +109,15 @@ private:
     /// Why the inclusion is to go on; nothing if the run is over.
     [[nodiscard]] std::optional<PhaseCause> follow_events()
     {
+        if (steps_taken() >= options_.max_steps) {
+            run_.outcome = HandOverOutcome::step_limit;
+            return std::nullopt;
+        }
         Options options = options_;
         options.t_start = run_.t;
         options.mode = run_.mode;
         options.sample_times = remaining_samples();
-        options.max_steps = options_.max_steps - run_.statistics.event_driven.steps;
+        options.max_steps = options_.max_steps - steps_taken();
         using Loop = Simulation<System, X, Stepping, Detector, Locator>;
         std::optional<Loop> simulation;
         try {
@@ -139,6 +150,7 @@ private:
         HandOverOptions options = hand_over_;
         options.t_start = run_.t;
         options.sample_times = remaining_samples();
+        options.max_steps -= std::min(options.max_steps, steps_taken());
         Vector w(static_cast<Eigen::Index>(run_.x.size()));
         w = detail::converted_state(run_.x, w);
         HandOver<Set> inclusion(set_, w, options);
@@ -167,6 +179,12 @@ private:
         }
         if constexpr (Moded<System, X>) run_.mode = system_.start_mode(run_.t, run_.x);
         return false;
+    }
+
+    /// Of both kinds, attempts included.
+    [[nodiscard]] std::uint64_t steps_taken() const noexcept
+    {
+        return run_.statistics.event_driven.steps + run_.statistics.set_valued.attempted;
     }
 
     [[nodiscard]] Event<X> converted(const Event<Vector>& from) const
