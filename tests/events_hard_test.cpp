@@ -475,5 +475,32 @@ TEST(HardEvents, SlidingMotionIsNotRunBackward)
                  std::invalid_argument);
 }
 
+// --- a straight guard beside a state that bends ---
+
+struct StraightGuard {
+    using State = std::array<double, 2>;
+    double at = 1;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {1, -x[1]}; }
+    [[nodiscard]] double guard(double, const State& x) const { return at - x[0]; }
+    void reset(double, State& x) const { x[0] = 0; }
+};
+
+TEST(HardEvents, AnEventAtTheEndOfAStepHasTheStateOfTheStep)
+{
+    // The guard reaches zero where a step ends, up to rounding. The other component is that of
+    // rk4, h^5 / 120 a step off exp(-t): nothing may be gone along the tangent.
+    for (const double h : {0.125, 0.1, 0.05}) {
+        for (const double at : {0.5, 0.75, 1.0}) {
+            const auto run = integrate(StraightGuard{at}, {0, 1}, {.t_end = 1.2, .step = h},
+                                       FixedStep<Rk4>{});
+            ASSERT_GE(run.events.size(), 1u);
+            EXPECT_NEAR(run.events[0].t, at, 1e-15);
+            EXPECT_NEAR(run.events[0].before[1], std::exp(-at), 2 * std::pow(h, 4) * at / 120)
+                << h << ' ' << at;
+            EXPECT_LT(run.statistics.resteps, 8u);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace ricochet

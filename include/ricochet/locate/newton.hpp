@@ -5,6 +5,8 @@
 // is straight to the last bit, the rest of the way is taken along the flow at that
 // sample, which costs no further step: the bracket closes around the root at the
 // price of guard calls alone, and does not widen with the rounding of a long step.
+// That the guard is straight does not say that the rest of the state is: the way
+// is never longer than a small part of the bracket, of which the square is rounding.
 #pragma once
 
 #include <algorithm>
@@ -51,6 +53,7 @@ struct Newton {
     [[nodiscard]] Location locate(Probe& probe, GuardSample lo, GuardSample hi,
                                   double tolerance) const
     {
+        const double reach = straight_part * (hi.s - lo.s);
         double s = first_guess(probe, lo, hi);
         double curvature = bend(lo, hi);
         double past = 0;
@@ -58,6 +61,10 @@ struct Newton {
             const double width = hi.s - lo.s;
             const double finest = probe.finest(hi.s);
             if (width <= std::max(tolerance, finest)) break;
+            // A root at an end is looked for beside it.
+            const double beside = std::max(finest, reach / 4);
+            if (s >= hi.s && slow == 0) s = hi.s - beside;
+            if (s <= lo.s && slow == 0) s = lo.s + beside;
             if (!(s > lo.s && s < hi.s)) s = lo.s + width / 2;
             if (s <= lo.s || s >= hi.s) break;  // neighbouring doubles
 
@@ -69,8 +76,9 @@ struct Newton {
             const double distance = std::fabs(correction);
             // What a straight line neglects over that distance, as a shift in time.
             const bool straight =
-                distance <= width && distance * distance * curvature <=
-                                         std::fabs(sample.rate) * std::max(finest, tolerance) / 2;
+                distance <= std::min(width, std::max(reach, finest)) &&
+                distance * distance * curvature <=
+                    std::fabs(sample.rate) * std::max(finest, tolerance) / 2;
             if (straight && close_in(probe, sample, correction, tolerance, lo, hi)) {
                 const TwoSum predicted = two_sum(sample.s, correction);
                 const TwoSum root = predicted.value < lo.s   ? two_sum(lo.s, 0)
@@ -93,6 +101,9 @@ struct Newton {
     }
 
 private:
+    /// Of a bracket, along which the flow may be followed: its square is 9e-16.
+    static constexpr double straight_part = 3e-8;
+
     [[nodiscard]] static Location located(const GuardSample& lo, const GuardSample& hi,
                                           const TwoSum& root) noexcept
     {
