@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the build tree and builds one consumer by find_package and one by
-# add_subdirectory, with every compiler given.
+# Installs the build tree and builds a consumer by find_package with every compiler given,
+# and one by add_subdirectory, which compiles the whole library, with the last of them.
 # usage: run.sh BUILD_TREE SOURCE_TREE COMPILER...
 set -euo pipefail
 build=$(realpath "$1") source=$(realpath "$2")
@@ -12,7 +12,9 @@ cmake --install "$build" --prefix "$work/prefix" >/dev/null
 export CMAKE_BUILD_PARALLEL_LEVEL=2
 
 for compiler in "$@"; do
-    for way in find_package add_subdirectory; do
+    ways=(find_package)
+    [ "$compiler" = "${!#}" ] && ways+=(add_subdirectory)
+    for way in "${ways[@]}"; do
         tree="$work/$way-$(basename "$compiler")"
         options=(-DCMAKE_PREFIX_PATH="$work/prefix")
         [ "$way" = add_subdirectory ] && options=(-DRICOCHET_SOURCE="$source")
