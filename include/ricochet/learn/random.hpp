@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -69,6 +70,13 @@ public:
     constexpr std::size_t below(std::size_t n) noexcept
     {
         return static_cast<std::size_t>(uniform() * static_cast<double>(n));
+    }
+
+    /// Of the standard normal distribution (Box and Muller, 1958, the cosine of the pair).
+    double normal() noexcept
+    {
+        const double radius = std::sqrt(-2 * std::log(1 - uniform()));
+        return radius * std::cos(2 * std::numbers::pi * uniform());
     }
 
     /// True with probability `share`.

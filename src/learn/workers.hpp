@@ -1,0 +1,43 @@
+// Threads that wait for work.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <thread>
+#include <vector>
+
+namespace ricochet::learn {
+
+/// A team that does task after task together with the caller.
+///
+/// Who does which part is left open, so that parts must not depend on each other.
+class Workers {
+public:
+    /// @param threads  with the caller's; at least 1. Where the system gives fewer,
+    ///                 fewer do the same work.
+    explicit Workers(unsigned threads);
+    ~Workers();
+    Workers(const Workers&) = delete;
+    Workers& operator=(const Workers&) = delete;
+
+    /// Calls `part(i)` for i = 0 ... n - 1, and returns when all are done. What is
+    /// not begun when one throws is left out; of the parts that threw, the first is thrown on.
+    void run(std::size_t n, const std::function<void(std::size_t)>& part);
+
+private:
+    void wait_for_work();
+    void work() noexcept;
+
+    const std::function<void(std::size_t)>* part_ = nullptr;
+    std::size_t parts_ = 0;
+    std::atomic<std::size_t> next_{0};  ///< the first part that nobody has taken
+    std::atomic<unsigned> busy_{0};     ///< threads besides the caller's
+    std::atomic<unsigned> round_{0};    ///< rises with every task
+    std::atomic<bool> closing_{false};
+    std::vector<std::exception_ptr> errors_;  ///< one per part
+    std::vector<std::thread> threads_;
+};
+
+}  // namespace ricochet::learn
