@@ -1,0 +1,102 @@
+// Multilayer perceptrons on batches, forward and backward.
+//
+//     x_0 = x,  x_k+1 = max(0, W_k x_k + b_k),  y = W_n x_n + b_n
+//
+// A shape and its arithmetic; parameters, gradients and what the layers say lie in memory of the
+// caller, so that a group of networks can share one vector, and threads one network.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "aligned.hpp"
+#include "dense.hpp"
+#include "ricochet/learn/random.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet::learn {
+
+/// A matrix of samples, row by row.
+template <class T>
+struct Rows {
+    T* data;
+    std::size_t stride;  ///< whole cache lines; beyond the columns there are zeros
+
+    [[nodiscard]] T* row(std::size_t i) const noexcept { return data + i * stride; }
+};
+
+/// Parameters: layer by layer the weight, inputs x outputs row by row, then the bias, each row
+/// filled up with zeros to whole cache lines.
+template <class T>
+class BatchMlp {
+public:
+    /// What the layers say of a batch, and the derivatives of a loss by it.
+    struct Work {
+        std::vector<Buffer<T>> values;  ///< of layer k, rows x padded outputs
+        std::vector<Buffer<T>> slopes;
+    };
+
+    /// @param relu_at_end  the last layer is followed by a ReLU too
+    BatchMlp(std::size_t inputs, std::span<const std::size_t> hidden, std::size_t outputs,
+             bool relu_at_end = false);
+
+    [[nodiscard]] std::size_t inputs() const noexcept { return shapes_.front().inputs; }
+    [[nodiscard]] std::size_t outputs() const noexcept { return shapes_.back().outputs; }
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }  ///< of the parameters
+    /// Of the transposed weights.
+    [[nodiscard]] std::size_t transposed_size() const noexcept { return transposed_size_; }
+
+    /// As PyTorch begins: weights and biases uniform within +-1 / sqrt(inputs).
+    void initialise(T* parameters, Random& random) const;
+
+    /// The weights, transposed; what `backward` goes back through.
+    void transpose(const T* parameters, T* transposed) const;
+
+    [[nodiscard]] Work work(std::size_t rows) const;
+
+    /// Writes `work.values`; returns those of the last layer.
+    Rows<T> forward(const T* parameters, Rows<const T> x, std::size_t rows, Work& work) const;
+
+    /// From the derivatives by the output, which lie in `slopes_out(work)`, to those by the
+    /// parameters, written to `gradient` (null: left out), and by the inputs, written to `dx` with
+    /// a stride of padded(inputs) (null: left out). After `forward` with the same x and work.
+    void backward(const T* transposed, Rows<const T> x, std::size_t rows, Work& work, T* gradient,
+                  T* dx) const;
+
+    [[nodiscard]] Rows<T> slopes_out(Work& work) const
+    {
+        return {work.slopes.back().data(), padded<T>(outputs())};
+    }
+
+    /// The parameters as layers of a model.
+    [[nodiscard]] std::vector<DenseLayer> layers(const T* parameters) const;
+
+    /// Sets the parameters from layers of this shape.
+    void assign(const std::vector<DenseLayer>& layers, T* parameters) const;
+
+private:
+    struct Shape {
+        std::size_t inputs;
+        std::size_t outputs;
+        std::size_t weight;  ///< where it begins
+        std::size_t bias;
+        std::size_t transposed;
+        bool relu;
+    };
+
+    std::vector<Shape> shapes_;
+    std::size_t size_ = 0;
+    std::size_t transposed_size_ = 0;
+    const DenseKernels<T>* kernels_;
+};
+
+/// a transposed, n x m, from m x n, both row by row with strides.
+template <class T>
+void transpose(const T* a, std::size_t a_stride, std::size_t m, std::size_t n, T* out,
+               std::size_t out_stride);
+
+extern template class BatchMlp<float>;
+extern template class BatchMlp<double>;
+
+}  // namespace ricochet::learn
