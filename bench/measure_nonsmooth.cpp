@@ -136,6 +136,16 @@ std::string line(const std::string& name, double seconds, double error, std::uin
                        error, solves);
 }
 
+/// On the reference machine, by the yardstick timed in turns with it. Tenth percentiles of
+/// both: who shares a core slows down a run, which keeps it busy, by more than the yardstick,
+/// which waits for its own results.
+double seconds_of(const Work& work)
+{
+    const std::vector<Work> works{yardstick(), work};
+    const std::vector<Timing> times = time_in_turns(works);
+    return times[1].p10 * yardstick_reference / times[0].p10;
+}
+
 template <class System>
 double seconds_of(const System& system, const StateOf<System>& start,
                   const SetValuedOptions& options)
@@ -145,17 +155,17 @@ double seconds_of(const System& system, const StateOf<System>& start,
         (void)motion.run();
         return motion.state().w[0];
     });
-    return time_alone(work).median;
+    return seconds_of(work);
 }
 
 double seconds_of_circuit(double rtol)
 {
-    return time_alone(repeated([=] { return circuit_run(rtol).state.w[1]; })).median;
+    return seconds_of(repeated([=] { return circuit_run(rtol).state.w[1]; }));
 }
 
 double seconds_of_sliding(double rtol)
 {
-    return time_alone(repeated([=] { return sliding_run(rtol).state.t; })).median;
+    return seconds_of(repeated([=] { return sliding_run(rtol).state.t; }));
 }
 
 double relative_error_of_circuit(double rtol, const ExactCircuit& exact)

@@ -16,7 +16,9 @@
 // Boxes of at most four reactions, in systems of fixed size, have such modes.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <span>
 
 #include "ricochet/hybrid/filippov_motion.hpp"
 #include "ricochet/hybrid/system.hpp"
@@ -71,6 +73,7 @@ public:
     using Vector = StateOf<System>;
     using Reaction = ReactionOf<System>;
     using Branches = Eigen::Matrix<Branch, M, 1>;
+    using Slacks = std::array<double, 2>;  ///< above the lower bound, below the upper one
 
     static constexpr bool forward_only = true;
     static constexpr std::size_t guard_count = 5 * static_cast<std::size_t>(M);
@@ -176,33 +179,64 @@ public:
         const auto i = static_cast<Eigen::Index>(which / 4);
         const Vector w = vector(x);
         if (which >= first_set_guard) {
-            const auto set = matrices_.system().reaction_set(t, w);
-            const std::size_t k = which - first_set_guard;
-            if (set.lower(k) <= set.upper(k)) return 1;
-            // Beyond y = 0, where the branch ends, bounds that depend on y need not be any.
-            const double y = observed(t, w)[static_cast<Eigen::Index>(k)];
-            const Branch at = branch(k, mode);
-            return (at == Branch::lower && y < 0) || (at == Branch::upper && y > 0) ? 1 : -1;
+            return is_set(which - first_set_guard, mode, t, w, observed(t, w));
         }
         if (which % 4 < 2) {
             const double y = observed(t, w)[i];
             return which % 4 == 0 ? y : -y;
         }
-        return slack(which, mode, t, w);
+        return slacks(i, t, w, reaction(mode, t, w)[i])[which % 4 - 2];
+    }
+
+    /// All of them, from one evaluation of the reactions.
+    void guards(Mode mode, double t, const State& x, std::span<double> g) const
+    {
+        const Vector w = vector(x);
+        const Reaction y = observed(t, w);
+        const Reaction r = reaction(mode < branch_modes ? mode : 0, t, w);
+        for (Eigen::Index i = 0; i < M; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            const auto slack = slacks(i, t, w, r[i]);
+            g[4 * k] = y[i];
+            g[4 * k + 1] = -y[i];
+            g[4 * k + 2] = slack[0];
+            g[4 * k + 3] = slack[1];
+            g[first_set_guard + k] = is_set(k, mode, t, w, y);
+        }
     }
 
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const State& x,
                                     const State& dxdt) const
     {
         if (which >= first_set_guard) return 0;
+        const auto i = static_cast<Eigen::Index>(which / 4);
         const Vector w = vector(x);
         const Vector dwdt = vector(dxdt);
-        if (which % 4 < 2) {
-            const auto i = static_cast<Eigen::Index>(which / 4);
-            const double rate = observed_rate(i, mode, t, w, dwdt);
-            return which % 4 == 0 ? rate : -rate;
+        if (which % 4 >= 2) return slack_rates(i, mode, t, w, dwdt)[which % 4 - 2];
+        const double rate = observed_rate(i, mode, t, w, dwdt);
+        return which % 4 == 0 ? rate : -rate;
+    }
+
+    /// Those that the mode enables; the others are 0.
+    void guard_rates(Mode mode, double t, const State& x, const State& dxdt,
+                     std::span<double> rates) const
+    {
+        std::fill(rates.begin(), rates.end(), 0.0);
+        if (mode >= branch_modes) return;
+        const Vector w = vector(x);
+        const Vector dwdt = vector(dxdt);
+        for (Eigen::Index i = 0; i < M; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            if (is_held(i, mode)) {
+                const Slacks of = slack_rates(i, mode, t, w, dwdt);
+                rates[4 * k + 2] = of[0];
+                rates[4 * k + 3] = of[1];
+            } else {
+                const double rate = observed_rate(i, mode, t, w, dwdt);
+                (branch(k, mode) == Branch::lower ? rates[4 * k] : rates[4 * k + 1]) =
+                    branch(k, mode) == Branch::lower ? rate : -rate;
+            }
         }
-        return slack_rate(which, mode, t, w, dwdt);
     }
 
     /// All that happened at one instant, together.
@@ -404,14 +438,26 @@ private:
         r -= holds_[mask_of(mode)].inverse.lazyProduct(rate);
     }
 
-    [[nodiscard]] double slack(std::size_t which, Mode mode, double t, const Vector& w) const
+    /// How far a reaction is above its lower bound and below its upper one; 1 or -1 where
+    /// there is none.
+    [[nodiscard]] Slacks slacks(Eigen::Index i, double t, const Vector& w, double r) const
     {
-        const auto i = static_cast<Eigen::Index>(which / 4);
-        const bool below = which % 4 == 2;
-        const double limit = bound(t, w, i, below ? Branch::lower : Branch::upper);
-        if (std::isinf(limit)) return (limit < 0) == below ? 1 : -1;
-        const double r = reaction(mode, t, w)[i];
-        return below ? r - limit : limit - r;
+        const double lower = bound(t, w, i, Branch::lower);
+        const double upper = bound(t, w, i, Branch::upper);
+        return {std::isinf(lower) ? std::copysign(1.0, -lower) : r - lower,
+                std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
+    }
+
+    /// 1 where the bounds of reaction k make an interval, else -1. Beyond y = 0, where the
+    /// branch ends, bounds that depend on y need not make one.
+    [[nodiscard]] double is_set(std::size_t k, Mode mode, double t, const Vector& w,
+                                const Reaction& y) const
+    {
+        const auto set = matrices_.system().reaction_set(t, w);
+        if (set.lower(k) <= set.upper(k)) return 1;
+        const double at = y[static_cast<Eigen::Index>(k)];
+        const Branch side = branch(k, mode);
+        return (side == Branch::lower && at < 0) || (side == Branch::upper && at > 0) ? 1 : -1;
     }
 
     /// y', and zero where rounding decides its sign: the bending of a motion that is tangent
@@ -431,23 +477,26 @@ private:
         return std::abs(rate) <= 64 * std::numeric_limits<double>::epsilon() * size ? 0 : rate;
     }
 
-    [[nodiscard]] double slack_rate(std::size_t which, Mode mode, double t, const Vector& w,
-                                    const Vector& dwdt) const
+    [[nodiscard]] Slacks slack_rates(Eigen::Index i, Mode mode, double t, const Vector& w,
+                                     const Vector& dwdt) const
     {
-        const auto i = static_cast<Eigen::Index>(which / 4);
-        const double here = slack(which, mode, t, w);
         const double lower = bound(t, w, i, Branch::lower);
         const double upper = bound(t, w, i, Branch::upper);
-        if (std::isinf(which % 4 == 2 ? lower : upper)) return 0;
+        if (std::isinf(lower) && std::isinf(upper)) return {0, 0};
         const double width = upper - lower;
-        const double size = std::isfinite(width) ? width : std::max(std::abs(here), 1.0);
-        if (!(size > 0)) return 0;
+        const auto at = [&](double s, const Vector& there) {
+            const Slacks slack = slacks(i, t + s, there, reaction(mode, t + s, there)[i]);
+            return detail::Exits{slack[0], slack[1], 0, 0};
+        };
+        const detail::Exits here = at(0, w);
+        const double size =
+            std::isfinite(width) ? width : std::max({std::abs(here[0]), std::abs(here[1]), 1.0});
+        if (!(size > 0)) return {0, 0};
         const detail::TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
                                        dwdt.template lpNorm<Eigen::Infinity>());
-        const auto later = [&](double s) {
-            return detail::Exits{slack(which, mode, t + s, w + s * dwdt), 0, 0, 0};
-        };
-        return detail::fitted_rates(later, {here, 0, 0, 0}, size, times)[0];
+        const auto later = [&](double s) { return at(s, w + s * dwdt); };
+        const detail::Exits rates = detail::fitted_rates(later, here, size, times);
+        return {rates[0], rates[1]};
     }
 
     [[nodiscard]] Mode checked(Mode mode) const noexcept { return flows(mode) ? mode : no_flow; }
