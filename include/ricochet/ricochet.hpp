@@ -41,6 +41,7 @@
 #include "ricochet/nonsmooth/event_hand_over.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/nonsmooth/step_policy.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/cave_body.hpp"

@@ -117,6 +117,10 @@ void validate(const StepController& controller)
             if constexpr (std::is_same_v<C, ErrorStep>) {
                 require(c.reject_above >= 1, "reject_above must be at least 1", c.reject_above);
             }
+            if constexpr (std::is_same_v<C, LearnedStep>) {
+                if (!c.policy) throw std::invalid_argument("step controller: no policy was given");
+                validate(StepController(c.plain));
+            }
             if constexpr (std::is_same_v<C, FilteredStep>) {
                 require(c.least > 0 && c.least <= 1, "least must lie in (0, 1]", c.least);
                 require(c.most > 1, "most must be above 1", c.most);

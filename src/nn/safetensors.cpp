@@ -27,8 +27,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view format_version = "1";
-constexpr std::array<std::string_view, 3> known_kinds{"event-classifier", "gate-horizon",
-                                                       "gate-level"};
+constexpr std::array<std::string_view, 4> known_kinds{"event-classifier", "gate-horizon",
+                                                       "gate-level", "step-policy"};
 
 constexpr std::size_t length_bytes = 8;
 constexpr std::size_t max_header = std::size_t{1} << 20;
@@ -500,8 +500,8 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
     model.kind = metadata.text("kind");
     if (std::ranges::find(known_kinds, model.kind) == known_kinds.end()) {
         refuse("metadata \"kind\"",
-               in_quotes(known_kinds[0]) + ", " + in_quotes(known_kinds[1]) + " or " +
-                   in_quotes(known_kinds[2]),
+               in_quotes(known_kinds[0]) + ", " + in_quotes(known_kinds[1]) + ", " +
+                   in_quotes(known_kinds[2]) + " or " + in_quotes(known_kinds[3]),
                in_quotes(model.kind));
     }
     const std::string& activation = metadata.text("activation");
@@ -555,7 +555,7 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
     }
     model.self_test.output = metadata.numbers("self_test_output", outputs);
     if (header.metadata.contains("certificate")) model.certificate = metadata.text("certificate");
-    if (model.kind != "event-classifier") read_gate(metadata, refuse, model);
+    if (model.kind.starts_with("gate-")) read_gate(metadata, refuse, model);
 }
 
 // Self-test ------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "ricochet/nonsmooth/step_policy.hpp"
+
 namespace ricochet {
 
 std::string_view name(SetValuedOutcome outcome) noexcept
@@ -56,6 +58,42 @@ void validate(const SetValuedOptions& options)
     if (!constant && options.estimate == ErrorEstimate::none) {
         throw std::invalid_argument(
             "SetValuedOptions: a controller other than ConstantStep needs an error estimate");
+    }
+}
+
+void detail::validate_fields(const std::vector<ErrorField>& fields, Eigen::Index size)
+{
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+        const ErrorField& f = fields[i];
+        if (f.first < 0 || f.count < 1 || f.first + f.count > size) {
+            throw std::invalid_argument(
+                fmt::format("SetValuedOptions: field {} must lie within the {} components, got {} "
+                            "from component {}",
+                            i, size, f.count, f.first));
+        }
+        if (!(f.rtol > 0) || !(f.floor >= 0) || !std::isfinite(f.rtol + f.floor)) {
+            throw std::invalid_argument(
+                fmt::format("SetValuedOptions: field {} needs a positive rtol and a floor of zero "
+                            "or more, got {} and {}",
+                            i, f.rtol, f.floor));
+        }
+    }
+}
+
+void detail::validate_policy(const SetValuedOptions& options, const StepLayout* layout)
+{
+    const auto* learned = std::get_if<LearnedStep>(&options.controller);
+    if (learned == nullptr) return;
+    if (layout == nullptr) {
+        throw std::invalid_argument(
+            fmt::format("SetValuedOptions: the policy is for the system {}, and this system "
+                        "declares no inputs for policies",
+                        learned->policy->model().system));
+    }
+    learned->policy->require(*layout);
+    if (options.estimate != ErrorEstimate::embedded) {
+        throw std::invalid_argument(
+            "SetValuedOptions: a learned controller needs the embedded estimate of the error");
     }
 }
 

@@ -177,12 +177,14 @@ struct Moment {
 
 class BatheRupture {
 public:
-    BatheRupture(const StrikeSlipFault& fault, const RuptureOptions& options,
+    BatheRupture(const StrikeSlipFault& fault, FaultForces& forces, const RuptureOptions& options,
                  const BatheOptions& bathe)
         : fault_(fault),
           options_(options),
           bathe_(bathe),
-          forces_(fault, detail::polynomial_bound(fault, options)),
+          forces_(forces),
+          evaluations_(forces.evaluations()),
+          products_(forces.product().count()),
           record_(fault, options, out_),
           solver_(fault, forces_, bathe)
     {
@@ -199,7 +201,7 @@ public:
         const double longest = bathe_.h_max > 0 ? bathe_.h_max / unit : end / 5;
         double h = std::min(longest, options_.step / unit);
         out_.longest_step = longest * unit;
-        StepController controller = bathe_.controller;
+        StepController& controller = controller_;
         while (t_ < end) {
             const double left = end - t_;
             const double step = left <= h * (1 + 1e-9) ? left : h;
@@ -208,8 +210,8 @@ public:
             bool accepted = solved;
             if (solved) {
                 const double error = bathe_.estimate == ErrorEstimate::none ? 0 : error_of(step);
-                const StepVerdict verdict = std::visit(
-                    [&](auto& rule) { return rule.judge(error, step * unit); }, controller);
+                const StepVerdict verdict =
+                    judge(controller, error, step * unit, [&] { return view(step); });
                 accepted = verdict.accepted;
                 factor = verdict.factor;
             } else {
@@ -325,11 +327,43 @@ private:
             e.path = 0.5 * (b.path - 4 * middle_.path + 3 * a.path + h * a.velocity.cwiseAbs());
         }
         if (bathe_.norm == FaultNorm::components) return of_components();
-        constexpr double floor = 1e-3;
+        const double floor = bathe_.floor;
         fastest_ = std::max(fastest_, b.velocity.norm());
         const double of_v = e.velocity.norm() / std::max(b.velocity.norm(), floor * fastest_);
         const double of_s = e.path.norm() / std::max(b.path.norm(), floor * fastest_);
         return std::max(of_v, of_s) / bathe_.rtol;
+    }
+
+    /// What a policy is told of the attempt.
+    [[nodiscard]] StepView view(double h) const
+    {
+        const FaultFields& e = next_.fields;
+        const auto n = static_cast<double>(fault_.size());
+        double speed = 0;  // of v^2
+        double growth = 0;
+        double path = 0;
+        double slipping = 0;
+        double switched = 0;
+        for (Index i = 0; i < fault_.size(); ++i) {
+            const double v = e.velocity[i];
+            speed += v * v;
+            growth += v * next_.acceleration[i];
+            path += std::exp(-e.path[i]);
+            slipping += v != 0 ? 1 : 0;
+            switched += (v != 0) != (now_.fields.velocity[i] != 0) ? 1 : 0;
+        }
+        const double rate = speed > 0 ? growth / speed : 0;
+        const double longest = 6;  // logarithm of a time without end
+        StepView out{.tolerance = bathe_.rtol, .step = h, .switched = switched / n};
+        out.state = {
+            0.5 * std::log(std::max(speed / n, 1e-24)),
+            std::asinh(rate),
+            rate < 0 ? std::clamp(-std::log(-rate), -longest, longest) : longest,
+            path / n,
+            slipping / n,
+            std::log(fault_.parameters().friction_drop * fault_.weight().sum() / n),
+        };
+        return out;
     }
 
     double of_components()
@@ -379,6 +413,12 @@ private:
     /// Parabolas through the three states of a step.
     void note(double t, double h, const FaultFields& a, const FaultFields& b, const FaultFields& c)
     {
+        if (bathe_.observer) {
+            bathe_.observer({.t = t,
+                             .h = h,
+                             .velocity = {&a.velocity, &b.velocity, &c.velocity},
+                             .path = {&a.path, &b.path, &c.path}});
+        }
         const double v[3] = {fault_.mean(a.velocity), fault_.mean(b.velocity),
                              fault_.mean(c.velocity)};
         const double s[3] = {fault_.mean(a.path), fault_.mean(b.path), fault_.mean(c.path)};
@@ -416,8 +456,12 @@ private:
         out_.outcome = outcome;
         record_.finish(t_, rest_time_, false, now_.fields);
         auto& s = out_.statistics;
-        s.evaluations = forces_.evaluations();
-        s.products = forces_.product().count();
+        s.evaluations = forces_.evaluations() - evaluations_;
+        s.products = forces_.product().count() - products_;
+        if (const auto* learned = std::get_if<LearnedStep>(&controller_)) {
+            s.asked = learned->asked;
+            s.handed_over = learned->handed_over;
+        }
         s.degree = forces_.root_of_stiffness().degree();
         s.bound = forces_.bound();
         return std::move(out_);
@@ -427,7 +471,10 @@ private:
     const RuptureOptions& options_;
     const BatheOptions& bathe_;
     Rupture out_;
-    FaultForces forces_;
+    FaultForces& forces_;
+    std::uint64_t evaluations_;  // of the runs before
+    std::uint64_t products_;
+    StepController controller_ = bathe_.controller;
     RuptureRecord record_;
     StageSolver solver_;
     StageOfFault stage_;
@@ -461,15 +508,57 @@ void validate(const BatheOptions& o)
     if (o.estimate == ErrorEstimate::embedded && o.norm == FaultNorm::components) {
         refuse("the norm of components is that of step doubling");
     }
+    if (const auto* learned = std::get_if<LearnedStep>(&o.controller)) {
+        if (o.estimate != ErrorEstimate::embedded) {
+            refuse("a learned controller needs the embedded estimate of the error");
+        }
+        learned->policy->require(fault_step_layout());
+    }
     if (!(o.rtol > 0)) refuse(fmt::format("rtol must be positive, got {}", o.rtol));
     if (!(o.atol >= 0)) refuse(fmt::format("atol must be zero or positive, got {}", o.atol));
+    if (!(o.floor > 0)) refuse(fmt::format("floor must be positive, got {}", o.floor));
     if (!(o.h_max >= 0)) refuse(fmt::format("h_max must be zero or positive, got {}", o.h_max));
     if (!(o.tolerance > 0)) refuse(fmt::format("tolerance must be positive, got {}", o.tolerance));
     if (o.max_iterations < 1 || o.max_inner < 1) refuse("at least one iteration must be allowed");
 }
 
-Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
-                 const BatheOptions& bathe)
+const StepLayout& fault_step_layout() noexcept
+{
+    static constexpr StepLayout layout{.system = StrikeSlipFault::name,
+                                       .version = 1,
+                                       .state = {{{"log_velocity", -4, 4},
+                                                  {"asinh_growth", 0, 1},
+                                                  {"log_time_to_stop", 2, 3},
+                                                  {"exp_minus_path", 0.5, 0.5},
+                                                  {"slipping", 1, 0.5},
+                                                  {"log_strength_drop", 1.5, 1}}}};
+    return layout;
+}
+
+struct BatheRuns::Parts {
+    Parts(const StrikeSlipFault& of, double bound) : fault(of), forces(fault, bound) {}
+
+    StrikeSlipFault fault;
+    FaultForces forces;
+};
+
+BatheRuns::BatheRuns(const StrikeSlipFault& fault, double bound)
+    : parts_(std::make_unique<Parts>(
+          fault, detail::polynomial_bound(fault, {.t_end = 1, .polynomial_bound = bound})))
+{
+}
+BatheRuns::BatheRuns(BatheRuns&&) noexcept = default;
+BatheRuns& BatheRuns::operator=(BatheRuns&&) noexcept = default;
+BatheRuns::~BatheRuns() = default;
+
+const StrikeSlipFault& BatheRuns::fault() const noexcept
+{
+    return parts_->fault;
+}
+
+namespace {
+
+void validate_both(const RuptureOptions& options, const BatheOptions& bathe)
 {
     validate(options);
     validate(bathe);
@@ -477,7 +566,22 @@ Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
         throw std::invalid_argument(fmt::format(
             "RuptureOptions: step must be positive for implicit steps, got {}", options.step));
     }
-    return BatheRupture(fault, options, bathe).run();
+}
+
+}  // namespace
+
+Rupture BatheRuns::simulate(const RuptureOptions& options, const BatheOptions& bathe)
+{
+    validate_both(options, bathe);
+    return BatheRupture(parts_->fault, parts_->forces, options, bathe).run();
+}
+
+Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
+                 const BatheOptions& bathe)
+{
+    validate_both(options, bathe);
+    FaultForces forces(fault, detail::polynomial_bound(fault, options));
+    return BatheRupture(fault, forces, options, bathe).run();
 }
 
 }  // namespace ricochet

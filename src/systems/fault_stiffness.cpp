@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -33,8 +34,9 @@ struct StiffnessData {
     std::vector<double> symbol;
     /// layered: for each frequency along x a matrix of rows by rows, over length
     std::vector<Eigen::MatrixXd> layers;
-    Eigen::MatrixXd matrix;  ///< dense
-    double upper = 0;        ///< bound of the eigenvalues
+    /// dense; also of a small toeplitz mesh, for which it takes less time than transforms
+    Eigen::MatrixXd matrix;
+    double upper = 0;  ///< bound of the eigenvalues
 
     [[nodiscard]] int frequencies() const { return length / 2 + 1; }
 };
@@ -367,6 +369,25 @@ private:
 
 // --- making K ---
 
+namespace {
+
+constexpr int small = 6;  // elements per side up to which K is stored
+
+Eigen::MatrixXd stored(int elements, const FaultStiffness::ByDistance& entry)
+{
+    const Eigen::Index size = Eigen::Index{elements} * elements;
+    Eigen::MatrixXd out(size, size);
+    for (int i = 0; i < size; ++i) {
+        for (int j = 0; j < size; ++j) {
+            out(i, j) =
+                entry(std::abs(i % elements - j % elements), std::abs(i / elements - j / elements));
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
 FaultStiffness FaultStiffness::toeplitz(int elements, const ByDistance& entry)
 {
     auto data = std::make_shared<StiffnessData>();
@@ -380,6 +401,7 @@ FaultStiffness FaultStiffness::toeplitz(int elements, const ByDistance& entry)
     const Eigen::MatrixXd by_x = even_transform(entries, data->length).transpose();
     const Eigen::MatrixXd both = even_transform(by_x, data->length);  // (kx, kz <= length / 2)
     data->upper = both.maxCoeff();
+    if (elements <= small) data->matrix = stored(elements, entry);
     const auto length = static_cast<std::size_t>(data->length);
     const auto frequencies = static_cast<std::size_t>(data->frequencies());
     const double scale = 0.5 / (static_cast<double>(length) * static_cast<double>(length));
@@ -556,7 +578,7 @@ Eigen::VectorXd FaultStiffness::solve(const Eigen::VectorXd& b) const
 
 StiffnessProduct::StiffnessProduct(const FaultStiffness& stiffness) : stiffness_(stiffness)
 {
-    if (stiffness_.data_->form != StiffnessData::Form::dense) {
+    if (stiffness_.data_->matrix.size() == 0) {
         transforms_ = std::make_unique<detail::StiffnessTransforms>(*stiffness_.data_);
     }
 }

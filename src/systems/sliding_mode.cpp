@@ -1,5 +1,7 @@
 #include "ricochet/systems/sliding_mode.hpp"
 
+#include <algorithm>
+
 #include "require.hpp"
 
 namespace ricochet {
@@ -32,6 +34,38 @@ double SlidingMode::reaching_time(double from) const noexcept
         (reaching(middle, from) > 0 ? low : high) = middle;
     }
     return high;
+}
+
+const StepLayout& SlidingMode::step_layout() noexcept
+{
+    static constexpr StepLayout layout{.system = name,
+                                       .version = 1,
+                                       .state = {{{"log_distance", 0, 3},
+                                                  {"approach", -0.5, 1},
+                                                  {"log_time_to_switch", 2, 3},
+                                                  {"reaction", 0.7, 0.5},
+                                                  {"disturbance", 0, 1},
+                                                  {"disturbance_rate", 0, 1}}}};
+    return layout;
+}
+
+void SlidingMode::step_inputs(double t, const Vector& w, const Vector& rate, const Vector& reaction,
+                              std::array<double, StepView::state_inputs>& out) const noexcept
+{
+    // The motion is the same mirrored: signs are those of the state, or at zero of what holds it.
+    const double sign = w[0] > 0 || (w[0] == 0 && reaction[0] < 0) ? 1 : -1;
+    const double gain = std::max(p_.gain, 1e-300);
+    const double distance = std::abs(w[0]) * p_.frequency / gain;
+    const double approach = sign * rate[0] / gain;
+    constexpr double far = 8;  // logarithm of a time without end
+    const double reached =
+        distance > 0 && approach < 0 ? std::clamp(std::log(distance / -approach), -far, far) : far;
+    out = {std::log(std::max(distance, 1e-6)),
+           approach,
+           reached,
+           std::abs(reaction[0]) / gain,
+           sign * p_.amplitude * std::sin(p_.frequency * t) / gain,
+           sign * p_.amplitude * std::cos(p_.frequency * t) / gain};
 }
 
 }  // namespace ricochet

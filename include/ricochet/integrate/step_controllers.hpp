@@ -11,6 +11,9 @@
 // Some of these rules accept steps of an error above 1, and some reject below it.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <memory>
 #include <variant>
 
 #include "ricochet/integrate/step_control.hpp"
@@ -142,11 +145,52 @@ struct FilteredStep {
     int rejections = 0;
 };
 
-using StepController =
-    std::variant<ConstantStep, ErrorStep, HeuristicStep, ClassicStep, PrintedPiStep, FilteredStep>;
+class StepPolicy;
+class StepRanges;
+
+/// What a learned rule is told of an attempt, besides its error.
+struct StepView {
+    static constexpr std::size_t state_inputs = 6;
+
+    double tolerance = 1;  ///< to which the error was scaled
+    double step = 1;       ///< the attempt's length over the system's unit of time
+    double switched = 0;   ///< share of the reactions that left their branch in it
+    std::array<double, state_inputs> state{};  ///< of its end, as the system declares
+};
+
+/// A learned rule: the factor of `plain` times that of a policy (`nonsmooth/step_policy.hpp`).
+/// A step of an error above `plain.reject_above` is rejected, and the retry's length is that of
+/// `plain`, as it is where the policy has no answer.
+struct LearnedStep {
+    std::shared_ptr<const StepPolicy> policy{};  ///< not null
+    ErrorStep plain{.order = 3, .reject_above = 100};
+    StepRanges* seen = nullptr;  ///< widened by every input, unless null
+
+    [[nodiscard]] StepVerdict judge(double error, double h, const StepView& view) noexcept;
+    /// Without a view, as `plain`.
+    [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
+    [[nodiscard]] double failed() const noexcept { return plain.failed(); }
+    void reset() const noexcept {}
+
+    std::uint64_t asked = 0;        ///< verdicts
+    std::uint64_t handed_over = 0;  ///< of these, left to `plain`
+};
+
+using StepController = std::variant<ConstantStep, ErrorStep, HeuristicStep, ClassicStep,
+                                    PrintedPiStep, FilteredStep, LearnedStep>;
+
+/// The controller's verdict; `view()` is only called for a `LearnedStep`.
+template <class View>
+[[nodiscard]] StepVerdict judge(StepController& controller, double error, double h, View&& view)
+{
+    if (auto* learned = std::get_if<LearnedStep>(&controller)) {
+        return learned->judge(error, h, view());
+    }
+    return std::visit([&](auto& rule) { return rule.judge(error, h); }, controller);
+}
 
 /// @throws std::invalid_argument for an order below 1, factors that do not shrink or grow,
-/// or exponents that are not finite.
+/// exponents that are not finite, or a learned rule without a policy.
 void validate(const StepController& controller);
 
 }  // namespace ricochet

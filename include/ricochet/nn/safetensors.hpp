@@ -7,7 +7,7 @@
 //     layers.<k>.bias     outputs
 //     __metadata__        strings; numbers in decimal, lists separated by spaces
 //         ricochet           "1", the version of this list
-//         kind               "event-classifier", "gate-horizon" or "gate-level"
+//         kind               "event-classifier", "gate-horizon", "gate-level" or "step-policy"
 //         system             name
 //         parameters         name=value ...
 //         recipe             name of what is computed from (t, x, h)

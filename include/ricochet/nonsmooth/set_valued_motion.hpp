@@ -10,9 +10,11 @@
 
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "ricochet/integrate/step_controllers.hpp"
 #include "ricochet/nonsmooth/minimal_selection.hpp"
+#include "ricochet/nonsmooth/step_layout.hpp"
 
 namespace ricochet {
 
@@ -41,6 +43,16 @@ enum class Switches {
     located,
 };
 
+/// Components that are measured as one field: the norm of their error against
+/// rtol max(norm of the field, floor). A floor as large as the field will be makes the tolerance
+/// absolute, none makes it relative.
+struct ErrorField {
+    Eigen::Index first = 0;
+    Eigen::Index count = 0;  ///< positive
+    double rtol = 1e-3;      ///< positive
+    double floor = 0;        ///< in the units of the state
+};
+
 struct SetValuedOptions {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();
@@ -49,6 +61,8 @@ struct SetValuedOptions {
     ErrorEstimate estimate = ErrorEstimate::none;
     double rtol = 1e-4;  ///< errors are measured against atol + rtol |w|, root mean square
     double atol = 1e-6;
+    /// In place of rtol and atol: the error is that of the worst field.
+    std::vector<ErrorField> fields{};
     int error_order = 2;  ///< p in (two half steps - one step) / (2^p - 1)
     double h_min = 0;     ///< 0: 1e-12 of the time integrated
     double h_max = std::numeric_limits<double>::infinity();
@@ -70,6 +84,14 @@ struct SetValuedStatistics {
     std::uint64_t switches = 0;    ///< located changes of branch
 };
 
+namespace detail {
+/// @throws std::invalid_argument naming the field, unless it lies within `size` components.
+void validate_fields(const std::vector<ErrorField>& fields, Eigen::Index size);
+/// @throws std::invalid_argument if a learned controller's policy is not for this layout, or if
+/// there is none, null.
+void validate_policy(const SetValuedOptions& options, const StepLayout* layout);
+}  // namespace detail
+
 template <Inclusion System>
 class SetValuedMotion {
 public:
@@ -77,6 +99,7 @@ public:
     using Reaction = ReactionOf<System>;
     using State = SetValuedState<System>;
     using Branches = detail::BranchesOf<System>;
+    static constexpr bool declares_inputs = DeclaresStepInputs<System, Vector, Reaction>;
 
     /// Starts with the minimal selection. Debug builds sample the projection of the first set.
     /// @throws std::invalid_argument for options, systems and initial states that cannot be
@@ -98,6 +121,15 @@ public:
             detail::refuse_inclusion("the initial state must have as many components as the system, not",
                                      static_cast<double>(w0.size()));
         }
+        detail::validate_fields(options.fields, w0.size());
+        if constexpr (declares_inputs) {
+            detail::validate_policy(options, &System::step_layout());
+        } else {
+            detail::validate_policy(options, nullptr);
+        }
+        rate_ = w0;
+        branches_before_.setConstant(step_.matrices().reactions(), Branch::inside);
+        branches_after_ = branches_before_;
         h_ = options.step;
         h_min_ = options.h_min > 0 ? options.h_min : 1e-12 * (options.t_end - options.t_start);
         now_.w = error_ = w0;
@@ -142,6 +174,8 @@ public:
     [[nodiscard]] double next_step() const noexcept { return h_; }
     /// The scaled error of the last attempt.
     [[nodiscard]] double error() const noexcept { return scaled_error_; }
+    /// With the counts of a `LearnedStep`.
+    [[nodiscard]] const StepController& controller() const noexcept { return options_.controller; }
     [[nodiscard]] CompositeStep<System>& stepper() noexcept { return step_; }
     /// The branches of the state, kept where switches are located.
     [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
@@ -179,8 +213,8 @@ public:
                 h_ = h * std::visit([](auto& c) { return c.failed(); }, options_.controller);
                 ++failures;
             } else {
-                const StepVerdict verdict = std::visit(
-                    [&](auto& c) { return c.judge(scaled_error_, h); }, options_.controller);
+                const StepVerdict verdict =
+                    judge(options_.controller, scaled_error_, h, [&] { return view(h); });
                 if (verdict.accepted) {
                     if (!holds_length_) h_ = h * verdict.factor;
                     else if (failures == 0 && !last) h_ = std::min(options_.step, 2 * h_);
@@ -299,8 +333,48 @@ private:
         return report;
     }
 
+    /// What a policy is told of the attempt.
+    [[nodiscard]] StepView view(double h)
+    {
+        StepView out{.step = h};
+        if constexpr (declares_inputs) {
+            const System& system = step_.system();
+            out.tolerance = options_.fields.empty() ? options_.rtol : options_.fields.front().rtol;
+            out.step = h / system.step_unit();
+            rate_ = (3 * trial_.w - 4 * step_.middle().w + now_.w) / h;
+            system.step_inputs(trial_.t, trial_.w, rate_, trial_.reaction, out.state);
+            if constexpr (CompositeStep<System>::box) {
+                step_.branches_of(now_, branches_before_);
+                step_.branches_of(trial_, branches_after_);
+                const auto n = branches_before_.size();
+                double changed = 0;
+                for (Eigen::Index i = 0; i < n; ++i) {
+                    changed += branches_before_[i] != branches_after_[i] ? 1 : 0;
+                }
+                out.switched = n > 0 ? changed / static_cast<double>(n) : 0;
+            }
+        }
+        return out;
+    }
+
+    [[nodiscard]] double scaled_by_fields(const Vector& error, const Vector& a,
+                                          const Vector& b) const
+    {
+        double worst = 0;
+        for (const ErrorField& field : options_.fields) {
+            const auto norm = [&](const Vector& v) { return v.segment(field.first, field.count).norm(); };
+            const double size = std::max({norm(a), norm(b), field.floor});
+            // Nothing moved, and nothing is wrong: zero over zero is no error.
+            const double off = norm(error);
+            if (!(off == 0)) worst = std::max(worst, off / (field.rtol * size));
+            if (std::isnan(off)) return off;
+        }
+        return worst;
+    }
+
     [[nodiscard]] double scaled(const Vector& error, const Vector& a, const Vector& b) const
     {
+        if (!options_.fields.empty()) return scaled_by_fields(error, a, b);
         double sum = 0;
         for (Eigen::Index i = 0; i < error.size(); ++i) {
             const double size = options_.atol +
@@ -442,7 +516,8 @@ private:
     CompositeStep<System> step_;
     State now_, before_, trial_, half_;
     Vector error_;
-    Branches start_branches_;
+    Vector rate_;
+    Branches start_branches_, branches_before_, branches_after_;
     Switch last_switch_;
     SetValuedStatistics statistics_;
     StageReport failure_;

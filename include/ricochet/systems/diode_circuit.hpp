@@ -1,9 +1,11 @@
 // A circuit with a set-valued diode.
 #pragma once
 
+#include <cmath>
 #include <string_view>
 
 #include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/step_layout.hpp"
 
 namespace ricochet {
 
@@ -63,6 +65,16 @@ public:
     {
         return IntervalSet::symmetric(p_.current);
     }
+
+    /// For policies that choose steps: they are measured over sqrt(inductance capacitance_2).
+    [[nodiscard]] static const StepLayout& step_layout() noexcept;
+    [[nodiscard]] double step_unit() const noexcept
+    {
+        return std::sqrt(p_.inductance * p_.capacitance_2);
+    }
+    void step_inputs(double t, const Vector& w, const Vector& rate,
+                     const Eigen::Matrix<double, 1, 1>& reaction,
+                     std::array<double, StepView::state_inputs>& out) const noexcept;
 
     [[nodiscard]] static Vector start() { return {9.998048, 1.980972, -10.908448}; }
     static constexpr double t_end = 20;  ///< [s]

@@ -13,8 +13,13 @@
 // solved for by conjugate gradients. A is one polynomial in K.
 #pragma once
 
+#include <array>
+#include <functional>
+#include <memory>
+
 #include "ricochet/integrate/step_controllers.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/nonsmooth/step_policy.hpp"
 #include "ricochet/systems/fault_rupture.hpp"
 
 namespace ricochet {
@@ -29,11 +34,20 @@ enum class FaultBound {
 /// How the errors of the fields become one number.
 enum class FaultNorm {
     /// the larger of the velocity's and the slip's, root mean square over rtol of that of the
-    /// field itself, at least 1e-3 of the largest so far
+    /// field itself, at least `BatheOptions::floor` of the largest velocity so far
     fields,
     /// root mean square over all components of error / (atol + rtol |component|), of velocity,
     /// displacement from the unloaded state, and path, in units of 0.1 mm, as the published code
     components,
+};
+
+/// A step that was taken, without units (`StrikeSlipFault`): the fields at its start, at the end
+/// of its first stage and at its end.
+struct BatheStep {
+    double t = 0;  ///< of its start
+    double h = 0;
+    std::array<const Eigen::VectorXd*, 3> velocity{};
+    std::array<const Eigen::VectorXd*, 3> path{};
 };
 
 struct BatheOptions {
@@ -45,11 +59,20 @@ struct BatheOptions {
     FaultNorm norm = FaultNorm::fields;
     double rtol = 1e-3;
     double atol = 1e-6;       ///< of FaultNorm::components
+    double floor = 0.03;      ///< of FaultNorm::fields: a fault that stops needs no digits of that
     double h_max = 0;         ///< [s]; 0: a fifth of the run
     double tolerance = 1e-7;  ///< residual of a stage, relative to its velocities
     int max_iterations = 50;  ///< of Newton's method
     int max_inner = 200;      ///< of conjugate gradients, in one of them
+    /// Shown every step; of step doubling both halves.
+    std::function<void(const BatheStep&)> observer{};
 };
+
+/// What a step policy is asked about: of the fields at the end of an attempt, without units, the
+/// logarithm of the root mean square velocity, the rate of growth of its square (half of it, as
+/// asinh) and the logarithm of the time in which it would vanish at that rate, the mean of
+/// exp(-path), the share of elements that slip, and the logarithm of the mean drop of strength.
+[[nodiscard]] const StepLayout& fault_step_layout() noexcept;
 
 /// @throws std::invalid_argument naming the option.
 void validate(const BatheOptions& options);
@@ -59,5 +82,24 @@ void validate(const BatheOptions& options);
 /// that cannot be met.
 [[nodiscard]] Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
                                const BatheOptions& bathe);
+
+/// One fault under many rules: what depends on the fault alone, a third of a millisecond for one
+/// element, is made once. Not for two threads at a time.
+class BatheRuns {
+public:
+    /// @param polynomial_bound  in place of `RuptureOptions::polynomial_bound`
+    explicit BatheRuns(const StrikeSlipFault& fault, double polynomial_bound = 0);
+    BatheRuns(BatheRuns&&) noexcept;
+    BatheRuns& operator=(BatheRuns&&) noexcept;
+    ~BatheRuns();
+
+    [[nodiscard]] const StrikeSlipFault& fault() const noexcept;
+    /// As the function of that name.
+    [[nodiscard]] Rupture simulate(const RuptureOptions& options, const BatheOptions& bathe);
+
+private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
 
 }  // namespace ricochet

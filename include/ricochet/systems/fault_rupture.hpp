@@ -68,10 +68,12 @@ struct RuptureStatistics {
     std::uint64_t products = 0;     ///< with K
     std::uint64_t arrests = 0;
     std::uint64_t restarts = 0;
-    std::uint64_t solves = 0;      ///< implicit stages
-    std::uint64_t iterations = 0;  ///< of their Newton method
-    int degree = 0;                ///< of the polynomial for sqrt(K)
-    double bound = 0;              ///< its relative error at most
+    std::uint64_t solves = 0;       ///< implicit stages
+    std::uint64_t iterations = 0;   ///< of their Newton method
+    std::uint64_t asked = 0;        ///< verdicts of a learned rule
+    std::uint64_t handed_over = 0;  ///< of these, left to the classical one
+    int degree = 0;                 ///< of the polynomial for sqrt(K)
+    double bound = 0;               ///< its relative error at most
 };
 
 struct Rupture {

@@ -1,8 +1,8 @@
 // The stiffness K of a fault of n x n elements: products, bounds of its spectrum, solutions.
 //
 // Elements are numbered along x first, by depth second. K is symmetric and positive definite,
-// and where its entries depend on distances only it is never stored: a product is taken by
-// transforms of twice the fault's size, in O(N log N) for N = n^2 elements.
+// and where its entries depend on distances only it is not stored, but for the smallest meshes: a
+// product is taken by transforms of twice the fault's size, in O(N log N) for N = n^2 elements.
 #pragma once
 
 #include <Eigen/Core>

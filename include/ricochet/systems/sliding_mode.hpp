@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/step_layout.hpp"
 
 namespace ricochet {
 
@@ -51,6 +52,12 @@ public:
     {
         return IntervalSet::symmetric(p_.gain);
     }
+
+    /// For policies that choose steps: they are measured over the disturbance's radian.
+    [[nodiscard]] static const StepLayout& step_layout() noexcept;
+    [[nodiscard]] double step_unit() const noexcept { return 1 / p_.frequency; }
+    void step_inputs(double t, const Vector& w, const Vector& rate, const Vector& reaction,
+                     std::array<double, StepView::state_inputs>& out) const noexcept;
 
     /// w(t) from w(0) = `from` > 0, for gain > amplitude.
     [[nodiscard]] double exact(double t, double from) const noexcept;

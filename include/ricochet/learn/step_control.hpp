@@ -1,0 +1,161 @@
+// Training a policy that chooses steps (`nonsmooth/step_policy.hpp`), by what it is for: less work
+// for the same true error.
+//
+//     const StepFamily family = fault_family({.seed = 1});
+//     const TrainedPolicy trained = train_step_policy(family, {.seconds = 150});
+//     save_model(trained.model, "fault-step.safetensors");
+//
+// A family is a set of problems of random parameters with reference solutions. A rule for steps
+// is run on all of them at a few tolerances; its work is compared with that of the best classical
+// rule that reaches the same true error. Weights are found by an evolution strategy on that score.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "ricochet/learn/evolution.hpp"
+#include "ricochet/nn/model.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/nonsmooth/step_policy.hpp"
+
+namespace ricochet {
+class StrikeSlipFault;
+}
+
+namespace ricochet::learn {
+
+/// A rule with its tolerance, or with the length of constant steps.
+struct StepRule {
+    StepController controller = ErrorStep{.order = 3, .reject_above = 100};
+    double tolerance = 1e-3;
+    ErrorEstimate estimate = ErrorEstimate::embedded;
+    /// The first step, or all of them with `ConstantStep`, over that of the problem.
+    double step = 1;
+};
+
+/// What a rule did on a problem.
+struct StepTrial {
+    bool ended = false;      ///< reached the end
+    double work = 0;         ///< Newton iterations, or solves
+    double error = 1;        ///< relative L2 over time
+    double final_error = 1;  ///< relative, of the final slip or state
+    std::uint64_t steps = 0;
+    std::uint64_t rejected = 0;
+    std::uint64_t solves = 0;
+    std::uint64_t iterations = 0;
+    std::uint64_t asked = 0;  ///< as of `LearnedStep`
+    std::uint64_t handed_over = 0;
+};
+
+/// A problem with its reference. Threads may share it.
+struct StepProblem {
+    std::string description;
+    int group = 0;  ///< problems of one group are compared together, e.g. all of one mesh
+    std::function<StepTrial(const StepRule& rule)> run;
+};
+
+/// Problems of one system.
+struct StepFamily {
+    StepLayout layout;
+    bool judges_final = false;  ///< the final error counts as much as that over time
+    std::vector<StepProblem> problems;
+    std::vector<double> tolerances;  ///< of a training
+};
+
+struct FaultFamilyOptions {
+    std::uint64_t seed = 1;
+    /// How many faults of 1 x 1, 2 x 2, ... elements.
+    std::vector<int> counts{10, 8, 8};
+};
+
+/// Faults of random parameters, wide about the default ones: side 2 to 6 km, damping ratio 0.15 to
+/// 0.45, slip distance 0.05 to 0.2 m, drop of friction 0.05 to 0.2, overload 1e-6 to 1e-4; those
+/// that do not rupture within 80 s are drawn again. Work is counted in Newton iterations, the
+/// references are explicit runs with steps far shorter.
+[[nodiscard]] StepFamily fault_family(const FaultFamilyOptions& options = {});
+
+/// A fault as a problem, its reference from an explicit run until `t_end` [s].
+[[nodiscard]] StepProblem fault_problem(const StrikeSlipFault& fault, double t_end,
+                                        double polynomial_bound = 0);
+
+/// The work of a rule against the error that it reaches, in logarithms, from coarse to fine.
+class WorkCurve {
+public:
+    void add(double log_work, double log_error) { points_.push_back({log_work, log_error}); }
+    /// To be called once, after the last point. Errors are averaged over `share` of work to both
+    /// sides, since they jump with where a node happens to fall.
+    void finish(double share = 0);
+    /// The log work after which the error stays below, extrapolated like that of a method of order
+    /// 2 beyond the ends.
+    [[nodiscard]] double work_at(double log_error) const;
+
+private:
+    struct Point {
+        double work;
+        double error;
+    };
+    std::vector<Point> points_;
+};
+
+/// Scores of rules on a family.
+class StepScore {
+public:
+    /// Runs the classical rules: the free estimate, rejecting above 100, and constant steps.
+    StepScore(const StepFamily& family, unsigned threads);
+
+    /// Mean over groups and tolerances of log(work / work of the best classical rule at the error
+    /// reached) and 0.2 log(error / error of the free estimate at that tolerance)^2; where the
+    /// final error counts, and by how much its work is not 5 % below that of the best classical
+    /// rule at the final error reached. Less is better, and a network that returns zero is near 0.
+    /// A better final error earns nothing: it is small by luck too easily.
+    [[nodiscard]] double operator()(const LearnedStep& rule) const;
+
+    /// The same in parts: for each group, and in it for each tolerance.
+    struct Part {
+        int group = 0;
+        double tolerance = 0;
+        double gain = 0;        ///< log of how much less work at the error reached
+        double final_gain = 0;  ///< at the final error reached
+        double off = 0;         ///< log(error / error of the classical rule)
+        double failed = 0;      ///< share that did not reach the end
+    };
+    [[nodiscard]] std::vector<Part> parts(const LearnedStep& rule) const;
+
+private:
+    struct Group {
+        int number = 0;
+        std::vector<const StepProblem*> problems;
+        std::vector<WorkCurve> of_error;
+        std::vector<WorkCurve> of_final;
+        std::vector<double> target;  ///< log error per tolerance
+    };
+    const StepFamily& family_;
+    std::vector<Group> groups_;
+};
+
+struct StepTrainingOptions {
+    std::uint64_t seed = 1;
+    std::size_t evaluations = 12'000;
+    double seconds = std::numeric_limits<double>::infinity();
+    unsigned threads = 2;
+    std::filesystem::path checkpoint{};
+    bool resume = false;
+};
+
+struct TrainedPolicy {
+    Model model;
+    EvolutionResult search;
+};
+
+/// Searches the weights, from a network that returns zero. The domain of the model is what the
+/// policy and the classical rule met on the family, a tenth wider.
+/// @throws as `evolve`.
+[[nodiscard]] TrainedPolicy train_step_policy(const StepFamily& family,
+                                              const StepTrainingOptions& options = {},
+                                              const EvolutionCallback& progress = {});
+
+}  // namespace ricochet::learn

@@ -1,0 +1,86 @@
+// A network that lengthens or shortens the steps of a classical controller.
+//
+//     const auto policy = std::make_shared<const StepPolicy>(load_model("fault-step.safetensors"));
+//     BatheOptions{.controller = LearnedStep{policy}, .estimate = ErrorEstimate::embedded}
+//
+// The classical proposal h 0.9 E^(-1/3) is multiplied by exp(network), held within [e^-2, e^2].
+// What the network is asked about is intensive, means over a field rather than sums, so that a
+// policy trained on one element serves any mesh. It decides about lengths alone: whatever its
+// weights, a step that is too wrong is rejected and repeated by the classical rule, and inputs
+// outside of those seen in training, or NaN, are that rule's too.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/nn/mlp.hpp"
+#include "ricochet/nonsmooth/step_layout.hpp"
+
+namespace ricochet {
+
+/// The range of every input that was met.
+class StepRanges {
+public:
+    static constexpr std::size_t inputs = 4 + StepView::state_inputs;
+    using Inputs = std::array<double, inputs>;
+
+    void include(const Inputs& inputs) noexcept;
+    void include(const StepRanges& other) noexcept;
+    [[nodiscard]] bool empty() const noexcept { return !(lower_[0] <= upper_[0]); }
+    /// One per input, each wider by this share of its width on both sides.
+    [[nodiscard]] std::vector<Interval> domain(double margin) const;
+
+private:
+    Inputs lower_ = filled(1);
+    Inputs upper_ = filled(-1);
+
+    static constexpr Inputs filled(double sign)
+    {
+        Inputs out{};
+        for (double& value : out) value = sign * 1e300;
+        return out;
+    }
+};
+
+/// A loaded policy. Immutable; threads may share it.
+class StepPolicy {
+public:
+    static constexpr std::string_view kind = "step-policy";
+    static constexpr std::size_t inputs = StepRanges::inputs;
+    static constexpr double most = 2;  ///< of |log factor|
+
+    /// @throws std::invalid_argument if the model is not of that kind, or has not that many
+    /// inputs and one output, or as `Mlp`.
+    explicit StepPolicy(Model model);
+
+    /// @throws std::invalid_argument naming both, if the policy is for another system or layout.
+    void require(const StepLayout& layout) const;
+
+    /// log E, log tolerance, log step, share that switched, and those of the system.
+    [[nodiscard]] static StepRanges::Inputs inputs_of(double error, const StepView& view) noexcept;
+
+    /// By how much to multiply the classical proposal, in [e^-2, e^2]. Nothing where an input is
+    /// outside of the domain, or the network's answer is not a number.
+    [[nodiscard]] std::optional<double> factor(const StepRanges::Inputs& inputs) const noexcept;
+
+    [[nodiscard]] const Model& model() const noexcept { return model_; }
+
+private:
+    Model model_;
+    Mlp<double> network_;
+};
+
+/// A model of that layout with these weights, to be trained or saved: 10-8-8-1, tanh, in double;
+/// an empty list is a network that returns zero. Weights of each layer row by row, then biases.
+/// @throws std::invalid_argument for another number of weights.
+[[nodiscard]] Model step_policy_model(const StepLayout& layout, const std::vector<double>& weights);
+
+/// How many weights that network has.
+inline constexpr std::size_t step_policy_weights = (StepPolicy::inputs + 1) * 8 + 9 * 8 + 9;
+
+}  // namespace ricochet

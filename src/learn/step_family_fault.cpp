@@ -1,0 +1,214 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "ricochet/learn/random.hpp"
+#include "ricochet/learn/step_control.hpp"
+#include "ricochet/systems/fault_bathe.hpp"
+
+namespace ricochet::learn {
+
+namespace {
+
+constexpr std::size_t samples = 600;
+constexpr double usual_step = 0.125 / 0.8660254037844386;  // [time units]: 0.125 s at 3 km
+
+/// Velocities of a reference at even times, without units, one column per time.
+struct Reference {
+    Eigen::MatrixXd velocity;
+    double of_all = 0;     ///< sum of its squares
+    double mean_slip = 0;  ///< [m]
+};
+
+/// The squared error of a run against the reference, from the parabolas of its steps.
+class Comparison {
+public:
+    Comparison(const Reference& reference, double end)
+        : reference_(reference), spacing_(end / static_cast<double>(samples))
+    {
+    }
+
+    [[nodiscard]] auto column() const
+    {
+        return reference_.velocity.col(static_cast<Eigen::Index>(next_ - 1));
+    }
+
+    void look(const BatheStep& step)
+    {
+        const auto& [a, b, c] = step.velocity;
+        for (; next_ <= samples; ++next_) {
+            const double theta = (static_cast<double>(next_) * spacing_ - step.t) / step.h;
+            if (theta > 1 + 1e-12) break;
+            const double wa = (2 * theta - 1) * (theta - 1);
+            const double wb = 4 * theta * (1 - theta);
+            const double wc = theta * (2 * theta - 1);
+            sum_ += (wa * *a + wb * *b + wc * *c - column()).squaredNorm();
+        }
+    }
+
+    /// Relative; what comes after the last step is at rest.
+    [[nodiscard]] double error()
+    {
+        for (; next_ <= samples; ++next_) sum_ += column().squaredNorm();
+        return std::sqrt(sum_ / reference_.of_all);
+    }
+
+private:
+    const Reference& reference_;
+    double spacing_;
+    std::size_t next_ = 1;
+    double sum_ = 0;
+};
+
+Reference reference_of(const StrikeSlipFault& fault, double t_end, double polynomial_bound)
+{
+    RuptureOptions options{.t_end = t_end,
+                           .step = 0.01 * fault.time_unit(),
+                           .rtol = std::numeric_limits<double>::infinity(),
+                           .polynomial_bound = polynomial_bound};
+    for (std::size_t i = 1; i <= samples; ++i) {
+        options.snapshot_times.push_back(
+            i == samples ? t_end : t_end * static_cast<double>(i) / static_cast<double>(samples));
+    }
+    const Rupture run = simulate(fault, options);
+    if (run.snapshots.size() != samples) {
+        throw std::runtime_error(
+            fmt::format("the reference of a fault of {0} x {0} elements ended early: {1}",
+                        fault.elements(), describe(run.outcome)));
+    }
+    Reference out;
+    out.velocity.resize(fault.size(), static_cast<Eigen::Index>(samples));
+    for (std::size_t i = 0; i < samples; ++i) {
+        out.velocity.col(static_cast<Eigen::Index>(i)) =
+            run.snapshots[i].velocity / fault.velocity_unit();
+    }
+    out.of_all = out.velocity.squaredNorm();
+    out.mean_slip = run.mean_slip;
+    return out;
+}
+
+/// A fault, its reference, and what runs have left behind for the next ones.
+class FaultProblem {
+public:
+    FaultProblem(const StrikeSlipFault& fault, double t_end, double polynomial_bound)
+        : fault_(fault),
+          t_end_(t_end),
+          bound_(polynomial_bound),
+          reference_(reference_of(fault, t_end, polynomial_bound))
+    {
+    }
+
+    StepTrial run(const StepRule& rule)
+    {
+        std::unique_ptr<BatheRuns> runs = take();
+        Comparison comparison(reference_, t_end_ / fault_.time_unit());
+        const bool doubling = rule.estimate == ErrorEstimate::doubling;
+        const bool constant = std::holds_alternative<ConstantStep>(rule.controller);
+        const Rupture r =
+            runs->simulate({.t_end = t_end_,
+                            .step = rule.step * usual_step * fault_.time_unit(),
+                            .max_steps = 4000},
+                           {.controller = rule.controller,
+                            .estimate = constant ? ErrorEstimate::none : rule.estimate,
+                            .norm = doubling ? FaultNorm::components : FaultNorm::fields,
+                            .rtol = rule.tolerance,
+                            .atol = 1e-3 * rule.tolerance,
+                            .h_max = constant ? t_end_ : 0,
+                            .observer = [&](const BatheStep& step) { comparison.look(step); }});
+        give_back(std::move(runs));
+        const RuptureStatistics& s = r.statistics;
+        StepTrial out{.ended = r.outcome == RuptureOutcome::reached_end ||
+                               r.outcome == RuptureOutcome::at_rest,
+                      .work = static_cast<double>(s.iterations),
+                      .steps = s.steps,
+                      .rejected = s.rejected,
+                      .solves = s.solves,
+                      .iterations = s.iterations,
+                      .asked = s.asked,
+                      .handed_over = s.handed_over};
+        if (out.ended) {
+            out.error = comparison.error();
+            out.final_error = std::abs(r.mean_slip / reference_.mean_slip - 1);
+        }
+        return out;
+    }
+
+private:
+    std::unique_ptr<BatheRuns> take()
+    {
+        {
+            const std::lock_guard lock(mutex_);
+            if (!idle_.empty()) {
+                auto out = std::move(idle_.back());
+                idle_.pop_back();
+                return out;
+            }
+        }
+        return std::make_unique<BatheRuns>(fault_, bound_);
+    }
+    void give_back(std::unique_ptr<BatheRuns> runs)
+    {
+        const std::lock_guard lock(mutex_);
+        idle_.push_back(std::move(runs));
+    }
+
+    StrikeSlipFault fault_;
+    double t_end_;
+    double bound_;
+    Reference reference_;
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<BatheRuns>> idle_;
+};
+
+/// A fault that ruptures, and a time that holds it all.
+std::optional<double> time_of_rupture(const StrikeSlipFault& fault, double after)
+{
+    const Rupture run = simulate(fault, {.t_end = 80, .rtol = 1e-3, .polynomial_bound = 1e-3});
+    const bool ruptures = run.peak_velocity > 0.02 * fault.velocity_unit();
+    if (!ruptures || !(run.arrest_time < 60)) return std::nullopt;
+    return run.arrest_time * after;
+}
+
+}  // namespace
+
+StepProblem fault_problem(const StrikeSlipFault& fault, double t_end, double polynomial_bound)
+{
+    auto problem = std::make_shared<FaultProblem>(fault, t_end, polynomial_bound);
+    return {.description = fmt::format("fault of {0} x {0} elements, side {1:.0f} m",
+                                       fault.elements(), fault.parameters().side),
+            .group = fault.elements(),
+            .run = [problem](const StepRule& rule) { return problem->run(rule); }};
+}
+
+StepFamily fault_family(const FaultFamilyOptions& options)
+{
+    Random random(options.seed);
+    StepFamily out{.layout = fault_step_layout(),
+                   .judges_final = true,
+                   .problems = {},
+                   .tolerances = {2e-2, 3e-3, 5e-4}};
+    for (std::size_t k = 0; k < options.counts.size(); ++k) {
+        for (int left = options.counts[k]; left > 0;) {
+            const StrikeSlipFault fault({.elements = static_cast<int>(k) + 1,
+                                         .side = random.log_uniform(2000, 6000),
+                                         .damping = random.uniform(0.15, 0.45),
+                                         .friction_drop = random.log_uniform(0.05, 0.2),
+                                         .slip_distance = random.log_uniform(0.05, 0.2),
+                                         .overload = random.log_uniform(1e-6, 1e-4)});
+            const double after = random.uniform(1.2, 2.2);
+            const auto t_end = time_of_rupture(fault, after);
+            if (!t_end) continue;
+            out.problems.push_back(fault_problem(fault, *t_end));
+            --left;
+        }
+    }
+    return out;
+}
+
+}  // namespace ricochet::learn
