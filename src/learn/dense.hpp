@@ -93,7 +93,7 @@ struct DenseKernels {
     void (*outer_product)(const OuterProduct<T>&) noexcept = nullptr;
     void (*adam)(const AdamStep<T>&) noexcept = nullptr;
     void (*quantile_slopes)(const QuantileHuber<T>&) noexcept = nullptr;
-    double (*quantile_loss)(const QuantileHuber<T>&) noexcept = nullptr;  ///< and slopes
+    double (*quantile_loss)(const QuantileHuber<T>&) noexcept = nullptr;  ///< the loss alone
 };
 
 struct DenseTable {

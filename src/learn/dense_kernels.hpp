@@ -230,7 +230,8 @@ void adam(const AdamStep<T>& s) noexcept
     }
 }
 
-/// A few registers of quantiles against all targets. Where d is clipped to c in [0, 1] or
+/// A few registers of quantiles against all targets: writes the slopes, or returns the loss. Where
+/// d is clipped to c in [0, 1] or
 /// [-1, 0], the slope is -w c and the loss w c (d - c / 2).
 template <class T, std::size_t Registers, bool Loss>
 RICOCHET_ALWAYS Vector<T> quantile_block(const QuantileHuber<T>& q, std::size_t i) noexcept
@@ -266,7 +267,9 @@ RICOCHET_ALWAYS Vector<T> quantile_block(const QuantileHuber<T>& q, std::size_t 
         const std::size_t at = i + v * lanes<T>;
         const Vector<T> above = load(q.above + at);
         const Vector<T> below = load(q.below + at);
-        store<T>(q.slopes + at, -all(q.scale) * (above * up[v] + below * down[v]));
+        if constexpr (!Loss) {
+            store<T>(q.slopes + at, -all(q.scale) * (above * up[v] + below * down[v]));
+        }
         cost += above * cost_up[v] + below * cost_down[v];
     }
     return cost;

@@ -70,7 +70,7 @@ void GaussianActor<T>::draw(Noise& noise, Random& random) const
 }
 
 template <class T>
-void GaussianActor<T>::prepare(const T* parameters, Noise& noise) const
+void GaussianActor<T>::prepare_forward(const T* parameters, Noise& noise) const
 {
     for (std::size_t j = 0; j < latent(); ++j) {
         for (std::size_t a = 0; a < actions(); ++a) {
@@ -80,6 +80,12 @@ void GaussianActor<T>::prepare(const T* parameters, Noise& noise) const
             noise.variance[i] = noise.deviation[i] * noise.deviation[i];
         }
     }
+}
+
+template <class T>
+void GaussianActor<T>::prepare(const T* parameters, Noise& noise) const
+{
+    prepare_forward(parameters, noise);
     const std::size_t out = padded<T>(latent());
     learn::transpose(noise.product.data(), stride(), latent(), actions(),
                      noise.product_transposed.data(), out);

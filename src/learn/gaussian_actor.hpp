@@ -56,7 +56,9 @@ public:
     [[nodiscard]] Noise noise() const;
     /// New values of `noise.normal`.
     void draw(Noise& noise, Random& random) const;
-    /// All the others, from these and the parameters.
+    /// All but the transposed ones, from these and the parameters: enough for `forward`.
+    void prepare_forward(const T* parameters, Noise& noise) const;
+    /// All, for `backward` too.
     void prepare(const T* parameters, Noise& noise) const;
 
     [[nodiscard]] Work work(std::size_t rows) const;

@@ -88,11 +88,8 @@ double TqcLosses<T>::huber(Work& work, const Parameters& p, bool loss) const
                 .n = stride,
                 .m = kept,
                 .scale = scale};
-            if (loss) {
-                sum += kernels_->quantile_loss(row);
-            } else {
-                kernels_->quantile_slopes(row);
-            }
+            kernels_->quantile_slopes(row);
+            if (loss) sum += kernels_->quantile_loss(row);
         }
     }
     return sum;
