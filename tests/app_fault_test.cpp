@@ -99,5 +99,51 @@ TEST_F(App, SimulateFaultRefusesWhatDoesNotFit)
     expect_refused({"simulate", "pendulum", "--kernel", "k.npy"}, {"--kernel"});
 }
 
+TEST_F(App, SimulateFaultWithRateAndStateFriction)
+{
+    const Words words{"simulate", "fault", "--set", "rate_and_state=1", "elements=3", "b=0.04"};
+    Words all = words;
+    all.insert(all.end(), {"--t-end", "5e8", "--json", "--csv", "steps.csv", "--samples", "3"});
+    const nlohmann::json run = json(all);
+    EXPECT_EQ(run["outcome"], "reached_end");
+    EXPECT_EQ(run["parameters"]["b"], 0.04);
+    EXPECT_FALSE(run["parameters"].contains("friction_drop"));
+    EXPECT_EQ(run["statistics"]["unsolved_stages"], 0);
+    EXPECT_LE(run["largest_residual"].get<double>(), 1e-11);
+    ASSERT_FALSE(run["earthquakes"].empty());
+    const auto& event = run["earthquakes"][0];
+    EXPECT_GT(event["largest_velocity"].get<double>(), 0.01);
+    EXPECT_GT(event["mean_slip"].get<double>(), 0.001);
+    EXPECT_LT(event["start"].get<double>(), event["end"].get<double>());
+    EXPECT_DOUBLE_EQ(run["trajectory"]["mean_slip"][2].get<double>(),
+                     run["mean_slip"].get<double>());
+    const std::string csv = content(work() / "steps.csv");
+    EXPECT_TRUE(csv.starts_with("t [s],mean slip [m],mean velocity [m/s],fastest [m/s]\n"));
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 2 + run["statistics"]["steps"].get<int>());
+
+    all = words;
+    all.insert(all.end(), {"--t-end", "1e7", "--plot", "cycle.svg"});
+    EXPECT_EQ(this->run(all).status, 0);
+    EXPECT_NE(content(work() / "cycle.svg").find("fastest element"), std::string::npos);
+}
+
+TEST_F(App, SimulateFaultRefusesFrictionOfTheOtherKind)
+{
+    const auto refused = [&](const Words& more, const Words& parts) {
+        Words all{"simulate", "fault"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_refused(all, parts);
+    };
+    refused({"--set", "a=0.01"}, {"a of fault", "rate_and_state=1"});
+    refused({"--set", "rate_and_state=1", "friction_drop=0.2"}, {"friction_drop"});
+    refused({"--set", "rate_and_state=1", "d_rs=-1"}, {"d_rs", "got -1"});
+    refused({"--set", "rate_and_state=1", "order=3"}, {"order", "got 3"});
+    refused({"--set", "rate_and_state=1", "theta=-1"}, {"theta", "got -1"});
+    refused({"--set", "rate_and_state=1", "slip_rate=0"}, {"slip_rate", "got 0"});
+    refused({"--set", "rate_and_state=1", "--integrator", "bathe"}, {"--integrator"});
+    refused({"--set", "rate_and_state=1", "--step", "-1"}, {"--step", "got -1"});
+    expect_refused({"compare", "fault", "--set", "rate_and_state=1"}, {"rate_and_state"});
+}
+
 }  // namespace
 }  // namespace ricochet

@@ -118,8 +118,8 @@ private:
     [[nodiscard]] double first_step() const
     {
         if (how_.first_step > 0) return how_.first_step;
-        const double fastest = now_.v.cwiseAbs().maxCoeff() * fault_.velocity_unit();
-        return std::min(1e-3 * law_.parameters().d_rs / fastest, 1e-2 * options_.t_end);
+        const double balance = std::abs(now_.v[0]) / (law_.parameters().a * normal_.maxCoeff());
+        return std::min(balance * fault_.time_unit(), 1e-2 * options_.t_end);
     }
 
     void start(const FaultFriction& friction)

@@ -45,7 +45,9 @@ struct RateStateOptions {
     /// 1, 2 or 4. Where elements are braked to a halt, order 4 leaves some of those that should be
     /// at rest creeping, which its estimate sees, and takes far more steps than order 2.
     int order = 2;
-    double first_step = 0;     ///< [s]; 0: 1e-3 D_RS / |slip_rate|, at most a hundredth of the run
+    /// [s]; 0: |slip_rate| rho L / (a sigma), in which the direct effect ends an imbalance of the
+    /// start, at most a hundredth of the run.
+    double first_step = 0;
     double tolerance = 1e-11;  ///< of a stage's residual, relative to the sizes of its terms
     int max_iterations = 40;   ///< of Newton's method
     int max_inner = 200;       ///< of conjugate gradients, in one of them

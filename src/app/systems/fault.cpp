@@ -128,33 +128,12 @@ RuptureOptions options(const SystemEntry& system, const SimulateRequest& request
     return out;
 }
 
-/// The mean motion at `n` even times, between the samples that there are.
-struct Samples {
-    std::vector<double> t, slip, velocity;
-};
-
-Samples sampled(const Rupture& r, double t_end, std::size_t n)
-{
-    Samples out;
-    std::size_t at = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-        const double t = t_end * static_cast<double>(i) / static_cast<double>(n - 1);
-        while (at + 2 < r.times.size() && r.times[at + 1] < t) ++at;
-        const double span = r.times[at + 1] - r.times[at];
-        const double x = span > 0 ? std::clamp((t - r.times[at]) / span, 0.0, 1.0) : 1;
-        out.t.push_back(t);
-        out.slip.push_back(std::lerp(r.mean_slips[at], r.mean_slips[at + 1], x));
-        out.velocity.push_back(std::lerp(r.mean_velocities[at], r.mean_velocities[at + 1], x));
-    }
-    return out;
-}
-
 std::string json(const SystemEntry& system, const std::vector<double>& values,
                  const StrikeSlipFault& fault, const RuptureOptions& asked, const Integration& how,
                  const Rupture& r, const SimulateRequest& request, double seconds)
 {
     Json parameters = Json::object();
-    for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t i = 0; i < weakening_parameters; ++i) {
         parameters[std::string(system.parameters[i].name)] = values[i];
     }
     const RuptureStatistics& s = r.statistics;
@@ -191,7 +170,7 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
     }
     if (request.kernel) out["kernel"] = request.kernel->string();
     if (request.samples) {
-        const Samples samples = sampled(r, asked.t_end, *request.samples);
+        const MeanSamples samples = sampled(r, asked.t_end, *request.samples);
         out["trajectory"] = {
             {"t", samples.t}, {"mean_slip", samples.slip}, {"mean_velocity", samples.velocity}};
     }
@@ -225,26 +204,11 @@ std::string text(const SystemEntry& system, const StrikeSlipFault& fault, const 
     return out;
 }
 
-std::string csv(const Samples& samples)
+std::string csv(const MeanSamples& samples)
 {
     std::string out = "t [s],mean slip [m],mean velocity [m/s]\n";
     for (std::size_t i = 0; i < samples.t.size(); ++i) {
         out += fmt::format("{},{},{}\n", samples.t[i], samples.slip[i], samples.velocity[i]);
-    }
-    return out;
-}
-
-/// x [km], depth [km], value; rows separated by blank lines, as gnuplot's images want them.
-std::string field(const StrikeSlipFault& fault, const Eigen::VectorXd& values)
-{
-    std::string out;
-    const int n = fault.elements();
-    for (int z = 0; z < n; ++z) {
-        for (int x = 0; x < n; ++x) {
-            out += fmt::format("{} {} {}\n", fault.depth(x) / 1000, fault.depth(z) / 1000,
-                               values[Eigen::Index{z} * n + x]);
-        }
-        out += '\n';
     }
     return out;
 }
@@ -259,7 +223,7 @@ const RuptureSnapshot& nearest(const Rupture& r, double t)
 void draw_rupture(const StrikeSlipFault& fault, const RuptureOptions& asked, const Rupture& r,
                   const std::filesystem::path& file)
 {
-    const Samples samples = sampled(r, asked.t_end, 1001);
+    const MeanSamples samples = sampled(r, asked.t_end, 1001);
     std::string mean;
     for (std::size_t i = 0; i < samples.t.size(); ++i) {
         mean += fmt::format("{} {} {}\n", samples.t[i], samples.slip[i], samples.velocity[i]);
@@ -267,10 +231,11 @@ void draw_rupture(const StrikeSlipFault& fault, const RuptureOptions& asked, con
     const double unit = fault.time_unit();
     const RuptureSnapshot* times[] = {&nearest(r, r.peak_time - 2 * unit), &nearest(r, r.peak_time),
                                       &nearest(r, r.peak_time + 1.5 * unit)};
-    PlotFiles files{
-        {"mean", mean}, {"slip", field(fault, r.slip)}, {"peak", field(fault, r.peak_velocity_of)}};
+    PlotFiles files{{"mean", mean},
+                    {"slip", fault_map(fault, r.slip)},
+                    {"peak", fault_map(fault, r.peak_velocity_of)}};
     for (std::size_t i = 0; i < 3; ++i) {
-        files.emplace_back(fmt::format("velocity{}", i), field(fault, times[i]->velocity));
+        files.emplace_back(fmt::format("velocity{}", i), fault_map(fault, times[i]->velocity));
     }
     std::string script = plot_head(file, 1500, 1250) +
                          fmt::format(
@@ -304,6 +269,8 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
 {
     refuse_what_is_not_for_faults(request.run);
     const std::vector<double> values = parameter_values(system, request.run.set);
+    if (has_rate_and_state(values)) return simulate_rate_state_fault(system, request, values);
+    refuse_rate_and_state(request.run.set, system);
     const Integration how = integration(request.run);
     RuptureOptions asked = options(system, request);
     validate(asked);
@@ -327,6 +294,36 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
 }
 
 }  // namespace
+
+MeanSamples sampled(const Rupture& r, double t_end, std::size_t n)
+{
+    MeanSamples out;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double t = t_end * static_cast<double>(i) / static_cast<double>(n - 1);
+        while (at + 2 < r.times.size() && r.times[at + 1] < t) ++at;
+        const double span = r.times[at + 1] - r.times[at];
+        const double x = span > 0 ? std::clamp((t - r.times[at]) / span, 0.0, 1.0) : 1;
+        out.t.push_back(t);
+        out.slip.push_back(std::lerp(r.mean_slips[at], r.mean_slips[at + 1], x));
+        out.velocity.push_back(std::lerp(r.mean_velocities[at], r.mean_velocities[at + 1], x));
+    }
+    return out;
+}
+
+std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& values)
+{
+    std::string out;
+    const int n = fault.elements();
+    for (int z = 0; z < n; ++z) {
+        for (int x = 0; x < n; ++x) {
+            out += fmt::format("{} {} {}\n", fault.depth(x) / 1000, fault.depth(z) / 1000,
+                               values[Eigen::Index{z} * n + x]);
+        }
+        out += '\n';
+    }
+    return out;
+}
 
 StrikeSlipFault::Parameters fault_parameters(const std::vector<double>& p,
                                              const std::optional<std::filesystem::path>& kernel)
@@ -361,7 +358,7 @@ SystemEntry fault_entry()
     const Range positive{.lower = 0};
     const Range not_negative{.lower = 0, .lower_included = true};
     const Range share{.lower = 0, .upper = 1, .lower_included = true, .upper_included = true};
-    return {
+    SystemEntry entry{
         .name = StrikeSlipFault::name,
         .description = "A strike-slip fault of n x n elements slips in an earthquake.",
         .parameters = {{.name = "elements",
@@ -442,6 +439,8 @@ SystemEntry fault_entry()
         .simulate = simulate_fault,
         .compare = compare_fault,
     };
+    for (const Parameter& p : rate_state_parameters()) entry.parameters.push_back(p);
+    return entry;
 }
 
 }  // namespace ricochet::app

@@ -160,8 +160,12 @@ std::string json(const StrikeSlipFault& fault, const Rupture& exact,
 int compare_fault(const SystemEntry& system, const CompareRequest& request)
 {
     if (request.csv) throw BadInput("--csv is of event times, and a fault has none; take --json");
-    StrikeSlipFault::Parameters parameters =
-        fault_parameters(parameter_values(system, request.set));
+    const std::vector<double> values = parameter_values(system, request.set);
+    if (has_rate_and_state(values)) {
+        throw BadInput("compare fault is of friction that weakens with slip, not rate_and_state=1");
+    }
+    refuse_rate_and_state(request.set, system);
+    StrikeSlipFault::Parameters parameters = fault_parameters(values);
     // Without a mesh of one's own: large enough for arrests one after the other.
     const bool given = std::any_of(request.set.begin(), request.set.end(),
                                    [](const auto& text) { return text.starts_with("elements="); });
