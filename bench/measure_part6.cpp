@@ -1,5 +1,6 @@
-// What the strike-slip fault must show.
+// What the strike-slip fault and the trainers must show.
 #include "measure_fault.hpp"
+#include "measure_trainers.hpp"
 
 namespace ricochet::bench {
 
@@ -47,6 +48,16 @@ std::vector<Check> checks_of_part_6()
          .sentence = "cost and mesh error from 10 x 10 to 400 x 400",
          .target = "shown",
          .run = table_of_meshes},
+        {.part = 6,
+         .id = "tqc-time",
+         .sentence = "20 000 steps of TQC with the networks of the source, 9 observations, 1 action",
+         .target = "<= 90 s on two cores",
+         .run = time_of_tqc},
+        {.part = 6,
+         .id = "trainers-optimum",
+         .sentence = "cost of a learned regulator over that of the optimal one, median of 5 seeds",
+         .target = "<= 1.1",
+         .run = cost_over_optimum},
     };
 }
 

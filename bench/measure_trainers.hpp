@@ -1,0 +1,14 @@
+// Checks of the trainers of policies.
+#pragma once
+
+#include "measure.hpp"
+
+namespace ricochet::bench {
+
+/// TQC with the networks of the source, on an environment that costs next to nothing.
+[[nodiscard]] Measured time_of_tqc();
+
+/// Both trainers on a linear-quadratic regulator.
+[[nodiscard]] Measured cost_over_optimum();
+
+}  // namespace ricochet::bench
