@@ -14,4 +14,10 @@ namespace ricochet::bench {
 [[nodiscard]] Measured bathe_100();
 [[nodiscard]] Measured table_of_meshes();
 
+/// With rate-and-state friction.
+[[nodiscard]] Measured compare_fault_with_slider();
+[[nodiscard]] Measured observe_orders_on_fault();
+[[nodiscard]] Measured cycle_25();
+[[nodiscard]] Measured cycle_50();
+
 }  // namespace ricochet::bench

@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "measure.hpp"
+#include "measure_fault.hpp"
 
 namespace ricochet::bench {
 
@@ -83,6 +84,26 @@ std::vector<Check> checks_of_part_7()
          .sentence = "slip law: state-dependent exact pair, and the class without",
          .target = "<= 1e-9; shown",
          .run = learn_slip_law},
+        {.part = 7,
+         .id = "fault-slider",
+         .sentence = "a fault of one element against the slider, orders 1, 2, 4",
+         .target = "<= 1e-11 relative after 300 steps",
+         .run = compare_fault_with_slider},
+        {.part = 7,
+         .id = "fault-orders",
+         .sentence = "observed orders of steps 1, 2, 4 on 10 x 10 elements",
+         .target = "1, 2 within 0.1; 4 within 0.4",
+         .run = observe_orders_on_fault},
+        {.part = 7,
+         .id = "fault-cycle-25",
+         .sentence = "25 x 25 elements, 32 years: earthquakes from load to rest",
+         .target = "every stage solved to 1e-11, 60 s, within 1 % of a tenth of the tolerance",
+         .run = cycle_25},
+        {.part = 7,
+         .id = "fault-cycle-50",
+         .sentence = "50 x 50 elements, 3.2 years with the first earthquake",
+         .target = "every stage solved to 1e-11, 120 s",
+         .run = cycle_50},
     };
 }
 

@@ -203,7 +203,7 @@ TEST(FaultRateState, StageIsSolvedForVelocitiesOverTwelveDecades)
 TEST(FaultRateState, SlidingWithThePlatesIsSteady)
 {
     const StrikeSlipFault fault({.elements = 4});
-    FaultFriction friction{.plate_velocity = 1e-9, .slip_rate = 1e-9};
+    FaultFriction friction{.plate_velocity = 1e-9, .slip_rate = 1e-9, .overload = 0};
     friction.law.a = 0.02;
     friction.law.b = 0.015;
     const double while_sliding = 1e3 * friction.law.d_rs / 1e-9;  // over 1e3 D_RS

@@ -37,8 +37,9 @@ struct FaultFriction {
     double normal_stress = 0;      ///< sigma [Pa] of all elements; 0: that of the fault, with depth
     double slip_rate = 1e-9;       ///< V at the start [m/s], not zero; positive with the log form
     std::optional<double> theta{};  ///< [s] at the start, positive; none: steady at |slip_rate|
-    /// tau = (1 + overload) sigma f at the start, above -1.
-    double overload = 0;
+    /// tau = (1 + overload) sigma f at the start, above -1. With 0 a start at `plate_velocity` and
+    /// its steady state goes on sliding so, stable or not.
+    double overload = 1e-5;
 };
 
 struct RateStateOptions {

@@ -1,0 +1,145 @@
+// Rate-and-state friction on the strike-slip fault.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <string>
+
+#include "measure_fault.hpp"
+#include "ricochet/friction/spring_slider.hpp"
+#include "ricochet/systems/fault_rate_state.hpp"
+
+namespace ricochet::bench {
+
+namespace {
+
+constexpr double constant_steps = std::numeric_limits<double>::infinity();
+
+/// The start is six percent faster than the plates, which is unstable: what is below the tolerance
+/// would have its own time to grow.
+const FaultFriction disturbed{.overload = 1e-3};
+
+struct TimedCycle {
+    RateStateRupture run;
+    double seconds = 0;  ///< processor time, with everything that is made before
+};
+
+TimedCycle cycle(int n, double t_end, double rtol)
+{
+    const std::clock_t start = std::clock();
+    const StrikeSlipFault fault({.elements = n});
+    TimedCycle out{.run = simulate(fault, {.t_end = t_end, .rtol = rtol}, disturbed)};
+    out.seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+    return out;
+}
+
+std::string counts(const TimedCycle& c)
+{
+    const RuptureStatistics& s = c.run.rupture.statistics;
+    const auto per_stage = [&](std::uint64_t count) {
+        return static_cast<double>(count) / static_cast<double>(s.solves);
+    };
+    std::string out = fmt::format(
+        "{} steps, {} rejected; {} stages, {} unsolved, residual {:.1e}, {:.2f} Newton and {:.2f} "
+        "inner iterations and {:.1f} products with K a stage; {:.1f} s",
+        s.steps, s.rejected, s.solves, c.run.unsolved, c.run.residual, per_stage(s.iterations),
+        per_stage(c.run.inner), per_stage(s.products), c.seconds);
+    for (const FaultEarthquake& e : c.run.earthquakes) {
+        out +=
+            fmt::format("; earthquake at {:.6g} s for {:.4g} s, slip {:.5f} m, fastest {:.4f} m/s",
+                        e.start, e.end - e.start, e.mean_slip, e.largest_velocity);
+    }
+    return out;
+}
+
+bool solved(const TimedCycle& c)
+{
+    return c.run.rupture.outcome == RuptureOutcome::reached_end && c.run.unsolved == 0 &&
+           c.run.residual <= RateStateOptions{}.tolerance;
+}
+
+}  // namespace
+
+Measured compare_fault_with_slider()
+{
+    const StrikeSlipFault fault({.elements = 1, .damping = 0});
+    const auto& p = fault.parameters();
+    const FaultFriction friction{.plate_velocity = 2e-3, .slip_rate = 1e-3, .overload = 1e-3};
+    const double sigma = p.stress_gradient * p.side / 2;
+    const double stiffness = p.shear_modulus / p.side;
+    const AgeingLaw<> law(friction.law);
+    const double xi = law.steady_state(1e-3);
+    const double draw = 1.001 * sigma * law.friction(1e-3, xi) / stiffness;
+    const SpringSlider slider{
+        .friction = friction.law,
+        .block = {.mass = p.density * p.side, .stiffness = stiffness, .normal_force = sigma},
+        .load = SliderLoad(draw, 2e-3)};
+    double worst = 0;
+    for (const int order : {1, 2, 4}) {
+        const RateStateRupture r = simulate(
+            fault, {.t_end = 30, .step = 0.1, .rtol = constant_steps}, friction, {.order = order});
+        const SliderRun s =
+            run_slider(slider, {0, 0, 1e-3, xi}, {.t_end = 30, .order = order, .step = 0.1});
+        worst = std::max({worst, std::abs(r.rupture.slip[0] / s.state.x - 1),
+                          std::abs(r.rupture.velocity[0] / s.state.v - 1),
+                          std::abs(r.xi[0] / s.state.xi - 1)});
+    }
+    return {.pass = worst <= 1e-11,
+            .text = fmt::format("slip, velocity, state apart by at most {:.1e}", worst)};
+}
+
+Measured observe_orders_on_fault()
+{
+    const StrikeSlipFault fault({.elements = 10});
+    const FaultFriction friction{.plate_velocity = 1e-3, .slip_rate = 2e-3, .overload = 1e-3};
+    const auto velocity = [&](int order, double h) {
+        return simulate(fault, {.t_end = 8, .step = h, .rtol = constant_steps}, friction,
+                        {.order = order, .tolerance = 1e-13})
+            .rupture.velocity;
+    };
+    const Eigen::VectorXd exact = velocity(4, 1.0 / 256);
+    Measured out{.pass = true, .text = {}};
+    for (const int order : {1, 2, 4}) {
+        const double coarse = (velocity(order, 1.0 / 32) - exact).norm();
+        const double fine = (velocity(order, 1.0 / 64) - exact).norm();
+        const double observed = std::log2(coarse / fine);
+        out.pass = out.pass && std::abs(observed - order) <= (order == 4 ? 0.4 : 0.1);
+        out.text += fmt::format("{}{:.2f}", out.text.empty() ? "" : ", ", observed);
+    }
+    return out;
+}
+
+Measured cycle_25()
+{
+    const TimedCycle usual = cycle(25, 1e9, 1e-3);
+    const TimedCycle finer = cycle(25, 1e8, 1e-4);
+    Measured out;
+    out.details = {counts(usual), "rtol 1e-4, 1e8 s: " + counts(finer)};
+    if (usual.run.earthquakes.size() < 2 || finer.run.earthquakes.empty()) {
+        out.text = "fewer earthquakes than expected";
+        return out;
+    }
+    const FaultEarthquake& a = usual.run.earthquakes.front();
+    const FaultEarthquake& b = finer.run.earthquakes.front();
+    const double slip = std::abs(a.mean_slip / b.mean_slip - 1);
+    const double start = std::abs(a.start / b.start - 1);
+    out.pass =
+        solved(usual) && solved(finer) && slip <= 0.01 && start <= 0.01 && usual.seconds <= 60;
+    out.text = fmt::format(
+        "{} earthquakes, {} unsolved, {:.1f} s; from rtol 1e-4: slip {:.3f} %, start {:.3f} %",
+        usual.run.earthquakes.size(), usual.run.unsolved, usual.seconds, 100 * slip, 100 * start);
+    return out;
+}
+
+Measured cycle_50()
+{
+    const TimedCycle c = cycle(50, 1e8, 1e-3);
+    return {.pass = solved(c) && !c.run.earthquakes.empty() && c.seconds <= 120,
+            .text = fmt::format("{} earthquakes, {} unsolved, {:.1f} s", c.run.earthquakes.size(),
+                                c.run.unsolved, c.seconds),
+            .details = {counts(c)}};
+}
+
+}  // namespace ricochet::bench
