@@ -1,6 +1,5 @@
 #include "workers.hpp"
 
-#include <exception>
 #include <system_error>
 
 namespace ricochet::learn {
@@ -10,6 +9,13 @@ namespace {
 // A task follows another within a fraction of a millisecond; falling asleep and
 // being woken takes a good part of that.
 constexpr int spins = 4000;
+
+constexpr std::uint64_t task = std::uint64_t{1} << 32U;
+
+constexpr std::uint64_t parts_left(std::uint64_t ticket) noexcept
+{
+    return ticket % task;
+}
 
 /// Returns when `value` is no longer `old`.
 template <class T>
@@ -35,8 +41,8 @@ Workers::Workers(unsigned threads)
 Workers::~Workers()
 {
     closing_ = true;
-    ++round_;
-    round_.notify_all();
+    ticket_ += task;
+    ticket_.notify_all();
     for (std::thread& thread : threads_) thread.join();
 }
 
@@ -45,12 +51,13 @@ void Workers::run(std::size_t n, const std::function<void(std::size_t)>& part)
     part_ = &part;
     parts_ = n;
     errors_.assign(n, nullptr);
-    next_ = 0;
-    busy_ = static_cast<unsigned>(threads_.size());
-    ++round_;
-    round_.notify_all();
+    unfinished_ = n;
+    ticket_ += task + n;  // all parts of the last task were taken
+    ticket_.notify_all();
     work();
-    for (unsigned left = busy_; left > 0; left = busy_) await_change(busy_, left);
+    for (std::size_t left = unfinished_; left > 0; left = unfinished_) {
+        await_change(unfinished_, left);
+    }
     for (const std::exception_ptr& error : errors_) {
         if (error) std::rethrow_exception(error);
     }
@@ -58,25 +65,37 @@ void Workers::run(std::size_t n, const std::function<void(std::size_t)>& part)
 
 void Workers::wait_for_work()
 {
-    for (unsigned seen = 0;;) {
-        await_change(round_, seen);
-        ++seen;  // no round begins before the last one is over
-        if (closing_) return;
-        work();
-        if (--busy_ == 0) busy_.notify_one();
+    while (!closing_) {
+        const std::uint64_t seen = ticket_;
+        if (parts_left(seen) > 0) {
+            work();
+        } else if (!closing_) {
+            await_change(ticket_, seen);
+        }
     }
 }
 
-void Workers::work() noexcept
+void Workers::work()
 {
-    for (std::size_t i = next_++; i < parts_; i = next_++) {
+    for (std::uint64_t ticket = ticket_; parts_left(ticket) > 0; ticket = ticket_) {
+        if (!ticket_.compare_exchange_weak(ticket, ticket - 1)) continue;
+        const auto i = parts_ - static_cast<std::size_t>(parts_left(ticket));
         try {
             (*part_)(i);
         } catch (...) {
             errors_[i] = std::current_exception();
-            next_ = parts_;
+            std::uint64_t rest = ticket_;
+            while (!ticket_.compare_exchange_weak(rest, rest - parts_left(rest))) {
+            }
+            finish(static_cast<std::size_t>(parts_left(rest)));
         }
+        finish(1);
     }
+}
+
+void Workers::finish(std::size_t parts)
+{
+    if (unfinished_.fetch_sub(parts) == parts) unfinished_.notify_all();
 }
 
 }  // namespace ricochet::learn

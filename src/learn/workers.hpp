@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <thread>
@@ -12,7 +13,8 @@ namespace ricochet::learn {
 
 /// A team that does task after task together with the caller.
 ///
-/// Who does which part is left open, so that parts must not depend on each other.
+/// Who does which part is left open, so that parts must not depend on each other. Nobody is
+/// waited for who has not begun a part: on a busy machine the caller may do all of them.
 class Workers {
 public:
     /// @param threads  with the caller's; at least 1. Where the system gives fewer,
@@ -22,21 +24,23 @@ public:
     Workers(const Workers&) = delete;
     Workers& operator=(const Workers&) = delete;
 
-    /// Calls `part(i)` for i = 0 ... n - 1, and returns when all are done. What is
+    /// Calls `part(i)` for i = 0 ... n - 1, n < 2^32, and returns when all are done. What is
     /// not begun when one throws is left out; of the parts that threw, the first is thrown on.
     void run(std::size_t n, const std::function<void(std::size_t)>& part);
 
 private:
     void wait_for_work();
-    void work() noexcept;
+    void work();
+    void finish(std::size_t parts);
 
     const std::function<void(std::size_t)>* part_ = nullptr;
     std::size_t parts_ = 0;
-    std::atomic<std::size_t> next_{0};  ///< the first part that nobody has taken
-    std::atomic<unsigned> busy_{0};     ///< threads besides the caller's
-    std::atomic<unsigned> round_{0};    ///< rises with every task
-    std::atomic<bool> closing_{false};
     std::vector<std::exception_ptr> errors_;  ///< one per part
+    /// Number of the task, times 2^32, plus its parts that nobody has taken. Who takes one by
+    /// an exchange knows that its task goes on, and may read what is above.
+    std::atomic<std::uint64_t> ticket_{0};
+    std::atomic<std::size_t> unfinished_{0};
+    std::atomic<bool> closing_{false};
     std::vector<std::thread> threads_;
 };
 
