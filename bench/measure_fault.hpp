@@ -17,6 +17,7 @@ namespace ricochet::bench {
 /// With rate-and-state friction.
 [[nodiscard]] Measured compare_fault_with_slider();
 [[nodiscard]] Measured observe_orders_on_fault();
+[[nodiscard]] Measured solve_random_stages();
 [[nodiscard]] Measured cycle_25();
 [[nodiscard]] Measured cycle_50();
 

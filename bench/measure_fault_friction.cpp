@@ -5,10 +5,12 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
+#include <random>
 #include <string>
 
 #include "measure_fault.hpp"
 #include "ricochet/friction/spring_slider.hpp"
+#include "ricochet/systems/fault_friction_stage.hpp"
 #include "ricochet/systems/fault_rate_state.hpp"
 
 namespace ricochet::bench {
@@ -107,6 +109,50 @@ Measured observe_orders_on_fault()
         const double observed = std::log2(coarse / fine);
         out.pass = out.pass && std::abs(observed - order) <= (order == 4 ? 0.4 : 0.1);
         out.text += fmt::format("{}{:.2f}", out.text.empty() ? "" : ", ", observed);
+    }
+    return out;
+}
+
+Measured solve_random_stages()
+{
+    // Velocities of 1e-12 to 1 m/s, states in [-10, 30], stresses from backwards to 1.5 strengths.
+    const StrikeSlipFault fault({.elements = 8});
+    const Eigen::Index n = fault.size();
+    StageStiffness stiffness(fault, 1e-4);
+    std::mt19937_64 engine(7);
+    const auto uniform = [&engine] { return static_cast<double>(engine() >> 11) * 0x1p-53; };
+    constexpr int repeats = 400;
+    Measured out{.pass = true, .text = {}};
+    for (const double b : {0.005, 0.02}) {  // below and above a
+        RateStateParameters p = FaultFriction{}.law;
+        p.b = b;
+        const AgeingLaw<> law(p);
+        FaultFrictionStage<AgeingLaw<>> stage(law, fault, stiffness, fault.weight());
+        const double strongest = fault.weight().maxCoeff() * b;
+        const double convex = std::sqrt(p.d_rs / fault.slip_unit() / strongest);
+        int within = 0, beyond = 0, all_beyond = 0, worst = 0;
+        for (double lg = -6; lg <= 9; lg += 1.5) {
+            stiffness.set_length(std::pow(10, lg) / fault.time_unit());
+            const bool may_fail = b > p.a && stiffness.length() > convex;
+            all_beyond += may_fail ? repeats : 0;
+            for (int i = 0; i < repeats; ++i) {
+                FaultStageEquation e{.force = Eigen::VectorXd(n), .xi = Eigen::VectorXd(n)};
+                FaultStagePoint at{.v = Eigen::VectorXd(n), .xi = {}, .friction = {}, .ease = {}};
+                for (Eigen::Index k = 0; k < n; ++k) {
+                    e.xi[k] = -10 + 40 * uniform();
+                    at.v[k] = std::pow(10, -12 + 12 * uniform()) / fault.velocity_unit();
+                    e.force[k] = at.v[k] / stiffness.length() +
+                                 fault.weight()[k] * p.f_star * (1.7 * uniform() - 0.2);
+                }
+                const FaultStageReport report = stage.solve(e, at);
+                (may_fail ? beyond : within) += !report.solved;
+                worst = std::max(worst, report.iterations);
+            }
+        }
+        out.pass = out.pass && within == 0 && beyond <= all_beyond / 20;
+        out.text += fmt::format("{}b = {}: {} unsolved", out.text.empty() ? "" : "; ", b, within);
+        if (all_beyond > 0) out.text += fmt::format(", {} of {} beyond", beyond, all_beyond);
+        out.text += fmt::format(", at most {} iterations", worst);
     }
     return out;
 }
