@@ -127,9 +127,11 @@ Measured time_of_tqc()
         learn::train_tqc(world.environment(), {.training = {.steps = 20'000, .threads = 2}});
     const double processor = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     const bool done = trained.outcome == learn::PolicyOutcome::finished;
-    return {.pass = done && trained.seconds <= 90,
-            .text = fmt::format("{:.1f} s on two threads, {:.1f} s of processor time ({})",
-                                trained.seconds, processor, name(best_instruction_set()))};
+    // Of both threads together: more than two cores take that have nothing else to do.
+    return {
+        .pass = done && processor <= 90,
+        .text = fmt::format("{:.1f} s of processor time of two threads, {:.1f} s on the clock ({})",
+                            processor, trained.seconds, name(best_instruction_set()))};
 }
 
 Measured cost_over_optimum()

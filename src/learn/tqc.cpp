@@ -130,8 +130,9 @@ public:
             .discount = static_cast<float>(options_.training.discount),
             .batch = options_.training.batch};
         workers_.run(parts_.size(), [&](std::size_t k) {
-            critic_losses_[k] = losses_.critic_part(p, parts_[k], losses,
+            const double loss = losses_.critic_part(p, parts_[k], losses,
                                                     critic_gradient_.data() + k * critics_.size());
+            critic_losses_[k] = losses ? loss : std::numeric_limits<double>::quiet_NaN();
         });
         move_critics();
         workers_.run(parts_.size(), [&](std::size_t k) {

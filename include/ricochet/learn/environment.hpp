@@ -28,10 +28,10 @@ struct Environment {
     std::size_t actions = 0;       ///< length of an action, whose components lie in [-1, 1]
 
     /// Begins an episode; writes the first observation.
-    std::function<void(std::uint64_t episode_seed, std::span<double> observation)> reset;
+    std::function<void(std::uint64_t episode_seed, std::span<double> observation)> reset{};
 
     /// Acts; writes the observation after. Not called after `terminal` or `truncated`.
-    std::function<Reaction(std::span<const double> action, std::span<double> observation)> step;
+    std::function<Reaction(std::span<const double> action, std::span<double> observation)> step{};
 };
 
 }  // namespace ricochet::learn

@@ -42,9 +42,10 @@ struct PolicyProgress {
     std::size_t step = 0;      ///< done so far
     std::size_t steps = 0;     ///< of the training
     std::size_t episodes = 0;  ///< ended so far
-    double mean_return =
-        0;  ///< of the episodes that ended since the last report, undiscounted; NaN: none
-    double critic_loss = 0;  ///< of the last batch; NaN before the first, as the next two
+    /// Of the episodes that ended since the last report, undiscounted; NaN: none.
+    double mean_return = 0;
+    /// Of the last batch; NaN where there is none, or no report was due. So the next two.
+    double critic_loss = 0;
     double actor_loss = 0;
     double temperature = 0;  ///< weight of the entropy; 0 for a trainer without
     double seconds = 0;      ///< so far
