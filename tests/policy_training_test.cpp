@@ -140,21 +140,26 @@ void expect_same_layers(const Model& a, const Model& b)
     }
 }
 
+/// Root mean square of what it misses the best action of the bandit by.
+double miss(const TrainedPolicy& trained)
+{
+    const Mlp<float> policy(trained.policy);
+    double squares = 0;
+    for (double s = -1; s <= 1; s += 0.125) {
+        squares += (act(policy, s) - s / 2) * (act(policy, s) - s / 2) / 17;
+    }
+    return std::sqrt(squares);
+}
+
 TEST_P(PolicyTrainingWith, FindsTheBestActionOfABandit)
 {
     const TrainedPolicy trained =
         train(bandit(), {.steps = 3000, .random_steps = 200, .batch = 64, .polyak = 0.02});
     ASSERT_EQ(trained.outcome, PolicyOutcome::finished) << trained.message;
     EXPECT_EQ(trained.episodes, 3000U);
-    const Mlp<float> policy(trained.policy);
-    double squares = 0;
-    for (double s = -1; s <= 1; s += 0.125) {
-        const double miss = act(policy, s) - s / 2;
-        squares += miss * miss / 17;
-    }
     // The best constant misses by 0.31 in the mean square. Eight seeds of each trainer left
     // 0.006 to 0.045 of that; bits, and so the luck of a seed, differ between instruction sets.
-    EXPECT_LT(std::sqrt(squares), 0.08);
+    EXPECT_LT(miss(trained), 0.08);
 }
 
 TEST_P(PolicyTrainingWith, NearsTheOptimalReturnOfALinearQuadraticRegulator)
@@ -247,6 +252,28 @@ TEST_P(PolicyTrainingWith, GoesOnWithMoreStepsAsIfThereHadBeenMoreFromTheStart)
     const TrainedPolicy whole = train(regulator(), {.steps = 200, .random_steps = 50, .batch = 32});
     options.resume = true;
     expect_same_layers(train(regulator(), options).policy, whole.policy);
+    std::filesystem::remove(file);
+}
+
+TEST_P(PolicyTrainingWith, StartsFromTheNetworksOfAnother)
+{
+    const std::filesystem::path file = scratch("first.checkpoint");
+    const TrainedPolicy first = train(
+        bandit(),
+        {.steps = 2000, .random_steps = 200, .batch = 64, .polyak = 0.02, .checkpoint = file});
+    // Fifty updates from other transitions change little; without a start they teach little.
+    PolicyTraining options{.steps = 100, .random_steps = 50, .batch = 64, .seed = 9};
+    const TrainedPolicy fresh = train(bandit(), options);
+    options.start_from = file;
+    const TrainedPolicy second = train(bandit(), options);
+    EXPECT_EQ(second.steps, 100U);
+    EXPECT_EQ(second.curve.size(), 1U);
+    EXPECT_LT(miss(second), miss(first) + 0.1);
+    EXPECT_GT(miss(fresh), 2 * miss(second));
+
+    Environment wider = bandit();
+    wider.observations = 2;
+    EXPECT_THROW((void)train(wider, options), std::runtime_error);
     std::filesystem::remove(file);
 }
 
@@ -346,6 +373,25 @@ TEST_P(PolicyTrainingWith, RefusesAWrongSetUp)
     refuses(bandit(), {.polyak = 0});
     refuses(bandit(), {.threads = 0});
     refuses(bandit(), {.resume = true});
+}
+
+TEST(PolicyTraining, ResumesToTheSameBitsBetweenTwoDrawsOfTheNoise)
+{
+    const std::filesystem::path file =
+        std::filesystem::temp_directory_path() / "ricochet_tqc_noise.checkpoint";
+    TqcOptions options{
+        .training = {.steps = 150, .random_steps = 50, .batch = 32, .report_every = 74},
+        .actor = {8},
+        .critic = {8},
+        .noise_interval = 5};
+    const TrainedPolicy whole = train_tqc(regulator(), options);
+    options.training.checkpoint = file;
+    const TrainedPolicy part =
+        train_tqc(regulator(), options, [](const PolicyProgress&, const Model&) { return false; });
+    EXPECT_EQ(part.steps, 74U);  // 24 with noise
+    options.training.resume = true;
+    expect_same_layers(train_tqc(regulator(), options).policy, whole.policy);
+    std::filesystem::remove(file);
 }
 
 TEST(PolicyTraining, KeepsFiniteWeightsWhenItDiverges)

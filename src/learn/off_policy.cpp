@@ -68,10 +68,12 @@ public:
         s_.observation.resize(environment.observations);
         s_.lowest.assign(environment.observations, infinity);
         s_.highest.assign(environment.observations, -infinity);
+        shape_ = shape();
         fingerprint_ = fingerprint();
         if (options.resume) {
-            load();
+            resume();
         } else {
+            if (!options.start_from.empty()) start_from_other();
             begin_episode();
         }
     }
@@ -143,7 +145,7 @@ private:
 
     void choose_action()
     {
-        if (s_.step >= options_.random_steps) {
+        if (s_.step >= options_.random_steps || !options_.start_from.empty()) {
             learner_.explore(s_.observation, action_);
             return;
         }
@@ -245,23 +247,34 @@ private:
         return model;
     }
 
+    [[nodiscard]] std::uint64_t shape() const
+    {
+        Writer all;
+        all.put(std::uint64_t{environment_.observations});
+        all.put(std::uint64_t{environment_.actions});
+        learner_.shape(all);
+        return checksum(learner_.name + all.bytes());
+    }
+
     [[nodiscard]] std::uint64_t fingerprint() const
     {
         Writer all;
-        for (const std::size_t n : {environment_.observations, environment_.actions,
-                                    options_.random_steps, options_.batch, options_.buffer}) {
+        all.put(shape_);
+        all.put(std::uint64_t{!options_.start_from.empty()});
+        for (const std::size_t n : {options_.random_steps, options_.batch, options_.buffer}) {
             all.put(std::uint64_t{n});
         }
         all.put(options_.discount);
         all.put(options_.polyak);
         all.put(options_.seed);
         learner_.options(all);
-        return checksum(learner_.name + all.bytes());
+        return checksum(all.bytes());
     }
 
     void save() const
     {
         Writer writer;
+        writer.put(shape_);
         writer.put(fingerprint_);
         fields([&writer](const auto& member) { writer.put(member); }, s_);
         writer.put(std::uint64_t{curve_.size()});
@@ -277,15 +290,37 @@ private:
         write_checkpoint(first_line, writer, options_.checkpoint);
     }
 
-    void load()
+    void resume()
     {
-        const std::string bytes = read_checkpoint(first_line, options_.checkpoint);
-        Reader reader(bytes, options_.checkpoint);
+        load(options_.checkpoint, true);
+        reported_ = s_.step;
+        return_to_episode();
+    }
+
+    /// Takes the networks of another training, and nothing else.
+    void start_from_other()
+    {
+        const State fresh = s_;
+        load(options_.start_from, false);
+        s_ = fresh;
+        curve_.clear();
+        buffer_ = ReplayBuffer(environment_.observations, environment_.actions, options_.buffer);
+        learner_.reseed(options_.seed);
+    }
+
+    void load(const std::filesystem::path& file, bool same_training)
+    {
+        const std::string bytes = read_checkpoint(first_line, file);
+        Reader reader(bytes, file);
+        std::uint64_t shape = 0;
+        reader.get(shape);
+        if (shape != shape_) {
+            refuse_checkpoint(file, "is of networks of another shape, or of another trainer");
+        }
         std::uint64_t found = 0;
         reader.get(found);
-        if (found != fingerprint_) {
-            refuse_checkpoint(options_.checkpoint,
-                              "is of another training: environment, options or seed differ");
+        if (same_training && found != fingerprint_) {
+            refuse_checkpoint(file, "is of another training: options or seed differ");
         }
         fields([&reader](auto& member) { reader.get(member); }, s_);
         std::uint64_t points = 0;
@@ -305,8 +340,6 @@ private:
         buffer_.load(reader);
         learner_.load(reader);
         reader.finish();
-        reported_ = s_.step;
-        return_to_episode();
     }
 
     /// Acts again as in the episode that was interrupted.
@@ -331,6 +364,7 @@ private:
     const Learner& learner_;
     ReplayBuffer buffer_;
     State s_;
+    std::uint64_t shape_ = 0;  ///< of the networks
     std::uint64_t fingerprint_ = 0;
     std::uint64_t reported_ = 0;  ///< step of the last report
     std::vector<double> action_, next_;

@@ -33,9 +33,11 @@ struct Learner {
     std::function<LearnerLosses()> losses;
     std::function<bool()> finite;
     std::function<std::vector<DenseLayer>()> layers;
-    std::function<void(Writer&)> options;  ///< that a resumed training must agree in
+    std::function<void(Writer&)> shape;    ///< of the networks
+    std::function<void(Writer&)> options;  ///< the others that a resumed training must agree in
     std::function<void(Writer&)> save;
     std::function<void(Reader&)> load;
+    std::function<void(std::uint64_t seed)> reseed;
 };
 
 /// @throws std::invalid_argument naming what is out of range

@@ -130,16 +130,26 @@ public:
         return losses_.actor().layers(actor_.data());
     }
 
-    void describe(Writer& writer) const
+    void shape(Writer& writer) const
     {
         for (const auto* hidden : {&options_.actor, &options_.critic}) {
             writer.put(std::vector<std::uint64_t>(hidden->begin(), hidden->end()));
         }
+    }
+
+    void options(Writer& writer) const
+    {
         for (const double x :
              {options_.rate, options_.exploration, options_.smoothing, options_.smoothing_bound}) {
             writer.put(x);
         }
         writer.put(std::uint64_t{options_.delay});
+    }
+
+    void reseed(std::uint64_t seed)
+    {
+        random_ = Random(seed);
+        updates_ = 0;
     }
 
     void save(Writer& writer) const
@@ -236,9 +246,11 @@ TrainedPolicy train_td3(const Environment& environment, const Td3Options& option
          .losses = [&] { return td3.losses(); },
          .finite = [&] { return td3.finite(); },
          .layers = [&] { return td3.layers(); },
-         .options = [&](Writer& writer) { td3.describe(writer); },
+         .shape = [&](Writer& writer) { td3.shape(writer); },
+         .options = [&](Writer& writer) { td3.options(writer); },
          .save = [&](Writer& writer) { td3.save(writer); },
-         .load = [&](Reader& reader) { td3.load(reader); }},
+         .load = [&](Reader& reader) { td3.load(reader); },
+         .reseed = [&](std::uint64_t seed) { td3.reseed(seed); }},
         progress);
 }
 

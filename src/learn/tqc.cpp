@@ -161,17 +161,29 @@ public:
         return losses_.actor().layers(actor_.data());
     }
 
-    void describe(Writer& writer) const
+    void shape(Writer& writer) const
     {
         for (const auto* hidden : {&options_.actor, &options_.critic}) {
             writer.put(std::vector<std::uint64_t>(hidden->begin(), hidden->end()));
         }
+        writer.put(std::uint64_t{options_.critics});
+        writer.put(std::uint64_t{options_.quantiles});
+    }
+
+    void options(Writer& writer) const
+    {
         for (const std::size_t n :
              {options_.critics, options_.quantiles, options_.dropped, options_.noise_interval}) {
             writer.put(std::uint64_t{n});
         }
         writer.put(options_.rate);
         writer.put(options_.first_temperature);
+    }
+
+    void reseed(std::uint64_t seed)
+    {
+        random_ = Random(seed);
+        explored_ = 0;
     }
 
     void save(Writer& writer) const
@@ -290,9 +302,11 @@ TrainedPolicy train_tqc(const Environment& environment, const TqcOptions& option
          .losses = [&] { return tqc.losses(); },
          .finite = [&] { return tqc.finite(); },
          .layers = [&] { return tqc.layers(); },
-         .options = [&](Writer& writer) { tqc.describe(writer); },
+         .shape = [&](Writer& writer) { tqc.shape(writer); },
+         .options = [&](Writer& writer) { tqc.options(writer); },
          .save = [&](Writer& writer) { tqc.save(writer); },
-         .load = [&](Reader& reader) { tqc.load(reader); }},
+         .load = [&](Reader& reader) { tqc.load(reader); },
+         .reseed = [&](std::uint64_t seed) { tqc.reseed(seed); }},
         progress);
 }
 

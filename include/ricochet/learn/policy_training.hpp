@@ -35,6 +35,12 @@ struct PolicyTraining {
     std::size_t report_every = 1000;
     std::filesystem::path checkpoint{};  ///< empty: none
     bool resume = false;                 ///< continue from `checkpoint`, to the same bits
+
+    /// The checkpoint of an earlier training, in another environment or with other options but with
+    /// networks of the same shape: this one starts from its networks and the moments of their
+    /// optimiser, with a buffer that is empty, and acts by its policy from the first step. Empty:
+    /// none.
+    std::filesystem::path start_from{};
 };
 
 /// How the training stands. One after the other they are its curve.
