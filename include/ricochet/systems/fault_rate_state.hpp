@@ -43,8 +43,8 @@ struct FaultFriction {
 };
 
 struct RateStateOptions {
-    /// 1, 2 or 4. Where elements are braked to a halt, order 4 leaves some of those that should be
-    /// at rest creeping, which its estimate sees, and takes far more steps than order 2.
+    /// 1, 2 or 4. Where elements are braked to a halt order 4 may leave some creeping that should
+    /// be at rest; its estimate sees that, and then takes far more steps than order 2.
     int order = 2;
     /// [s]; 0: |slip_rate| rho L / (a sigma), in which the direct effect ends an imbalance of the
     /// start, at most a hundredth of the run.
