@@ -58,6 +58,11 @@ std::vector<Check> checks_of_part_6()
          .sentence = "cost of a learned regulator over that of the optimal one, median of 5 seeds",
          .target = "<= 1.1",
          .run = cost_over_optimum},
+        {.part = 6,
+         .id = "trainers-swing-up",
+         .sentence = "mean return of a pendulum swung up, after 8000 steps",
+         .target = ">= -200",
+         .run = swing_up},
     };
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <ctime>
 #include <functional>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -117,6 +118,86 @@ double median_cost(const std::string& name, const Train& train, Measured& out)
     return costs[2];
 }
 
+/// Gymnasium's Pendulum-v1, written down again: angle th from upright and rate w,
+///
+///     reward -(th^2 + w^2 / 10 + u^2 / 1000),  w' = 15 sin(th) + 3 u,  |u| <= 2,  |w| <= 8,
+///
+/// 200 steps of 0.05 s, the rate first; seen are cos th, sin th and w.
+class Pendulum {
+public:
+    [[nodiscard]] learn::Environment environment()
+    {
+        return {.observations = 3,
+                .actions = 1,
+                .reset =
+                    [this](std::uint64_t seed, std::span<double> observation) {
+                        learn::Random random(seed);
+                        angle_ = random.uniform(-std::numbers::pi, std::numbers::pi);
+                        rate_ = random.uniform(-1, 1);
+                        steps_ = 0;
+                        observe(observation);
+                    },
+                .step =
+                    [this](std::span<const double> action, std::span<double> observation) {
+                        const double reward = step(2 * action[0]);
+                        observe(observation);
+                        return learn::Reaction{.reward = reward, .truncated = steps_ == 200};
+                    }};
+    }
+
+private:
+    double step(double u)
+    {
+        const double angle = std::remainder(angle_, 2 * std::numbers::pi);
+        const double cost = angle * angle + rate_ * rate_ / 10 + u * u / 1000;
+        rate_ = std::clamp(rate_ + 0.05 * (15 * std::sin(angle_) + 3 * u), -8.0, 8.0);
+        angle_ += 0.05 * rate_;
+        ++steps_;
+        return -cost;
+    }
+
+    void observe(std::span<double> o) const
+    {
+        o[0] = std::cos(angle_);
+        o[1] = std::sin(angle_);
+        o[2] = rate_;
+    }
+
+    double angle_ = 0;
+    double rate_ = 0;
+    int steps_ = 0;
+};
+
+/// The mean of 100 episodes that were not trained on.
+double mean_return(const std::function<double(const std::vector<double>&)>& act)
+{
+    Pendulum pendulum;
+    const learn::Environment world = pendulum.environment();
+    std::vector<double> observation(3);
+    double sum = 0;
+    for (std::uint64_t episode = 0; episode < 100; ++episode) {
+        world.reset(1000 + episode, observation);
+        for (bool over = false; !over;) {
+            const double action = act(observation);
+            const learn::Reaction reaction = world.step(std::span(&action, 1), observation);
+            sum += reaction.reward;
+            over = reaction.truncated;
+        }
+    }
+    return sum / 100;
+}
+
+double mean_return(const Model& policy)
+{
+    const Mlp<float> network(policy);
+    return mean_return([&network](const std::vector<double>& observation) {
+        const std::vector<float> in(observation.begin(), observation.end());
+        float out = 0;
+        network.forward(in.data(), &out);
+        return std::tanh(static_cast<double>(out));
+    });
+}
+
 }  // namespace
 
 Measured time_of_tqc()
@@ -157,6 +238,19 @@ Measured cost_over_optimum()
     out.pass = std::max(tqc, td3) <= 1.1 && std::min(tqc, td3) >= 1 - 1e-6;
     out.text = fmt::format("TQC {:.4f}, TD3 {:.4f}", tqc, td3);
     return out;
+}
+
+Measured swing_up()
+{
+    Pendulum pendulum;
+    const learn::Environment world = pendulum.environment();
+    const learn::PolicyTraining training{.steps = 8000};
+    const double idle = mean_return([](const std::vector<double>&) { return 0.0; });
+    const double tqc =
+        mean_return(learn::train_tqc(world, {.training = training, .rate = 1e-3}).policy);
+    const double td3 = mean_return(learn::train_td3(world, {.training = training}).policy);
+    return {.pass = std::min(tqc, td3) >= -200,
+            .text = fmt::format("TQC {:.1f}, TD3 {:.1f}; without acting {:.1f}", tqc, td3, idle)};
 }
 
 }  // namespace ricochet::bench

@@ -11,4 +11,7 @@ namespace ricochet::bench {
 /// Both trainers on a linear-quadratic regulator.
 [[nodiscard]] Measured cost_over_optimum();
 
+/// Both trainers on a pendulum that is to be swung up.
+[[nodiscard]] Measured swing_up();
+
 }  // namespace ricochet::bench
