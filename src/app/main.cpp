@@ -17,6 +17,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "certify.hpp"
@@ -28,6 +29,8 @@
 #include "report.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "simulate.hpp"
+#include "step_control_compare.hpp"
+#include "step_policy.hpp"
 #include "systems.hpp"
 #include "train.hpp"
 
@@ -117,7 +120,8 @@ void add_simulate(CLI::App& app, int& status)
     add_text(command, "--integrator", run.integrator, "NAME",
              "of set-valued systems: handover (default), event, bathe or time-stepping");
     add_text(command, "--controller", run.controller, "NAME",
-             "of the steps of bathe: constant (default), heuristic, pi or filter");
+             "of the steps of bathe: constant (default), error, heuristic, pi, filter or learned "
+             "(by --model, default: the system's own policy)");
     add_number(command, "--rtol", run.rtol, "R", "relative error allowed in a step, default 1e-8");
     add_number(command, "--atol", run.atol, "A", "absolute error allowed in a step, default 1e-10");
     add_number(command, "--event-tolerance", run.event_tolerance, "T",
@@ -151,12 +155,59 @@ void add_simulate(CLI::App& app, int& status)
     });
 }
 
+/// The request for a policy, from the options that both kinds of training have.
+TrainPolicyRequest policy_of(const TrainRequest& request, TrainPolicyRequest policy)
+{
+    const TrainingRequest& t = request.training;
+    const std::pair<bool, std::string_view> others[] = {{!t.kind.empty(), "--kind"},
+                                                        {!t.set.empty(), "--set"},
+                                                        {t.step.has_value(), "--step"},
+                                                        {t.states.has_value(), "--states"},
+                                                        {t.fresh_events.has_value(), "--fresh"},
+                                                        {request.allow_misses, "--allow-misses"}};
+    for (const auto& [given, option] : others) {
+        if (given) throw BadInput(fmt::format("{} is not for a step policy", option));
+    }
+    if (policy.system.empty()) {
+        throw BadInput(
+            "a step policy is for a system: fault, sliding-mode or diode-circuit; got none");
+    }
+    policy.out = request.out;
+    policy.checkpoint = t.checkpoint;
+    policy.seed = t.seed;
+    policy.evaluations = t.iterations;
+    policy.resume = t.resume;
+    policy.json = request.json;
+    return policy;
+}
+
+const TrainRequest& event_network(const TrainRequest& request, const TrainPolicyRequest& policy)
+{
+    if (!policy.system.empty()) {
+        throw BadInput(
+            fmt::format("train takes one system, got {} and {}", request.system, policy.system));
+    }
+    if (policy.seconds || policy.threads) {
+        throw BadInput("--seconds and --threads are for a step policy");
+    }
+    return request;
+}
+
 void add_train(CLI::App& app, int& status)
 {
-    CLI::App& command = *app.add_subcommand("train", "Train a network that predicts events");
+    CLI::App& command = *app.add_subcommand(
+        "train", "Train a network that predicts events, or one that chooses steps");
     auto request = std::make_shared<TrainRequest>();
+    auto policy = std::make_shared<TrainPolicyRequest>();
     TrainingRequest& training = request->training;
-    add_system(command, request->system);
+    command.add_option("SYSTEM", request->system, "its name, or step-policy and its name")
+        ->required()
+        ->type_name("");
+    command
+        .add_option("OF", policy->system,
+                    "after step-policy: fault, sliding-mode or "
+                    "diode-circuit")
+        ->type_name("");
     command.add_option("--out", request->out, "the model, a .safetensors file")
         ->required()
         ->type_name("FILE");
@@ -172,7 +223,7 @@ void add_train(CLI::App& app, int& status)
     add_whole_number(command, "--seed", training.seed, 0, std::numeric_limits<std::uint64_t>::max(),
                      "of sampling and training");
     add_whole_number(command, "--iterations", training.iterations, 1, 1'000'000'000,
-                     "of the training");
+                     "of the training; of a step policy: evaluations");
     add_whole_number(command, "--states", training.states, 100, 100'000'000,
                      "sampled for training and testing");
     add_whole_number(command, "--fresh", training.fresh_events, 1, 100'000'000,
@@ -185,8 +236,16 @@ void add_train(CLI::App& app, int& status)
     command.add_flag("--allow-misses", request->allow_misses,
                      "write the model even if it misses events");
     command.add_flag("--json", request->json, "print the report as JSON");
-    command.footer("Example:\n  ricochet train bouncing-ball --out ball.safetensors");
-    command.callback([&status, request] { status = train(*request); });
+    add_number(command, "--seconds", policy->seconds, "S", "of a step policy: stop then [s]");
+    add_whole_number(command, "--threads", policy->threads, 1, 64, "of a step policy, default 2");
+    command.footer(
+        "Examples:\n"
+        "  ricochet train bouncing-ball --out ball.safetensors\n"
+        "  ricochet train step-policy fault --out steps.safetensors");
+    command.callback([&status, request, policy] {
+        status = request->system == step_policy_name ? train_policy(policy_of(*request, *policy))
+                                                     : train(event_network(*request, *policy));
+    });
 }
 
 void add_inspect(CLI::App& app, int& status)
@@ -247,12 +306,21 @@ void add_compare(CLI::App& app, int& status)
         ->type_name("name=value ...");
     command.add_flag("--json", request->json, "print JSON");
     add_text(command, "--csv", request->csv, "FILE", "write the event times");
+    auto of = std::make_shared<std::optional<std::string>>();
+    add_text(command, "--system", *of, "NAME",
+             "of step-control: sliding-mode, diode-circuit or fault; default: all of them");
     command.footer(
         "Examples:\n"
         "  ricochet compare bouncing-ball\n"
         "  ricochet compare thermostat --set low=19\n"
-        "  ricochet compare rate-and-state     (the tables of a published study; a minute)");
-    command.callback([&status, request] {
+        "  ricochet compare rate-and-state     (the tables of a published study; a minute)\n"
+        "  ricochet compare step-control --system fault");
+    command.callback([&status, request, of] {
+        if (request->system == step_control_name) {
+            status = compare_step_control(*request, of->value_or(""));
+            return;
+        }
+        if (*of) throw BadInput("--system is of compare step-control");
         status = request->system == rate_and_state_name ? compare_rate_and_state(*request)
                                                         : compare(*request);
     });

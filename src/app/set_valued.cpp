@@ -10,6 +10,9 @@
 #include "files.hpp"
 #include "input.hpp"
 #include "report.hpp"
+#include "ricochet/systems/diode_circuit.hpp"
+#include "ricochet/systems/sliding_mode.hpp"
+#include "step_policy.hpp"
 #include "systems/inclusion_options.hpp"
 #include "timing.hpp"
 
@@ -45,8 +48,21 @@ double tolerance(std::string_view option, const std::optional<double>& given, do
     return given.value_or(otherwise);
 }
 
-StepController controller(const std::string& name)
+/// What the policies of a system are asked about.
+/// @throws BadInput naming the systems that have some.
+const StepLayout& layout_of(const SystemEntry& system)
 {
+    const std::vector<std::string_view> known{SlidingMode::name, DiodeCircuit::name, "fault"};
+    if (system.name == known[0]) return SlidingMode::step_layout();
+    if (system.name == known[1]) return DiodeCircuit::step_layout();
+    throw unknown("system for --controller learned", system.name, known);
+}
+
+StepController controller(const SetValuedSettings& settings)
+{
+    const std::string& name = settings.controller;
+    if (name == "learned") return LearnedStep{.policy = settings.policy};
+    if (name == "error") return ErrorStep{.order = 3, .reject_above = 100};
     if (name == "heuristic") return HeuristicStep{};
     if (name == "pi") return FilteredStep::pi3333();
     if (name == "filter") return FilteredStep::h211b(4);
@@ -74,8 +90,8 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
         refuse(request.controller.has_value(), "--controller", "is for --integrator bathe");
         return false;
     }
-    chosen.controller =
-        one_of("controller", request.controller, {"constant", "heuristic", "pi", "filter"});
+    chosen.controller = one_of("controller", request.controller,
+                               {"constant", "error", "heuristic", "pi", "filter", "learned"});
     const bool steps = chosen.integrator == "bathe" || chosen.integrator == "time-stepping";
     const bool controlled = chosen.controller != "constant";
     refuse(controlled && chosen.integrator != "bathe", "--controller", "is for --integrator bathe");
@@ -83,7 +99,13 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
            "of a differential inclusion can only be extremum");
     refuse(request.locator && *request.locator != "newton", "--locator",
            "of a differential inclusion can only be newton");
-    refuse(request.model.has_value(), "--model", "is not for differential inclusions");
+    const bool learned = chosen.controller == "learned";
+    refuse(request.model && !learned, "--model",
+           "of a differential inclusion is for --controller learned");
+    refuse(request.atol && measured_by_norm(chosen), "--atol",
+           "is not for --controller error and learned, whose errors are relative to the norm of "
+           "the start");
+    if (learned) chosen.policy = named_policy(layout_of(system), request.model);
     refuse(request.gate.has_value(), "--gate", "is not for differential inclusions");
     refuse(request.mode.has_value(), "--mode",
            "of a differential inclusion follows from its state");
@@ -119,6 +141,11 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
     return true;
 }
 
+bool measured_by_norm(const SetValuedSettings& settings) noexcept
+{
+    return settings.controller == "error" || settings.controller == "learned";
+}
+
 SetValuedOptions set_valued_options(const RunSettings& settings)
 {
     const SetValuedSettings& chosen = settings.set_valued.value();
@@ -126,11 +153,14 @@ SetValuedOptions set_valued_options(const RunSettings& settings)
     options.t_start = settings.options.t_start;
     options.t_end = settings.options.t_end;
     options.step = chosen.step;
-    options.controller = controller(chosen.controller);
+    options.controller = controller(chosen);
     options.rtol = settings.options.rtol;
     options.atol = settings.options.atol;
     options.max_attempts = settings.options.max_steps;
-    if (chosen.controller != "constant") {
+    if (measured_by_norm(chosen)) {
+        options.estimate = ErrorEstimate::embedded;
+        options.scheme.first_stage = FirstStage::switch_aware;
+    } else if (chosen.controller != "constant") {
         // As the source of these rules estimates and limits.
         options.estimate = ErrorEstimate::doubling;
         options.error_order = 1;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,10 @@
 
 #include "ricochet/detect/network.hpp"
 #include "ricochet/integrate/options.hpp"
+
+namespace ricochet {
+class StepPolicy;
+}
 
 namespace ricochet::app {
 
@@ -35,8 +40,10 @@ enum class StepperKind { rk4, dopri5, fehlberg78, cash_karp54, euler };
 /// How a system that is a differential inclusion is integrated.
 struct SetValuedSettings {
     std::string integrator = "handover";  ///< or "event", "bathe", "time-stepping"
-    std::string controller = "constant";  ///< of bathe: or "heuristic", "pi", "filter"
-    double step = 0;                      ///< [s] of set-valued steps
+    /// Of bathe: or "error", "heuristic", "pi", "filter", "learned".
+    std::string controller = "constant";
+    double step = 0;                             ///< [s] of set-valued steps
+    std::shared_ptr<const StepPolicy> policy{};  ///< of "learned"
 };
 
 /// Everything a system needs to be run.

@@ -1,14 +1,9 @@
 #include "train.hpp"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <csignal>
 #include <cstdio>
-#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -16,7 +11,9 @@
 #include "files.hpp"
 #include "gates.hpp"
 #include "input.hpp"
+#include "interrupt.hpp"
 #include "json_text.hpp"
+#include "progress_bar.hpp"
 #include "report.hpp"
 #include "ricochet/learn/checkpoint.hpp"
 #include "ricochet/nn/safetensors.hpp"
@@ -27,108 +24,6 @@ namespace ricochet::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-volatile std::sig_atomic_t interrupted = 0;
-
-/// While it lives, the first interrupt sets a flag; a second one ends the program.
-class InterruptWatch {
-public:
-    InterruptWatch()
-    {
-        interrupted = 0;
-        struct sigaction action = {};
-        action.sa_handler = [](int) { interrupted = 1; };
-        action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
-        sigaction(SIGINT, &action, &before_int_);
-        sigaction(SIGTERM, &action, &before_term_);
-    }
-    ~InterruptWatch()
-    {
-        sigaction(SIGINT, &before_int_, nullptr);
-        sigaction(SIGTERM, &before_term_, nullptr);
-    }
-    InterruptWatch(const InterruptWatch&) = delete;
-    InterruptWatch& operator=(const InterruptWatch&) = delete;
-
-private:
-    struct sigaction before_int_ = {};
-    struct sigaction before_term_ = {};
-};
-
-/// A bar that is redrawn on a terminal; elsewhere a line every tenth of the way.
-class ProgressBar {
-public:
-    void show(const learn::Progress& progress)
-    {
-        const double now = progress.seconds;
-        if (progress.stage != stage_) {
-            stage_ = progress.stage;
-            started_ = false;
-            tenth_ = 100;
-            drawn_.reset();
-        }
-        if (!started_) {
-            first_iteration_ = progress.iteration;
-            first_seconds_ = now;
-            started_ = true;
-        }
-        const auto done = static_cast<double>(progress.iteration - first_iteration_);
-        const double rate = now > first_seconds_ ? done / (now - first_seconds_) : 0;
-        const std::string left =
-            rate > 0 ? fmt::format("{:.0f} s left",
-                                   static_cast<double>(progress.total - progress.iteration) / rate)
-                     : std::string("starting");
-        const std::size_t percent =
-            progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
-        const bool trains = stage_ == learn::Progress{}.stage;
-        // What has just begun may be refused, and some stages have no measure.
-        if (!trains && (progress.total == 0 || (!terminal_ && percent < 10))) return;
-        const std::string figures =
-            fmt::format("{:>3} %  {} of {}{}  {}", percent, progress.iteration, progress.total,
-                        trains ? "" : " events", left) +
-            (trains ? fmt::format("  loss {:.2e}  {:.0f} iterations/s", progress.loss, rate) : "");
-        if (terminal_) {
-            const bool last = progress.iteration == progress.total;
-            if (drawn_ && now - *drawn_ < redraw_every && !last) return;
-            drawn_ = now;
-            constexpr std::size_t width = 20;
-            const std::size_t full = width * percent / 100;
-            const std::string line =
-                fmt::format("[{}{}] {}{}", std::string(full, '#'), std::string(width - full, '.'),
-                            figures, trains ? "" : fmt::format("  {}", stage_));
-            fmt::print(stderr, "\r{}\x1b[K", line.substr(0, columns() - 1));
-            std::fflush(stderr);
-        } else if (percent / 10 != tenth_) {
-            fmt::print(stderr, "{}: {}\n", stage_, figures);
-        }
-        tenth_ = percent / 10;
-    }
-
-    /// The line is free again for something else.
-    void finish() const
-    {
-        if (terminal_ && started_) fmt::print(stderr, "\n");
-    }
-
-private:
-    static constexpr double redraw_every = 0.05;  // [s]
-
-    /// Of the terminal: a line any longer would wrap and be left behind.
-    static std::size_t columns()
-    {
-        winsize size{};
-        const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
-        return known ? size.ws_col : 80;
-    }
-
-    bool terminal_ = isatty(STDERR_FILENO) == 1;
-    std::optional<double> drawn_{};  ///< [s] when
-    std::string_view stage_;
-    bool started_ = false;
-    std::size_t first_iteration_ = 0;
-    double first_seconds_ = 0;
-    std::size_t tenth_ = 100;
-};
 
 std::string text(std::string_view set, const learn::Assessment& a)
 {
@@ -233,7 +128,7 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
     check_writable("--checkpoint", training.checkpoint);
     ProgressBar bar;
-    const InterruptWatch watch;
+    const Interrupts watch;
     const auto train_it = [&](const TrainingRequest& wanted,
                               const learn::ProgressCallback& progress) {
         // A checkpoint that cannot be read is refused before states are sampled.
@@ -243,7 +138,7 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     const learn::TrainedGate trained =
         run_training(train_it, training, [&](const learn::Progress& progress) {
             bar.show(progress);
-            return interrupted == 0;
+            return !Interrupts::any();
         });
     bar.finish();
 
@@ -310,17 +205,17 @@ int train(const TrainRequest& request)
 
     ProgressBar bar;
     learn::Progress last;
-    const InterruptWatch watch;
+    const Interrupts watch;
     const learn::Trained trained =
         run_training(system.training->train, training, [&](const learn::Progress& progress) {
             last = progress;
             bar.show(progress);
-            return interrupted == 0;
+            return !Interrupts::any();
         });
     bar.finish();
 
     const learn::Report& report = trained.report;
-    const bool stopped = interrupted != 0 && last.iteration < last.total;
+    const bool stopped = Interrupts::any() && last.iteration < last.total;
     const bool sound = trained.misses_none() && report.outcome != learn::TrainingOutcome::diverged;
     const bool write = sound || request.allow_misses;
     if (write) save_model(trained.model, request.out);

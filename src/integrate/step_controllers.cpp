@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -93,6 +94,13 @@ StepVerdict FilteredStep::judge(double error, double /*h*/) noexcept
     return {true, factor_before};
 }
 
+StepVerdict PrescribedSteps::judge(double /*error*/, double h) noexcept
+{
+    const double wanted = (*lengths)[std::min(next, lengths->size() - 1)];
+    ++next;
+    return {true, wanted / h};
+}
+
 double FilteredStep::failed() noexcept
 {
     if (++rejections >= 3) reset();
@@ -116,6 +124,11 @@ void validate(const StepController& controller)
             if constexpr (requires { c.up; }) require(c.up >= 1, "up must be at least 1", c.up);
             if constexpr (std::is_same_v<C, ErrorStep>) {
                 require(c.reject_above >= 1, "reject_above must be at least 1", c.reject_above);
+            }
+            if constexpr (std::is_same_v<C, PrescribedSteps>) {
+                require(c.lengths && !c.lengths->empty(), "steps must be prescribed", 0);
+                const double least = *std::min_element(c.lengths->begin(), c.lengths->end());
+                require(least > 0, "prescribed steps must be positive", least);
             }
             if constexpr (std::is_same_v<C, LearnedStep>) {
                 if (!c.policy) throw std::invalid_argument("step controller: no policy was given");

@@ -112,7 +112,7 @@ public:
         const bool constant = std::holds_alternative<ConstantStep>(rule.controller);
         const Rupture r =
             runs->simulate({.t_end = t_end_,
-                            .step = rule.step * usual_step * fault_.time_unit(),
+                            .step = first_step(rule, usual_step * fault_.time_unit()),
                             .max_steps = 4000},
                            {.controller = rule.controller,
                             .estimate = constant ? ErrorEstimate::none : rule.estimate,
@@ -183,6 +183,7 @@ StepProblem fault_problem(const StrikeSlipFault& fault, double t_end, double pol
     return {.description = fmt::format("fault of {0} x {0} elements, side {1:.0f} m",
                                        fault.elements(), fault.parameters().side),
             .group = fault.elements(),
+            .usual_step = usual_step * fault.time_unit(),
             .run = [problem](const StepRule& rule) { return problem->run(rule); }};
 }
 

@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <memory>
 #include <variant>
+#include <vector>
 
 #include "ricochet/integrate/step_control.hpp"
 
@@ -145,6 +146,18 @@ struct FilteredStep {
     int rejections = 0;
 };
 
+/// Steps of lengths that were chosen before the run, whatever their errors, the last of them for
+/// all that is left; the first is the run's own first step.
+struct PrescribedSteps {
+    std::shared_ptr<const std::vector<double>> lengths{};  ///< [s] positive; neither is empty
+
+    [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
+    [[nodiscard]] static double failed() noexcept { return 0.5; }
+    void reset() noexcept { next = 1; }
+
+    std::size_t next = 1;  ///< memory
+};
+
 class StepPolicy;
 class StepRanges;
 
@@ -177,7 +190,7 @@ struct LearnedStep {
 };
 
 using StepController = std::variant<ConstantStep, ErrorStep, HeuristicStep, ClassicStep,
-                                    PrintedPiStep, FilteredStep, LearnedStep>;
+                                    PrintedPiStep, FilteredStep, PrescribedSteps, LearnedStep>;
 
 /// The controller's verdict; `view()` is only called for a `LearnedStep`.
 template <class View>
@@ -190,7 +203,8 @@ template <class View>
 }
 
 /// @throws std::invalid_argument for an order below 1, factors that do not shrink or grow,
-/// exponents that are not finite, or a learned rule without a policy.
+/// exponents that are not finite, a learned rule without a policy,
+/// or prescribed steps that are not positive.
 void validate(const StepController& controller);
 
 }  // namespace ricochet

@@ -23,8 +23,10 @@
 #include "ricochet/nonsmooth/step_policy.hpp"
 
 namespace ricochet {
+class DiodeCircuit;
+class SlidingMode;
 class StrikeSlipFault;
-}
+}  // namespace ricochet
 
 namespace ricochet::learn {
 
@@ -36,6 +38,9 @@ struct StepRule {
     /// The first step, or all of them with `ConstantStep`, over that of the problem.
     double step = 1;
 };
+
+/// [s] The first step of a rule on a problem whose usual step is that.
+[[nodiscard]] double first_step(const StepRule& rule, double usual_step);
 
 /// What a rule did on a problem.
 struct StepTrial {
@@ -54,7 +59,8 @@ struct StepTrial {
 /// A problem with its reference. Threads may share it.
 struct StepProblem {
     std::string description;
-    int group = 0;  ///< problems of one group are compared together, e.g. all of one mesh
+    int group = 0;          ///< problems of one group are compared together, e.g. all of one mesh
+    double usual_step = 0;  ///< [s] the unit of `StepRule::step`
     std::function<StepTrial(const StepRule& rule)> run;
 };
 
@@ -69,7 +75,7 @@ struct StepFamily {
 struct FaultFamilyOptions {
     std::uint64_t seed = 1;
     /// How many faults of 1 x 1, 2 x 2, ... elements.
-    std::vector<int> counts{10, 8, 8};
+    std::vector<int> counts{12, 10, 10};
 };
 
 /// Faults of random parameters, wide about the default ones: side 2 to 6 km, damping ratio 0.15 to
@@ -81,6 +87,18 @@ struct FaultFamilyOptions {
 /// A fault as a problem, its reference from an explicit run until `t_end` [s].
 [[nodiscard]] StepProblem fault_problem(const StrikeSlipFault& fault, double t_end,
                                         double polynomial_bound = 0);
+
+/// Sliding modes: gain, frequency and start up and down by 2, amplitude 0.4 to 0.95 of the gain;
+/// they slide for 30 to 85 % of the time. Work is counted in solves, the reference is the solution.
+[[nodiscard]] StepFamily sliding_mode_family(std::uint64_t seed = 1, int count = 24);
+[[nodiscard]] StepProblem sliding_mode_problem(const SlidingMode& system, double from,
+                                               double t_end);
+
+/// Diode circuits: parameters up and down by 1.5, starts by 2 and of all signs. Work is counted in
+/// solves, the references are steps of order 2 with located switches, far shorter.
+[[nodiscard]] StepFamily diode_circuit_family(std::uint64_t seed = 1, int count = 24);
+[[nodiscard]] StepProblem diode_circuit_problem(const DiodeCircuit& system,
+                                                const Eigen::Vector3d& start, double t_end);
 
 /// The work of a rule against the error that it reaches, in logarithms, from coarse to fine.
 class WorkCurve {
@@ -137,9 +155,21 @@ private:
     std::vector<Group> groups_;
 };
 
+struct SearchedSteps {
+    std::vector<double> lengths;  ///< [s]
+    StepTrial trial;
+};
+
+/// The best sequence of that many steps that an evolution strategy finds, from even ones: a
+/// yardstick for rules, which see a run only as it comes. What is least is the mean logarithm of
+/// the error over four copies whose steps are off by up to 5 %, so that no luck of a node counts.
+[[nodiscard]] SearchedSteps search_steps(const StepProblem& problem, std::size_t count,
+                                         std::size_t evaluations, std::uint64_t seed = 1,
+                                         unsigned threads = 2);
+
 struct StepTrainingOptions {
     std::uint64_t seed = 1;
-    std::size_t evaluations = 12'000;
+    std::size_t evaluations = 15'000;
     double seconds = std::numeric_limits<double>::infinity();
     unsigned threads = 2;
     std::filesystem::path checkpoint{};

@@ -13,6 +13,7 @@
 #include "../plot.hpp"
 #include "../report.hpp"
 #include "../simulate.hpp"
+#include "../step_policy.hpp"
 #include "entries.hpp"
 #include "fault.hpp"
 #include "ricochet/systems/fault_bathe.hpp"
@@ -39,11 +40,14 @@ void refuse_what_is_not_for_faults(const RunRequest& run)
         {run.detector.has_value(), "--detector"},
         {run.locator.has_value(), "--locator"},
         {run.stepper.has_value(), "--stepper"},
-        {run.model.has_value(), "--model"},
+        {run.gate.has_value(), "--gate"},
         {run.atol.has_value(), "--atol"},
         {run.event_tolerance.has_value(), "--event-tolerance"}};
     for (const auto& [given, option] : options) {
         if (given) throw BadInput(fmt::format("{} is not for the system fault", option));
+    }
+    if (run.model && run.controller != "learned") {
+        throw BadInput("--model of fault is for --controller learned");
     }
     if (run.t_start.value_or(0) != 0) {
         throw BadInput(fmt::format("a fault starts at 0 s, got --t-start {}", *run.t_start));
@@ -61,8 +65,8 @@ Integration integration(const RunRequest& run)
 {
     Integration out;
     const std::vector<std::string_view> integrators{"explicit", "bathe", "bathe-published"};
-    const std::vector<std::string_view> controllers{"constant", "error", "heuristic", "pi",
-                                                    "filter"};
+    const std::vector<std::string_view> controllers{"constant", "error",  "heuristic",
+                                                    "pi",       "filter", "learned"};
     out.integrator = run.integrator.value_or(out.integrator);
     out.controller = run.controller.value_or(out.controller);
     const auto known = [](const auto& all, const std::string& name) {
@@ -85,11 +89,16 @@ Integration integration(const RunRequest& run)
         return out;
     }
     if (run.rtol) out.bathe.rtol = *run.rtol;
-    if (out.controller == "error") {
+    if (out.controller == "error" || out.controller == "learned") {
         if (out.integrator != "bathe") {
-            throw BadInput("--controller error is of the averaged scheme: --integrator bathe");
+            throw BadInput(fmt::format(
+                "--controller {} is of the averaged scheme: --integrator bathe", out.controller));
         }
         out.bathe.controller = ErrorStep{.order = 3, .reject_above = 100};
+        if (out.controller == "learned") {
+            out.bathe.controller =
+                LearnedStep{.policy = named_policy(fault_step_layout(), run.model)};
+        }
         out.bathe.estimate = ErrorEstimate::embedded;
         return out;
     }
@@ -167,6 +176,7 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
         out["step"] = asked.step;
         out["statistics"]["solves"] = s.solves;
         out["statistics"]["iterations"] = s.iterations;
+        if (how.controller == "learned") out["statistics"]["handed_over"] = s.handed_over;
     }
     if (request.kernel) out["kernel"] = request.kernel->string();
     if (request.samples) {
@@ -199,6 +209,9 @@ std::string text(const SystemEntry& system, const StrikeSlipFault& fault, const 
     out += s.solves > 0 ? fmt::format("{} stages in {} Newton iterations\n", s.solves, s.iterations)
                         : fmt::format("{} force evaluations; stable up to {:.4g} s\n",
                                       s.evaluations, r.stable_step);
+    if (s.asked > 0) {
+        out += fmt::format("{} of {} steps left to the classical rule\n", s.handed_over, s.asked);
+    }
     out += fmt::format("sqrt(K) by a polynomial of degree {}, within {:.2g}\n{:.3g} s of time\n",
                        s.degree, s.bound, seconds);
     return out;

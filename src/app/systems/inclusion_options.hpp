@@ -7,6 +7,9 @@
 
 namespace ricochet::app {
 
+/// Whether errors are measured against the norm of the start.
+[[nodiscard]] bool measured_by_norm(const SetValuedSettings& settings) noexcept;
+
 /// The options of Bathe's steps and of time stepping.
 [[nodiscard]] SetValuedOptions set_valued_options(const RunSettings& settings);
 

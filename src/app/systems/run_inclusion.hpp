@@ -101,7 +101,12 @@ template <class System>
 [[nodiscard]] TimedRun run_by_steps(const System& system, const StateOf<System>& w0,
                                     const RunSettings& settings)
 {
-    SetValuedMotion<System> motion(system, w0, set_valued_options(settings));
+    SetValuedOptions options = set_valued_options(settings);
+    if (measured_by_norm(*settings.set_valued)) {
+        options.fields = {
+            {.first = 0, .count = w0.size(), .rtol = options.rtol, .floor = w0.norm()}};
+    }
+    SetValuedMotion<System> motion(system, w0, options);
     TimedRun out;
     const auto& times = settings.options.sample_times;
     std::size_t next = 0;

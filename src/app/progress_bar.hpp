@@ -1,0 +1,92 @@
+// How a training gets on, on standard error.
+#pragma once
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "ricochet/learn/classifier.hpp"
+
+namespace ricochet::app {
+
+/// A bar that is redrawn on a terminal; elsewhere a line every tenth of the way.
+class ProgressBar {
+public:
+    void show(const learn::Progress& progress)
+    {
+        const double now = progress.seconds;
+        if (progress.stage != stage_) {
+            stage_ = progress.stage;
+            started_ = false;
+            tenth_ = 100;
+            drawn_.reset();
+        }
+        if (!started_) {
+            first_iteration_ = progress.iteration;
+            first_seconds_ = now;
+            started_ = true;
+        }
+        const auto done = static_cast<double>(progress.iteration - first_iteration_);
+        const double rate = now > first_seconds_ ? done / (now - first_seconds_) : 0;
+        const std::string left =
+            rate > 0 ? fmt::format("{:.0f} s left",
+                                   static_cast<double>(progress.total - progress.iteration) / rate)
+                     : std::string("starting");
+        const std::size_t percent =
+            progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
+        const bool trains = stage_ == learn::Progress{}.stage;
+        // What has just begun may be refused, and some stages have no measure.
+        if (!trains && (progress.total == 0 || (!terminal_ && percent < 10))) return;
+        const std::string figures =
+            fmt::format("{:>3} %  {} of {}{}  {}", percent, progress.iteration, progress.total,
+                        trains ? "" : " events", left) +
+            (trains ? fmt::format("  loss {:.2e}  {:.0f} iterations/s", progress.loss, rate) : "");
+        if (terminal_) {
+            const bool last = progress.iteration == progress.total;
+            if (drawn_ && now - *drawn_ < redraw_every && !last) return;
+            drawn_ = now;
+            constexpr std::size_t width = 20;
+            const std::size_t full = width * percent / 100;
+            const std::string line =
+                fmt::format("[{}{}] {}{}", std::string(full, '#'), std::string(width - full, '.'),
+                            figures, trains ? "" : fmt::format("  {}", stage_));
+            fmt::print(stderr, "\r{}\x1b[K", line.substr(0, columns() - 1));
+            std::fflush(stderr);
+        } else if (percent / 10 != tenth_) {
+            fmt::print(stderr, "{}: {}\n", stage_, figures);
+        }
+        tenth_ = percent / 10;
+    }
+
+    /// The line is free again for something else.
+    void finish() const
+    {
+        if (terminal_ && started_) fmt::print(stderr, "\n");
+    }
+
+private:
+    static constexpr double redraw_every = 0.05;  // [s]
+
+    /// Of the terminal: a line any longer would wrap and be left behind.
+    static std::size_t columns()
+    {
+        winsize size{};
+        const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
+        return known ? size.ws_col : 80;
+    }
+
+    bool terminal_ = isatty(STDERR_FILENO) == 1;
+    std::optional<double> drawn_{};  ///< [s] when
+    std::string_view stage_;
+    bool started_ = false;
+    std::size_t first_iteration_ = 0;
+    double first_seconds_ = 0;
+    std::size_t tenth_ = 100;
+};
+
+}  // namespace ricochet::app

@@ -1,0 +1,158 @@
+#include "step_policy.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "files.hpp"
+#include "input.hpp"
+#include "interrupt.hpp"
+#include "json_text.hpp"
+#include "model_lookup.hpp"
+#include "progress_bar.hpp"
+#include "report.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "timing.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t held_out = 1'000'003;  // added to a seed: other problems
+
+std::string table(const std::vector<learn::StepScore::Part>& parts, bool judges_final)
+{
+    std::string out = fmt::format("{:<8}{:>12}{:>8}{}{:>10}\n", "group", "tolerance", "gain",
+                                  judges_final ? fmt::format("{:>10}", "final") : "", "error");
+    for (const auto& part : parts) {
+        out += fmt::format("{:<8}{:>12}{:>8.2f}{}{:>10.2f}\n", part.group, part.tolerance,
+                           std::exp(part.gain),
+                           judges_final ? fmt::format("{:>10.2f}", std::exp(part.final_gain)) : "",
+                           std::exp(part.off));
+    }
+    return out +
+           "gain: work of the best classical rule over that of the policy, at the true error "
+           "reached;\nfinal: the same at the final error; error: over that of the free estimate's "
+           "rule at that tolerance\n";
+}
+
+Json rows(const std::vector<learn::StepScore::Part>& parts)
+{
+    Json out = Json::array();
+    for (const auto& part : parts) {
+        out.push_back({{"group", part.group},
+                       {"tolerance", part.tolerance},
+                       {"gain", std::exp(part.gain)},
+                       {"final_gain", std::exp(part.final_gain)},
+                       {"error_ratio", std::exp(part.off)},
+                       {"failed", part.failed}});
+    }
+    return out;
+}
+
+learn::TrainedPolicy trained_policy(const learn::StepFamily& family,
+                                    const learn::StepTrainingOptions& options)
+{
+    ProgressBar bar;
+    const Interrupts watch;
+    bool started = false;
+    try {
+        auto out = learn::train_step_policy(
+            family, options, [&](const learn::EvolutionProgress& progress) {
+                started = true;
+                bar.show({.iteration = std::min(progress.evaluations, options.evaluations),
+                          .total = options.evaluations,
+                          .loss = progress.best,
+                          .seconds = progress.seconds});
+                return !Interrupts::any();
+            });
+        bar.finish();
+        return out;
+    } catch (const std::runtime_error& error) {
+        if (options.resume && !started) throw BadInput(error.what());
+        throw;
+    }
+}
+
+}  // namespace
+
+learn::StepFamily step_family(const std::string& system, std::uint64_t seed)
+{
+    const std::vector<std::string_view> known{"fault", "sliding-mode", "diode-circuit"};
+    if (system == known[0]) return learn::fault_family({.seed = seed});
+    if (system == known[1]) return learn::sliding_mode_family(seed);
+    if (system == known[2]) return learn::diode_circuit_family(seed);
+    throw unknown("system for a step policy", system, known);
+}
+
+int train_policy(const TrainPolicyRequest& request)
+{
+    const std::uint64_t seed = request.seed.value_or(1);
+    if (request.seconds && !(*request.seconds > 0)) {
+        throw BadInput(fmt::format("--seconds must be positive, got {}", *request.seconds));
+    }
+    check_writable("--out", request.out);
+    learn::StepTrainingOptions options{.seed = seed, .resume = request.resume};
+    options.checkpoint = request.checkpoint.empty() ? fs::path(request.out.string() + ".checkpoint")
+                                                    : request.checkpoint;
+    check_writable("--checkpoint", options.checkpoint);
+    if (request.resume && !fs::exists(options.checkpoint)) {
+        throw BadInput(
+            fmt::format("there is no checkpoint '{}' to resume", options.checkpoint.string()));
+    }
+    if (request.evaluations) options.evaluations = *request.evaluations;
+    if (request.seconds) options.seconds = *request.seconds;
+    if (request.threads) options.threads = *request.threads;
+    const learn::StepFamily family = step_family(request.system, seed);
+    const learn::TrainedPolicy trained = trained_policy(family, options);
+    const bool stopped = trained.search.outcome == learn::EvolutionOutcome::stopped;
+    if (stopped) {
+        fmt::print(stderr,
+                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+                   options.checkpoint.string());
+        return 1;
+    }
+    save_model(trained.model, request.out);
+    std::error_code ignored;
+    if (request.checkpoint.empty()) fs::remove(options.checkpoint, ignored);
+    const learn::StepFamily others = step_family(request.system, seed + held_out);
+    const learn::StepScore score(others, options.threads);
+    const auto parts = score.parts({.policy = std::make_shared<const StepPolicy>(trained.model)});
+    if (request.json) {
+        print(json_text({{"system", request.system},
+                         {"seed", seed},
+                         {"score", trained.search.score},
+                         {"evaluations", trained.search.evaluations},
+                         {"seconds", trained.search.seconds},
+                         {"held_out", rows(parts)},
+                         {"model", request.out.string()}}));
+    } else {
+        print(fmt::format("{} evaluations in {}, score {:.4f} on {} problems; {} problems held "
+                          "out:\n",
+                          trained.search.evaluations, duration(trained.search.seconds),
+                          trained.search.score, family.problems.size(), others.problems.size()) +
+              table(parts, family.judges_final));
+    }
+    fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
+    return 0;
+}
+
+std::shared_ptr<const StepPolicy> named_policy(const StepLayout& layout,
+                                               const std::optional<std::string>& given)
+{
+    const fs::path file = find_model(given ? *given : fmt::format("{}-step", layout.system));
+    try {
+        auto policy = std::make_shared<const StepPolicy>(load_model(file));
+        policy->require(layout);
+        return policy;
+    } catch (const std::invalid_argument& error) {
+        throw BadInput(fmt::format("model '{}': {}", file.string(), error.what()));
+    }
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,42 @@
+// Policies that choose steps, by name: training them and finding them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "ricochet/learn/step_control.hpp"
+
+namespace ricochet::app {
+
+/// What `ricochet train` is told to train one.
+inline constexpr std::string_view step_policy_name = "step-policy";
+
+struct TrainPolicyRequest {
+    std::string system{};
+    std::filesystem::path out{};
+    std::filesystem::path checkpoint{};  ///< empty: beside the model
+    std::optional<std::uint64_t> seed{}, evaluations{};
+    std::optional<double> seconds{};
+    std::optional<unsigned> threads{};
+    bool resume = false;
+    bool json = false;
+};
+
+/// Trains, shows progress on standard error, prints the gains on problems held out and writes the
+/// model. @return as `train`.
+/// @throws BadInput, ModelError, std::invalid_argument or std::runtime_error.
+int train_policy(const TrainPolicyRequest& request);
+
+/// Random problems of that system, for training or held out.
+/// @throws BadInput naming the systems that have some.
+[[nodiscard]] learn::StepFamily step_family(const std::string& system, std::uint64_t seed);
+
+/// The policy that the user named, or the one that comes along for the system.
+/// @throws BadInput or ModelError if it is not there, or not for that system and its inputs.
+[[nodiscard]] std::shared_ptr<const StepPolicy> named_policy(
+    const StepLayout& layout, const std::optional<std::string>& given);
+
+}  // namespace ricochet::app
