@@ -1,6 +1,7 @@
 // What the strike-slip fault and the trainers must show.
 #include "measure_fault.hpp"
 #include "measure_trainers.hpp"
+#include "measure_step_control.hpp"
 
 namespace ricochet::bench {
 
@@ -63,6 +64,50 @@ std::vector<Check> checks_of_part_6()
          .sentence = "mean return of a pendulum swung up, after 8000 steps",
          .target = ">= -200",
          .run = swing_up},
+        {.part = 6,
+         .id = "steps-classical",
+         .sentence = "learned steps on 10, 25, 50 per side, 3 then 5 km: iterations saved over the "
+                     "best rule that looks at errors, L2 of velocity 1e-2, median of five seeds",
+         .target = "1.3",
+         .run = gain_over_classical_rules},
+        {.part = 6,
+         .id = "steps-eq5",
+         .sentence = "the same over eq. 5",
+         .target = "2",
+         .run = gain_over_heuristic},
+        {.part = 6,
+         .id = "steps-constant",
+         .sentence = "the same over constant steps",
+         .target = "1.5 (3 km), 2 (5 km)",
+         .run = gain_over_constant_steps,
+         .required = false},
+        {.part = 6,
+         .id = "steps-slip",
+         .sentence = "the same at a final slip of 1e-3, over the best classical of all",
+         .target = "1",
+         .run = final_slip_of_policies,
+         .required = false},
+        {.part = 6,
+         .id = "steps-held-out",
+         .sentence = "learned steps on small faults held out: iterations saved over the best of "
+                     "constant steps and the free estimate's rule",
+         .target = "1",
+         .run = gain_on_held_out_faults},
+        {.part = 6,
+         .id = "steps-sliding-mode",
+         .sentence = "learned steps on 64 sliding modes held out: solves saved over the same",
+         .target = "1.25",
+         .run = gain_on_sliding_mode},
+        {.part = 6,
+         .id = "steps-diode-circuit",
+         .sentence = "learned steps on 64 diode circuits held out: solves saved over the same",
+         .target = "parity, 0.95",
+         .run = gain_on_diode_circuit},
+        {.part = 6,
+         .id = "steps-training",
+         .sentence = "training of the fault's policy",
+         .target = "<= 180 s on two cores",
+         .run = time_of_training},
     };
 }
 

@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <sstream>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -21,6 +24,7 @@
 #include "ricochet/nn/classifier.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nonsmooth/step_policy.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -46,6 +50,12 @@ const SystemEntry* system_of(const Model& model)
     return found == all.end() ? nullptr : &*found;
 }
 
+/// Whether it chooses steps.
+bool is_policy(const Model& model)
+{
+    return model.kind == StepPolicy::kind;
+}
+
 /// What the features are called, in the order of the inputs; "feature 0" where the
 /// recipe is not known here.
 std::vector<std::string> feature_names(const Model& model)
@@ -59,6 +69,11 @@ std::vector<std::string> feature_names(const Model& model)
             names.push_back(fmt::format("{} [{}]", x.name, x.unit));
         }
     }
+    if (is_policy(model)) {
+        std::istringstream recipe(model.recipe);
+        std::string word;
+        for (recipe >> word; recipe >> word;) names.push_back(printable(word));
+    }
     if (names.size() == model.offset.size()) return names;
     names.clear();
     for (std::size_t i = 0; i < model.offset.size(); ++i) {
@@ -69,6 +84,7 @@ std::vector<std::string> feature_names(const Model& model)
 
 bool recipe_known(const Model& model)
 {
+    if (is_policy(model)) return model.recipe.starts_with("step-inputs-1:");
     if (model.kind != "event-classifier") {
         try {
             (void)gate_recipe(model.recipe);
@@ -213,9 +229,11 @@ std::string to_text(const Inspection& found)
                      system_of(model) == nullptr ? unknown_here : "",
                      parameters.empty() ? "whatever its parameters"
                                         : fmt::format("{}", fmt::join(parameters, ", "))));
-    line("steps", model.step_min == model.step_max
-                      ? fmt::format("{} s only", model.step_min)
-                      : fmt::format("{} to {} s", model.step_min, model.step_max));
+    if (!is_policy(model)) {
+        line("steps", model.step_min == model.step_max
+                          ? fmt::format("{} s only", model.step_min)
+                          : fmt::format("{} to {} s", model.step_min, model.step_max));
+    }
     line("recipe",
          fmt::format("{}{}", printable(model.recipe), recipe_known(model) ? "" : unknown_here));
     const std::vector<std::string> names = feature_names(model);
@@ -231,7 +249,11 @@ std::string to_text(const Inspection& found)
         line(k == 0 ? "layers" : "", fmt::format("{}: weight {} x {}, bias {}", k, layer.outputs,
                                                  layer.inputs, layer.outputs));
     }
-    if (model.levels.empty()) {
+    if (is_policy(model)) {
+        line("decision",
+             fmt::format("the classical step times exp(output), held to [{:.3g}, {:.3g}]",
+                         std::exp(-StepPolicy::most), std::exp(StepPolicy::most)));
+    } else if (model.levels.empty()) {
         line("decision", fmt::format("event where the logit is at least {}", model.threshold));
     }
     for (std::size_t k = 0; k < model.levels.size(); ++k) {

@@ -1,0 +1,100 @@
+// Steps chosen by policies, on the command line.
+
+#include "app.hpp"
+
+namespace ricochet {
+namespace {
+
+TEST_F(App, SimulateFaultByLearnedSteps)
+{
+    const auto with = [&](const std::string& controller) {
+        return json({"simulate", "fault", "--set", "elements=5", "--integrator", "bathe",
+                     "--controller", controller, "--rtol", "1e-3", "--json"});
+    };
+    const nlohmann::json learned = with("learned");
+    const nlohmann::json classical = with("error");
+    EXPECT_EQ(learned["outcome"], "at_rest");
+    EXPECT_EQ(learned["controller"], "learned");
+    // Both are of order 2 at tolerance 1e-3.
+    EXPECT_NEAR(learned["mean_slip"].get<double>() / classical["mean_slip"].get<double>(), 1, 5e-3);
+    EXPECT_LT(learned["statistics"]["handed_over"].get<int>(),
+              learned["statistics"]["steps"].get<int>() / 2);
+}
+
+TEST_F(App, SimulateSlidingModeByLearnedSteps)
+{
+    for (const char* controller : {"error", "learned"}) {
+        const nlohmann::json run = json({"simulate", "sliding-mode", "--integrator", "bathe",
+                                         "--controller", controller, "--rtol", "1e-4", "--json"});
+        EXPECT_EQ(run["outcome"], "reached_end") << controller;
+        EXPECT_LT(run["set_valued_statistics"]["solves"].get<int>(), 150) << controller;
+    }
+}
+
+TEST_F(App, LearnedStepsRefuseWhatIsNotTheirs)
+{
+    const auto fault = [](std::vector<std::string> more) {
+        Words all{"simulate", "fault", "--integrator", "bathe", "--controller", "learned"};
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    expect_refused(fault({"--model", "sliding-mode-step"}), {"sliding-mode", "fault"});
+    expect_refused(fault({"--model", "bouncing-ball"}), {"step-policy", "event-classifier"});
+    expect_refused(fault({"--model", "nowhere"}), {"nowhere", "not found"});
+    expect_refused({"simulate", "fault", "--model", "fault-step"}, {"--controller learned"});
+    expect_refused(
+        {"simulate", "super-twisting", "--integrator", "bathe", "--controller", "learned"},
+        {"super-twisting", "sliding-mode"});
+    expect_refused(
+        {"simulate", "sliding-mode", "--integrator", "bathe", "--model", "sliding-mode-step"},
+        {"--model", "learned"});
+}
+
+TEST_F(App, TrainStepPolicyWritesAModelThatIsUsed)
+{
+    const nlohmann::json report = json({"train", "step-policy", "sliding-mode", "--out",
+                                        "mine.safetensors", "--iterations", "41", "--json"});
+    EXPECT_GE(report["evaluations"].get<int>(), 41);
+    EXPECT_EQ(report["held_out"].size(), 4U);
+    EXPECT_FALSE(fs::exists(work() / "mine.safetensors.checkpoint"));
+    const nlohmann::json run =
+        json({"simulate", "sliding-mode", "--integrator", "bathe", "--controller", "learned",
+              "--model", "mine.safetensors", "--json"});
+    EXPECT_EQ(run["outcome"], "reached_end");
+    const Result shown = run({"inspect", "mine.safetensors"});
+    EXPECT_NE(shown.out.find("log_distance"), std::string::npos) << shown.out;
+}
+
+TEST_F(App, TrainStepPolicyRefusesBadInput)
+{
+    expect_refused({"train", "step-policy", "--out", "a.safetensors"}, {"fault", "none"});
+    expect_refused({"train", "step-policy", "pendulum", "--out", "a.safetensors"},
+                   {"pendulum", "sliding-mode"});
+    expect_refused({"train", "step-policy", "fault", "--out", "a.safetensors", "--resume"},
+                   {"a.safetensors.checkpoint"});
+    expect_refused({"train", "step-policy", "fault", "--out", "a.safetensors", "--seconds", "0"},
+                   {"--seconds"});
+    expect_refused({"train", "step-policy", "fault", "--out", "a.safetensors", "--kind", "gate"},
+                   {"--kind"});
+    expect_refused({"train", "pendulum", "fault", "--out", "a.safetensors"}, {"one system"});
+    expect_refused({"compare", "step-control", "--system", "pendulum"}, {"pendulum", "fault"});
+    expect_refused({"compare", "pendulum", "--system", "fault"}, {"--system"});
+    expect_refused({"compare", "step-control", "--system", "fault", "--set", "elements=80"},
+                   {"50", "80"});
+}
+
+TEST_F(App, CompareStepControlShowsEveryRule)
+{
+    const nlohmann::json table =
+        json({"compare", "step-control", "--system", "sliding-mode", "--json"});
+    const nlohmann::json& rules = table["cases"][0]["rules"];
+    ASSERT_EQ(rules.size(), 8U);
+    for (const auto& rule : rules) {
+        const std::string name = rule["rule"];
+        EXPECT_TRUE(rule["reached"].get<bool>()) << name;
+        if (name != "optimum found") EXPECT_LE(rule["error"].get<double>(), 1e-3) << name;
+    }
+}
+
+}  // namespace
+}  // namespace ricochet
