@@ -103,7 +103,7 @@ TEST(StepTraining, ImprovesAndResumesToTheSameBits)
         std::filesystem::temp_directory_path() / ("step-training-" + std::to_string(getpid()));
     std::filesystem::create_directories(directory);
     const StepTrainingOptions whole{.seed = 7, .evaluations = 101, .threads = 1};
-    const TrainedPolicy once = train_step_policy(family, whole);
+    const TrainedStepPolicy once = train_step_policy(family, whole);
     const StepScore score(family, 1);
     EXPECT_LT(once.search.score, score(rule_of(family.layout)));
     EXPECT_FALSE(once.model.domain.empty());
@@ -113,7 +113,7 @@ TEST(StepTraining, ImprovesAndResumesToTheSameBits)
     (void)train_step_policy(family, parts,
                             [](const EvolutionProgress& now) { return now.generation < 3; });
     parts.resume = true;
-    const TrainedPolicy again = train_step_policy(family, parts);
+    const TrainedStepPolicy again = train_step_policy(family, parts);
     EXPECT_EQ(again.search.x, once.search.x);
     EXPECT_EQ(again.search.score, once.search.score);
     EXPECT_EQ(again.model.layers.back().weight, once.model.layers.back().weight);

@@ -55,8 +55,8 @@ Json rows(const std::vector<learn::StepScore::Part>& parts)
     return out;
 }
 
-learn::TrainedPolicy trained_policy(const learn::StepFamily& family,
-                                    const learn::StepTrainingOptions& options)
+learn::TrainedStepPolicy trained_policy(const learn::StepFamily& family,
+                                        const learn::StepTrainingOptions& options)
 {
     ProgressBar bar;
     const Interrupts watch;
@@ -109,7 +109,7 @@ int train_policy(const TrainPolicyRequest& request)
     if (request.seconds) options.seconds = *request.seconds;
     if (request.threads) options.threads = *request.threads;
     const learn::StepFamily family = step_family(request.system, seed);
-    const learn::TrainedPolicy trained = trained_policy(family, options);
+    const learn::TrainedStepPolicy trained = trained_policy(family, options);
     const bool stopped = trained.search.outcome == learn::EvolutionOutcome::stopped;
     if (stopped) {
         fmt::print(stderr,

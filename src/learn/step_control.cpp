@@ -199,12 +199,12 @@ Start start_of(std::uint64_t seed)
 
 }  // namespace
 
-TrainedPolicy train_step_policy(const StepFamily& family, const StepTrainingOptions& options,
-                                const EvolutionCallback& progress)
+TrainedStepPolicy train_step_policy(const StepFamily& family, const StepTrainingOptions& options,
+                                    const EvolutionCallback& progress)
 {
     const StepScore score(family, options.threads);
     const Start start = start_of(options.seed);
-    TrainedPolicy out;
+    TrainedStepPolicy out;
     out.search = evolve(
         [&](std::span<const double> x) {
             return score(rule_of(family.layout, std::vector<double>(x.begin(), x.end())));

@@ -2,7 +2,7 @@
 // for the same true error.
 //
 //     const StepFamily family = fault_family({.seed = 1});
-//     const TrainedPolicy trained = train_step_policy(family, {.seconds = 150});
+//     const TrainedStepPolicy trained = train_step_policy(family, {.seconds = 150});
 //     save_model(trained.model, "fault-step.safetensors");
 //
 // A family is a set of problems of random parameters with reference solutions. A rule for steps
@@ -176,7 +176,7 @@ struct StepTrainingOptions {
     bool resume = false;
 };
 
-struct TrainedPolicy {
+struct TrainedStepPolicy {
     Model model;
     EvolutionResult search;
 };
@@ -184,8 +184,8 @@ struct TrainedPolicy {
 /// Searches the weights, from a network that returns zero. The domain of the model is what the
 /// policy and the classical rule met on the family, a tenth wider.
 /// @throws as `evolve`.
-[[nodiscard]] TrainedPolicy train_step_policy(const StepFamily& family,
-                                              const StepTrainingOptions& options = {},
-                                              const EvolutionCallback& progress = {});
+[[nodiscard]] TrainedStepPolicy train_step_policy(const StepFamily& family,
+                                                  const StepTrainingOptions& options = {},
+                                                  const EvolutionCallback& progress = {});
 
 }  // namespace ricochet::learn
