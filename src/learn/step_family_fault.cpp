@@ -11,87 +11,16 @@
 #include "ricochet/learn/random.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/systems/fault_bathe.hpp"
+#include "step_reference.hpp"
 
 namespace ricochet::learn {
 
 namespace {
 
-constexpr std::size_t samples = 600;
 constexpr double usual_step = 0.125 / 0.8660254037844386;  // [time units]: 0.125 s at 3 km
 
-/// Velocities of a reference at even times, without units, one column per time.
-struct Reference {
-    Eigen::MatrixXd velocity;
-    double of_all = 0;     ///< sum of its squares
-    double mean_slip = 0;  ///< [m]
-};
-
-/// The squared error of a run against the reference, from the parabolas of its steps.
-class Comparison {
-public:
-    Comparison(const Reference& reference, double end)
-        : reference_(reference), spacing_(end / static_cast<double>(samples))
-    {
-    }
-
-    [[nodiscard]] auto column() const
-    {
-        return reference_.velocity.col(static_cast<Eigen::Index>(next_ - 1));
-    }
-
-    void look(const BatheStep& step)
-    {
-        const auto& [a, b, c] = step.velocity;
-        for (; next_ <= samples; ++next_) {
-            const double theta = (static_cast<double>(next_) * spacing_ - step.t) / step.h;
-            if (theta > 1 + 1e-12) break;
-            const double wa = (2 * theta - 1) * (theta - 1);
-            const double wb = 4 * theta * (1 - theta);
-            const double wc = theta * (2 * theta - 1);
-            sum_ += (wa * *a + wb * *b + wc * *c - column()).squaredNorm();
-        }
-    }
-
-    /// Relative; what comes after the last step is at rest.
-    [[nodiscard]] double error()
-    {
-        for (; next_ <= samples; ++next_) sum_ += column().squaredNorm();
-        return std::sqrt(sum_ / reference_.of_all);
-    }
-
-private:
-    const Reference& reference_;
-    double spacing_;
-    std::size_t next_ = 1;
-    double sum_ = 0;
-};
-
-Reference reference_of(const StrikeSlipFault& fault, double t_end, double polynomial_bound)
-{
-    RuptureOptions options{.t_end = t_end,
-                           .step = 0.01 * fault.time_unit(),
-                           .rtol = std::numeric_limits<double>::infinity(),
-                           .polynomial_bound = polynomial_bound};
-    for (std::size_t i = 1; i <= samples; ++i) {
-        options.snapshot_times.push_back(
-            i == samples ? t_end : t_end * static_cast<double>(i) / static_cast<double>(samples));
-    }
-    const Rupture run = simulate(fault, options);
-    if (run.snapshots.size() != samples) {
-        throw std::runtime_error(
-            fmt::format("the reference of a fault of {0} x {0} elements ended early: {1}",
-                        fault.elements(), describe(run.outcome)));
-    }
-    Reference out;
-    out.velocity.resize(fault.size(), static_cast<Eigen::Index>(samples));
-    for (std::size_t i = 0; i < samples; ++i) {
-        out.velocity.col(static_cast<Eigen::Index>(i)) =
-            run.snapshots[i].velocity / fault.velocity_unit();
-    }
-    out.of_all = out.velocity.squaredNorm();
-    out.mean_slip = run.mean_slip;
-    return out;
-}
+using detail::Comparison;
+using detail::FaultReference;
 
 /// A fault, its reference, and what runs have left behind for the next ones.
 class FaultProblem {
@@ -100,7 +29,7 @@ public:
         : fault_(fault),
           t_end_(t_end),
           bound_(polynomial_bound),
-          reference_(reference_of(fault, t_end, polynomial_bound))
+          reference_(detail::reference_of(fault, t_end, polynomial_bound))
     {
     }
 
@@ -161,7 +90,7 @@ private:
     StrikeSlipFault fault_;
     double t_end_;
     double bound_;
-    Reference reference_;
+    FaultReference reference_;
     std::mutex mutex_;
     std::vector<std::unique_ptr<BatheRuns>> idle_;
 };

@@ -9,49 +9,17 @@
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
+#include "step_reference.hpp"
 
 namespace ricochet::learn {
 
 namespace {
 
-constexpr std::size_t samples = 2000;
 constexpr double usual_step = 0.1;  // over the system's unit of time
 
-/// States at even times, the start among them.
-template <class System>
-using Reference = std::vector<StateOf<System>>;
-
-/// Walks the even times that a step covers; the state there is on the parabola of the step.
-template <class System>
-class Samples {
-public:
-    Samples(double t_end, const StateOf<System>& start)
-        : spacing_(t_end / static_cast<double>(samples)), last_(start)
-    {
-    }
-
-    template <class Use>
-    void step(const SetValuedMotion<System>& motion, const Use& use)
-    {
-        const auto& a = motion.before();
-        const auto& c = motion.state();
-        const double h = c.t - a.t;
-        for (; next_ <= samples; ++next_) {
-            const double theta = (static_cast<double>(next_) * spacing_ - a.t) / h;
-            if (theta > 1 + 1e-12) break;
-            const double wa = (2 * theta - 1) * (theta - 1);
-            const double wb = 4 * theta * (1 - theta);
-            const double wc = theta * (2 * theta - 1);
-            last_ = wa * a.w + wb * motion.middle().w + wc * c.w;
-            use(next_, last_);
-        }
-    }
-
-private:
-    double spacing_;
-    std::size_t next_ = 1;
-    StateOf<System> last_;
-};
+using detail::Reference;
+using detail::samples;
+using detail::Samples;
 
 template <class System>
 struct SmallProblem {
@@ -87,8 +55,9 @@ struct SmallProblem {
 
     [[nodiscard]] StepTrial run(const StepRule& rule) const
     {
-        SetValuedMotion<System> motion(system, start, options(rule));
-        Samples<System> at(t_end, start);
+        const SetValuedOptions set = options(rule);
+        SetValuedMotion<System> motion(system, start, set);
+        Samples<System> at(t_end, set.estimate);
         double sum = 0;
         while (motion.outcome() == SetValuedOutcome::running) {
             const SetValuedOutcome outcome = motion.advance();
@@ -142,34 +111,17 @@ StepProblem sliding_mode_problem(const SlidingMode& system, double from, double 
     SmallProblem<SlidingMode> problem{.system = system,
                                       .start = SlidingMode::Vector::Constant(from),
                                       .t_end = t_end,
-                                      .reference = {}};
-    for (std::size_t i = 0; i <= samples; ++i) {
-        const double t = t_end * static_cast<double>(i) / static_cast<double>(samples);
-        problem.reference.push_back(SlidingMode::Vector::Constant(system.exact(t, from)));
-    }
+                                      .reference = detail::reference_of(system, from, t_end)};
     return as_problem(std::move(problem), 1);
 }
 
 StepProblem diode_circuit_problem(const DiodeCircuit& system, const Eigen::Vector3d& start,
                                   double t_end)
 {
-    SmallProblem<DiodeCircuit> problem{
-        .system = system, .start = start, .t_end = t_end, .reference = {start}};
-    // Of order 2 with its switches located: off by about a millionth.
-    SetValuedMotion<DiodeCircuit> motion(
-        system, start,
-        {.t_end = t_end, .step = 5e-4 * system.step_unit(), .switches = Switches::located});
-    Samples<DiodeCircuit> at(t_end, start);
-    while (motion.outcome() == SetValuedOutcome::running) {
-        (void)motion.advance();
-        at.step(motion,
-                [&](std::size_t, const Eigen::Vector3d& w) { problem.reference.push_back(w); });
-    }
-    if (motion.outcome() != SetValuedOutcome::reached_end ||
-        problem.reference.size() != samples + 1) {
-        throw std::runtime_error(fmt::format("the reference of a diode circuit ended early: {}",
-                                             describe(motion.outcome())));
-    }
+    SmallProblem<DiodeCircuit> problem{.system = system,
+                                       .start = start,
+                                       .t_end = t_end,
+                                       .reference = detail::reference_of(system, start, t_end)};
     return as_problem(std::move(problem), 1);
 }
 

@@ -192,12 +192,41 @@ public:
         zero(middle_);
         zero(first_middle_);
         forces_.drive(now_.fields.slip, now_.fields.velocity, now_.acceleration);
+        next_ = now_;
+        seen_ = view(0);
     }
+
+    /// `BatheMotion::step`
+    bool step(double h)
+    {
+        const double end = end_time();
+        const double left = end - t_;
+        const double length = left <= h * (1 + 1e-9) ? left : h;
+        if (!attempt(length)) {
+            ++out_.statistics.rejected;
+            return false;
+        }
+        scaled_error_ = bathe_.estimate == ErrorEstimate::none ? 0 : error_of(length);
+        seen_ = view(length);
+        accept(length, length == left ? end : t_ + length);
+        return true;
+    }
+    [[nodiscard]] double end_time() const { return options_.t_end / fault_.time_unit(); }
+    [[nodiscard]] double time() const { return t_; }
+    [[nodiscard]] double error() const { return scaled_error_; }
+    [[nodiscard]] const StepView& seen() const { return seen_; }
+    [[nodiscard]] const RuptureStatistics& statistics() const { return out_.statistics; }
+    [[nodiscard]] double mean_slip() const
+    {
+        return fault_.mean(now_.fields.path * fault_.slip_unit());
+    }
+    /// Whether nothing moves, nor is any element driven beyond its strength.
+    bool at_rest() { return now_.fields.velocity.isZero(0) && rests(); }
 
     Rupture run()
     {
         const double unit = fault_.time_unit();
-        const double end = options_.t_end / unit;
+        const double end = end_time();
         const double longest = bathe_.h_max > 0 ? bathe_.h_max / unit : end / 5;
         double h = std::min(longest, options_.step / unit);
         out_.longest_step = longest * unit;
@@ -228,7 +257,7 @@ public:
                 continue;
             }
             accept(step, step == left ? end : t_ + step);
-            if (now_.fields.velocity.isZero(0) && rests()) {
+            if (at_rest()) {
                 rest_time_ = t_;
                 return finish(RuptureOutcome::at_rest);
             }
@@ -483,6 +512,8 @@ private:
     VectorXd unloaded_;
     double t_ = 0;
     double fastest_ = 0;
+    double scaled_error_ = 0;  // of `step`
+    StepView seen_;
     double rest_time_ = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -569,6 +600,64 @@ void validate_both(const RuptureOptions& options, const BatheOptions& bathe)
 }
 
 }  // namespace
+
+struct BatheMotion::Parts {
+    Parts(const StrikeSlipFault& fault, FaultForces& forces, const RuptureOptions& o,
+          const BatheOptions& b)
+        : unit(fault.time_unit()), options(o), bathe(b), rupture(fault, forces, options, bathe)
+    {
+    }
+
+    double unit;
+    RuptureOptions options;
+    BatheOptions bathe;
+    BatheRupture rupture;
+};
+
+BatheMotion::BatheMotion(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+BatheMotion::BatheMotion(BatheMotion&&) noexcept = default;
+BatheMotion& BatheMotion::operator=(BatheMotion&&) noexcept = default;
+BatheMotion::~BatheMotion() = default;
+
+bool BatheMotion::step(double h)
+{
+    return parts_->rupture.step(h / parts_->unit);
+}
+bool BatheMotion::ended() const noexcept
+{
+    return !(parts_->rupture.time() < parts_->rupture.end_time());
+}
+double BatheMotion::t() const noexcept
+{
+    return parts_->rupture.time() * parts_->unit;
+}
+bool BatheMotion::rests()
+{
+    return parts_->rupture.at_rest();
+}
+double BatheMotion::error() const noexcept
+{
+    return parts_->rupture.error();
+}
+const StepView& BatheMotion::view() const noexcept
+{
+    return parts_->rupture.seen();
+}
+const RuptureStatistics& BatheMotion::statistics() const noexcept
+{
+    return parts_->rupture.statistics();
+}
+double BatheMotion::mean_slip() const
+{
+    return parts_->rupture.mean_slip();
+}
+
+BatheMotion BatheRuns::start(const RuptureOptions& options, const BatheOptions& bathe)
+{
+    validate_both(options, bathe);
+    return BatheMotion(
+        std::make_unique<BatheMotion::Parts>(parts_->fault, parts_->forces, options, bathe));
+}
 
 Rupture BatheRuns::simulate(const RuptureOptions& options, const BatheOptions& bathe)
 {

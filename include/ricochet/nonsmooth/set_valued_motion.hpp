@@ -172,6 +172,8 @@ public:
     [[nodiscard]] const StageReport& failure() const noexcept { return failure_; }
     /// The step that will be tried next.
     [[nodiscard]] double next_step() const noexcept { return h_; }
+    /// For whoever chooses steps himself, positive.
+    void next_step(double h) noexcept { h_ = h; }
     /// The scaled error of the last attempt.
     [[nodiscard]] double error() const noexcept { return scaled_error_; }
     /// With the counts of a `LearnedStep`.

@@ -83,6 +83,40 @@ void validate(const BatheOptions& options);
 [[nodiscard]] Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
                                const BatheOptions& bathe);
 
+/// A run whose steps are chosen from outside, one at a time.
+///
+///     BatheMotion motion = runs.start(options, bathe);
+///     while (!motion.ended()) motion.step(h);
+///
+/// The steps are those of `simulate`, to the bit. What made it must outlive it.
+class BatheMotion {
+public:
+    BatheMotion(BatheMotion&&) noexcept;
+    BatheMotion& operator=(BatheMotion&&) noexcept;
+    ~BatheMotion();
+
+    /// One attempt over h [s], positive, or over what is left. If a stage has no solution
+    /// nothing moves: false. The controller of the options is not asked.
+    bool step(double h);
+
+    [[nodiscard]] bool ended() const noexcept;
+    [[nodiscard]] double t() const noexcept;  ///< [s]
+    /// Whether nothing moves any more, nor will.
+    [[nodiscard]] bool rests();
+    /// The scaled error of the last step; 0 if none is estimated.
+    [[nodiscard]] double error() const noexcept;
+    /// Of the last step, or of the start.
+    [[nodiscard]] const StepView& view() const noexcept;
+    [[nodiscard]] const RuptureStatistics& statistics() const noexcept;
+    [[nodiscard]] double mean_slip() const;  ///< path [m]
+
+private:
+    friend class BatheRuns;
+    struct Parts;
+    explicit BatheMotion(std::unique_ptr<Parts> parts);
+    std::unique_ptr<Parts> parts_;
+};
+
 /// One fault under many rules: what depends on the fault alone, a third of a millisecond for one
 /// element, is made once. Not for two threads at a time.
 class BatheRuns {
@@ -96,6 +130,9 @@ public:
     [[nodiscard]] const StrikeSlipFault& fault() const noexcept;
     /// As the function of that name.
     [[nodiscard]] Rupture simulate(const RuptureOptions& options, const BatheOptions& bathe);
+    /// A run to be stepped, which must end before another begins. `RuptureOptions::step` is not
+    /// used, but for being positive.
+    [[nodiscard]] BatheMotion start(const RuptureOptions& options, const BatheOptions& bathe);
 
 private:
     struct Parts;

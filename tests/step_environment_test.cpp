@@ -1,0 +1,257 @@
+// Runs as environments: their steps, rewards and ends.
+#include "ricochet/learn/step_environment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "ricochet/learn/random.hpp"
+#include "ricochet/systems/diode_circuit.hpp"
+#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/systems/sliding_mode.hpp"
+
+namespace ricochet::learn {
+namespace {
+
+struct Episode {
+    double undiscounted = 0;
+    std::uint64_t attempts = 0;
+    bool terminal = false;
+    StepTrial trial;
+    std::array<double, 9> observation{};  // the last
+};
+
+/// An episode by a rule for actions.
+template <class Action>
+Episode act(const StepWorld& world, const Action& action)
+{
+    Episode out;
+    EXPECT_EQ(world.environment.observations, out.observation.size());
+    world.environment.reset(1, out.observation);
+    for (;;) {
+        const double a = action();
+        const Reaction reaction = world.environment.step({&a, 1}, out.observation);
+        for (const double o : out.observation) EXPECT_LE(std::abs(o), 5);
+        out.undiscounted += reaction.reward;
+        ++out.attempts;
+        if (!reaction.terminal && !reaction.truncated) continue;
+        out.terminal = reaction.terminal;
+        out.trial = world.trial();
+        return out;
+    }
+}
+
+Episode constant(const StepWorld& world, double length)
+{
+    return act(world, [a = world.action_of(length)] { return a; });
+}
+
+TEST(StepWorld, ActionsSpanTheSteps)
+{
+    for (const StepScale scale : {StepScale::linear, StepScale::logarithmic}) {
+        const StepWorld world =
+            step_world(SlidingMode{}, 0.15, 0.1, {.scale = scale, .h_min = 1e-4, .h_max = 1e-2});
+        EXPECT_NEAR(world.length_of(-1), 1e-4, 1e-18);
+        EXPECT_NEAR(world.length_of(1), 1e-2, 1e-16);
+        const double middle = scale == StepScale::linear ? 5.05e-3 : 1e-3;
+        EXPECT_NEAR(world.length_of(0), middle, 1e-16);
+        EXPECT_NEAR(world.action_of(world.length_of(0.3)), 0.3, 1e-14);
+    }
+}
+
+// The episode is the run: to the bit, whatever the estimate and scheme.
+TEST(StepWorld, AConstantActionIsAConstantStepOfAFault)
+{
+    const StrikeSlipFault fault({.elements = 2});
+    for (const bool published : {false, true}) {
+        StepWorldOptions options = published ? published_step_world() : StepWorldOptions{};
+        options.until_rest = true;
+        const StepWorld world = step_world(fault, 20, options);
+        const double h = world.length_of(world.action_of(0.2));
+        const Episode episode = constant(world, 0.2);
+        const Rupture run = simulate(fault, {.t_end = 20, .step = h},
+                                     {.first_stage = options.first_stage,
+                                      .estimate = options.estimate,
+                                      .norm = published ? FaultNorm::components : FaultNorm::fields,
+                                      .rtol = 1e-3,
+                                      .atol = 1e-6,
+                                      .h_max = 20});
+        EXPECT_EQ(run.outcome, RuptureOutcome::at_rest);
+        EXPECT_TRUE(episode.terminal);
+        EXPECT_EQ(episode.trial.steps, run.statistics.steps);
+        EXPECT_EQ(episode.trial.solves, run.statistics.solves);
+        EXPECT_EQ(episode.trial.iterations, run.statistics.iterations);
+        // A function of the final slip, which is the same double.
+        const Rupture other = simulate(fault, {.t_end = 20,
+                                               .step = 0.01 * fault.time_unit(),
+                                               .rtol = std::numeric_limits<double>::infinity()});
+        EXPECT_EQ(episode.trial.final_error, std::abs(run.mean_slip / other.mean_slip - 1));
+    }
+}
+
+TEST(StepWorld, AConstantActionIsAConstantStepOfAnInclusion)
+{
+    // The problem's rule for changes of branch.
+    const StepWorld world = step_world(DiodeCircuit{}, DiodeCircuit::start(), 5,
+                                       {.first_stage = FirstStage::switch_aware});
+    const StepProblem problem = diode_circuit_problem(DiodeCircuit{}, DiodeCircuit::start(), 5);
+    const double h = world.length_of(world.action_of(0.02));
+    const Episode episode = constant(world, 0.02);
+    const StepTrial run =
+        problem.run({.controller = ConstantStep{}, .step = h / problem.usual_step});
+    EXPECT_EQ(episode.trial.steps, run.steps);
+    // h / usual_step * usual_step is h to a rounding, which is what the errors then differ by.
+    EXPECT_NEAR(episode.trial.error, run.error, 1e-12);
+    EXPECT_NEAR(episode.trial.final_error, run.final_error, 1e-12);
+}
+
+// Without a discount equation 7 pays for the time covered, however many steps cover it: the sum of
+// (h - h_min) / (h_max - h_min) is (T - n h_min) / (h_max - h_min).
+TEST(StepWorld, ThePublishedReturnTelescopes)
+{
+    const double t_end = 0.5;
+    const StepWorldOptions options{
+        .alpha = 0, .scale = StepScale::linear, .h_min = 1e-4, .h_max = 1e-2};
+    const StepWorld world = step_world(SlidingMode{}, 0.15, t_end, options);
+    const auto expected = [&](const Episode& episode) {
+        return (t_end - static_cast<double>(episode.attempts) * options.h_min) /
+               (options.h_max - options.h_min);
+    };
+    Random random(3);
+    const Episode wild = act(world, [&] { return random.uniform(-1, 1); });
+    const Episode large = act(world, [] { return 1.0; });
+    const Episode small = act(world, [] { return -0.9; });
+    // Each term is off by roundings of times of order 1 over a range of 1e-2.
+    for (const Episode& episode : {wild, large, small}) {
+        EXPECT_TRUE(episode.terminal);
+        EXPECT_NEAR(episode.undiscounted, expected(episode),
+                    1e-14 * static_cast<double>(episode.attempts));
+    }
+    EXPECT_EQ(large.attempts, 50U);
+    EXPECT_GT(small.attempts, 700U);
+}
+
+// So the error alone decides: of constant steps the smallest are paid best.
+TEST(StepWorld, ThePublishedReturnIsLargestForTheSmallestSteps)
+{
+    StepWorldOptions options = published_step_world();
+    options.dear = 1e9;  // solves cost nothing
+    const StepWorld world = step_world(StrikeSlipFault({.elements = 1}), 30, options);
+    const double coarse = constant(world, 0.3).undiscounted;
+    const double fine = constant(world, 0.003).undiscounted;
+    EXPECT_GT(fine, coarse + 1);
+    EXPECT_LT(fine, 5);
+}
+
+template <class World>
+void sums_to_cost(const World& make, double t)
+{
+    StepWorldOptions options{
+        .reward = StepReward::additive, .lambda = 70, .work_unit = 3, .h_min = 1e-3 * t};
+    options.h_max = 0.03 * t;
+    const StepWorld world = make(options);
+    Random random(5);
+    const Episode episode = act(world, [&] { return random.uniform(-1, 1); });
+    EXPECT_TRUE(episode.trial.ended);
+    const double error = episode.trial.error;
+    const double cost = episode.trial.work / 3 + 70 * error * error;
+    EXPECT_GT(error, 0);
+    // Sums of some hundred terms.
+    EXPECT_NEAR(episode.undiscounted, -cost, 1e-11 * cost);
+}
+
+TEST(StepWorld, AdditiveRewardsAreMinusTheCostOfTheRun)
+{
+    sums_to_cost([](const auto& o) { return step_world(SlidingMode{}, 0.15, 0.5, o); }, 0.5);
+    sums_to_cost(
+        [](const auto& o) { return step_world(DiodeCircuit{}, DiodeCircuit::start(), 20, o); }, 20);
+    for (const bool until_rest : {false, true}) {
+        sums_to_cost(
+            [&](StepWorldOptions o) {
+                o.until_rest = until_rest;
+                return step_world(StrikeSlipFault({.elements = 1}), 30, o);
+            },
+            30);
+    }
+}
+
+// Steps of a fault that are too long have no solution: nothing moves, and in the end it is over.
+TEST(StepWorld, StepsWithoutASolutionArePunished)
+{
+    const StepWorldOptions options{.scale = StepScale::linear, .h_min = 0.01};
+    const StepWorld world = step_world(StrikeSlipFault({.elements = 1}), 30, options);
+    const Episode episode = act(world, [] { return 1.0; });
+    EXPECT_TRUE(episode.terminal);
+    EXPECT_EQ(episode.attempts, static_cast<std::uint64_t>(step_world_failures));
+    EXPECT_DOUBLE_EQ(episode.undiscounted, -step_world_failures);
+    EXPECT_FALSE(episode.trial.ended);
+    EXPECT_EQ(episode.trial.steps, 0U);
+}
+
+// Sums of a state of 1e308 overflow: infinity less infinity.
+TEST(StepWorld, ANotANumberEndsTheEpisode)
+{
+    for (const ErrorEstimate estimate : {ErrorEstimate::none, ErrorEstimate::embedded}) {
+        const StepWorld world = step_world(SlidingMode{}, 1e308, 0.005,
+                                           {.h_min = 1e-3, .h_max = 2e-3, .estimate = estimate});
+        const Episode episode = constant(world, 2e-3);
+        EXPECT_TRUE(episode.terminal);
+        EXPECT_EQ(episode.attempts, 1U);
+        EXPECT_TRUE(std::isfinite(episode.undiscounted));
+        EXPECT_LT(episode.undiscounted, 0);
+        EXPECT_FALSE(episode.trial.ended);
+    }
+}
+
+TEST(StepWorld, AttemptsAreLimited)
+{
+    const StepWorld world = step_world(SlidingMode{}, 0.15, 0.5, {.max_attempts = 7});
+    const Episode episode = act(world, [] { return 0.0; });
+    EXPECT_FALSE(episode.terminal);
+    EXPECT_EQ(episode.attempts, 7U);
+}
+
+// A policy that answers the same whatever it sees.
+TEST(StepWorld, PoliciesAreFollowed)
+{
+    const StepWorld world = step_world(SlidingMode{}, 0.15, 0.5, {.h_min = 1e-4});
+    Model policy;
+    policy.layers.push_back(
+        {.inputs = 9, .outputs = 1, .weight = std::vector<double>(9, 0), .bias = {0.5}});
+    const StepTrial trial = follow(world, policy);
+    const Episode episode = act(world, [] { return std::tanh(0.5); });
+    EXPECT_TRUE(trial.ended);
+    EXPECT_EQ(trial.steps, episode.trial.steps);
+    EXPECT_EQ(trial.error, episode.trial.error);
+    policy.layers[0].inputs = 8;
+    policy.layers[0].weight.pop_back();
+    EXPECT_THROW((void)follow(world, policy), std::invalid_argument);
+}
+
+TEST(StepWorld, RefusesOptionsThatCannotBe)
+{
+    const double nan = std::nan("");
+    const auto refused = [](const StepWorldOptions& options) {
+        EXPECT_THROW((void)step_world(SlidingMode{}, 0.15, 0.5, options), std::invalid_argument);
+    };
+    for (const double bad : {-1.0, nan}) {
+        refused({.alpha = bad});
+        refused({.dear = bad});
+        refused({.lambda = bad});
+        refused({.work_unit = bad});
+        refused({.h_min = bad});
+        refused({.h_max = bad});
+        refused({.tolerance = bad});
+    }
+    refused({.h_min = 0.1, .h_max = 0.05});
+    refused({.max_attempts = 0});
+    // The free estimate is not of the source's first stage.
+    refused({.first_stage = FirstStage::at_end});
+}
+
+}  // namespace
+}  // namespace ricochet::learn
