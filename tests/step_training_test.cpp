@@ -70,7 +70,6 @@ TEST(StepProblem, SearchedStepsAreBetterThanEvenOnes)
     ASSERT_TRUE(found.trial.ended);
     EXPECT_LE(found.trial.steps, 13U);
     const double even = SlidingMode::t_end / 12 / problem.usual_step;
-    // What is searched is good for steps that are off by 5 %; the switch is missed by most.
     EXPECT_LT(found.trial.error,
               0.9 * problem.run({.controller = ConstantStep{}, .step = even}).error);
 }

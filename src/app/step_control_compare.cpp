@@ -50,7 +50,7 @@ struct Case {
     double target = 1e-2;
     double coarsest = 0.1;     ///< tolerance that a ladder begins with
     double constant_span = 8;  ///< its constant steps, over the usual one
-    std::size_t evaluations = 3000;
+    std::size_t evaluations = 30'000;
     std::function<RuleRow(double target)> event_driven{};
 };
 
@@ -117,7 +117,7 @@ std::vector<RuleRow> rows_of(const Case& of)
     controlled("learned", LearnedStep{.policy = policy, .plain = plain}, ErrorEstimate::embedded);
     const RuleRow& learned = out.back();
     if (learned.reached) {
-        RuleRow optimum{.rule = "optimum found", .setting = "as many steps"};
+        RuleRow optimum{.rule = "searched sequence", .setting = "as many steps"};
         const auto found = learn::search_steps(
             of.problem, static_cast<std::size_t>(learned.trial.steps), of.evaluations);
         optimum.trial = found.trial;
@@ -163,6 +163,7 @@ RuleRow by_hand_over(const std::string& name, double target)
             }
         }
         out.trial.error = std::sqrt(of_error / of_all);
+        out.trial.final_error = std::numeric_limits<double>::quiet_NaN();
         out.trial.steps = timed.run.statistics.steps;
         out.setting = fmt::format("{:.1e}", rtol);
         out.reached = out.trial.error <= target;
@@ -225,6 +226,7 @@ Case case_of(const std::string& system, const CompareRequest& request)
                 .event_driven = [system](double target) { return by_hand_over(system, target); }};
     }
     const SystemEntry& entry = find_system("fault");
+    refuse_rate_and_state(request.set, entry);
     StrikeSlipFault::Parameters parameters = fault_parameters(parameter_values(entry, request.set));
     const bool given = std::any_of(request.set.begin(), request.set.end(),
                                    [](const auto& text) { return text.starts_with("elements="); });
@@ -259,11 +261,12 @@ std::string table(const Case& of, const std::vector<RuleRow>& rows)
             continue;
         }
         const bool implicit = t.solves > 0;
-        out += fmt::format(
-            "{:<24}{:>14}{:>7}{:>6}{:>8}{:>8}{:>12}{:>10.2e}{:>10.2e}\n", row.rule, row.setting,
-            t.steps, t.rejected, implicit ? std::to_string(t.solves) : "-",
-            implicit ? std::to_string(t.iterations) : "-",
-            std::isnan(row.seconds) ? "-" : duration(row.seconds), t.error, t.final_error);
+        out +=
+            fmt::format("{:<24}{:>14}{:>7}{:>6}{:>8}{:>8}{:>12}{:>10.2e}{:>10}\n", row.rule,
+                        row.setting, t.steps, t.rejected, implicit ? std::to_string(t.solves) : "-",
+                        implicit ? std::to_string(t.iterations) : "-",
+                        std::isnan(row.seconds) ? "-" : duration(row.seconds), t.error,
+                        std::isnan(t.final_error) ? "-" : fmt::format("{:.2e}", t.final_error));
     }
     return out;
 }

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ricochet/learn/random.hpp"
 #include "ricochet/learn/step_control.hpp"
 
 namespace ricochet::learn {
@@ -25,36 +24,25 @@ double first_step(const StepRule& rule, double usual_step)
 SearchedSteps search_steps(const StepProblem& problem, std::size_t count, std::size_t evaluations,
                            std::uint64_t seed, unsigned threads)
 {
-    constexpr std::size_t copies = 4;
-    constexpr double jitter = 0.05;
-    Random random(seed);
-    std::vector<double> off(copies * count);
-    for (double& value : off) value = 1 + random.uniform(-jitter, jitter);
     // Even steps as far as the motion goes: some end at rest, long before their time.
     const StepTrial even = problem.run({.controller = ConstantStep{}});
     const double span = static_cast<double>(even.steps) * problem.usual_step;
     const std::vector<double> start(count, std::log(span / static_cast<double>(count)));
-    const auto lengths_of = [&](std::span<const double> x, const double* factor) {
+    const auto lengths_of = [&](std::span<const double> x) {
         std::vector<double> out(count);
-        for (std::size_t i = 0; i < count; ++i) {
-            out[i] = std::exp(std::clamp(x[i], -40.0, 40.0)) * (factor ? factor[i] : 1);
-        }
+        for (std::size_t i = 0; i < count; ++i) out[i] = std::exp(std::clamp(x[i], -40.0, 40.0));
         return out;
     };
     const EvolutionResult found = evolve(
         [&](std::span<const double> x) {
-            double sum = 0;
-            for (std::size_t k = 0; k < copies; ++k) {
-                const StepTrial trial = problem.run(prescribed(lengths_of(x, &off[k * count])));
-                // More steps than asked for, because the last was repeated, are no bargain.
-                const double more = std::max(
-                    0.0, static_cast<double>(trial.steps) / static_cast<double>(count) - 1);
-                sum += std::log(std::max(trial.error, 1e-12)) + 10 * more + (trial.ended ? 0 : 10);
-            }
-            return sum / copies;
+            const StepTrial trial = problem.run(prescribed(lengths_of(x)));
+            // More steps than asked for, because the last was repeated, are no bargain.
+            const double more =
+                std::max(0.0, static_cast<double>(trial.steps) / static_cast<double>(count) - 1);
+            return std::log(std::max(trial.error, 1e-12)) + 10 * more + (trial.ended ? 0 : 10);
         },
-        start, {.spread = 0.2, .seed = seed, .max_evaluations = evaluations, .threads = threads});
-    SearchedSteps out{.lengths = lengths_of(found.x, nullptr), .trial = {}};
+        start, {.spread = 0.6, .seed = seed, .max_evaluations = evaluations, .threads = threads});
+    SearchedSteps out{.lengths = lengths_of(found.x), .trial = {}};
     out.trial = problem.run(prescribed(out.lengths));
     return out;
 }

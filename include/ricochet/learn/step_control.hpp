@@ -160,9 +160,9 @@ struct SearchedSteps {
     StepTrial trial;
 };
 
-/// The best sequence of that many steps that an evolution strategy finds, from even ones: a
-/// yardstick for rules, which see a run only as it comes. What is least is the mean logarithm of
-/// the error over four copies whose steps are off by up to 5 %, so that no luck of a node counts.
+/// The sequence of that many steps with the least error that an evolution strategy finds, from even
+/// ones: a yardstick for rules, which see a run only as it comes. It may profit from where a node
+/// happens to fall, and is no proof that there is none better.
 [[nodiscard]] SearchedSteps search_steps(const StepProblem& problem, std::size_t count,
                                          std::size_t evaluations, std::uint64_t seed = 1,
                                          unsigned threads = 2);
