@@ -50,7 +50,7 @@ struct Case {
     double target = 1e-2;
     double coarsest = 0.1;     ///< tolerance that a ladder begins with
     double constant_span = 8;  ///< its constant steps, over the usual one
-    std::size_t evaluations = 30'000;
+    std::size_t evaluations = 6000;
     std::function<RuleRow(double target)> event_driven{};
 };
 
