@@ -1,5 +1,6 @@
 // What the strike-slip fault and the trainers must show.
 #include "measure_fault.hpp"
+#include "measure_policies.hpp"
 #include "measure_trainers.hpp"
 #include "measure_step_control.hpp"
 
@@ -64,6 +65,13 @@ std::vector<Check> checks_of_part_6()
          .sentence = "mean return of a pendulum swung up, after 8000 steps",
          .target = ">= -200",
          .run = swing_up},
+        {.part = 6,
+         .id = "tqc-published",
+         .sentence = "TQC on steps of a fault of one element, by the published reward and by the "
+                     "additive one, 10 000 steps",
+         .target = "both end the run, the additive one less wrong",
+         .run = tqc_by_both_rewards,
+         .required = false},
         {.part = 6,
          .id = "steps-classical",
          .sentence = "learned steps on 10, 25, 50 per side, 3 then 5 km: iterations saved over the "
