@@ -1,5 +1,7 @@
 // Steps chosen by policies, on the command line.
 
+#include <sys/stat.h>
+
 #include "app.hpp"
 
 namespace ricochet {
@@ -83,6 +85,28 @@ TEST_F(App, TrainStepPolicyRefusesBadInput)
                    {"50", "80"});
 }
 
+TEST_F(App, TrainStepPolicyResumesNoOtherSystem)
+{
+    (void)json({"train", "step-policy", "sliding-mode", "--out", "a.safetensors", "--checkpoint",
+                "shared", "--iterations", "21", "--json"});
+    ASSERT_TRUE(fs::exists(work() / "shared"));
+    expect_refused({"train", "step-policy", "diode-circuit", "--out", "b.safetensors",
+                    "--checkpoint", "shared", "--resume"},
+                   {"shared", "another search"});
+}
+
+TEST_F(App, TrainStepPolicyReplacesNothingButFiles)
+{
+    ASSERT_EQ(::mkfifo((work() / "pipe").c_str(), 0600), 0);
+    expect_refused({"train", "step-policy", "sliding-mode", "--out", "pipe"}, {"--out", "pipe"});
+    expect_refused({"train", "step-policy", "sliding-mode", "--out", "a.safetensors",
+                    "--checkpoint", "pipe"},
+                   {"--checkpoint", "pipe"});
+    expect_refused({"train", "step-policy", "sliding-mode", "--out", "a", "--checkpoint", "a"},
+                   {"two files"});
+    expect_refused({"simulate", "fault", "--kernel", "pipe"}, {"pipe", "something else"});
+}
+
 TEST_F(App, CompareStepControlShowsEveryRule)
 {
     const nlohmann::json table =
@@ -91,9 +115,10 @@ TEST_F(App, CompareStepControlShowsEveryRule)
     ASSERT_EQ(rules.size(), 8U);
     for (const auto& rule : rules) {
         const std::string name = rule["rule"];
-        EXPECT_TRUE(rule["reached"].get<bool>()) << name;
-        if (name == "searched sequence") continue;
-        EXPECT_LE(rule["error"].get<double>(), 1e-3) << name;
+        const bool reached = rule["reached"];
+        EXPECT_EQ(reached, rule["error"].get<double>() <= 1e-3) << name;
+        // What a search finds may be worse, and is not said to be as good then.
+        if (name != "searched sequence") EXPECT_TRUE(reached) << name;
     }
 }
 

@@ -76,6 +76,16 @@ void check_writable(std::string_view option, const fs::path& file)
     if (regular && access(directory.c_str(), W_OK | X_OK) != 0) refuse(last_error());
 }
 
+void check_replaceable(std::string_view option, const fs::path& file)
+{
+    std::error_code error;
+    const fs::path target = behind_links(file);
+    if (fs::exists(target, error) && !fs::is_regular_file(target, error)) {
+        throw BadInput(fmt::format("{} must be a file, got '{}', which is something else", option,
+                                   file.string()));
+    }
+}
+
 void write_file(const fs::path& file, std::string_view content)
 {
     const auto fail = [&] {

@@ -18,6 +18,10 @@ public:
 /// @throws BadInput naming the option.
 void check_writable(std::string_view option, const std::filesystem::path& file);
 
+/// For files that something else than a file may not become: models, checkpoints.
+/// @throws BadInput naming the option.
+void check_replaceable(std::string_view option, const std::filesystem::path& file);
+
 /// Writes a neighbouring file and renames it. Devices and pipes are written to.
 /// @throws WriteError naming the file and what the system said.
 void write_file(const std::filesystem::path& file, std::string_view content);

@@ -121,7 +121,7 @@ std::vector<RuleRow> rows_of(const Case& of)
         const auto found = learn::search_steps(
             of.problem, static_cast<std::size_t>(learned.trial.steps), of.evaluations);
         optimum.trial = found.trial;
-        optimum.reached = found.trial.ended;
+        optimum.reached = found.trial.ended && found.trial.error <= of.target;
         optimum.seconds = std::numeric_limits<double>::quiet_NaN();
         out.push_back(std::move(optimum));
     }

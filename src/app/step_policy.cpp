@@ -37,20 +37,21 @@ std::string table(const std::vector<learn::StepScore::Part>& parts, bool judges_
     }
     return out +
            "gain: work of the best classical rule over that of the policy, at the true error "
-           "reached;\nfinal: the same at the final error; error: over that of the free estimate's "
-           "rule at that tolerance\n";
+           "reached;\n" +
+           (judges_final ? "final: the same at the final error; group: elements per side; " : "") +
+           "error: over that of the free estimate's rule at that tolerance\n";
 }
 
-Json rows(const std::vector<learn::StepScore::Part>& parts)
+Json rows(const std::vector<learn::StepScore::Part>& parts, bool judges_final)
 {
     Json out = Json::array();
     for (const auto& part : parts) {
         out.push_back({{"group", part.group},
                        {"tolerance", part.tolerance},
                        {"gain", std::exp(part.gain)},
-                       {"final_gain", std::exp(part.final_gain)},
                        {"error_ratio", std::exp(part.off)},
                        {"failed", part.failed}});
+        if (judges_final) out.back()["final_gain"] = std::exp(part.final_gain);
     }
     return out;
 }
@@ -101,6 +102,12 @@ int train_policy(const TrainPolicyRequest& request)
     options.checkpoint = request.checkpoint.empty() ? fs::path(request.out.string() + ".checkpoint")
                                                     : request.checkpoint;
     check_writable("--checkpoint", options.checkpoint);
+    check_replaceable("--out", request.out);
+    check_replaceable("--checkpoint", options.checkpoint);
+    if (request.out == options.checkpoint) {
+        throw BadInput(fmt::format("--out and --checkpoint must be two files, got '{}' for both",
+                                   request.out.string()));
+    }
     if (request.resume && !fs::exists(options.checkpoint)) {
         throw BadInput(
             fmt::format("there is no checkpoint '{}' to resume", options.checkpoint.string()));
@@ -129,7 +136,7 @@ int train_policy(const TrainPolicyRequest& request)
                          {"score", trained.search.score},
                          {"evaluations", trained.search.evaluations},
                          {"seconds", trained.search.seconds},
-                         {"held_out", rows(parts)},
+                         {"held_out", rows(parts, family.judges_final)},
                          {"model", request.out.string()}}));
     } else {
         print(fmt::format("{} evaluations in {}, score {:.4f} on {} problems; {} problems held "

@@ -124,6 +124,7 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
         throw unknown(fmt::format("kind of network for {}", system.name), training.kind, kinds);
     }
     check_writable("--out", request.out);
+    check_replaceable("--out", request.out);
     const bool own_checkpoint = training.checkpoint.empty();
     if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
     check_writable("--checkpoint", training.checkpoint);
@@ -199,6 +200,7 @@ int train(const TrainRequest& request)
     TrainingRequest training = request.training;
     training.kind = kind_named(system, *system.training, training.kind);
     check_writable("--out", request.out);
+    check_replaceable("--out", request.out);
     const bool own_checkpoint = training.checkpoint.empty();
     if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
     check_writable("--checkpoint", training.checkpoint);

@@ -337,6 +337,7 @@ private:
         all.put(options_.spread);
         all.put(options_.scales);
         all.put(options_.seed);
+        all.put(std::vector<double>(options_.problem.begin(), options_.problem.end()));
         return checksum(all.bytes());
     }
 
@@ -356,7 +357,7 @@ private:
         reader.get(found);
         if (found != fingerprint_) {
             refuse_checkpoint(options_.checkpoint,
-                              "is of another search: start, population, spread or seed differ");
+                              "is of another search: problem, start, population, spread or seed differ");
         }
         fields([&reader](auto& member) { reader.get(member); }, s_);
         reader.finish();

@@ -197,6 +197,14 @@ Start start_of(std::uint64_t seed)
     return out;
 }
 
+/// The system and all problems, so that no checkpoint of other ones is resumed.
+std::string name_of(const StepFamily& family)
+{
+    std::string out(family.layout.system);
+    for (const StepProblem& problem : family.problems) out += '\n' + problem.description;
+    return out;
+}
+
 }  // namespace
 
 TrainedStepPolicy train_step_policy(const StepFamily& family, const StepTrainingOptions& options,
@@ -214,6 +222,7 @@ TrainedStepPolicy train_step_policy(const StepFamily& family, const StepTraining
          .spread = 0.5,
          .scales = start.scales,
          .seed = options.seed,
+         .problem = name_of(family),
          .max_evaluations = options.evaluations,
          .max_seconds = options.seconds,
          .threads = options.threads,

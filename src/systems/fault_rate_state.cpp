@@ -84,6 +84,7 @@ public:
         const double longest = options_.step > 0 ? options_.step / unit : end;
         out_.rupture.longest_step = longest * unit;
         double h = controlled() ? std::min(longest, first_step() / unit) : longest;
+        out_.rupture.mean_velocities.front() = fault_.mean(now_.v) * fault_.velocity_unit();
         note_fastest(0);
         while (t_ < end) {
             const double left = end - t_;

@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "ricochet/systems/fault_kernel.hpp"
 
@@ -94,6 +96,10 @@ Eigen::MatrixXd matrix(const char* data, std::uint64_t side)
 Eigen::MatrixXd read_npy_square(const std::filesystem::path& file)
 {
     static_assert(std::endian::native == std::endian::little);
+    std::error_code error;
+    if (std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error)) {
+        refuse(file, "expected a file, found something else");
+    }
     std::ifstream in(file, std::ios::binary);
     if (!in) refuse(file, "cannot be read");
     const std::string bytes(std::istreambuf_iterator<char>(in), {});

@@ -17,6 +17,7 @@
 #include <functional>
 #include <limits>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -32,6 +33,8 @@ struct EvolutionOptions {
     double spread = 0.5;           ///< standard deviation at the start, positive
     std::vector<double> scales{};  ///< of the spread per component, positive; empty: 1
     std::uint64_t seed = 1;
+    /// What the score is of; a checkpoint of another problem is not resumed.
+    std::string problem{};
 
     /// The search ends after the generation in which one of these is reached.
     std::size_t max_evaluations = 10'000;

@@ -328,6 +328,16 @@ std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& value
 {
     std::string out;
     const int n = fault.elements();
+    if (n == 1) {  // a picture of one point would be empty: of four
+        const double side = fault.parameters().side / 1000;
+        for (const double z : {0.25, 0.75}) {
+            for (const double x : {0.25, 0.75}) {
+                out += fmt::format("{} {} {}\n", x * side, z * side, values[0]);
+            }
+            out += '\n';
+        }
+        return out;
+    }
     for (int z = 0; z < n; ++z) {
         for (int x = 0; x < n; ++x) {
             out += fmt::format("{} {} {}\n", fault.depth(x) / 1000, fault.depth(z) / 1000,

@@ -178,8 +178,14 @@ std::string text(const SystemEntry& system, const StrikeSlipFault& fault, const 
     out += fmt::format("{:>14}{:>14}{:>14}{:>20}\n", "earthquake [y]", "lasts [s]", "slip [m]",
                        "fastest [m/s]");
     for (const FaultEarthquake& e : r.earthquakes) {
-        out += fmt::format("{:>14.6f}{:>14.6g}{:>14.6g}{:>20.6g}\n", e.start / year,
-                           e.end - e.start, e.mean_slip, e.largest_velocity);
+        const double lasts = e.end - e.start;
+        out += fmt::format("{:>14.6f}{:>14}{:>14.6g}{:>20.6g}\n", e.start / year,
+                           std::isnan(lasts) ? "not over" : fmt::format("{:.6g}", lasts),
+                           e.mean_slip, e.largest_velocity);
+    }
+    if (r.earthquakes.empty()) out += fmt::format("{:>14}\n", "none");
+    if (r.elements_of_front < 1) {
+        out += "below one element to a front elements fail each on its own: take more of them\n";
     }
     out += fmt::format("ended at {} s, {:.4g} years: {}\n", r.rupture.t, r.rupture.t / year,
                        describe(r.rupture.outcome));
