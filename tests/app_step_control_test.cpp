@@ -118,7 +118,7 @@ TEST_F(App, CompareStepControlShowsEveryRule)
         const bool reached = rule["reached"];
         EXPECT_EQ(reached, rule["error"].get<double>() <= 1e-3) << name;
         // What a search finds may be worse, and is not said to be as good then.
-        if (name != "searched sequence") EXPECT_TRUE(reached) << name;
+        EXPECT_TRUE(reached || name == "searched sequence") << name;
     }
 }
 
