@@ -23,6 +23,13 @@ TEST_F(App, SimulateFaultByLearnedSteps)
               learned["statistics"]["steps"].get<int>() / 2);
 }
 
+TEST_F(App, TheLengthOfARunIsNoMeasureOfItsSteps)
+{
+    const nlohmann::json run = json({"simulate", "fault", "--integrator", "bathe", "--controller",
+                                     "learned", "--t-end", "1e8", "--json"});
+    EXPECT_EQ(run["outcome"], "at_rest");
+}
+
 TEST_F(App, SimulateSlidingModeByLearnedSteps)
 {
     for (const char* controller : {"error", "learned"}) {

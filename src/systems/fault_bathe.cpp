@@ -250,7 +250,7 @@ public:
             h = std::min(longest, (accepted ? std::max(step, h) : step) * factor);
             if (!accepted) {
                 ++out_.statistics.rejected;
-                if (h < 1e-9 * end) {
+                if (h < 1e-12 * std::max(t_, std::min(1.0, end))) {
                     return finish(solved ? RuptureOutcome::step_underflow
                                          : RuptureOutcome::not_converged);
                 }
