@@ -34,6 +34,8 @@ using learn::StepTrial;
 constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr std::size_t samples = 600;
 
+constexpr std::string_view searched = "searched sequence";  // a yardstick: it need not reach the target
+
 struct RuleRow {
     std::string rule{};
     std::string setting{};
@@ -117,7 +119,7 @@ std::vector<RuleRow> rows_of(const Case& of)
     controlled("learned", LearnedStep{.policy = policy, .plain = plain}, ErrorEstimate::embedded);
     const RuleRow& learned = out.back();
     if (learned.reached) {
-        RuleRow optimum{.rule = "searched sequence", .setting = "as many steps"};
+        RuleRow optimum{.rule = std::string(searched), .setting = "as many steps"};
         const auto found = learn::search_steps(
             of.problem, static_cast<std::size_t>(learned.trial.steps), of.evaluations);
         optimum.trial = found.trial;
@@ -319,7 +321,7 @@ int compare_step_control(const CompareRequest& request, const std::string& syste
     for (const Case& each : cases) {
         const std::vector<RuleRow> rows = rows_of(each);
         all = all &&
-              std::all_of(rows.begin(), rows.end(), [](const RuleRow& r) { return r.reached; });
+              std::all_of(rows.begin(), rows.end(), [](const RuleRow& r) { return r.reached || r.rule == searched; });
         if (request.json) {
             list.push_back(json(each, rows));
         } else {
