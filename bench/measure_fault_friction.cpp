@@ -8,6 +8,7 @@
 #include <random>
 #include <string>
 
+#include "fault_as_slider.hpp"
 #include "measure_fault.hpp"
 #include "ricochet/friction/spring_slider.hpp"
 #include "ricochet/systems/fault_friction_stage.hpp"
@@ -66,24 +67,11 @@ bool solved(const TimedCycle& c)
 
 Measured compare_fault_with_slider()
 {
-    const StrikeSlipFault fault({.elements = 1, .damping = 0});
-    const auto& p = fault.parameters();
-    const FaultFriction friction{.plate_velocity = 2e-3, .slip_rate = 1e-3, .overload = 1e-3};
-    const double sigma = p.stress_gradient * p.side / 2;
-    const double stiffness = p.shear_modulus / p.side;
-    const AgeingLaw<> law(friction.law);
-    const double xi = law.steady_state(1e-3);
-    const double draw = 1.001 * sigma * law.friction(1e-3, xi) / stiffness;
-    const SpringSlider slider{
-        .friction = friction.law,
-        .block = {.mass = p.density * p.side, .stiffness = stiffness, .normal_force = sigma},
-        .load = SliderLoad(draw, 2e-3)};
+    const test::FaultAsSlider pair;
     double worst = 0;
     for (const int order : {1, 2, 4}) {
-        const RateStateRupture r = simulate(
-            fault, {.t_end = 30, .step = 0.1, .rtol = constant_steps}, friction, {.order = order});
-        const SliderRun s =
-            run_slider(slider, {0, 0, 1e-3, xi}, {.t_end = 30, .order = order, .step = 0.1});
+        const RateStateRupture r = pair.run_fault(order);
+        const SliderRun s = pair.run_as_slider(order);
         worst = std::max({worst, std::abs(r.rupture.slip[0] / s.state.x - 1),
                           std::abs(r.rupture.velocity[0] / s.state.v - 1),
                           std::abs(r.xi[0] / s.state.xi - 1)});

@@ -136,14 +136,12 @@ std::string line(const std::string& name, double seconds, double error, std::uin
                        error, solves);
 }
 
-/// On the reference machine, by the yardstick timed in turns with it. Tenth percentiles of
-/// both: who shares a core slows down a run, which keeps it busy, by more than the yardstick,
-/// which waits for its own results.
+/// On the reference machine, by the yardstick timed in turns with it.
 double seconds_of(const Work& work)
 {
     const std::vector<Work> works{yardstick(), work};
     const std::vector<Timing> times = time_in_turns(works);
-    return times[1].p10 * yardstick_reference / times[0].p10;
+    return scaled(times[1].median, times[0]);
 }
 
 template <class System>

@@ -7,6 +7,8 @@
 #include <limits>
 #include <string>
 
+#include "fault_as_slider.hpp"
+#include "refusal.hpp"
 #include "ricochet/friction/spring_slider.hpp"
 #include "ricochet/systems/fault_friction_stage.hpp"
 #include "ricochet/systems/fault_rate_state.hpp"
@@ -30,40 +32,14 @@ double apart(const Eigen::VectorXd& a, const Eigen::VectorXd& b)
     return ((a - b).array() / b.array().abs()).abs().maxCoeff();
 }
 
-/// What a call throws; empty if it does not.
-template <class Call>
-std::string refusal(Call&& call)
-{
-    try {
-        call();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
-}
-
 TEST(FaultRateState, OneElementIsTheSpringSlider)
 {
     // K = 1: m = rho L, k = G / L, N = sigma. The equations of a stage are those of the slider,
     // solved to rounding by either. 300 steps through a slip of 0.1 m leave 1e-11.
-    const StrikeSlipFault fault({.elements = 1, .damping = 0});
-    const auto& p = fault.parameters();
-    FaultFriction friction{.plate_velocity = 2e-3, .slip_rate = 1e-3, .overload = 1e-3};
-    const double sigma = p.stress_gradient * p.side / 2;
-    const double stiffness = p.shear_modulus / p.side;
-    const AgeingLaw<> law(friction.law);
-    const double xi = law.steady_state(1e-3);
-    const double draw = 1.001 * sigma * law.friction(1e-3, xi) / stiffness;
-    const SpringSlider slider{
-        .friction = friction.law,
-        .block = {.mass = p.density * p.side, .stiffness = stiffness, .normal_force = sigma},
-        .load = SliderLoad(draw, 2e-3)};
+    const test::FaultAsSlider pair;
     for (const int order : {1, 2, 4}) {
-        const double step = 0.1;
-        const RateStateRupture r = simulate(
-            fault, {.t_end = 30, .step = step, .rtol = constant_steps}, friction, {.order = order});
-        const SliderRun s =
-            run_slider(slider, {0, 0, 1e-3, xi}, {.t_end = 30, .order = order, .step = step});
+        const RateStateRupture r = pair.run_fault(order);
+        const SliderRun s = pair.run_as_slider(order);
         ASSERT_EQ(r.rupture.outcome, RuptureOutcome::reached_end);
         ASSERT_EQ(s.outcome, SliderOutcome::reached_end);
         EXPECT_GT(s.state.x, 0.1);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "refusal.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
 #include "ricochet/systems/incline_block.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
@@ -235,17 +236,6 @@ TEST(TimeStepping, ARunOfNoLengthIsOver)
     EXPECT_THROW((TimeStepping<Ball1d>({}, Ball1d::V(1.0), Ball1d::V(0.0),
                                        {.t_start = 2, .t_end = 1.9, .step = 0.1})),
                  std::invalid_argument);
-}
-
-template <class Call>
-std::string refusal(const Call& call)
-{
-    try {
-        call();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "accepted";
 }
 
 TEST(TimeStepping, ARefusalSaysWhatIsWrongAndNamesTheContact)

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "rate_state_identities.hpp"
+#include "refusal.hpp"
 #include "ricochet/friction/affine_law.hpp"
 #include "ricochet/friction/wright_omega.hpp"
 
@@ -17,18 +18,6 @@ using test::check_identities;
 using test::IdentityErrors;
 using test::Quad;
 using test::QuadLaw;
-
-/// What `call` says when it refuses.
-template <class Call>
-std::string refusal(const Call& call)
-{
-    try {
-        call();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "not refused";
-}
 
 void expect_says(const std::string& sentence, const std::string& piece)
 {

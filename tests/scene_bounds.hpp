@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "refusal.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/integrate.hpp"
@@ -127,18 +128,6 @@ inline void expect_bounds_hold(const BoundsSampled& sampled, std::size_t count, 
     EXPECT_EQ(sampled.broken_upper, 0U);
     EXPECT_GT(sampled.closest_way, used);
     EXPECT_LE(sampled.closest_way, 1 + 1e-3);
-}
-
-/// The sentence with which a set-up is refused.
-template <class Make>
-[[nodiscard]] std::string refusal(const Make& make)
-{
-    try {
-        make();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "accepted";
 }
 
 }  // namespace ricochet

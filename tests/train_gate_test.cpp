@@ -1,4 +1,5 @@
 // Gates trained for a user's system.
+#include "refusal.hpp"
 #include "ricochet/learn/train_gate.hpp"
 
 #include <gtest/gtest.h>
@@ -101,16 +102,6 @@ GateTraining quick()
 bool trains(const Progress& progress)
 {
     return progress.stage == "training";
-}
-
-std::string refusal(const std::function<void()>& act)
-{
-    try {
-        act();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "nothing was refused";
 }
 
 TEST(TrainGate, SavesMostChecksOfABlackBoxAndKeepsItsEvents)

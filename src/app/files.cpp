@@ -78,6 +78,7 @@ void check_writable(std::string_view option, const fs::path& file)
 
 void check_replaceable(std::string_view option, const fs::path& file)
 {
+    check_writable(option, file);
     std::error_code error;
     const fs::path target = behind_links(file);
     if (fs::exists(target, error) && !fs::is_regular_file(target, error)) {

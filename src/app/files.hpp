@@ -18,7 +18,7 @@ public:
 /// @throws BadInput naming the option.
 void check_writable(std::string_view option, const std::filesystem::path& file);
 
-/// For files that something else than a file may not become: models, checkpoints.
+/// The same for models and checkpoints, which are renamed into place: only a file may be there.
 /// @throws BadInput naming the option.
 void check_replaceable(std::string_view option, const std::filesystem::path& file);
 

@@ -97,12 +97,10 @@ int train_policy(const TrainPolicyRequest& request)
     if (request.seconds && !(*request.seconds > 0)) {
         throw BadInput(fmt::format("--seconds must be positive, got {}", *request.seconds));
     }
-    check_writable("--out", request.out);
+    check_replaceable("--out", request.out);
     learn::StepTrainingOptions options{.seed = seed, .resume = request.resume};
     options.checkpoint = request.checkpoint.empty() ? fs::path(request.out.string() + ".checkpoint")
                                                     : request.checkpoint;
-    check_writable("--checkpoint", options.checkpoint);
-    check_replaceable("--out", request.out);
     check_replaceable("--checkpoint", options.checkpoint);
     if (request.out == options.checkpoint) {
         throw BadInput(fmt::format("--out and --checkpoint must be two files, got '{}' for both",

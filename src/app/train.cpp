@@ -123,11 +123,10 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     if (std::find(kinds.begin(), kinds.end(), training.kind) == kinds.end()) {
         throw unknown(fmt::format("kind of network for {}", system.name), training.kind, kinds);
     }
-    check_writable("--out", request.out);
     check_replaceable("--out", request.out);
     const bool own_checkpoint = training.checkpoint.empty();
     if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
-    check_writable("--checkpoint", training.checkpoint);
+    check_replaceable("--checkpoint", training.checkpoint);
     ProgressBar bar;
     const Interrupts watch;
     const auto train_it = [&](const TrainingRequest& wanted,
@@ -199,11 +198,10 @@ int train(const TrainRequest& request)
     }
     TrainingRequest training = request.training;
     training.kind = kind_named(system, *system.training, training.kind);
-    check_writable("--out", request.out);
     check_replaceable("--out", request.out);
     const bool own_checkpoint = training.checkpoint.empty();
     if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
-    check_writable("--checkpoint", training.checkpoint);
+    check_replaceable("--checkpoint", training.checkpoint);
 
     ProgressBar bar;
     learn::Progress last;

@@ -337,7 +337,7 @@ private:
         all.put(options_.spread);
         all.put(options_.scales);
         all.put(options_.seed);
-        all.put(std::vector<double>(options_.problem.begin(), options_.problem.end()));
+        all.put(checksum(options_.problem));
         return checksum(all.bytes());
     }
 
