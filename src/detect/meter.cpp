@@ -15,6 +15,8 @@ namespace {
 constexpr double memory = 0.98;
 /// Pieces of two ways before one is believed to be the better one.
 constexpr std::uint64_t fewest = 4;
+/// Pieces after which their noise is believed to a factor of two.
+constexpr double unsure = 2;
 /// Of what a step costs where checks are planned, the least that is left where they are not.
 constexpr double least_step = 0.5;
 /// Of a piece in the best way, what each of the first pieces in which every step is checked may
@@ -172,6 +174,13 @@ void Meter::close_piece(const Counts& piece, double cost)
     of(way_).add(std::max(piece.steps, 1.0), cost);
 }
 
+/// Of the difference of two means. Few pieces tell little of how much pieces differ.
+double Meter::noise_between(Way a, Way b) const noexcept
+{
+    const auto pieces = static_cast<double>(std::min(of(a).pieces, of(b).pieces));
+    return (1 + unsure / pieces) * std::hypot(of(a).error(), of(b).error());
+}
+
 /// The cheapest way that is well enough known. To ask has to be better beyond doubt.
 Meter::Way Meter::find_best() const noexcept
 {
@@ -179,8 +188,8 @@ Meter::Way Meter::find_best() const noexcept
     if (of(best).pieces < fewest) return best;
     for (const Way way : all_ways) {
         if (way == best || of(way).pieces < fewest) continue;
-        const double noise = std::hypot(of(way).error(), of(best).error());
-        const double doubt = best == ask ? 0 : way == ask ? 2 * noise : noise;
+        const double noise = noise_between(way, best);
+        const double doubt = best == ask || way != ask ? 0 : 2 * noise;
         if (of(best).mean() - of(way).mean() > doubt) best = way;
     }
     return best;
