@@ -97,6 +97,9 @@ TEST_F(App, TrainStepPolicyResumesNoOtherSystem)
     (void)json({"train", "step-policy", "sliding-mode", "--out", "a.safetensors", "--checkpoint",
                 "shared", "--iterations", "21", "--json"});
     ASSERT_TRUE(fs::exists(work() / "shared"));
+    expect_refused({"train", "step-policy", "sliding-mode", "--out", "b.safetensors",
+                    "--checkpoint", "shared"},
+                   {"shared", "--resume", "remove"});
     expect_refused({"train", "step-policy", "diode-circuit", "--out", "b.safetensors",
                     "--checkpoint", "shared", "--resume"},
                    {"shared", "another search"});
@@ -119,14 +122,47 @@ TEST_F(App, CompareStepControlShowsEveryRule)
     const nlohmann::json table =
         json({"compare", "step-control", "--system", "sliding-mode", "--json"});
     const nlohmann::json& rules = table["cases"][0]["rules"];
-    ASSERT_EQ(rules.size(), 8U);
+    ASSERT_EQ(rules.size(), 9U);
     for (const auto& rule : rules) {
         const std::string name = rule["rule"];
         const bool reached = rule["reached"];
         EXPECT_EQ(reached, rule["error"].get<double>() <= 1e-3) << name;
         // What a search finds may be worse, and is not said to be as good then.
-        EXPECT_TRUE(reached || name == "searched sequence") << name;
+        EXPECT_TRUE(reached || name == "searched sequence" || name == "TQC, eq. 7") << name;
+        if (name != "TQC, eq. 7") continue;
+        // Six solves a step: one attempt by doubling.
+        EXPECT_EQ(rule["solves"].get<int>(), 6 * rule["steps"].get<int>());
+        EXPECT_GT(rule["error"].get<double>(), 0);
     }
+}
+
+TEST_F(App, TrainStepPolicyByReinforcement)
+{
+    for (const char* trainer : {"tqc", "td3"}) {
+        const nlohmann::json report =
+            json({"train", "step-policy", "sliding-mode", "--trainer", trainer, "--alpha", "1",
+                  "--iterations", "150", "--threads", "1", "--out", "actor.safetensors", "--json"});
+        EXPECT_EQ(report["trained_steps"], 150) << trainer;
+        EXPECT_EQ(report["trainer"], trainer);
+        const nlohmann::json actor = json({"inspect", "actor.safetensors", "--json"});
+        EXPECT_EQ(actor["kind"], "step-actor");
+        EXPECT_EQ(actor["parameters"]["alpha"], 1);
+        EXPECT_FALSE(std::filesystem::exists(work() / "actor.safetensors.checkpoint"));
+    }
+    const Words simulate{"simulate", "sliding-mode", "--integrator", "bathe", "--controller",
+                         "learned", "--model", "actor.safetensors"};
+    expect_refused(simulate, {"step-policy", "step-actor"});
+    const auto train = [](std::vector<std::string> more) {
+        Words all{"train", "step-policy", "sliding-mode", "--out", "b.safetensors"};
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    expect_refused(train({"--trainer", "ppo"}), {"ppo", "tqc"});
+    expect_refused(train({"--alpha", "2"}), {"--alpha", "tqc"});
+    expect_refused(train({"--trainer", "tqc", "--alpha", "-1"}), {"alpha", "-1"});
+    expect_refused(train({"--trainer", "td3", "--resume"}), {"checkpoint", "resume"});
+    expect_refused({"train", "bouncing-ball", "--trainer", "tqc", "--out", "b.safetensors"},
+                   {"--trainer", "step policy"});
 }
 
 }  // namespace

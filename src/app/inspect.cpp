@@ -25,6 +25,7 @@
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
+#include "step_actor.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -56,6 +57,12 @@ bool is_policy(const Model& model)
     return model.kind == StepPolicy::kind;
 }
 
+/// Whether it is the actor of a reinforcement learner.
+bool is_actor(const Model& model)
+{
+    return model.kind == step_actor_kind;
+}
+
 /// What the features are called, in the order of the inputs; "feature 0" where the
 /// recipe is not known here.
 std::vector<std::string> feature_names(const Model& model)
@@ -85,6 +92,7 @@ std::vector<std::string> feature_names(const Model& model)
 bool recipe_known(const Model& model)
 {
     if (is_policy(model)) return model.recipe.starts_with("step-inputs-1:");
+    if (is_actor(model)) return model.recipe == step_actor_recipe;
     if (model.kind != "event-classifier") {
         try {
             (void)gate_recipe(model.recipe);
@@ -253,6 +261,9 @@ std::string to_text(const Inspection& found)
         line("decision",
              fmt::format("the classical step times exp(output), held to [{:.3g}, {:.3g}]",
                          std::exp(-StepPolicy::most), std::exp(StepPolicy::most)));
+    } else if (is_actor(model)) {
+        line("decision", fmt::format("the step is linear in tanh(output), {} to {} s",
+                                     model.step_min, model.step_max));
     } else if (model.levels.empty()) {
         line("decision", fmt::format("event where the logit is at least {}", model.threshold));
     }

@@ -187,8 +187,8 @@ const TrainRequest& event_network(const TrainRequest& request, const TrainPolicy
         throw BadInput(
             fmt::format("train takes one system, got {} and {}", request.system, policy.system));
     }
-    if (policy.seconds || policy.threads) {
-        throw BadInput("--seconds and --threads are for a step policy");
+    if (policy.seconds || policy.threads || !policy.trainer.empty() || policy.alpha) {
+        throw BadInput("--seconds, --threads, --trainer and --alpha are for a step policy");
     }
     return request;
 }
@@ -223,7 +223,7 @@ void add_train(CLI::App& app, int& status)
     add_whole_number(command, "--seed", training.seed, 0, std::numeric_limits<std::uint64_t>::max(),
                      "of sampling and training");
     add_whole_number(command, "--iterations", training.iterations, 1, 1'000'000'000,
-                     "of the training; of a step policy: evaluations");
+                     "of the training; of a step policy: evaluations, or steps of tqc and td3");
     add_whole_number(command, "--states", training.states, 100, 100'000'000,
                      "sampled for training and testing");
     add_whole_number(command, "--fresh", training.fresh_events, 1, 100'000'000,
@@ -238,6 +238,13 @@ void add_train(CLI::App& app, int& status)
     command.add_flag("--json", request->json, "print the report as JSON");
     add_number(command, "--seconds", policy->seconds, "S", "of a step policy: stop then [s]");
     add_whole_number(command, "--threads", policy->threads, 1, 64, "of a step policy, default 2");
+    command
+        .add_option("--trainer", policy->trainer,
+                    "of a step policy: evolution (default; the true cost), or tqc or td3 with the "
+                    "published reward")
+        ->type_name("NAME");
+    add_number(command, "--alpha", policy->alpha, "A",
+               "of the published reward: weight of the error, default 2");
     command.footer(
         "Examples:\n"
         "  ricochet train bouncing-ball --out ball.safetensors\n"

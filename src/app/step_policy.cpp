@@ -15,6 +15,7 @@
 #include "progress_bar.hpp"
 #include "report.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "step_actor.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -91,25 +92,39 @@ learn::StepFamily step_family(const std::string& system, std::uint64_t seed)
     throw unknown("system for a step policy", system, known);
 }
 
-int train_policy(const TrainPolicyRequest& request)
+fs::path checked_checkpoint(const TrainPolicyRequest& request)
 {
-    const std::uint64_t seed = request.seed.value_or(1);
     if (request.seconds && !(*request.seconds > 0)) {
         throw BadInput(fmt::format("--seconds must be positive, got {}", *request.seconds));
     }
     check_replaceable("--out", request.out);
-    learn::StepTrainingOptions options{.seed = seed, .resume = request.resume};
-    options.checkpoint = request.checkpoint.empty() ? fs::path(request.out.string() + ".checkpoint")
-                                                    : request.checkpoint;
-    check_replaceable("--checkpoint", options.checkpoint);
-    if (request.out == options.checkpoint) {
+    fs::path checkpoint = request.checkpoint.empty()
+                              ? fs::path(request.out.string() + ".checkpoint")
+                              : request.checkpoint;
+    check_replaceable("--checkpoint", checkpoint);
+    if (request.out == checkpoint) {
         throw BadInput(fmt::format("--out and --checkpoint must be two files, got '{}' for both",
                                    request.out.string()));
     }
-    if (request.resume && !fs::exists(options.checkpoint)) {
-        throw BadInput(
-            fmt::format("there is no checkpoint '{}' to resume", options.checkpoint.string()));
+    if (request.resume && !fs::exists(checkpoint)) {
+        throw BadInput(fmt::format("there is no checkpoint '{}' to resume", checkpoint.string()));
     }
+    if (!request.resume && fs::exists(checkpoint)) {
+        throw BadInput(
+            fmt::format("'{}' keeps an earlier training: --resume goes on from it; "
+                        "to begin anew, remove it",
+                        checkpoint.string()));
+    }
+    return checkpoint;
+}
+
+int train_policy(const TrainPolicyRequest& request)
+{
+    if (!request.trainer.empty() && request.trainer != "evolution") return train_actor(request);
+    if (request.alpha) throw BadInput("--alpha is of --trainer tqc and td3");
+    const std::uint64_t seed = request.seed.value_or(1);
+    learn::StepTrainingOptions options{
+        .seed = seed, .checkpoint = checked_checkpoint(request), .resume = request.resume};
     if (request.evaluations) options.evaluations = *request.evaluations;
     if (request.seconds) options.seconds = *request.seconds;
     if (request.threads) options.threads = *request.threads;

@@ -21,6 +21,8 @@ struct TrainPolicyRequest {
     std::optional<std::uint64_t> seed{}, evaluations{};
     std::optional<double> seconds{};
     std::optional<unsigned> threads{};
+    std::string trainer{};          ///< "evolution" if empty, "tqc" or "td3"
+    std::optional<double> alpha{};  ///< of the reward of the latter two
     bool resume = false;
     bool json = false;
 };
@@ -29,6 +31,10 @@ struct TrainPolicyRequest {
 /// model. @return as `train`.
 /// @throws BadInput, ModelError, std::invalid_argument or std::runtime_error.
 int train_policy(const TrainPolicyRequest& request);
+
+/// Where a training is kept that is interrupted.
+/// @throws BadInput if files cannot be what they are to be.
+[[nodiscard]] std::filesystem::path checked_checkpoint(const TrainPolicyRequest& request);
 
 /// Random problems of that system, for training or held out.
 /// @throws BadInput naming the systems that have some.

@@ -27,8 +27,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view format_version = "1";
-constexpr std::array<std::string_view, 4> known_kinds{"event-classifier", "gate-horizon",
-                                                       "gate-level", "step-policy"};
+constexpr std::array<std::string_view, 5> known_kinds{"event-classifier", "gate-horizon",
+                                                      "gate-level", "step-policy", "step-actor"};
 
 constexpr std::size_t length_bytes = 8;
 constexpr std::size_t max_header = std::size_t{1} << 20;
@@ -501,7 +501,8 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
     if (std::ranges::find(known_kinds, model.kind) == known_kinds.end()) {
         refuse("metadata \"kind\"",
                in_quotes(known_kinds[0]) + ", " + in_quotes(known_kinds[1]) + ", " +
-                   in_quotes(known_kinds[2]) + " or " + in_quotes(known_kinds[3]),
+                   in_quotes(known_kinds[2]) + ", " + in_quotes(known_kinds[3]) + " or " +
+                   in_quotes(known_kinds[4]),
                in_quotes(model.kind));
     }
     const std::string& activation = metadata.text("activation");

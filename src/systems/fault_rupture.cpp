@@ -342,8 +342,9 @@ double detail::polynomial_bound(const StrikeSlipFault& fault, const RuptureOptio
 
 void validate(const RuptureOptions& o)
 {
-    if (!(o.t_end > 0 && std::isfinite(o.t_end)))
-        refuse("t_end", "be positive and finite", o.t_end);
+    // Shares of still shorter runs would not be numbers of full precision.
+    if (!(o.t_end >= 1e-300 && std::isfinite(o.t_end)))
+        refuse("t_end", "be at least 1e-300 s and finite", o.t_end);
     if (!(o.step >= 0 && std::isfinite(o.step))) refuse("step", "be zero or positive", o.step);
     if (!(o.rtol > 0)) refuse("rtol", "be positive", o.rtol);
     if (!(o.polynomial_bound >= 0)) {

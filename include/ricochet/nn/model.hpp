@@ -64,7 +64,8 @@ struct Calibration {
 ///
 /// with `features` computed from (t, x, h) by the recipe of that name.
 struct Model {
-    std::string kind = "event-classifier";  ///< or "gate-horizon", "gate-level", "step-policy"
+    /// Or "gate-horizon", "gate-level", "step-policy", "step-actor".
+    std::string kind = "event-classifier";
     std::string system;                        ///< e.g. "bouncing-ball"
     std::map<std::string, double> parameters;  ///< of the system, those the model depends on
     std::string recipe;                        ///< e.g. "state"

@@ -1,0 +1,184 @@
+#include "step_actor.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "files.hpp"
+#include "input.hpp"
+#include "interrupt.hpp"
+#include "json_text.hpp"
+#include "model_lookup.hpp"
+#include "progress_bar.hpp"
+#include "report.hpp"
+#include "ricochet/learn/td3.hpp"
+#include "ricochet/learn/tqc.hpp"
+#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/systems/diode_circuit.hpp"
+#include "ricochet/systems/sliding_mode.hpp"
+#include "ricochet/systems/strike_slip_fault.hpp"
+#include "timing.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+using learn::PolicyOutcome;
+using learn::StepWorld;
+using learn::StepWorldOptions;
+using learn::TrainedPolicy;
+
+/// The source's problem: one element of fault, its sliding mode, its circuit.
+StepWorld source_world(const std::string& system, const StepWorldOptions& options)
+{
+    const std::vector<std::string_view> known{"fault", SlidingMode::name, DiodeCircuit::name};
+    if (system == known[0]) {
+        return learn::step_world(StrikeSlipFault({.elements = 1}), 30, options);
+    }
+    if (system == known[1]) {
+        return learn::step_world(SlidingMode{}, SlidingMode::start, SlidingMode::t_end, options);
+    }
+    if (system == known[2]) {
+        return learn::step_world(DiodeCircuit{}, DiodeCircuit::start(), DiodeCircuit::t_end,
+                                 options);
+    }
+    throw unknown("system for a step policy", system, known);
+}
+
+learn::PolicyTraining training_of(const TrainPolicyRequest& request)
+{
+    learn::PolicyTraining out{.seed = request.seed.value_or(1), .report_every = 200};
+    if (request.evaluations) out.steps = *request.evaluations;
+    if (request.threads) out.threads = *request.threads;
+    if (request.seconds) out.max_seconds = *request.seconds;
+    out.checkpoint = checked_checkpoint(request);
+    out.resume = request.resume;
+    return out;
+}
+
+TrainedPolicy trained_by(const std::string& trainer, const learn::Environment& environment,
+                         const learn::PolicyTraining& training)
+{
+    ProgressBar bar;
+    const Interrupts watch;
+    bool started = false;
+    const auto progress = [&](const learn::PolicyProgress& now, const Model&) {
+        started = true;
+        bar.show({.iteration = now.step,
+                  .total = now.steps,
+                  .loss = now.critic_loss,
+                  .seconds = now.seconds});
+        return !Interrupts::any();
+    };
+    try {
+        TrainedPolicy out = trainer == "tqc"
+                                ? learn::train_tqc(environment, {.training = training}, progress)
+                                : learn::train_td3(environment, {.training = training}, progress);
+        bar.finish();
+        return out;
+    } catch (const std::runtime_error& error) {
+        if (training.resume && !started) throw BadInput(error.what());
+        throw;
+    }
+}
+
+Model named(Model actor, const std::string& system, double alpha, std::uint64_t seed,
+            const StepWorld& world)
+{
+    actor.kind = step_actor_kind;
+    actor.system = system;
+    actor.recipe = step_actor_recipe;
+    actor.parameters = {{"alpha", alpha}};
+    actor.seed = seed;
+    actor.step_min = world.length_of(-1);
+    actor.step_max = world.length_of(1);
+    return actor;
+}
+
+}  // namespace
+
+int train_actor(const TrainPolicyRequest& request)
+{
+    const std::vector<std::string_view> known{"evolution", "tqc", "td3"};
+    if (request.trainer != known[1] && request.trainer != known[2]) {
+        throw unknown("trainer", request.trainer, known);
+    }
+    const double alpha = request.alpha.value_or(2);
+    const StepWorld world = source_world(request.system, learn::published_step_world(alpha));
+    const learn::PolicyTraining training = training_of(request);
+    const TrainedPolicy trained = trained_by(request.trainer, world.environment, training);
+    if (trained.outcome == PolicyOutcome::stopped) {
+        fmt::print(stderr,
+                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+                   training.checkpoint.string());
+        return 1;
+    }
+    const Model actor = named(trained.policy, request.system, alpha, training.seed, world);
+    save_model(actor, request.out);
+    if (!trained.message.empty()) {
+        throw std::runtime_error(fmt::format("{}; the policy before it is in '{}'", trained.message,
+                                             request.out.string()));
+    }
+    std::error_code ignored;
+    if (request.checkpoint.empty()) fs::remove(training.checkpoint, ignored);
+    const learn::StepTrial run = learn::follow(source_world(request.system, judged(actor)), actor);
+    if (request.json) {
+        print(json_text({{"system", request.system},
+                         {"trainer", request.trainer},
+                         {"alpha", alpha},
+                         {"seed", training.seed},
+                         {"trained_steps", trained.steps},
+                         {"seconds", trained.seconds},
+                         {"ended", run.ended},
+                         {"steps", run.steps},
+                         {"solves", run.solves},
+                         {"iterations", run.iterations},
+                         {"error", run.error},
+                         {"final_error", run.final_error},
+                         {"model", request.out.string()}}));
+    } else {
+        print(fmt::format(
+            "{} steps of training in {}; its run of the same problem: {} steps, {} "
+            "solves, {} iterations{}, error {:.2e} (relative L2 over time), {:.2e} "
+            "at the end\n",
+            trained.steps, duration(trained.seconds), run.steps, run.solves, run.iterations,
+            run.ended ? "" : " without coming to the end", run.error, run.final_error));
+    }
+    fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
+    return 0;
+}
+
+Model shipped_actor(std::string_view system)
+{
+    const fs::path file = find_model(fmt::format("{}-tqc", system));
+    Model actor = load_model(file);
+    const auto refuse = [&](std::string_view what, const std::string& given,
+                            std::string_view expected) {
+        throw BadInput(fmt::format("model '{}': {} is '{}', expected '{}'", file.string(), what,
+                                   given, expected));
+    };
+    if (actor.kind != step_actor_kind) refuse("its kind", actor.kind, step_actor_kind);
+    if (actor.system != system) refuse("its system", actor.system, system);
+    if (actor.recipe != step_actor_recipe) refuse("its recipe", actor.recipe, step_actor_recipe);
+    return actor;
+}
+
+StepWorldOptions judged(const Model& actor)
+{
+    const auto alpha = actor.parameters.find("alpha");
+    StepWorldOptions options =
+        learn::published_step_world(alpha == actor.parameters.end() ? 2 : alpha->second);
+    options.h_min = actor.step_min;
+    options.h_max = actor.step_max;
+    options.until_rest = true;
+    options.max_attempts = 5000;
+    return options;
+}
+
+}  // namespace ricochet::app
