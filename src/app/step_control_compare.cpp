@@ -295,7 +295,8 @@ std::string table(const Case& of, const std::vector<RuleRow>& rows)
     for (const RuleRow& row : rows) {
         const StepTrial& t = row.trial;
         if (!row.reached && !(row.rule == reinforced && t.ended)) {
-            out += fmt::format("{:<24}{:>14}\n", row.rule, "not reached");
+            const bool stuck = row.rule == reinforced;
+            out += fmt::format("{:<24}{:>14}\n", row.rule, stuck ? "has no end" : "not reached");
             continue;
         }
         const bool implicit = t.solves > 0;
