@@ -3,14 +3,17 @@
 #include "measure.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
+#include <vector>
 
 namespace {
 
@@ -50,11 +53,11 @@ int run(int argc, char** argv)
 {
     CLI::App app("Runs what the library must show. Exit status 1 if a check fails.");
     int part = 0;
-    std::string only;
+    std::vector<std::string> only;
     std::string json_file;
     bool list = false;
     app.add_option("--part", part, "only the checks of this part")->check(CLI::PositiveNumber);
-    app.add_option("--only", only, "only the check of this name");
+    app.add_option("--only", only, "only the checks of these names");
     app.add_option("--json", json_file, "also write the results to this file");
     app.add_flag("--list", list, "names and sentences of the checks, nothing is run");
     CLI11_PARSE(app, argc, argv);
@@ -63,7 +66,8 @@ int run(int argc, char** argv)
     bool all_passed = true;
     bool any = false;
     for (const Check& check : all_checks()) {
-        if ((part != 0 && check.part != part) || (!only.empty() && check.id != only)) continue;
+        const bool wanted = only.empty() || std::ranges::find(only, check.id) != only.end();
+        if ((part != 0 && check.part != part) || !wanted) continue;
         any = true;
         if (list) {
             fmt::print("{:<4}{:<24}{}\n", check.part, check.id, check.sentence);
@@ -88,10 +92,10 @@ int run(int argc, char** argv)
                            {"details", measured.details}});
     }
     if (!any) {
-        throw std::invalid_argument(
-            fmt::format("no check of {}{}; --list shows all",
-                        part == 0 ? "any part" : fmt::format("part {}", part),
-                        only.empty() ? "" : fmt::format(" is named '{}'", only)));
+        throw std::invalid_argument(fmt::format(
+            "no check of {}{}; --list shows all",
+            part == 0 ? "any part" : fmt::format("part {}", part),
+            only.empty() ? "" : fmt::format(" is named '{}'", fmt::join(only, "' or '"))));
     }
     if (!json_file.empty()) {
         std::ofstream file(json_file);
