@@ -584,7 +584,7 @@ TEST(Safetensors, RefusesAnotherVersionKindOrActivation)
               "m.safetensors: metadata \"ricochet\": expected format version \"1\", found \"2\"");
     EXPECT_EQ(refusal_with_metadata("kind", "poet"),
               "m.safetensors: metadata \"kind\": expected \"event-classifier\", "
-              "\"gate-horizon\", \"gate-level\" or \"step-policy\", found \"poet\"");
+              "\"gate-horizon\", \"gate-level\", \"step-policy\" or \"step-actor\", found \"poet\"");
     EXPECT_EQ(refusal_with_metadata("activation", "gelu"),
               "m.safetensors: metadata \"activation\": expected \"relu\" or \"tanh\", "
               "found \"gelu\"");
