@@ -34,23 +34,6 @@ using learn::StepWorld;
 using learn::StepWorldOptions;
 using learn::TrainedPolicy;
 
-/// The source's problem: one element of fault, its sliding mode, its circuit.
-StepWorld source_world(const std::string& system, const StepWorldOptions& options)
-{
-    const std::vector<std::string_view> known{"fault", SlidingMode::name, DiodeCircuit::name};
-    if (system == known[0]) {
-        return learn::step_world(StrikeSlipFault({.elements = 1}), 30, options);
-    }
-    if (system == known[1]) {
-        return learn::step_world(SlidingMode{}, SlidingMode::start, SlidingMode::t_end, options);
-    }
-    if (system == known[2]) {
-        return learn::step_world(DiodeCircuit{}, DiodeCircuit::start(), DiodeCircuit::t_end,
-                                 options);
-    }
-    throw unknown("system for a step policy", system, known);
-}
-
 learn::PolicyTraining training_of(const TrainPolicyRequest& request)
 {
     learn::PolicyTraining out{.seed = request.seed.value_or(1), .report_every = 200};
@@ -102,6 +85,22 @@ Model named(Model actor, const std::string& system, double alpha, std::uint64_t 
 }
 
 }  // namespace
+
+StepWorld source_world(const std::string& system, const StepWorldOptions& options)
+{
+    const std::vector<std::string_view> known{"fault", SlidingMode::name, DiodeCircuit::name};
+    if (system == known[0]) {
+        return learn::step_world(StrikeSlipFault({.elements = 1}), 30, options);
+    }
+    if (system == known[1]) {
+        return learn::step_world(SlidingMode{}, SlidingMode::start, SlidingMode::t_end, options);
+    }
+    if (system == known[2]) {
+        return learn::step_world(DiodeCircuit{}, DiodeCircuit::start(), DiodeCircuit::t_end,
+                                 options);
+    }
+    throw unknown("system for a step policy", system, known);
+}
 
 int train_actor(const TrainPolicyRequest& request)
 {
@@ -166,14 +165,13 @@ Model shipped_actor(std::string_view system)
     if (actor.kind != step_actor_kind) refuse("its kind", actor.kind, step_actor_kind);
     if (actor.system != system) refuse("its system", actor.system, system);
     if (actor.recipe != step_actor_recipe) refuse("its recipe", actor.recipe, step_actor_recipe);
+    if (!actor.parameters.contains("alpha")) refuse("parameter alpha", "missing", "a number");
     return actor;
 }
 
 StepWorldOptions judged(const Model& actor)
 {
-    const auto alpha = actor.parameters.find("alpha");
-    StepWorldOptions options =
-        learn::published_step_world(alpha == actor.parameters.end() ? 2 : alpha->second);
+    StepWorldOptions options = learn::published_step_world(actor.parameters.at("alpha"));
     options.h_min = actor.step_min;
     options.h_max = actor.step_max;
     options.until_rest = true;

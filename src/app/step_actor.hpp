@@ -14,6 +14,11 @@ namespace ricochet::app {
 inline constexpr std::string_view step_actor_kind = "step-actor";
 inline constexpr std::string_view step_actor_recipe = "step-world-1";
 
+/// Runs of the source's problem of a system: one element of fault, its sliding mode, its circuit.
+/// @throws BadInput naming the systems that have one.
+[[nodiscard]] learn::StepWorld source_world(const std::string& system,
+                                            const learn::StepWorldOptions& options);
+
 /// Trains one by TQC or TD3 on the source's problem of that system, prints its run there and
 /// writes the model. @return as `train`.
 /// @throws BadInput, ModelError, std::invalid_argument or std::runtime_error.

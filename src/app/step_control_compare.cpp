@@ -243,9 +243,8 @@ Case case_of(const std::string& system, const CompareRequest& request)
                 .target = 1e-3,
                 .event_driven = [system](double target) { return by_hand_over(system, target); },
                 .world =
-                    [](const learn::StepWorldOptions& options) {
-                        return learn::step_world(SlidingMode{}, SlidingMode::start,
-                                                 SlidingMode::t_end, options);
+                    [system](const learn::StepWorldOptions& options) {
+                        return source_world(system, options);
                     }};
     }
     if (system == DiodeCircuit::name) {
@@ -255,9 +254,8 @@ Case case_of(const std::string& system, const CompareRequest& request)
                 .layout = DiodeCircuit::step_layout(),
                 .event_driven = [system](double target) { return by_hand_over(system, target); },
                 .world =
-                    [](const learn::StepWorldOptions& options) {
-                        return learn::step_world(DiodeCircuit{}, DiodeCircuit::start(),
-                                                 DiodeCircuit::t_end, options);
+                    [system](const learn::StepWorldOptions& options) {
+                        return source_world(system, options);
                     }};
     }
     const SystemEntry& entry = find_system("fault");
@@ -356,6 +354,7 @@ int compare_step_control(const CompareRequest& request, const std::string& syste
     for (const std::string& name : wanted) {
         cases.push_back(case_of(name, request));
         (void)named_policy(cases.back().layout, std::nullopt);
+        (void)shipped_actor(name);
     }
     bool all = true;
     Json list = Json::array();
