@@ -7,9 +7,12 @@
 
 #include <cstdio>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
+#include "input.hpp"
+#include "interrupt.hpp"
 #include "ricochet/learn/classifier.hpp"
 
 namespace ricochet::app {
@@ -88,5 +91,27 @@ private:
     double first_seconds_ = 0;
     std::size_t tenth_ = 100;
 };
+
+/// A training that is given what to call with its progress, until it is done or interrupted. What
+/// it throws before the first call is about the checkpoint that it was to resume.
+template <class Train>
+auto train_under_bar(bool resume, const Train& train)
+{
+    ProgressBar bar;
+    const Interrupts watch;
+    bool started = false;
+    try {
+        auto out = train([&](const learn::Progress& progress) {
+            started = true;
+            bar.show(progress);
+            return !Interrupts::any();
+        });
+        bar.finish();
+        return out;
+    } catch (const std::runtime_error& error) {
+        if (resume && !started) throw BadInput(error.what());
+        throw;
+    }
+}
 
 }  // namespace ricochet::app

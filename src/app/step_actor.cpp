@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
@@ -11,7 +10,6 @@
 
 #include "files.hpp"
 #include "input.hpp"
-#include "interrupt.hpp"
 #include "json_text.hpp"
 #include "model_lookup.hpp"
 #include "progress_bar.hpp"
@@ -48,27 +46,16 @@ learn::PolicyTraining training_of(const TrainPolicyRequest& request)
 TrainedPolicy trained_by(const std::string& trainer, const learn::Environment& environment,
                          const learn::PolicyTraining& training)
 {
-    ProgressBar bar;
-    const Interrupts watch;
-    bool started = false;
-    const auto progress = [&](const learn::PolicyProgress& now, const Model&) {
-        started = true;
-        bar.show({.iteration = now.step,
-                  .total = now.steps,
-                  .loss = now.critic_loss,
-                  .seconds = now.seconds});
-        return !Interrupts::any();
-    };
-    try {
-        TrainedPolicy out = trainer == "tqc"
-                                ? learn::train_tqc(environment, {.training = training}, progress)
+    return train_under_bar(training.resume, [&](const auto& show) {
+        const auto progress = [&](const learn::PolicyProgress& now, const Model&) {
+            return show({.iteration = now.step,
+                         .total = now.steps,
+                         .loss = now.critic_loss,
+                         .seconds = now.seconds});
+        };
+        return trainer == "tqc" ? learn::train_tqc(environment, {.training = training}, progress)
                                 : learn::train_td3(environment, {.training = training}, progress);
-        bar.finish();
-        return out;
-    } catch (const std::runtime_error& error) {
-        if (training.resume && !started) throw BadInput(error.what());
-        throw;
-    }
+    });
 }
 
 Model named(Model actor, const std::string& system, double alpha, std::uint64_t seed,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <system_error>
 #include <utility>
@@ -9,7 +10,6 @@
 
 #include "files.hpp"
 #include "input.hpp"
-#include "interrupt.hpp"
 #include "json_text.hpp"
 #include "model_lookup.hpp"
 #include "progress_bar.hpp"
@@ -60,25 +60,15 @@ Json rows(const std::vector<learn::StepScore::Part>& parts, bool judges_final)
 learn::TrainedStepPolicy trained_policy(const learn::StepFamily& family,
                                         const learn::StepTrainingOptions& options)
 {
-    ProgressBar bar;
-    const Interrupts watch;
-    bool started = false;
-    try {
-        auto out = learn::train_step_policy(
+    return train_under_bar(options.resume, [&](const auto& show) {
+        return learn::train_step_policy(
             family, options, [&](const learn::EvolutionProgress& progress) {
-                started = true;
-                bar.show({.iteration = std::min(progress.evaluations, options.evaluations),
-                          .total = options.evaluations,
-                          .loss = progress.best,
-                          .seconds = progress.seconds});
-                return !Interrupts::any();
+                return show({.iteration = std::min(progress.evaluations, options.evaluations),
+                             .total = options.evaluations,
+                             .loss = progress.best,
+                             .seconds = progress.seconds});
             });
-        bar.finish();
-        return out;
-    } catch (const std::runtime_error& error) {
-        if (options.resume && !started) throw BadInput(error.what());
-        throw;
-    }
+    });
 }
 
 }  // namespace
