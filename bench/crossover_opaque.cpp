@@ -42,9 +42,9 @@ Regime regime_of(std::string name, std::size_t dimension, const System& inner,
     std::uint64_t hash = 0;
     Regime regime = plain_regime(std::move(name), dimension, system, options, hash);
     regime.opaque = true;
-    regime.ways.insert(
-        regime.ways.begin() + 1,
-        measure_way("network", system, start, options, Calibrated<>(Gate(trained.model)), hash));
+    regime.ways.insert(regime.ways.begin() + 1,
+                       measure_way("network", system, start, options,
+                                   Calibrated<>(gates::Gate(trained.model)), hash));
     return regime;
 }
 

@@ -44,6 +44,12 @@ struct Check {
 /// Rate-and-state friction.
 [[nodiscard]] std::vector<Check> checks_of_part_7();
 
+/// Saved runs, potential files, runs that cannot go on.
+[[nodiscard]] std::vector<Check> checks_of_part_8_saved();
+
+/// The fault and the rules for its steps.
+[[nodiscard]] std::vector<Check> checks_of_part_8_fault();
+
 /// The sliding mode and the diode circuit, handed over: changes, times, states.
 [[nodiscard]] Measured hand_over_sliding_mode();
 [[nodiscard]] Measured hand_over_circuit();

@@ -92,7 +92,7 @@ Measured compare_on_arm(std::size_t obstacles, std::size_t events, std::vector<s
     Measured out;
     const learn::TrainedGate trained =
         learn::train_gate(system, arm_starts<N>(arm), FixedStep<Rk4>{}, {}, training);
-    const GateTrial gate = runs.compare(Calibrated(Gate(trained.model)), events, seed);
+    const GateTrial gate = runs.compare(Calibrated(gates::Gate(trained.model)), events, seed);
     out.details.push_back(row("gate", gate));
     out.details.push_back(row("gate, its calibration", trained.report.trial));
     Rival best;
@@ -209,7 +209,8 @@ Measured gate_eigenvalue(double level, double seconds)
     constexpr std::size_t all = 1'000'000;
     const PlannerOptions planning{.check_bounds = false};
     const GateTrial plan = runs.compare(Planned(planning), all, seed);
-    const GateTrial gate = runs.compare(CalibratedBounds(Gate(trained.model), planning), all, seed);
+    const GateTrial gate =
+        runs.compare(CalibratedBounds(gates::Gate(trained.model), planning), all, seed);
     Measured out;
     out.details = {row("two-ended cover", plan), row("with the level gate", gate)};
     for (const GateLevel& l : trained.model.levels) {

@@ -52,13 +52,13 @@ Model model_of(std::string_view system, std::size_t inputs, std::size_t hidden, 
 }
 
 /// Horizons of 2 to 64 steps, the more likely to be cleared the higher the threshold.
-Gate gate_of(Model model, double step, double threshold)
+gates::Gate gate_of(Model model, double step, double threshold)
 {
     model.kind = "gate-horizon";
     for (double tau = 2 * step; model.levels.size() < 6; tau *= 2) {
         model.levels.push_back({.value = tau, .threshold = threshold});
     }
-    return Gate(std::move(model));
+    return gates::Gate(std::move(model));
 }
 
 }  // namespace

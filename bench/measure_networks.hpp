@@ -22,7 +22,7 @@ namespace ricochet::bench {
 
 struct AnyGate {
     std::string name;
-    Gate gate;
+    gates::Gate gate;
 };
 struct AnyNetwork {
     std::string name;

@@ -78,7 +78,7 @@ int main()
     const Options options{.t_end = 200, .step = step};
     const auto exact = integrate(drone, start, options, FixedStep<Rk4>{});
     const auto gated =
-        integrate(drone, start, options, FixedStep<Rk4>{}, Calibrated(Gate(trained.model)));
+        integrate(drone, start, options, FixedStep<Rk4>{}, Calibrated(gates::Gate(trained.model)));
     std::printf("200 s of flight: %zu and %zu collisions, %llu and %llu calls of the black box\n",
                 exact.events.size(), gated.events.size(),
                 static_cast<unsigned long long>(exact.statistics.guard_calls),

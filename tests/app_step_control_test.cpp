@@ -136,6 +136,62 @@ TEST_F(App, CompareStepControlShowsEveryRule)
     }
 }
 
+TEST_F(App, CompareStepControlTakesParametersOfEverySystem)
+{
+    const auto one = [&](const Words& more) {
+        Words all{"compare", "step-control", "--json", "--system"};
+        all.insert(all.end(), more.begin(), more.end());
+        return json(all)["cases"][0];
+    };
+    // The relay switches once at the same time, and the disturbance is twice as fast.
+    const nlohmann::json mode = one({"sliding-mode", "--set", "frequency=100", "start=0.1"});
+    ASSERT_EQ(mode["rules"].size(), 9U);
+    for (const auto& rule : mode["rules"]) {
+        EXPECT_EQ(rule["reached"].get<bool>(), rule["error"].get<double>() <= 1e-3);
+    }
+    // What was asked for is no default, and the policy's limits are not shown.
+    EXPECT_FALSE(mode.contains("beyond"));
+    const nlohmann::json circuit = one({"diode-circuit", "--set", "current=0.4"});
+    ASSERT_EQ(circuit["rules"].size(), 9U);
+    const auto steps = [](const nlohmann::json& of) { return of["rules"][0]["steps"].get<int>(); };
+    const nlohmann::json usual = one({"diode-circuit"});
+    EXPECT_NE(steps(circuit), steps(usual));
+    const Words mode_with{"compare", "step-control", "--system", "sliding-mode", "--set"};
+    const auto refused = [&](const std::string& set, const Words& parts) {
+        Words all = mode_with;
+        all.push_back(set);
+        expect_refused(all, parts);
+    };
+    refused("gain=1", {"gain", "amplitude", "got gain = 1"});
+    refused("start=-1", {"start > 0", "-1"});
+    refused("elements=3", {"elements"});
+    expect_refused({"compare", "step-control", "--set", "frequency=100"}, {"--set", "--system"});
+}
+
+TEST_F(App, CompareStepControlShowsWhereAPolicyWasNotTrained)
+{
+    const nlohmann::json of =
+        json({"compare", "step-control", "--system", "sliding-mode", "--json"})["cases"][0];
+    ASSERT_EQ(of["beyond"].size(), 2U);
+    for (const auto& problem : of["beyond"]) {
+        ASSERT_EQ(problem["rules"].size(), 3U) << problem["what"];
+        EXPECT_EQ(problem["rules"][0]["rule"], "constant");
+        EXPECT_EQ(problem["rules"][1]["rule"], "free estimate");
+        EXPECT_EQ(problem["rules"][2]["rule"], "learned");
+        EXPECT_GT(problem["rules"][2]["asked"].get<int>(), 0);
+        for (const auto& rule : problem["rules"]) {
+            EXPECT_LE(rule["error"].get<double>(), 1e-3) << problem["what"] << rule["rule"];
+        }
+    }
+    const std::string advice = of["advice"];
+    EXPECT_NE(advice.find("free estimate"), std::string::npos);
+    for (const char* model : {"fault-step", "sliding-mode-step", "diode-circuit-step"}) {
+        const Result shown = run({"inspect", model});
+        EXPECT_NE(shown.out.find("use          trained on"), std::string::npos) << shown.out;
+        EXPECT_NE(shown.out.find("Take "), std::string::npos) << shown.out;
+    }
+}
+
 TEST_F(App, TrainStepPolicyByReinforcement)
 {
     for (const char* trainer : {"tqc", "td3"}) {

@@ -518,7 +518,7 @@ TEST(Certify, AGateOfLevelsKeepsWhatIsProvedOfEachLevel)
         EXPECT_EQ(out.model.calibration.events, 0U);
         EXPECT_EQ(why_void(out.model), "");
 
-        const Gate gate(out.model);
+        const gates::Gate gate(out.model);
         const CertifiedClassifier certified(out.model);
         Random random(9);
         int far = 0;

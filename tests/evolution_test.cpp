@@ -4,13 +4,17 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "../src/learn/checkpoint_file.hpp"
 
 namespace ricochet::learn {
 namespace {
@@ -154,6 +158,51 @@ TEST(Evolution, RefusesAnAlteredCheckpoint)
     options.resume = true;
     EXPECT_THROW((void)evolve(sphere, start, options), std::runtime_error);
     std::filesystem::remove(file);
+}
+
+TEST(Evolution, RefusesACheckpointOfOtherLengths)
+{
+    // As if somebody had changed it and its checksum: the mean is a component shorter.
+    const std::filesystem::path file = scratch("evolution_short.checkpoint");
+    const std::vector<double> start(3, 2.0);
+    EvolutionOptions options{.max_evaluations = 100, .checkpoint = file};
+    (void)evolve(sphere, start, options);
+    const std::string_view line = "ricochet evolution checkpoint 1\n";
+    const std::string bytes = read_checkpoint(line, file);
+    constexpr std::size_t mean = 8 * (1 + 3 + 1 + 4 + 1);  // after which its length comes
+    ASSERT_EQ(bytes[mean], 3);
+    Writer shorter;
+    for (std::size_t i = 0; i < bytes.size(); i += 8) {
+        std::uint64_t word = 0;
+        std::memcpy(&word, bytes.data() + i, 8);
+        if (i == mean) word = 2;
+        if (i != mean + 24) shorter.put(word);
+    }
+    write_checkpoint(line, shorter, file);
+    options.resume = true;
+    EXPECT_THROW((void)evolve(sphere, start, options), std::runtime_error);
+    std::filesystem::remove(file);
+}
+
+TEST(Evolution, IsNotLostWithItsCheckpoint)
+{
+    const std::filesystem::path file = scratch("evolution_full.checkpoint");
+    std::filesystem::remove_all(file);
+    const std::vector<double> start(3, 2.0);
+    // What cannot be written at the start is an error: nothing is lost yet.
+    EXPECT_THROW((void)evolve(sphere, start, {.checkpoint = file / "nowhere"}), std::runtime_error);
+    // Later it is not: here a directory comes into the way.
+    int calls = 0;
+    const Objective score = [&](std::span<const double> x) {
+        if (++calls == 50) std::filesystem::create_directory(file);
+        return sphere(x);
+    };
+    const EvolutionResult found =
+        evolve(score, start, {.max_evaluations = 100, .threads = 1, .checkpoint = file});
+    EXPECT_LT(found.score, sphere(start));
+    EXPECT_NE(found.checkpoint_trouble.find("cannot be written"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(file.string() + ".part"));
+    std::filesystem::remove_all(file);
 }
 
 TEST(Evolution, PassesOnWhatTheScoreThrows)

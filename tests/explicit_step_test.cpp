@@ -18,9 +18,9 @@ using test::WalledOscillator;
 template <class Method>
 using StepOf = detail::ExplicitStep<Method, WalledOscillator, X>;
 
-static_assert(Step<StepOf<Rk4>, X>);
-static_assert(Step<StepOf<Dopri5>, X>);
-static_assert(Step<StepOf<Fehlberg78>, X>);
+static_assert(MethodStep<StepOf<Rk4>, X>);
+static_assert(MethodStep<StepOf<Dopri5>, X>);
+static_assert(MethodStep<StepOf<Fehlberg78>, X>);
 
 template <class Method>
 class ExplicitStepTest : public testing::Test {

@@ -238,6 +238,31 @@ TEST_F(KernelFile, ThatDoesNotFitIsRefused)
     EXPECT_TRUE(contains(refusal_of(Eigen::MatrixXd::Zero(2, 3), 1), "square"));
 }
 
+TEST_F(KernelFile, WhoseHeaderSaysOtherThingsIsRefused)
+{
+    const auto with = [this](std::string header) {
+        header.resize(118, ' ');
+        const double one = -1;
+        std::string bytes("\x93NUMPY\x01\0\x76\0", 10);
+        bytes += header + std::string(reinterpret_cast<const char*>(&one), sizeof one);
+        return refusal_of_bytes(bytes);
+    };
+    EXPECT_EQ(with("{'descr': '<f8', 'fortran_order': False, 'shape': (1, 1), }"), "accepted");
+    EXPECT_EQ(with("{'descr': '<f8', 'fortran_order': True , 'shape': (1, 1), }"), "accepted");
+    for (const char* order : {"maybe", "1", "'True'", "true", "", "FalseTrue"}) {
+        EXPECT_TRUE(contains(with(std::string("{'descr': '<f8', 'fortran_order': ") + order +
+                                  ", 'shape': (1, 1), }"),
+                             "True or False"))
+            << order;
+    }
+    EXPECT_TRUE(contains(with("{'descr': '<f8', 'descr': '<f4', 'fortran_order': False, "
+                              "'shape': (1, 1), }"),
+                         "appears twice"));
+    EXPECT_TRUE(
+        contains(with("'descr': '<f8', 'fortran_order': False, 'shape': (1, 1), "), "in braces"));
+    EXPECT_TRUE(contains(refusal([] { (void)read_npy_square("/dev/zero"); }), "something else"));
+}
+
 TEST_F(KernelFile, ThatIsNoneIsRefused)
 {
     EXPECT_TRUE(contains(refusal_of_bytes("nonsense, no matrix"), "no NumPy file"));

@@ -219,26 +219,29 @@ TEST(GateModel, WithLevelsThatDoNotFitIsRefusedWithASentence)
     Model model = true_horizons({0.02, 0.04});
     model.levels.pop_back();
     EXPECT_NE(refusal([&] { (void)to_safetensors(model); }).find("levels"), std::string::npos);
-    EXPECT_NE(refusal([&] { Gate gate(model); }).find("2 outputs and 1 levels"), std::string::npos);
+    EXPECT_NE(refusal([&] { gates::Gate gate(model); }).find("2 outputs and 1 levels"),
+              std::string::npos);
     model = true_horizons({0.04, 0.02});
-    EXPECT_NE(refusal([&] { Gate gate(model); }).find("do not rise"), std::string::npos);
+    EXPECT_NE(refusal([&] { gates::Gate gate(model); }).find("do not rise"), std::string::npos);
     EXPECT_NE(refusal([&] { (void)to_safetensors(model); }).find("rise"), std::string::npos);
     model = true_horizons({0.04});
     model.domain.clear();
-    EXPECT_NE(refusal([&] { Gate gate(model); }).find("has no domain"), std::string::npos);
+    EXPECT_NE(refusal([&] { gates::Gate gate(model); }).find("has no domain"), std::string::npos);
     model = true_horizons({0.04});
     model.kind = "event-classifier";
-    EXPECT_NE(refusal([&] { Gate gate(model); }).find("expected a gate"), std::string::npos);
-    EXPECT_NE(refusal([] { Calibrated d{Gate(true_levels())}; }).find("expected a horizon gate"),
-              std::string::npos);
+    EXPECT_NE(refusal([&] { gates::Gate gate(model); }).find("expected a gate"), std::string::npos);
     EXPECT_NE(
-        refusal([] { CalibratedBounds d{Gate(true_horizons({1}))}; }).find("expected a level gate"),
+        refusal([] { Calibrated d{gates::Gate(true_levels())}; }).find("expected a horizon gate"),
         std::string::npos);
+    EXPECT_NE(refusal([] {
+                  CalibratedBounds d{gates::Gate(true_horizons({1}))};
+              }).find("expected a level gate"),
+              std::string::npos);
 }
 
 TEST(GateModel, IsRefusedForAnotherSystemLayoutOrStep)
 {
-    const Calibrated gate(Gate(true_horizons({0.02, 0.04})));
+    const Calibrated gate(gates::Gate(true_horizons({0.02, 0.04})));
     const Options options{.t_end = 1, .step = 0.01};
     EXPECT_NE(refusal([&] {
                   (void)integrate(Measured{}, Measured::State{0, 1}, options, Fixed{}, gate);
@@ -253,7 +256,8 @@ TEST(GateModel, IsRefusedForAnotherSystemLayoutOrStep)
     Model wide = true_horizons({0.02});
     wide.recipe = "state-rate";
     EXPECT_NE(refusal([&] {
-                  (void)integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(Gate(wide)));
+                  (void)integrate(Shuttle{}, at_centre, options, Fixed{},
+                                  Calibrated(gates::Gate(wide)));
               }).find("takes 2 features, but 'state-rate' of this state are 4"),
               std::string::npos);
 }
@@ -264,8 +268,9 @@ TEST(Calibrated, FindsTheEventsOfTheExactDetectorInFewerCalls)
 {
     const Options options{.t_end = 50, .step = 0.01};
     const auto exact = integrate(Shuttle{}, at_centre, options, Fixed{});
-    const auto gated = integrate(Shuttle{}, at_centre, options, Fixed{},
-                                 Calibrated(Gate(true_horizons({0.02, 0.04, 0.08, 0.16, 0.32}))));
+    const auto gated =
+        integrate(Shuttle{}, at_centre, options, Fixed{},
+                  Calibrated(gates::Gate(true_horizons({0.02, 0.04, 0.08, 0.16, 0.32}))));
     ASSERT_EQ(exact.events.size(), 25U);
     expect_same_events(exact, gated);
     const Statistics& s = gated.statistics;
@@ -288,7 +293,8 @@ TEST(Calibrated, ComesBackToAnEventThatTheGateDidNotSeeComing)
     bold.levels[0].threshold = 1e9;
     const Options options{.t_end = 50, .step = 0.01};
     const auto exact = integrate(Shuttle{}, at_centre, options, Fixed{});
-    const auto gated = integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(Gate(bold)));
+    const auto gated =
+        integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(gates::Gate(bold)));
     expect_same_events(exact, gated);
     EXPECT_GT(gated.statistics.rollbacks, 20U);
 }
@@ -299,12 +305,14 @@ TEST(Calibrated, LooksAtEveryStepOutsideOfItsBoxAndCountsThem)
     model.domain[0] = {-1, 0};  // half of the way
     const Options options{.t_end = 50, .step = 0.01};
     const auto exact = integrate(Shuttle{}, at_centre, options, Fixed{});
-    const auto gated = integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(Gate(model)));
+    const auto gated =
+        integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(gates::Gate(model)));
     expect_same_events(exact, gated);
     EXPECT_GT(gated.statistics.outside_domain, 2400U);
     EXPECT_GT(gated.statistics.guard_calls, 2500U);
     model.domain[0] = {5, 6};
-    const auto outside = integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(Gate(model)));
+    const auto outside =
+        integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(gates::Gate(model)));
     expect_same_events(exact, outside);
     EXPECT_EQ(outside.statistics.evidence.gated, 0U);
 }
@@ -315,7 +323,8 @@ TEST(Calibrated, OfWeightsThatAreNoNumbersClearsNothing)
     for (double& w : model.layers[1].weight) w = std::nan("");
     const Options options{.t_end = 10, .step = 0.01};
     const auto exact = integrate(Shuttle{}, at_centre, options, Fixed{});
-    const auto gated = integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(Gate(model)));
+    const auto gated =
+        integrate(Shuttle{}, at_centre, options, Fixed{}, Calibrated(gates::Gate(model)));
     expect_same_events(exact, gated);
     EXPECT_EQ(gated.statistics.evidence.gated, 0U);
 }
@@ -329,7 +338,7 @@ TEST(CalibratedBounds, LooksLessThanThePlannerAlone)
     const auto exact = integrate(Measured{}, start, options, Fixed{});
     const auto planned = integrate(Measured{}, start, options, Fixed{}, Planned(planning));
     const auto gated = integrate(Measured{}, start, options, Fixed{},
-                                 CalibratedBounds(Gate(true_levels()), planning));
+                                 CalibratedBounds(gates::Gate(true_levels()), planning));
     expect_same_events(exact, planned);
     expect_same_events(exact, gated);
     EXPECT_LT(gated.statistics.guard_calls, planned.statistics.guard_calls);
@@ -343,7 +352,7 @@ TEST(CalibratedBounds, ThatClaimTooMuchEndTheRunOrMissAndAreNamedGated)
     for (GateLevel& level : bold.levels) level.threshold = 1e9;
     const Options options{.t_end = 50, .step = 0.01};
     const auto gated = integrate(Measured{}, Measured::State{0, 1}, options, Fixed{},
-                                 CalibratedBounds(Gate(bold)));
+                                 CalibratedBounds(gates::Gate(bold)));
     // The guard is never asked, and nothing found: what was skipped is called gated.
     EXPECT_TRUE(gated.outcome == Outcome::wrong_bound || gated.events.size() < 25);
     EXPECT_GT(gated.statistics.evidence.gated, 0U);
@@ -388,7 +397,7 @@ void expect_verified(const System& system, std::size_t inputs, const Options& op
             model.levels.push_back({.value = tau, .threshold = 0});
         }
         const auto seen =
-            integrate(system, system.start(), options, Fixed{}, Foreseen(Gate(model)));
+            integrate(system, system.start(), options, Fixed{}, Foreseen(gates::Gate(model)));
         expect_same_events(exact, seen);
         EXPECT_EQ(seen.statistics.evidence.gated, 0U);
     }

@@ -18,6 +18,8 @@
 namespace ricochet {
 namespace {
 
+using namespace sets;
+
 using testing_support::ExactCircuit;
 using One = Eigen::Matrix<double, 1, 1>;
 

@@ -71,7 +71,7 @@ private:
     HostState x0_, x1_, rate0_, rate1_;
 };
 
-static_assert(Step<HostStep, HostState>);
+static_assert(MethodStep<HostStep, HostState>);
 
 /// One look of a detector at a step of a guard armed on `side`.
 template <class Detector>

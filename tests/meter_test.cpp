@@ -87,13 +87,13 @@ Model shuttle_model()
 }
 
 /// Says of every state that there will be no event for so long, or never does (threshold -1).
-Gate horizon_gate(double horizon, double threshold = 1)
+gates::Gate horizon_gate(double horizon, double threshold = 1)
 {
     Model model = shuttle_model();
     model.kind = "gate-horizon";
     model.layers = {{2, 2, {0, 0, 0, 0}, {0, 0}}, {2, 1, {0, 0}, {0}}};
     model.levels = {{.value = horizon, .threshold = threshold}};
-    return Gate(model);
+    return gates::Gate(model);
 }
 
 /// logit |x|, with what has been proved of it.

@@ -11,6 +11,8 @@
 namespace ricochet {
 namespace {
 
+using namespace sets;
+
 /// A set that is everything: its projection is the identity, and the reaction zero.
 struct Everything {
     [[nodiscard]] static std::size_t dimension() { return 5; }

@@ -10,6 +10,8 @@
 namespace ricochet {
 namespace {
 
+using namespace sets;
+
 template <class Set>
 std::vector<double> projected(const Set& set, std::vector<double> z)
 {

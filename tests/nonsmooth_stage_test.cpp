@@ -15,6 +15,8 @@
 namespace ricochet {
 namespace {
 
+using namespace sets;
+
 // --- semismooth Newton ---
 
 // y + c y^3 = 0 in every component.

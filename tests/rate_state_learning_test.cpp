@@ -171,8 +171,53 @@ TEST(PairFile, RefusesWhatItIsNot)
     says(refusal([](auto& j) { j["rate"]["shift"] = {1}; }), "expected 3 numbers, found 1");
     says(refusal([](auto& j) { j["direct"]["offset"] = 0.6; }), "self test: friction");
     says(refusal([](auto& j) { j["v_star"] = "fast"; }), "expected a number");
+    // Of another type than it should be.
+    says(refusal([](auto& j) { j["format"] = 3; }), "expected format");
+    says(refusal([](auto& j) { j["version"] = "1"; }), "expected version 1, found \"1\"");
+    says(refusal([](auto& j) { j["version"] = 1.5; }), "expected version 1, found 1.5");
+    says(refusal([](auto& j) { j["version"] = nullptr; }), "expected version 1, found null");
+    says(refusal([](auto& j) { j["convex"] = 1; }), "expected \"convex\": true, found 1");
+    says(refusal([](auto& j) { j["self_test"]["v"] = -1; }), "self test: \"v\" must be positive");
+    says(refusal([](auto& j) { j["state"]["scale"] = true; }), "expected at most 8 numbers");
+    says(refusal([](auto& j) { j["state"]["scale"][0] = nullptr; }), "expected numbers");
+    // A domain is none, or an interval of slip rates and one of states.
+    const auto domain = [&](double v_min, double v_max, double xi_min, double xi_max) {
+        return refusal([=](auto& j) {
+            j["domain"] = {
+                {"v_min", v_min}, {"v_max", v_max}, {"xi_min", xi_min}, {"xi_max", xi_max}};
+        });
+    };
+    const std::string rates = "expected 0 < v_min < v_max";
+    const std::string states = "xi_min < xi_max";
+    says(domain(1e-3, 1e-9, -5, 25), rates);
+    says(domain(1e-9, 1e-9, -5, 25), rates);
+    says(domain(-1e-9, 1e-3, -5, 25), rates);
+    says(domain(0, 1e-3, -5, 25), rates);
+    says(domain(1e-9, 1e300, -5, 25), rates);
+    says(domain(1e-9, 1e-3, 25, -5), states);
+    says(domain(1e-9, 1e-3, -5, 1e4), states);
+    // Deeper than any file is, and longer than anybody reads.
+    const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
+    for (const std::string& text : {deep, "{\"format\": " + deep + '}'}) {
+        try {
+            (void)parse_pair(text, "pair.json");
+            ADD_FAILURE();
+        } catch (const PotentialFileError& error) {
+            says(error.what(), "nested deeper");
+        }
+    }
+    EXPECT_LT(refusal([](auto& j) { j["format"] = std::string(100'000, 'x'); }).size(), 200u);
+    // Units with which quotients or products leave the doubles.
+    says(refusal([](auto& j) { j["v_star"] = 5e-324; }), "v_star");
+    says(refusal([](auto& j) { j["beta"] = 1e308; }), "beta");
     EXPECT_THROW((void)parse_pair("[", "x"), PotentialFileError);
+    const std::string twice =
+        to_json(AdditivePair(crooked_parameters())).replace(0, 1, "{\"beta\": 1,");
+    EXPECT_THROW((void)parse_pair(twice, "x"), PotentialFileError);
+    EXPECT_THROW((void)load_pair("."), PotentialFileError);
+    EXPECT_THROW((void)load_pair("/dev/zero"), PotentialFileError);
     EXPECT_THROW((void)load_pair("no-such-file.json"), PotentialFileError);
+    EXPECT_THROW((void)load_pair("/"), PotentialFileError);
 }
 
 /// Gradients of a model by its parameters against central differences of order four.

@@ -119,6 +119,19 @@ TEST(VariationalStep, EveryEvolutionLawHasItsOrder)
     }
 }
 
+TEST(VariationalStep, StageWithoutARepresentableSlipRateIsNotSolved)
+{
+    // f* + a log(V / V*) + b xi = 0.1 needs V = V* e^-5000 with a = 1e-4: the log form has no such
+    // double, and says so as every stage does.
+    RateStateParameters p;
+    p.a = 1e-4;
+    const RateStateLaw<StateEvolution::slip, DirectEffect::log> slip(p);
+    const RateStateLaw<StateEvolution::prz, DirectEffect::log> prz(p);
+    const StageEquation e{.c = 1, .normal_force = 1, .force = p.f_star - 0.5};
+    EXPECT_FALSE(solve_stage(StateElimination(slip, 1e-3), e, 1e-6).report.solved);
+    EXPECT_FALSE(solve_stage(StateElimination(prz, 1e-3), e, 1e-6).report.solved);
+}
+
 TEST(VariationalStep, SolvesAdversarialSteps)
 {
     // Any history, also of the wrong sign, any step from microseconds to hours.

@@ -121,7 +121,8 @@ TEST(TrainGate, SavesMostChecksOfABlackBoxAndKeepsItsEvents)
     const Options options{.t_end = 50, .step = 0.005};
     const X start{0.1, 0.2, 0.5, 0.3};
     const auto exact = integrate(Table{}, start, options, Fixed{});
-    const auto gated = integrate(Table{}, start, options, Fixed{}, Calibrated(Gate(trained.model)));
+    const auto gated =
+        integrate(Table{}, start, options, Fixed{}, Calibrated(gates::Gate(trained.model)));
     ASSERT_EQ(exact.events.size(), gated.events.size());
     EXPECT_EQ(exact.x, gated.x);
     EXPECT_GT(exact.statistics.guard_calls, 2 * gated.statistics.guard_calls);
@@ -170,7 +171,7 @@ TEST(TrainGate, LearnsLevelsFromBelow)
         EXPECT_LE(levels[k].threshold, levels[k - 1].threshold);
     }
     // In a run of its own what is cleared is not more than the guard.
-    const Gate gate(trained.model);
+    const gates::Gate gate(trained.model);
     const auto run = integrate(MeasuredTable{}, X{0, 0.3, 0.4, 0.1},
                                {.t_end = 30,
                                 .step = 0.005,
@@ -210,7 +211,7 @@ TEST(TrainGate, StopsWhenItIsToldAndKeepsTheBest)
     EXPECT_EQ(calls, 2U);
     EXPECT_EQ(trained.report.iterations, 400U);
     EXPECT_EQ(trained.model.calibration.events, 0U);
-    EXPECT_NO_THROW(Gate gate(trained.model));
+    EXPECT_NO_THROW(gates::Gate gate(trained.model));
 }
 
 TEST(TrainGate, StopsAtOnceWhileStatesAreSampled)

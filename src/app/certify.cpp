@@ -12,12 +12,15 @@
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
+#include "keep_model.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/learn/certify.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "run_watch.hpp"
 #include "timing.hpp"
+#include "train.hpp"
 
 namespace ricochet::app {
 
@@ -187,16 +190,21 @@ int certify(const CertifyRequest& request)
 {
     const fs::path file = find_model(request.model);
     const Model model = load_model(file);
-    const learn::GuardProblem problem = problem_of(model, file);
     const fs::path out = request.out.empty() ? file : request.out;
-    check_replaceable("--out", out);
     learn::CertifyOptions options = options_of(request);
-    options.checkpoint =
-        request.checkpoint.empty() ? fs::path(file.string() + ".checkpoint") : request.checkpoint;
-    check_replaceable("--checkpoint", options.checkpoint);
+    options.checkpoint = request.checkpoint;
+    if (options.checkpoint.empty()) options.checkpoint = file.string() + ".checkpoint";
+    Claims claims;  // the model itself may get the certificate
+    std::error_code error;
+    if (out != file && !fs::equivalent(out, file, error)) claims.reads("the model", file);
+    claims.replaces("--out", out);
+    claims.keeps("--checkpoint", options.checkpoint, options.resume);
+    // Bounds of a guard may take long to prepare.
+    const Interrupts interrupts;
+    const RunWatch watch(0.5);
+    const learn::GuardProblem problem = problem_of(model, file);
 
     Bar bar;
-    const Interrupts watch;
     const learn::CertifiedModel certified =
         run(model, problem, options, [&](const learn::CertifyProgress& now) {
             bar.show(now);
@@ -206,22 +214,25 @@ int certify(const CertifyRequest& request)
 
     const learn::CertifyReport& report = certified.report;
     const bool goes_on = stopped(report.outcome);
-    if (!goes_on && request.checkpoint.empty()) {
-        std::error_code ignored;
-        fs::remove(options.checkpoint, ignored);
-    }
     if (report.outcome == learn::CertifyOutcome::too_long && report.levels.empty()) {
+        std::error_code ignored;
+        if (request.checkpoint.empty()) fs::remove(options.checkpoint, ignored);
         throw BadInput(fmt::format("the proof takes {}, above the limit of {}; --limit raises it",
                                    text(report.estimates.back()), duration(options.limit)));
     }
     // A checkpoint speaks of the model as it was: while one is left the file is not touched.
     const bool write = !report.levels.empty() && !(goes_on && out == file);
-    if (write) save_model(certified.model, out);
-    print(request.json ? to_json(report, out, write) : to_text(report));
+    deliver({[&] {
+                 if (write) keep_model(certified.model, out, options.checkpoint);
+             },
+             [&] { print(request.json ? to_json(report, out, write) : to_text(report)); }});
+    if (!goes_on && request.checkpoint.empty()) {
+        std::error_code ignored;
+        fs::remove(options.checkpoint, ignored);
+    }
     if (write) fmt::print(stderr, "ricochet: the model is in '{}'\n", out.string());
     if (goes_on) {
-        fmt::print(stderr, "ricochet: the same command with --resume goes on from '{}'\n",
-                   options.checkpoint.string());
+        say_what_is_kept(options.checkpoint, report.checkpoint_trouble);
     }
     return certified.proved() ? 0 : 1;
 }

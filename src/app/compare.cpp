@@ -4,15 +4,19 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "files.hpp"
 #include "input.hpp"
+#include "interrupt.hpp"
 #include "json_text.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
+#include "run_watch.hpp"
 #include "set_valued.hpp"
 #include "timing.hpp"
 
@@ -113,12 +117,17 @@ std::vector<Method> methods(const SystemEntry& system, const std::vector<std::st
     return list.take();
 }
 
-/// Runs each method once, with its events.
+/// Runs each method once, with its events. Those after an interrupt are left out.
 void check_answers(const SystemEntry& system, const std::vector<double>& exact,
                    std::vector<Method>& methods)
 {
-    for (Method& method : methods) {
+    for (std::size_t i = 0; i < methods.size(); ++i) {
+        Method& method = methods[i];
         const TimedRun timed = system.run(method.settings, 1);
+        if (Interrupts::any()) {
+            methods.resize(i);
+            return;
+        }
         std::vector<double> times;
         for (const auto& event : timed.run.events) times.push_back(event.t);
         method.accuracy = judge(exact, times);
@@ -131,17 +140,23 @@ void check_answers(const SystemEntry& system, const std::vector<double>& exact,
 void measure(const SystemEntry& system, std::vector<Method>& methods)
 {
     constexpr std::size_t rounds = 101;
+    constexpr std::size_t fewest = 3;
     constexpr double batch_seconds = 2e-4;
+    constexpr std::chrono::seconds enough(20);  // runs of seconds are measured less often
+    const auto start = std::chrono::steady_clock::now();
     std::vector<std::vector<double>> seconds(methods.size());
     std::vector<int> repeats;
     for (Method& method : methods) {
         method.settings.options.record_events = false;
-        const double once = system.run(method.settings, 20).seconds;
-        repeats.push_back(1 + static_cast<int>(batch_seconds / once));
+        double once = system.run(method.settings, 1).seconds;
+        if (once < batch_seconds) once = system.run(method.settings, 20).seconds;
+        repeats.push_back(1 + static_cast<int>(std::min(batch_seconds / once, 1e6)));
     }
-    for (std::size_t round = 0; round < rounds; ++round) {
+    for (std::size_t round = 0; round < rounds && !Interrupts::any(); ++round) {
+        if (round >= fewest && std::chrono::steady_clock::now() - start > enough) break;
         for (std::size_t i = 0; i < methods.size(); ++i) {
-            seconds[i].push_back(system.run(methods[i].settings, repeats[i]).seconds);
+            const double taken = system.run(methods[i].settings, repeats[i]).seconds;
+            if (!Interrupts::any()) seconds[i].push_back(taken);
         }
     }
     for (std::size_t i = 0; i < methods.size(); ++i) {
@@ -206,9 +221,11 @@ void add_verdict(const std::vector<Method>& methods, bool fixed_step,
     }
 }
 
+/// Nothing where methods are missing.
 std::vector<std::string> verdict(const std::vector<Method>& methods)
 {
     std::vector<std::string> sentences;
+    if (Interrupts::any()) return sentences;
     add_verdict(methods, true, sentences);
     add_verdict(methods, false, sentences);
     return sentences;
@@ -279,9 +296,11 @@ std::string to_text(const SystemEntry& system, const std::vector<double>& exact,
     std::string out =
         fmt::format("{}, to t = {} s\n\n", title(system, settings), settings.options.t_end);
     out += times_table(system, exact, methods) + '\n' + cost_table(system, exact, methods) + '\n';
-    const Options& controlled = find(methods, DetectorKind::extremum, false)->settings.options;
-    out += fmt::format("Where no step h is given the error is controlled, rtol {}, atol {}.\n",
-                       controlled.rtol, controlled.atol);
+    if (const Method* controlled = find(methods, DetectorKind::extremum, false)) {
+        const Options& options = controlled->settings.options;
+        out += fmt::format("Where no step h is given the error is controlled, rtol {}, atol {}.\n",
+                           options.rtol, options.atol);
+    }
     if (!system.line.empty()) {
         out += fmt::format("line: the boundary itself, {}, is asked in the place of a network.\n",
                            system.line);
@@ -337,13 +356,15 @@ std::string to_json(const SystemEntry& system, const std::vector<double>& exact,
         row.update(json(exact, judge(exact, column.times)));
         published.push_back(std::move(row));
     }
-    return json_text({{"system", system.name},
-                      {"t_end", methods.front().settings.options.t_end},
-                      {"reference", exact},
-                      {"reference_kind", system.numerical_reference ? "numerical" : "closed form"},
-                      {"methods", rows},
-                      {"published", published},
-                      {"verdict", verdict(methods)}});
+    Json out{{"system", system.name},
+             {"t_end", methods.front().settings.options.t_end},
+             {"reference", exact},
+             {"reference_kind", system.numerical_reference ? "numerical" : "closed form"},
+             {"methods", rows},
+             {"published", published},
+             {"verdict", verdict(methods)}};
+    if (Interrupts::any()) out["incomplete"] = Interrupts::cause();
+    return json_text(out);
 }
 
 std::string to_csv(const SystemEntry& system, const std::vector<double>& exact,
@@ -366,7 +387,7 @@ std::string to_csv(const SystemEntry& system, const std::vector<double>& exact,
         }
         out += '\n';
     }
-    return out;
+    return Interrupts::any() ? out + incomplete_line() : out;
 }
 
 }  // namespace
@@ -388,16 +409,31 @@ int compare(const CompareRequest& request)
         }
         system.published.clear();  // of the defaults
     }
-    if (request.csv) check_writable("--csv", *request.csv);
+    Claims claims;
     std::vector<Method> all = methods(system, request.set);
+    const std::size_t wanted = all.size();
+    for (const Method& method : all) {
+        if (!method.settings.model.empty()) claims.reads("the model", method.settings.model);
+    }
+    if (request.csv) claims.writes("--csv", *request.csv);
     const RunSettings& settings = all.front().settings;
     const std::vector<double> exact =
         system.exact_events(settings.parameters, settings.options.t_end);
+    const Interrupts interrupts;
+    std::optional<RunWatch> watch(0.25);
     check_answers(system, exact, all);
+    if (all.empty()) return ended_early("before anything was compared");
     measure(system, all);
+    watch.reset();
 
-    print(request.json ? to_json(system, exact, all) : to_text(system, exact, all));
-    if (request.csv) write_file(*request.csv, to_csv(system, exact, all));
+    deliver(
+        {[&] { print(request.json ? to_json(system, exact, all) : to_text(system, exact, all)); },
+         [&] {
+             if (request.csv) write_file(*request.csv, to_csv(system, exact, all));
+         }});
+    if (Interrupts::any()) {
+        return ended_early(fmt::format("after {} of {} methods", all.size(), wanted));
+    }
     const bool all_found = std::all_of(all.begin(), all.end(), [](const Method& method) {
         return method.accuracy.missed == 0 && method.accuracy.spurious == 0;
     });

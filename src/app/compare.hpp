@@ -18,6 +18,7 @@ struct CompareRequest {
 /// Prints the event times of every method beside the exact ones, then what each
 /// method made of them and what it cost. The answers are checked before the clock
 /// counts.
+/// An interrupt leaves the methods that were run by then.
 /// @return 0 if every method found every event, else 1.
 /// @throws BadInput or ModelError before anything is printed or written.
 int compare(const CompareRequest& request);

@@ -1,16 +1,23 @@
 #include "files.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
+#include <cstdio>
 #include <cstdlib>
-#include <fstream>
+#include <exception>
 #include <string>
 #include <system_error>
+#include <thread>
+#include <utility>
 
 #include "input.hpp"
+#include "interrupt.hpp"
 
 namespace ricochet::app {
 
@@ -29,12 +36,17 @@ fs::path directory_of(const fs::path& file)
     return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
-/// The file itself where the name is a link to it, so that the link stays.
+/// The file itself where the name is a link to it, so that the link stays; it need not be there.
 fs::path behind_links(const fs::path& file)
 {
+    constexpr int most = 40;  // as the system has it
     std::error_code error;
-    const fs::path resolved = fs::weakly_canonical(file, error);
-    return error ? file : resolved;
+    fs::path target = fs::absolute(file, error);
+    for (int i = 0; i < most && fs::is_symlink(fs::symlink_status(target, error)); ++i) {
+        target = target.parent_path() / fs::read_symlink(target, error);
+    }
+    const fs::path directory = fs::weakly_canonical(target.parent_path(), error);
+    return error ? file : directory / target.filename();
 }
 
 mode_t creation_mask()
@@ -57,33 +69,128 @@ bool write_all(int descriptor, std::string_view content)
 
 }  // namespace
 
-void check_writable(std::string_view option, const fs::path& file)
+namespace {
+
+/// Longest name that a file may have beside which another is written first: that of a model gets
+/// 15 characters more.
+std::size_t longest_name(const fs::path& directory)
 {
-    const auto refuse = [&](const std::string& why) {
-        throw BadInput(fmt::format("{} must be a file that can be written, got '{}': {}", option,
-                                   file.string(), why));
-    };
-    if (!file.has_filename()) refuse("it names no file");
-    const fs::path target = behind_links(file);
-    std::error_code error;
-    if (fs::is_directory(target, error)) refuse("it is a directory");
-    const fs::path directory = directory_of(target);
-    if (!fs::is_directory(directory, error)) {
-        refuse(fmt::format("there is no directory '{}'", directory.string()));
-    }
-    if (fs::exists(target, error) && access(target.c_str(), W_OK) != 0) refuse(last_error());
-    const bool regular = !fs::exists(target, error) || fs::is_regular_file(target, error);
-    if (regular && access(directory.c_str(), W_OK | X_OK) != 0) refuse(last_error());
+    constexpr long beside = 16;
+    const long most = pathconf(directory.c_str(), _PC_NAME_MAX);
+    return static_cast<std::size_t>(std::max(most < 0 ? 255L : most, beside) - beside);
 }
 
-void check_replaceable(std::string_view option, const fs::path& file)
+[[noreturn]] void refuse_to_write(std::string_view option, const fs::path& file,
+                                  std::string_view why)
 {
-    check_writable(option, file);
-    std::error_code error;
+    throw BadInput(fmt::format("{} must be a file that can be written, got '{}': {}", option,
+                               shortened(file.string()), why));
+}
+
+/// @throws BadInput unless a file of that name could be written.
+void check_writable(std::string_view option, const fs::path& file, bool only_files)
+{
+    const auto refuse = [&](std::string_view why) { refuse_to_write(option, file, why); };
+    if (!file.has_filename()) refuse("it names no file");
     const fs::path target = behind_links(file);
-    if (fs::exists(target, error) && !fs::is_regular_file(target, error)) {
+    const fs::path directory = directory_of(target);
+    if (target.filename().string().size() > longest_name(directory)) refuse("its name is too long");
+    std::error_code error;
+    const fs::file_status status = fs::status(target, error);
+    if (fs::is_directory(status)) refuse("it is a directory");
+    if (status.type() == fs::file_type::none) refuse(error.message());
+    if (!fs::is_directory(directory, error)) {
+        refuse(fmt::format("there is no directory '{}'", shortened(directory.string())));
+    }
+    if (fs::exists(status) && access(target.c_str(), W_OK) != 0) refuse(last_error());
+    const bool regular = !fs::exists(status) || fs::is_regular_file(status);
+    if (regular && access(directory.c_str(), W_OK | X_OK) != 0) refuse(last_error());
+    if (only_files && !regular) {
         throw BadInput(fmt::format("{} must be a file, got '{}', which is something else", option,
                                    file.string()));
+    }
+}
+
+bool is_device(const fs::path& file)
+{
+    std::error_code error;
+    return fs::exists(file, error) && !fs::is_regular_file(file, error);
+}
+
+/// To be written to. A pipe without a reader is waited for, until an interrupt: the system would
+/// wait on. Below 0: errno says why not.
+int open_device(const fs::path& device)
+{
+    constexpr std::chrono::milliseconds often(20);
+    bool said = false;
+    for (;;) {
+        const int descriptor = open(device.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+        if (descriptor >= 0) {
+            fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) & ~O_NONBLOCK);
+            return descriptor;
+        }
+        if (errno != ENXIO || !fs::is_fifo(device) || Interrupts::any()) return descriptor;
+        if (!std::exchange(said, true)) {
+            fmt::print(stderr, "ricochet: waiting for somebody to read '{}'\n", device.string());
+        }
+        std::this_thread::sleep_for(often);
+    }
+}
+
+bool same_file(const fs::path& a, const fs::path& b)
+{
+    std::error_code error;
+    return a == b || fs::equivalent(a, b, error);
+}
+
+}  // namespace
+
+void Claims::add(std::string_view option, const fs::path& file, bool written)
+{
+    const fs::path target = behind_links(file);
+    for (const Claim& other : claims_) {
+        if (!written && !other.written) continue;
+        if (!same_file(target, other.file) || is_device(target)) continue;
+        throw BadInput(fmt::format("{} and {} must be two files, got '{}' for both", other.option,
+                                   option, file.string()));
+    }
+    claims_.push_back({.option = std::string(option), .file = target, .written = written});
+}
+
+void Claims::reads(std::string_view option, const fs::path& file)
+{
+    add(option, file, false);
+}
+
+void Claims::writes(std::string_view option, const fs::path& file)
+{
+    check_writable(option, file, false);
+    add(option, file, true);
+}
+
+void Claims::replaces(std::string_view option, const fs::path& file)
+{
+    check_writable(option, file, true);
+    add(option, file, true);
+}
+
+void Claims::keeps(std::string_view option, const fs::path& file, bool resume)
+{
+    replaces(option, file);
+    fs::path part = file;
+    part += ".part";
+    add(fmt::format("the part of {}", option), part, true);
+    std::error_code error;
+    const bool there = fs::exists(file, error);
+    if (resume && !there) {
+        throw BadInput(
+            fmt::format("there is no checkpoint '{}' to resume: it cannot be read", file.string()));
+    }
+    if (!resume && there) {
+        throw BadInput(
+            fmt::format("'{}' keeps an earlier training or proof: --resume goes on from it; to "
+                        "begin anew, remove it",
+                        file.string()));
     }
 }
 
@@ -94,9 +201,14 @@ void write_file(const fs::path& file, std::string_view content)
     };
     const fs::path target = behind_links(file);
     std::error_code error;
-    if (fs::exists(target, error) && !fs::is_regular_file(target, error)) {
-        std::ofstream out(target, std::ios::binary);
-        if (!(out << content << std::flush)) fail();
+    if (is_device(target)) {
+        const int descriptor = open_device(target);
+        if (descriptor < 0) fail();
+        const bool written = write_all(descriptor, content);
+        const int why = errno;
+        const bool closed = close(descriptor) == 0;
+        if (!written) errno = why;
+        if (!written || !closed) fail();
         return;
     }
     std::string name = target.string() + ".XXXXXX";
@@ -113,6 +225,19 @@ void write_file(const fs::path& file, std::string_view content)
         errno = reason;
         fail();
     }
+}
+
+void deliver(std::initializer_list<std::function<void()>> parts)
+{
+    std::exception_ptr first;
+    for (const auto& part : parts) {
+        try {
+            part();
+        } catch (...) {
+            if (!first) first = std::current_exception();
+        }
+    }
+    if (first) std::rethrow_exception(first);
 }
 
 TemporaryDirectory::TemporaryDirectory()

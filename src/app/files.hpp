@@ -2,8 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <initializer_list>
 #include <stdexcept>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace ricochet::app {
 
@@ -13,18 +17,41 @@ public:
     using std::runtime_error::runtime_error;
 };
 
-/// Looks, before any work is done, whether a file of that name could be written.
-/// Creates nothing.
-/// @throws BadInput naming the option.
-void check_writable(std::string_view option, const std::filesystem::path& file);
+/// The files of one command, claimed before any work is done: what it reads is not written, and
+/// nothing is written twice. Creates nothing. Everything throws BadInput naming the options.
+class Claims {
+public:
+    /// A model or a kernel.
+    void reads(std::string_view option, const std::filesystem::path& file);
 
-/// The same for models and checkpoints, which are renamed into place: only a file may be there.
-/// @throws BadInput naming the option.
-void check_replaceable(std::string_view option, const std::filesystem::path& file);
+    /// A file of which a new one could be written now, or a device or a pipe.
+    void writes(std::string_view option, const std::filesystem::path& file);
+
+    /// The same for models, which are renamed into place: only a file may be there.
+    void replaces(std::string_view option, const std::filesystem::path& file);
+
+    /// Where an interrupted training or proof is kept: not there yet, unless it is to `resume`.
+    void keeps(std::string_view option, const std::filesystem::path& file, bool resume);
+
+private:
+    struct Claim {
+        std::string option;
+        std::filesystem::path file;
+        bool written;
+    };
+
+    void add(std::string_view option, const std::filesystem::path& file, bool written);
+
+    std::vector<Claim> claims_;
+};
 
 /// Writes a neighbouring file and renames it. Devices and pipes are written to.
 /// @throws WriteError naming the file and what the system said.
 void write_file(const std::filesystem::path& file, std::string_view content);
+
+/// Does everything of a list, whatever fails of it, and throws the first failure then: what was
+/// computed is not lost with the first file that cannot be written.
+void deliver(std::initializer_list<std::function<void()>> parts);
 
 /// A new directory under the system's temporary one, removed with what is in it.
 class TemporaryDirectory {

@@ -21,10 +21,10 @@ TimedRun with_gate(const RunSettings& settings, Use&& use)
     switch (settings.detector) {
         case DetectorKind::certified: return use(Certified<>(model));
         case DetectorKind::calibrated: {
-            const Gate gate(model);
+            const gates::Gate gate(model);
             return gate.is_horizon() ? use(Calibrated<>(gate)) : use(CalibratedBounds<>(gate));
         }
-        default: return use(Foreseen<>(Gate(model)));
+        default: return use(Foreseen<>(gates::Gate(model)));
     }
 }
 

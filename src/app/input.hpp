@@ -24,6 +24,9 @@ public:
 /// Bytes that a terminal would act on, as a foreign file may hold, become '?'.
 [[nodiscard]] std::string printable(std::string_view text);
 
+/// The text, or its start where it is too long for a sentence.
+[[nodiscard]] std::string shortened(std::string_view text);
+
 /// The finite number that `text` spells.
 /// @throws BadInput naming the option.
 [[nodiscard]] double number(std::string_view option, std::string_view text);

@@ -26,6 +26,7 @@
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
 #include "step_actor.hpp"
+#include "step_policy.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -261,6 +262,7 @@ std::string to_text(const Inspection& found)
         line("decision",
              fmt::format("the classical step times exp(output), held to [{:.3g}, {:.3g}]",
                          std::exp(-StepPolicy::most), std::exp(StepPolicy::most)));
+        line("use", std::string(policy_advice(model.system)));
     } else if (is_actor(model)) {
         line("decision", fmt::format("the step is linear in tanh(output), {} to {} s",
                                      model.step_min, model.step_max));
@@ -343,6 +345,7 @@ std::string to_json(const Inspection& found)
                         {"recorded", model.self_test.output},
                         {"output", found.outputs}}},
                       {"certificate", certificate_json(model)},
+                      {"use", is_policy(model) ? policy_advice(model.system) : ""},
                       {"cost",
                        {{"nanoseconds",
                          {{"median", cost.median * 1e9},

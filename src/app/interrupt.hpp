@@ -1,18 +1,34 @@
-// Ctrl-C while something long is under way.
+// What ends a command early and keeps what it has computed: Ctrl-C, a request to terminate, memory
+// that runs short.
 #pragma once
 
+#include <unistd.h>
+
+#include <atomic>
 #include <csignal>
+#include <string_view>
 
 namespace ricochet::app {
 
-/// While it lives, the first interrupt sets a flag; a second one ends the program.
+/// Why a command is to end early.
+enum class Cause : int { none = 0, interrupt = SIGINT, terminate = SIGTERM, memory = -1 };
+
+/// While it lives, the first interrupt sets a flag that runs look at after every step; a second one
+/// ends the program.
 class Interrupts {
 public:
     Interrupts()
     {
-        seen = 0;
+        cause_ = 0;
+        flag_ = false;
         struct sigaction action = {};
-        action.sa_handler = [](int) { seen = 1; };
+        action.sa_handler = [](int signal) {
+            constexpr std::string_view answer =
+                "\nricochet: ending with what there is; a second interrupt ends without\n";
+            [[maybe_unused]] const auto written =
+                write(STDERR_FILENO, answer.data(), answer.size());
+            raise_for(static_cast<Cause>(signal));
+        };
         action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
         sigaction(SIGINT, &action, &before_int_);
         sigaction(SIGTERM, &action, &before_term_);
@@ -25,10 +41,41 @@ public:
     Interrupts(const Interrupts&) = delete;
     Interrupts& operator=(const Interrupts&) = delete;
 
-    [[nodiscard]] static bool any() noexcept { return seen != 0; }
+    /// Safe in a signal handler and in any thread; the first cause stays.
+    static void raise_for(Cause cause) noexcept
+    {
+        int none = 0;
+        cause_.compare_exchange_strong(none, static_cast<int>(cause));
+        flag_ = true;
+    }
+
+    [[nodiscard]] static bool any() noexcept { return flag_.load(std::memory_order_relaxed); }
+    /// For `Options::cancelled`.
+    [[nodiscard]] static const std::atomic<bool>* flag() noexcept { return &flag_; }
+
+    /// "interrupted"; empty if there was nothing.
+    [[nodiscard]] static std::string_view cause() noexcept
+    {
+        switch (static_cast<Cause>(cause_.load())) {
+            case Cause::none: break;
+            case Cause::interrupt: return "interrupted";
+            case Cause::terminate: return "asked to terminate";
+            case Cause::memory: return "no memory was left for more";
+        }
+        return "";
+    }
+
+    /// Exit status of a command that was ended early: 128 and the signal, as a shell has it.
+    [[nodiscard]] static int status() noexcept
+    {
+        const int cause = cause_.load();
+        return cause > 0 ? 128 + cause : 1;
+    }
 
 private:
-    inline static volatile std::sig_atomic_t seen = 0;
+    inline static std::atomic<int> cause_ = 0;
+    inline static std::atomic<bool> flag_ = false;
+    static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
     struct sigaction before_int_ = {};
     struct sigaction before_term_ = {};
 };

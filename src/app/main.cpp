@@ -2,18 +2,22 @@
 //
 // Exit status: 0 fine; 1 a run or training that ended otherwise than hoped (its
 // result is printed all the same) or a file that could not be written in the end;
-// 2 bad input: one sentence on standard error, nothing printed, nothing written.
+// 2 bad input: one sentence on standard error, nothing printed, nothing written;
+// 130 and 143 a run or comparison ended by a signal, its result printed as incomplete.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <limits>
 #include <memory>
+#include <new>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -333,6 +337,57 @@ void add_compare(CLI::App& app, int& status)
     });
 }
 
+/// One thing that was typed where a value or a name belongs.
+void check_value(std::string_view of, std::string_view value)
+{
+    constexpr std::size_t longest = 4096;  // of a path
+    if (value.find_first_not_of(" \t\n") == std::string_view::npos) {
+        throw BadInput(fmt::format("{} needs a value, got '{}'", of, value));
+    }
+    if (value.size() > longest) {
+        throw BadInput(
+            fmt::format("{} is longer than any value may be: {} characters", of, value.size()));
+    }
+}
+
+/// All values of a command, before anything is made of them: every option that takes one has one,
+/// once (but --set, which may be repeated); none is empty, or the option that follows.
+void check_values(const CLI::App& command, const std::vector<std::string>& arguments)
+{
+    std::set<std::string> given;
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+        const std::string& argument = arguments[i];
+        const std::size_t equals = argument.find('=');
+        const std::string name = argument.substr(0, equals);
+        const CLI::Option* option =
+            name.starts_with("--") ? command.get_option_no_throw(name) : nullptr;
+        if (option == nullptr) {
+            check_value("an argument", argument);
+            continue;
+        }
+        if (name != "--set" && !given.insert(name).second) {
+            throw BadInput(fmt::format("{} is given twice", name));
+        }
+        if (option->get_items_expected_min() == 0) {
+            if (equals != std::string::npos) {
+                throw BadInput(fmt::format("{} takes no value, got '{}'", name,
+                                           shortened(argument.substr(equals + 1))));
+            }
+        } else if (equals != std::string::npos) {
+            check_value(name, std::string_view(argument).substr(equals + 1));
+        } else if (i + 1 == arguments.size()) {
+            throw BadInput(fmt::format("{} needs a value, got none", name));
+        } else if (arguments[i + 1].starts_with("--")) {
+            throw BadInput(
+                fmt::format("{0} needs a value, got the option {1}; a value of that name "
+                            "is written {0}={1}",
+                            name, shortened(arguments[i + 1])));
+        } else {
+            check_value(name, arguments[++i]);
+        }
+    }
+}
+
 /// A first word that is no command gets a sentence of its own.
 void check_command(const CLI::App& app, int count, char** arguments)
 {
@@ -358,7 +413,7 @@ int run(int count, char** arguments)
     app.footer(
         "Example:\n  ricochet simulate bouncing-ball\n\n"
         "Exit status: 0 fine, 1 a run that ended early or a file that could not be written,\n"
-        "2 bad input.");
+        "2 bad input, 130 or 143 interrupted: the result so far is printed, as incomplete.");
     int status = 0;
     add_systems(app, status);
     add_simulate(app, status);
@@ -368,6 +423,10 @@ int run(int count, char** arguments)
     add_compare(app, status);
 
     check_command(app, count, arguments);
+    const std::string first = arguments[1];
+    if (!first.starts_with('-')) {
+        check_values(*app.get_subcommand(first), {arguments + 2, arguments + count});
+    }
     try {
         app.parse(count, arguments);
     } catch (const CLI::Success& success) {  // --help, --version
@@ -391,6 +450,10 @@ int fail(int status, std::string_view sentence)
 int main(int count, char** arguments)
 {
     using namespace ricochet::app;
+    // A file or a pipe that takes no more is an error like any other: what else there is to write
+    // still is.
+    std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);
     try {
         return run(count, arguments);
     } catch (const BadInput& error) {
@@ -399,6 +462,8 @@ int main(int count, char** arguments)
         return fail(2, error.what());
     } catch (const std::invalid_argument& error) {
         return fail(2, error.what());
+    } catch (const std::bad_alloc&) {
+        return fail(1, "there is not enough memory for this");
     } catch (const std::exception& error) {
         return fail(1, error.what());
     }

@@ -96,7 +96,9 @@ std::string script(const SystemEntry& system, const RunSettings& settings, const
         "set tmargin 2.5\n"
         "set key outside top right horizontal Left reverse samplen 2.5\n"
         "set offsets graph 0, graph 0, graph 0.06, graph 0.06\n",
-        panels, single_quoted(title(system, settings)));
+        panels,
+        single_quoted(title(system, settings) +
+                      (run.outcome == Outcome::cancelled ? " (incomplete)" : "")));
     if (run.t != settings.options.t_start) {
         const auto [left, right] = std::minmax(settings.options.t_start, run.t);
         out += fmt::format("set xrange [{}:{}]\n", left, right);
@@ -184,7 +186,6 @@ void check_plot(const fs::path& file)
         throw BadInput(
             fmt::format("--plot must be a file ending in .svg or .png, got '{}'", file.string()));
     }
-    check_writable("--plot", file);
 }
 
 void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,

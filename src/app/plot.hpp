@@ -10,7 +10,7 @@
 
 namespace ricochet::app {
 
-/// @throws BadInput unless `file` ends in .svg or .png and can be written.
+/// @throws BadInput unless `file` ends in .svg or .png.
 void check_plot(const std::filesystem::path& file);
 
 /// Draws every component of the state against time, broken at the events, which

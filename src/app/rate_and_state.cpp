@@ -11,12 +11,14 @@
 
 #include "files.hpp"
 #include "input.hpp"
+#include "interrupt.hpp"
 #include "json_text.hpp"
 #include "plot.hpp"
 #include "report.hpp"
 #include "ricochet/friction/spring_slider.hpp"
 #include "ricochet/learn/friction_study.hpp"
 #include "ricochet/learn/identify_friction.hpp"
+#include "run_watch.hpp"
 
 namespace ricochet::app {
 
@@ -95,6 +97,7 @@ double positive(std::string_view option, const std::optional<double>& given, dou
 Run<std::vector<double>> plain(const SpringSlider& slider, const SliderRun& run)
 {
     Run<std::vector<double>> out;
+    if (run.outcome == SliderOutcome::cancelled) out.outcome = Outcome::cancelled;
     out.t = run.state.t;
     out.x = shown(slider, run.state);
     for (const SliderState& s : run.samples) {
@@ -141,7 +144,9 @@ std::string to_text(const SpringSlider& slider, const RunSettings& settings,
     }
     return out + fmt::format("{:>22.15g} {:<9} {:>13.6e} {:>13.6e} {:>9.6f}\n\n{}\n", run.state.t,
                              "end", run.state.x, run.state.v, slider_friction(slider, run.state),
-                             describe(run.outcome));
+                             run.outcome == SliderOutcome::cancelled
+                                 ? fmt::format("incomplete: {}", Interrupts::cause())
+                                 : std::string(describe(run.outcome)));
 }
 
 std::string_view outcome_name(SliderOutcome outcome)
@@ -152,6 +157,7 @@ std::string_view outcome_name(SliderOutcome outcome)
         case SliderOutcome::step_underflow: return "step_underflow";
         case SliderOutcome::step_limit: return "step_limit";
         case SliderOutcome::non_finite: return "non_finite";
+        case SliderOutcome::cancelled: return "cancelled";
     }
     return "";
 }
@@ -179,6 +185,7 @@ std::string to_json(const SpringSlider& slider, const SliderOptions& options, co
              {"unsolved", run.unsolved},
              {"not_convex", run.not_convex},
              {"residual", run.residual}};
+    if (run.outcome == SliderOutcome::cancelled) out["incomplete"] = Interrupts::cause();
     if (with_trajectory) {
         const Run<std::vector<double>> all = plain(slider, run);
         out["trajectory"] = {{"t", all.trajectory.t}, {"x", all.trajectory.x}};
@@ -255,16 +262,31 @@ int simulate_spring_slider(const SimulateRequest& request)
     if (request.samples || request.csv || request.plot) {
         options.samples = request.samples.value_or(2001);
     }
-    if (request.csv) check_writable("--csv", *request.csv);
-    if (request.plot) check_plot(*request.plot);
+    if (request.kernel) throw BadInput("--kernel is for the system fault");
+    Claims claims;
+    claim_results(claims, request);
     settings.options.t_end = options.t_end;
 
+    const Interrupts interrupts;
+    options.cancelled = Interrupts::flag();
     const SliderState start{.v = slider.friction.v_star};
-    const SliderRun run = run_slider(slider, start, options);
-    print(request.json ? to_json(slider, options, run, request.samples.has_value())
-                       : to_text(slider, settings, options, run));
-    if (request.csv) write_file(*request.csv, to_csv(entry, plain(slider, run)));
-    if (request.plot) plot(entry, settings, plain(slider, run), *request.plot);
+    const SliderRun run = [&] {
+        const RunWatch watch(1.0 / 20);
+        return run_slider(slider, start, options);
+    }();
+    deliver({[&] {
+                 print(request.json ? to_json(slider, options, run, request.samples.has_value())
+                                    : to_text(slider, settings, options, run));
+             },
+             [&] {
+                 if (request.csv) write_file(*request.csv, to_csv(entry, plain(slider, run)));
+             },
+             [&] {
+                 if (request.plot) plot(entry, settings, plain(slider, run), *request.plot);
+             }});
+    if (run.outcome == SliderOutcome::cancelled) {
+        return ended_early(fmt::format("at t = {} s", run.state.t));
+    }
     return run.outcome == SliderOutcome::reached_end ? 0 : 1;
 }
 
@@ -286,8 +308,9 @@ constexpr double study_noise = 5e-3;
 
 struct Study {
     double identified = 0;  ///< mean test error of the identified law
-    std::array<learn::InternalVariables, 3> internal;
+    std::vector<learn::InternalVariables> internal;
     learn::Transfer transfer;
+    bool transferred = false;
     std::vector<Row6> unstable, mean_error;
     double seconds = 0;
 };
@@ -336,6 +359,7 @@ Study make_study()
 {
     const auto start = std::chrono::steady_clock::now();
     Study study;
+    const auto goes_on = [] { return !Interrupts::any(); };
     const FrictionData data = make_friction_data(1);
     std::vector<FrictionHistory> noisy(data.training.begin(), data.training.begin() + 24);
     add_noise(noisy, study_noise, 101);
@@ -346,18 +370,21 @@ Study make_study()
             static_cast<double>(data.test.size());
     }
     constexpr std::array seconds{2.0, 12.0, 15.0};
-    for (int internal = 0; internal < 3; ++internal) {
-        study.internal[static_cast<std::size_t>(internal)] = learn::try_internal_variables(
-            data, internal, 32, seconds[static_cast<std::size_t>(internal)]);
+    for (int internal = 0; internal < 3 && goes_on(); ++internal) {
+        study.internal.push_back(learn::try_internal_variables(
+            data, internal, 32, seconds[static_cast<std::size_t>(internal)]));
     }
+    if (!goes_on()) return study;
     const std::vector<FrictionHistory> some(data.training.begin(), data.training.begin() + 32);
     const learn::LearnedFriction pair =
         learn::train_friction(some, {.iterations = 200, .seconds = 12});
     study.transfer = learn::transfer_to_sliders(pair, 5, 10);
 
+    study.transferred = true;
     const std::vector<SliderCase> cases = slider_cases(1);
     std::vector<std::vector<double>> reference;
     for (const SliderCase& c : cases) {
+        if (!goes_on()) return study;
         reference.push_back(learn::slider_velocities(c, 4, 512).velocity);
     }
     study.unstable.push_back({"paper: NN, implicit and explicit", {}, true});
@@ -370,12 +397,14 @@ Study make_study()
                                 {7.321e-06, 4.447e-06, 5.267e-06, 4.426e-06, 6.464e-06, 8.069e-06},
                                 true});
     for (const int order : {1, 2, 4}) {
+        if (!goes_on()) return study;
         add_method(study, fmt::format("variational, order {}", order), cases, reference,
                    [order](const SliderCase& c, int steps) {
                        return learn::slider_velocities(c, order, steps);
                    });
     }
     const auto baseline = [&](const std::string& name, const BaselineOptions& options) {
+        if (!goes_on()) return;
         add_method(study, name, cases, reference, [&](const SliderCase& c, int steps) {
             return learn::slider_velocities(c, options, steps);
         });
@@ -423,8 +452,10 @@ std::string to_text(const Study& study)
         return fmt::format("{:<16} x {:.1e}, V {:.1e}, f {:.1e}, f - f* {:.1e}   (paper: {})\n",
                            name, e.x, e.v, e.friction, e.beyond, source);
     };
-    out += line("as trained", study.transfer.as_trained, "1.9e-5, 2.7e-4, 0.030");
-    out += line("further trained", study.transfer.further_trained, "5.4e-6, 1.6e-4, 0.016");
+    if (study.transferred)
+        out += line("as trained", study.transfer.as_trained, "1.9e-5, 2.7e-4, 0.030");
+    if (study.transferred)
+        out += line("further trained", study.transfer.further_trained, "5.4e-6, 1.6e-4, 0.016");
     out += "\nTable 3. Share of 77 sliders that become unstable\n";
     out += rows_text(study.unstable, "{:>10.3f}");
     out += "\nTable 4. Mean relative L2 error in V, of the sliders stable at every step\n";
@@ -462,13 +493,17 @@ std::string to_json(const Study& study)
     const auto errors = [](const learn::SliderErrors& e) {
         return Json{{"x", e.x}, {"v", e.v}, {"friction", e.friction}, {"beyond", e.beyond}};
     };
-    return json_text({{"identified", {{"noise", study_noise}, {"test", study.identified}}},
-                      {"table1", internal},
-                      {"table2",
-                       {{"as_trained", errors(study.transfer.as_trained)},
-                        {"further_trained", errors(study.transfer.further_trained)}}},
-                      {"table3", json(study.unstable)},
-                      {"table4", json(study.mean_error)}});
+    Json out{{"identified", {{"noise", study_noise}, {"test", study.identified}}},
+             {"table1", internal},
+             {"table2", Json()},
+             {"table3", json(study.unstable)},
+             {"table4", json(study.mean_error)}};
+    if (study.transferred) {
+        out["table2"] = {{"as_trained", errors(study.transfer.as_trained)},
+                         {"further_trained", errors(study.transfer.further_trained)}};
+    }
+    if (Interrupts::any()) out["incomplete"] = Interrupts::cause();
+    return json_text(out);
 }
 
 }  // namespace
@@ -478,8 +513,13 @@ int compare_rate_and_state(const CompareRequest& request)
     if (!request.set.empty()) throw BadInput("compare rate-and-state has no parameters to set");
     if (request.csv)
         throw BadInput("compare rate-and-state writes no --csv; --json has its tables");
-    const Study study = make_study();
+    const Interrupts interrupts;
+    const Study study = [] {
+        const RunWatch watch(0.25);
+        return make_study();
+    }();
     print(request.json ? to_json(study) : to_text(study));
+    if (Interrupts::any()) return ended_early("within the study");
     for (const Row6& row : study.unstable) {
         if (!row.name.starts_with("variational")) continue;
         for (const double share : row.value) {

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "files.hpp"
+#include "interrupt.hpp"
 #include "json_text.hpp"
 #include "set_valued.hpp"
 #include "timing.hpp"
@@ -212,6 +213,7 @@ std::string to_json(const SystemEntry& system, const RunSettings& settings, cons
     }
     if (settings.network || settings.gate) out["model"] = settings.model.string();
     out["outcome"] = ricochet::name(run.outcome);
+    if (run.outcome == Outcome::cancelled) out["incomplete"] = Interrupts::cause();
     out["t"] = run.t;
     out["state"] = run.x;
     if (!system.modes.empty()) out["mode"] = system.modes.at(run.mode);
@@ -250,7 +252,9 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
         const std::string guard = run.guard == no_guard
                                       ? ""
                                       : fmt::format("guard {}: ", system.guards.at(run.guard).name);
-        out += fmt::format("  {}{}\n", guard, describe(run.outcome));
+        out += run.outcome == Outcome::cancelled
+                   ? fmt::format("  incomplete: {}\n", Interrupts::cause())
+                   : fmt::format("  {}{}\n", guard, describe(run.outcome));
     }
     out +=
         fmt::format("{} event{}, {} steps ({} rejected), {} flow calls, {} guard calls", s.events,
@@ -279,7 +283,19 @@ std::string to_csv(const SystemEntry& system, const PlainRun& run)
         for (double& value : row.x) value = unsigned_zero(value);
         out += fmt::format("{},{},{}\n", unsigned_zero(row.t), fmt::join(row.x, ","), row.event);
     }
+    if (run.outcome == Outcome::cancelled) out += incomplete_line();
     return out;
+}
+
+int ended_early(std::string_view where)
+{
+    fmt::print(stderr, "ricochet: {} {}; the result is incomplete\n", Interrupts::cause(), where);
+    return Interrupts::status();
+}
+
+std::string incomplete_line()
+{
+    return fmt::format("# incomplete: {}\n", Interrupts::cause());
 }
 
 void print(std::string_view text)

@@ -35,6 +35,13 @@ struct Row {
 /// Header "t [s],u [m],...,event", then `rows`.
 [[nodiscard]] std::string to_csv(const SystemEntry& system, const Run<std::vector<double>>& run);
 
+/// Of a result that is incomplete because the command was ended early: says so on standard error,
+/// `where` it ended, and returns the exit status.
+[[nodiscard]] int ended_early(std::string_view where);
+
+/// The same in a table of numbers: its last line, a comment.
+[[nodiscard]] std::string incomplete_line();
+
 /// Prints to standard output.
 /// @throws WriteError if it cannot.
 void print(std::string_view text);

@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "files.hpp"
 #include "input.hpp"
+#include "interrupt.hpp"
 #include "report.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
+#include "run_watch.hpp"
 #include "step_policy.hpp"
 #include "systems/inclusion_options.hpp"
 #include "timing.hpp"
@@ -105,7 +108,10 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
     refuse(request.atol && measured_by_norm(chosen), "--atol",
            "is not for --controller error and learned, whose errors are relative to the norm of "
            "the start");
-    if (learned) chosen.policy = named_policy(layout_of(system), request.model);
+    if (learned) {
+        settings.model = policy_file(layout_of(system), request.model);
+        chosen.policy = named_policy(layout_of(system), request.model);
+    }
     refuse(request.gate.has_value(), "--gate", "is not for differential inclusions");
     refuse(request.mode.has_value(), "--mode",
            "of a differential inclusion follows from its state");
@@ -191,6 +197,7 @@ Outcome as_outcome(SetValuedOutcome outcome) noexcept
         case SetValuedOutcome::not_converged: return Outcome::not_converged;
         case SetValuedOutcome::step_underflow: return Outcome::step_underflow;
         case SetValuedOutcome::step_limit: return Outcome::step_limit;
+        case SetValuedOutcome::running: return Outcome::cancelled;
         default: return Outcome::reached_end;
     }
 }
@@ -299,7 +306,8 @@ Measured measure(const SystemEntry& system, std::string label, const RunRequest&
     RunSettings settings = resolve(system, request);
     Measured row{.label = std::move(label)};
     double best = std::numeric_limits<double>::infinity();
-    for (int batch = 0; batch < 20; ++batch) best = std::min(best, system.run(settings, 1).seconds);
+    for (int batch = 0; batch < 20 && !Interrupts::any(); ++batch)
+        best = std::min(best, system.run(settings, 1).seconds);
     row.seconds = best;
     settings.options.sample_times = times;
     const TimedRun timed = system.run(settings, 1);
@@ -392,7 +400,8 @@ int compare_set_valued(const SystemEntry& system, const CompareRequest& request)
     RunRequest base;
     base.set = request.set;
     const RunSettings settings = resolve(system, base);
-    if (request.csv) check_writable("--csv", *request.csv);
+    Claims claims;
+    if (request.csv) claims.writes("--csv", *request.csv);
     std::vector<double> times(grid);
     const double start = settings.options.t_start;
     const double span = settings.options.t_end - start;
@@ -400,14 +409,23 @@ int compare_set_valued(const SystemEntry& system, const CompareRequest& request)
         times[i] = start + span * static_cast<double>(i) / static_cast<double>(grid - 1);
     }
     times.back() = settings.options.t_end;
+    const Interrupts interrupts;
+    std::optional<RunWatch> watch(0.25);
     const auto exact = reference(system, base, times);
-    if (exact.size() != grid) throw BadInput("no reference: its run did not reach the end");
-
-    std::vector<Measured> rows;
-    for (auto& [label, way] : ways(system, base)) {
-        rows.push_back(measure(system, label, way, times, exact));
+    if (exact.size() != grid && !Interrupts::any()) {
+        throw BadInput("no reference: its run did not reach the end");
     }
+    const auto all = ways(system, base);
+    std::vector<Measured> rows;
+    for (const auto& [label, way] : all) {
+        if (Interrupts::any()) break;
+        Measured row = measure(system, label, way, times, exact);
+        if (!Interrupts::any()) rows.push_back(std::move(row));
+    }
+    watch.reset();
+    const bool complete = rows.size() == all.size();
     Json json{{"system", system.name}, {"t_end", settings.options.t_end}};
+    if (!complete) json["incomplete"] = Interrupts::cause();
     Json methods = Json::array();
     std::string csv = "method,steps,solves,events,seconds,L2,relative,largest\n";
     for (const Measured& row : rows) {
@@ -428,8 +446,14 @@ int compare_set_valued(const SystemEntry& system, const CompareRequest& request)
     const std::vector<std::string_view> published =
         request.set.empty() ? system.published_errors : std::vector<std::string_view>{};
     json["published"] = published;
-    print(request.json ? json_text(json) : table(system, settings, rows, published));
-    if (request.csv) write_file(*request.csv, csv);
+    if (!complete) csv += incomplete_line();
+    deliver(
+        {[&] { print(request.json ? json_text(json) : table(system, settings, rows, published)); },
+         [&] {
+             if (request.csv) write_file(*request.csv, csv);
+         }});
+    if (!complete)
+        return ended_early(fmt::format("after {} of {} methods", rows.size(), all.size()));
     return std::all_of(rows.begin(), rows.end(), [](const Measured& row) { return row.ended; }) ? 0
                                                                                                 : 1;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "input.hpp"
+#include "interrupt.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
 #include "set_valued.hpp"
@@ -228,6 +229,7 @@ std::vector<double> parameter_values(const SystemEntry& system, const std::vecto
         values.push_back(parameter.initial);
         known.push_back(parameter.name);
     }
+    std::vector<bool> is_set(values.size(), false);
     for (const std::string& text : set) {
         const Assignment given = assignment("--set", text);
         const auto found = std::find(known.begin(), known.end(), given.name);
@@ -236,6 +238,10 @@ std::vector<double> parameter_values(const SystemEntry& system, const std::vecto
         }
         const auto i = static_cast<std::size_t>(found - known.begin());
         const Parameter& parameter = system.parameters[i];
+        if (is_set[i]) {
+            throw BadInput(fmt::format("{} of {} is set twice", parameter.name, system.name));
+        }
+        is_set[i] = true;
         if (!parameter.range.contains(given.value)) {
             throw BadInput(fmt::format(
                 "{} of {} must lie in {}{}, got {}", parameter.name, system.name,
@@ -260,6 +266,7 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     options.event_tolerance = request.event_tolerance.value_or(0);
     require_not_negative("--event-tolerance", options.event_tolerance);
     options.max_steps = request.max_steps.value_or(default_max_steps);
+    options.cancelled = Interrupts::flag();
 
     if (choose_set_valued(system, request, settings)) return settings;
     choose_stepping(request, settings);

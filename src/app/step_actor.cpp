@@ -11,6 +11,7 @@
 #include "files.hpp"
 #include "input.hpp"
 #include "json_text.hpp"
+#include "keep_model.hpp"
 #include "model_lookup.hpp"
 #include "progress_bar.hpp"
 #include "report.hpp"
@@ -21,6 +22,7 @@
 #include "ricochet/systems/sliding_mode.hpp"
 #include "ricochet/systems/strike_slip_fault.hpp"
 #include "timing.hpp"
+#include "train.hpp"
 
 namespace ricochet::app {
 
@@ -100,17 +102,14 @@ int train_actor(const TrainPolicyRequest& request)
     const learn::PolicyTraining training = training_of(request);
     const TrainedPolicy trained = trained_by(request.trainer, world.environment, training);
     if (trained.outcome == PolicyOutcome::stopped) {
-        fmt::print(stderr,
-                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
-                   training.checkpoint.string());
+        say_what_is_kept(training.checkpoint, trained.checkpoint_trouble);
         return 1;
     }
-    const Model actor = named(trained.policy, request.system, alpha, training.seed, world);
-    save_model(actor, request.out);
     if (!trained.message.empty()) {
-        throw std::runtime_error(fmt::format("{}; the policy before it is in '{}'", trained.message,
-                                             request.out.string()));
+        throw std::runtime_error(fmt::format("{}, and no model was written", trained.message));
     }
+    const Model actor = named(trained.policy, request.system, alpha, training.seed, world);
+    keep_model(actor, request.out, training.checkpoint);
     std::error_code ignored;
     if (request.checkpoint.empty()) fs::remove(training.checkpoint, ignored);
     const learn::StepTrial run = learn::follow(source_world(request.system, judged(actor)), actor);

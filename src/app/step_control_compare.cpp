@@ -7,20 +7,24 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "files.hpp"
 #include "input.hpp"
+#include "interrupt.hpp"
 #include "json_text.hpp"
 #include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
+#include "run_watch.hpp"
 #include "settings.hpp"
 #include "step_actor.hpp"
 #include "step_policy.hpp"
+#include "step_progress.hpp"
 #include "systems/fault.hpp"
 #include "timing.hpp"
 
@@ -44,12 +48,37 @@ bool is_yardstick(const std::string& rule)
     return rule == searched || rule == reinforced;
 }
 
+/// Thrown in the midst of a rule, which is then left out.
+struct Interrupted {};
+
+void check_interrupt()
+{
+    if (Interrupts::any()) throw Interrupted{};
+}
+
+/// The same problem, of which no run begins after an interrupt.
+StepProblem interruptible(StepProblem problem)
+{
+    problem.run = [run = std::move(problem.run)](const StepRule& rule) {
+        check_interrupt();
+        return run(rule);
+    };
+    return problem;
+}
+
 struct RuleRow {
     std::string rule{};
     std::string setting{};
     StepTrial trial{};
     double seconds = 0;
     bool reached = false;
+    int given_up = 0;  ///< settings at which time stood still
+};
+
+/// A problem that the policy of its system was not trained for.
+struct Beyond {
+    std::string what;
+    std::function<StepProblem(const learn::StepWatch& watch)> problem;
 };
 
 /// A problem with what is particular to it.
@@ -61,51 +90,148 @@ struct Case {
     double coarsest = 0.1;     ///< tolerance that a ladder begins with
     double constant_span = 8;  ///< its constant steps, over the usual one
     std::size_t evaluations = 6000;
-    std::function<RuleRow(double target)> event_driven{};
+    std::function<RuleRow(double target, LongRun& progress)> event_driven{};
     std::function<learn::StepWorld(const learn::StepWorldOptions& options)> world{};
+    std::vector<Beyond> beyond{};
+};
+
+/// What three rules did on one.
+struct BeyondRows {
+    std::string what;
+    std::string description;
+    std::vector<RuleRow> rows;
+};
+
+/// Shows how far a run has come, and gives it up where time stands still: the published norm
+/// judges every component by itself, so that one element which begins to slip from rest has any
+/// relative error, and the rules that look at it shorten their steps by decades.
+class Standstill {
+public:
+    Standstill(LongRun& progress, std::string label)
+        : progress_(&progress), label_(std::move(label))
+    {
+    }
+
+    bool operator()(double done)
+    {
+        if (Interrupts::any()) return false;
+        progress_->show(label_, done);
+        if (++steps_ % standstill != 0) return true;
+        given_up_ = done - before_ < 1e-3;
+        before_ = done;
+        return !given_up_;
+    }
+    [[nodiscard]] bool given_up() const { return given_up_; }
+
+    /// Steps that cover a thousandth of the time: many times those of a whole run.
+    static constexpr int standstill = 500;
+
+private:
+    LongRun* progress_;
+    std::string label_;
+    int steps_ = 0;
+    double before_ = 0;
+    bool given_up_ = false;
 };
 
 double seconds_of(const std::function<void()>& work)
 {
     double best = inf;
-    for (int i = 0; i < 5; ++i) {
+    double all = 0;
+    for (int i = 0; i < 5 && all < 1; ++i) {
         const auto start = std::chrono::steady_clock::now();
         work();
         const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
         best = std::min(best, taken.count());
+        all += taken.count();
     }
     return best;
 }
 
-/// The coarsest rule of a ladder from which on the error stays below the target.
-RuleRow coarsest(const Case& of, std::string name,
-                 const std::function<std::pair<StepRule, std::string>(int)>& rung)
-{
-    constexpr int rungs = 40;
-    constexpr int enough = 4;  // finer ones that are looked at, too
-    RuleRow out{.rule = std::move(name)};
-    int below = 0;
-    int first = -1;
-    for (int i = 0; i < rungs && below <= enough; ++i) {
-        const StepTrial trial = of.problem.run(rung(i).first);
-        const bool good = trial.ended && trial.error <= of.target;
-        below = good ? below + 1 : 0;
-        first = !good ? -1 : first < 0 ? i : first;
+/// Rules on one problem, each by a ladder of settings.
+class Ladders {
+public:
+    Ladders(const Case& of, const StepProblem& problem, LongRun& progress)
+        : of_(of), problem_(problem), progress_(progress)
+    {
     }
-    if (first < 0) return out;
-    const auto [rule, setting] = rung(first);
-    out.setting = setting;
-    out.reached = true;
-    out.trial = of.problem.run(rule);
-    out.seconds = seconds_of([&] { (void)of.problem.run(rule); });
-    return out;
-}
+
+    [[nodiscard]] RuleRow constant() const
+    {
+        return coarsest("constant", [this](int i) {
+            const double step = of_.constant_span * finer(i);
+            return std::pair(StepRule{.controller = ConstantStep{}, .step = step},
+                             fmt::format("{:.3g} s", step * problem_.usual_step));
+        });
+    }
+    [[nodiscard]] RuleRow controlled(std::string name, const StepController& controller,
+                                     ErrorEstimate estimate) const
+    {
+        return coarsest(std::move(name), [&, estimate](int i) {
+            const double tolerance = of_.coarsest * finer(i);
+            return std::pair(
+                StepRule{.controller = controller, .tolerance = tolerance, .estimate = estimate},
+                fmt::format("{:.1e}", tolerance));
+        });
+    }
+    [[nodiscard]] RuleRow free_estimate() const
+    {
+        return controlled("free estimate", plain, ErrorEstimate::embedded);
+    }
+    [[nodiscard]] RuleRow learned() const
+    {
+        const LearnedStep rule{.policy = named_policy(of_.layout, std::nullopt), .plain = plain};
+        return controlled("learned", rule, ErrorEstimate::embedded);
+    }
+
+private:
+    static constexpr ErrorStep plain{.order = 3, .reject_above = 100};
+
+    static double finer(int i) { return std::pow(10.0, -i / 6.0); }
+
+    /// The coarsest rule of a ladder from which on the error stays below the target.
+    [[nodiscard]] RuleRow coarsest(
+        std::string name, const std::function<std::pair<StepRule, std::string>(int)>& rung) const
+    {
+        constexpr int rungs = 40;
+        constexpr int enough = 4;  // finer ones that are looked at, too
+        RuleRow out{.rule = std::move(name)};
+        int below = 0;
+        int first = -1;
+        for (int i = 0; i < rungs && below <= enough; ++i) {
+            auto [rule, setting] = rung(i);
+            Standstill watch(progress_, fmt::format("{}: {}, {}", of_.system, out.rule, setting));
+            rule.watch = std::ref(watch);
+            const StepTrial trial = problem_.run(rule);
+            out.given_up += watch.given_up();
+            const bool good = trial.ended && trial.error <= of_.target;
+            below = good ? below + 1 : 0;
+            first = !good ? -1 : first < 0 ? i : first;
+        }
+        if (first < 0) return out;
+        const auto [rule, setting] = rung(first);
+        out.setting = setting;
+        out.reached = true;
+        out.trial = problem_.run(rule);
+        out.seconds = seconds_of([&, chosen = rule] { (void)problem_.run(chosen); });
+        return out;
+    }
+
+    const Case& of_;
+    const StepProblem& problem_;
+    LongRun& progress_;
+};
 
 /// What a reinforcement learner made of the published reward: steps without a tolerance.
-RuleRow by_actor(const Case& of)
+RuleRow by_actor(const Case& of, LongRun& progress)
 {
     const Model actor = shipped_actor(of.system);
-    const learn::StepWorld world = of.world(judged(actor));
+    learn::StepWorldOptions options = judged(actor);
+    options.watch = [&](double done) {
+        progress.show(fmt::format("{}: {}", of.system, reinforced), done);
+        return true;
+    };
+    const learn::StepWorld world = of.world(options);
     RuleRow out{.rule = std::string(reinforced),
                 .setting = fmt::format("alpha {}", actor.parameters.at("alpha")),
                 .trial = learn::follow(world, actor)};
@@ -114,52 +240,59 @@ RuleRow by_actor(const Case& of)
     return out;
 }
 
-std::vector<RuleRow> rows_of(const Case& of)
+/// @throws Interrupted with the rows until then in `out`
+void add_rows(const Case& of, std::vector<RuleRow>& out, LongRun& progress)
 {
-    std::vector<RuleRow> out;
-    const auto finer = [](int i) { return std::pow(10.0, -i / 6.0); };
-    out.push_back(coarsest(of, "constant", [&](int i) {
-        const double step = of.constant_span * finer(i);
-        return std::pair(StepRule{.controller = ConstantStep{}, .step = step},
-                         fmt::format("{:.3g} s", step * of.problem.usual_step));
-    }));
-    const auto controlled = [&](std::string name, const StepController& controller,
-                                ErrorEstimate estimate) {
-        out.push_back(coarsest(of, std::move(name), [&, estimate](int i) {
-            const double tolerance = of.coarsest * finer(i);
-            return std::pair(
-                StepRule{.controller = controller, .tolerance = tolerance, .estimate = estimate},
-                fmt::format("{:.1e}", tolerance));
-        }));
-    };
-    controlled("eq. 5, doubling", HeuristicStep{}, ErrorEstimate::doubling);
-    controlled("PI 3333, doubling", FilteredStep::pi3333(), ErrorEstimate::doubling);
-    controlled("h211b, doubling", FilteredStep::h211b(4), ErrorEstimate::doubling);
-    const ErrorStep plain{.order = 3, .reject_above = 100};
-    controlled("free estimate", plain, ErrorEstimate::embedded);
-    const auto policy = named_policy(of.layout, std::nullopt);
-    controlled("learned", LearnedStep{.policy = policy, .plain = plain}, ErrorEstimate::embedded);
+    const Ladders ladders(of, of.problem, progress);
+    out.push_back(ladders.constant());
+    constexpr auto doubling = ErrorEstimate::doubling;
+    out.push_back(ladders.controlled("eq. 5, doubling", HeuristicStep{}, doubling));
+    out.push_back(ladders.controlled("PI 3333, doubling", FilteredStep::pi3333(), doubling));
+    out.push_back(ladders.controlled("h211b, doubling", FilteredStep::h211b(4), doubling));
+    out.push_back(ladders.free_estimate());
+    out.push_back(ladders.learned());
     const RuleRow& learned = out.back();
     if (learned.reached) {
         RuleRow optimum{.rule = std::string(searched), .setting = "as many steps"};
-        const auto found = learn::search_steps(
-            of.problem, static_cast<std::size_t>(learned.trial.steps), of.evaluations);
+        const auto found =
+            learn::search_steps(of.problem, static_cast<std::size_t>(learned.trial.steps),
+                                of.evaluations, 1, 2, [&](double done) {
+                                    progress.show(fmt::format("{}: {}", of.system, searched), done);
+                                    return true;
+                                });
         optimum.trial = found.trial;
         optimum.reached = found.trial.ended && found.trial.error <= of.target;
         optimum.seconds = std::numeric_limits<double>::quiet_NaN();
         out.push_back(std::move(optimum));
     }
-    out.push_back(by_actor(of));
-    out.push_back(of.event_driven(of.target));
-    return out;
+    out.push_back(by_actor(of, progress));
+    out.push_back(of.event_driven(of.target, progress));
+    check_interrupt();  // its last run may have been cut short
+}
+
+/// The learned rule where it was not trained, beside constant steps and the free estimate.
+/// @throws Interrupted with the problems until then in `out`
+void add_beyond(const Case& of, std::vector<BeyondRows>& out, LongRun& progress)
+{
+    for (const Beyond& each : of.beyond) {
+        const StepProblem problem = interruptible(each.problem([&](double done) {
+            progress.show(fmt::format("{}: reference, {}", of.system, each.what), done);
+            return true;
+        }));
+        const Ladders ladders(of, problem, progress);
+        out.push_back({.what = each.what,
+                       .description = problem.description,
+                       .rows = {ladders.constant(), ladders.free_estimate(), ladders.learned()}});
+    }
 }
 
 /// By hand-over between explicit steps and set-valued ones, as `ricochet simulate` does it.
-RuleRow by_hand_over(const std::string& name, double target)
+RuleRow by_hand_over(const std::string& name, const std::vector<std::string>& set, double target)
 {
     const SystemEntry& system = find_system(name);
     const auto at = [&](double rtol, bool sampled) {
         RunRequest request;
+        request.set = set;
         request.rtol = request.atol = rtol;
         if (system.state.size() > 1) request.stepper = "fehlberg78";
         RunSettings settings = resolve(system, request);
@@ -174,6 +307,7 @@ RuleRow by_hand_over(const std::string& name, double target)
     const TimedRun exact = system.run(at(1e-13, true), 1);
     RuleRow out{.rule = "event-driven explicit"};
     for (int i = 0; i < 24 && !out.reached; ++i) {
+        check_interrupt();
         const double rtol = std::pow(10.0, -1 - i / 2.0);
         const TimedRun timed = system.run(at(rtol, true), 1);
         const auto& x = timed.run.trajectory.x;
@@ -201,19 +335,23 @@ RuleRow by_hand_over(const std::string& name, double target)
     return out;
 }
 
-RuleRow by_explicit_pair(const StrikeSlipFault& fault, double t_end, double target)
+RuleRow by_explicit_pair(const StrikeSlipFault& fault, double t_end, double target,
+                         LongRun& progress)
 {
     RuptureOptions options{.t_end = t_end, .rtol = inf};
+    options.progress = [](double) { return !Interrupts::any(); };
     for (std::size_t i = 1; i <= samples; ++i) {
         options.snapshot_times.push_back(i == samples ? t_end
                                                       : t_end * static_cast<double>(i) / samples);
     }
     options.step = 0.01 * fault.time_unit();
-    const Rupture exact = ricochet::simulate(fault, options);
+    const Rupture exact = ricochet::simulate(fault, shown(options, progress, "fault: reference"));
     RuleRow out{.rule = "event-driven explicit"};
     for (int i = 0; i < 24 && !out.reached; ++i) {
+        check_interrupt();
         options.step = 0.4 * fault.time_unit() * std::pow(10.0, -i / 6.0);
-        const Rupture run = ricochet::simulate(fault, options);
+        const Rupture run =
+            ricochet::simulate(fault, shown(options, progress, "fault: explicit steps"));
         if (run.snapshots.size() != exact.snapshots.size()) continue;
         double of_error = 0;
         double of_all = 0;
@@ -233,35 +371,100 @@ RuleRow by_explicit_pair(const StrikeSlipFault& fault, double t_end, double targ
     return out;
 }
 
-Case case_of(const std::string& system, const CompareRequest& request)
+/// The value of a parameter of an entry, by name.
+double value_of(const SystemEntry& entry, const std::vector<double>& values, std::string_view name)
 {
-    if (system == SlidingMode::name) {
-        return {.system = system,
-                .problem = learn::sliding_mode_problem(SlidingMode{}, SlidingMode::start,
-                                                       SlidingMode::t_end),
-                .layout = SlidingMode::step_layout(),
-                .target = 1e-3,
-                .event_driven = [system](double target) { return by_hand_over(system, target); },
-                .world =
-                    [system](const learn::StepWorldOptions& options) {
-                        return source_world(system, options);
-                    }};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (entry.parameters[i].name == name) return values[i];
     }
-    if (system == DiodeCircuit::name) {
-        return {.system = system,
-                .problem = learn::diode_circuit_problem(DiodeCircuit{}, DiodeCircuit::start(),
-                                                        DiodeCircuit::t_end),
-                .layout = DiodeCircuit::step_layout(),
-                .event_driven = [system](double target) { return by_hand_over(system, target); },
-                .world =
-                    [system](const learn::StepWorldOptions& options) {
-                        return source_world(system, options);
-                    }};
+    throw std::logic_error(fmt::format("{} has no parameter {}", entry.name, name));
+}
+
+Case sliding_mode_case(const std::vector<std::string>& set)
+{
+    const SystemEntry& entry = find_system(SlidingMode::name);
+    const std::vector<double> values = parameter_values(entry, set);
+    const auto value = [&](std::string_view name) { return value_of(entry, values, name); };
+    const SlidingMode::Parameters p{
+        .amplitude = value("amplitude"), .frequency = value("frequency"), .gain = value("gain")};
+    const double from = value("start");
+    if (!(p.gain > p.amplitude && from > 0)) {
+        throw BadInput(fmt::format(
+            "compare step-control knows the solution of the sliding mode for gain > amplitude and "
+            "start > 0, got gain = {}, amplitude = {}, start = {}",
+            p.gain, p.amplitude, from));
     }
-    const SystemEntry& entry = find_system("fault");
-    refuse_rate_and_state(request.set, entry);
-    StrikeSlipFault::Parameters parameters = fault_parameters(parameter_values(entry, request.set));
-    const bool given = std::any_of(request.set.begin(), request.set.end(),
+    const auto problem = [](const SlidingMode::Parameters& parameters, double start) {
+        return [=](const learn::StepWatch&) {
+            const SlidingMode mode(parameters);
+            return learn::sliding_mode_problem(mode, start, mode.reaching_time(start) / 0.4);
+        };
+    };
+    constexpr double t_end = SlidingMode::t_end;
+    Case out{.system = std::string(SlidingMode::name),
+             .problem = learn::sliding_mode_problem(SlidingMode(p), from, t_end),
+             .layout = SlidingMode::step_layout(),
+             .target = 1e-3,
+             .event_driven =
+                 [set](double target, LongRun&) {
+                     return by_hand_over(std::string(SlidingMode::name), set, target);
+                 },
+             .world =
+                 [p, from](const learn::StepWorldOptions& options) {
+                     return learn::step_world(SlidingMode(p), from, t_end, options);
+                 }};
+    if (set.empty()) {
+        out.beyond = {{"frequency 400 rad/s", problem({.frequency = 400}, SlidingMode::start)},
+                      {"start 2", problem({}, 2)}};
+    }
+    return out;
+}
+
+Case diode_circuit_case(const std::vector<std::string>& set)
+{
+    const SystemEntry& entry = find_system(DiodeCircuit::name);
+    const std::vector<double> values = parameter_values(entry, set);
+    const auto value = [&](std::string_view name) { return value_of(entry, values, name); };
+    const DiodeCircuit circuit({.capacitance_1 = value("capacitance-1"),
+                                .capacitance_2 = value("capacitance-2"),
+                                .resistance = value("resistance"),
+                                .inductance = value("inductance"),
+                                .current = value("current")});
+    const Eigen::Vector3d start(value("V1"), value("V2"), value("i"));
+    constexpr double t_end = DiodeCircuit::t_end;
+    const auto problem = [start](const DiodeCircuit::Parameters& parameters) {
+        return [=](const learn::StepWatch&) {
+            return learn::diode_circuit_problem(DiodeCircuit(parameters), start, t_end);
+        };
+    };
+    Case out{.system = std::string(DiodeCircuit::name),
+             .problem = learn::diode_circuit_problem(circuit, start, t_end),
+             .layout = DiodeCircuit::step_layout(),
+             .event_driven =
+                 [set](double target, LongRun&) {
+                     return by_hand_over(std::string(DiodeCircuit::name), set, target);
+                 },
+             .world =
+                 [circuit, start](const learn::StepWorldOptions& options) {
+                     return learn::step_world(circuit, start, t_end, options);
+                 }};
+    if (set.empty()) {
+        DiodeCircuit::Parameters more_current;
+        more_current.current *= 5;
+        DiodeCircuit::Parameters more_resistance;
+        more_resistance.resistance *= 10;
+        out.beyond = {{"current x 5", problem(more_current)},
+                      {"resistance x 10", problem(more_resistance)}};
+    }
+    return out;
+}
+
+Case fault_case(const std::vector<std::string>& set, LongRun& progress)
+{
+    const SystemEntry& entry = find_system(StrikeSlipFault::name);
+    refuse_rate_and_state(set, entry);
+    StrikeSlipFault::Parameters parameters = fault_parameters(parameter_values(entry, set));
+    const bool given = std::any_of(set.begin(), set.end(),
                                    [](const auto& text) { return text.starts_with("elements="); });
     if (!given) parameters.elements = 5;
     constexpr int most = 50;
@@ -271,16 +474,44 @@ Case case_of(const std::string& system, const CompareRequest& request)
     }
     const StrikeSlipFault fault(parameters);
     const double t_end = parameters.side > 4000 ? 50 : 30;
-    return {.system = system,
-            .problem = learn::fault_problem(fault, t_end),
-            .layout = fault_step_layout(),
-            .evaluations = parameters.elements > 6 ? 500U : 2000U,
-            .event_driven =
-                [fault, t_end](double target) { return by_explicit_pair(fault, t_end, target); },
-            .world =
-                [fault, t_end](const learn::StepWorldOptions& options) {
-                    return learn::step_world(fault, t_end, options);
-                }};
+    const auto watch = [&](double done) {
+        progress.show("fault: reference", done);
+        return true;
+    };
+    Case out{.system = std::string(StrikeSlipFault::name),
+             .problem = learn::fault_problem(fault, t_end, 0, watch),
+             .layout = fault_step_layout(),
+             .evaluations = parameters.elements > 6 ? 500U : 2000U,
+             .event_driven =
+                 [fault, t_end](double target, LongRun& run) {
+                     return by_explicit_pair(fault, t_end, target, run);
+                 },
+             .world =
+                 [fault, t_end](const learn::StepWorldOptions& options) {
+                     return learn::step_world(fault, t_end, options);
+                 }};
+    if (!set.empty()) return out;
+    const auto beyond = [&](std::string what, StrikeSlipFault::Parameters p) {
+        p.elements = parameters.elements;
+        out.beyond.push_back({std::move(what), [p](const learn::StepWatch& shown) {
+                                  constexpr double ends = 30 / 0.8660254037844386;  // 30 s at 3 km
+                                  const StrikeSlipFault other(p);
+                                  return learn::fault_problem(other, ends * other.time_unit(), 0,
+                                                              shown);
+                              }});
+    };
+    beyond("damping 0.05", {.damping = 0.05});
+    beyond("damping 0.8", {.damping = 0.8});
+    beyond("side 12 km", {.side = 12000});
+    beyond("overload 1e-2", {.overload = 1e-2});
+    return out;
+}
+
+Case case_of(const std::string& system, const CompareRequest& request, LongRun& progress)
+{
+    if (system == SlidingMode::name) return sliding_mode_case(request.set);
+    if (system == DiodeCircuit::name) return diode_circuit_case(request.set);
+    return fault_case(request.set, progress);
 }
 
 std::string table(const Case& of, const std::vector<RuleRow>& rows)
@@ -309,10 +540,41 @@ std::string table(const Case& of, const std::vector<RuleRow>& rows)
         return r.rule == reinforced && r.trial.ended && !r.reached;
     });
     if (above) out += fmt::format("{}: has no tolerance, and stays above that error\n", reinforced);
+    for (const RuleRow& row : rows) {
+        if (row.given_up == 0) continue;
+        out += fmt::format(
+            "{}: {} {} given up, where {} steps covered less than 0.1 % of the time\n", row.rule,
+            row.given_up, row.given_up == 1 ? "setting" : "settings", Standstill::standstill);
+    }
     return out;
 }
 
-Json json(const Case& of, const std::vector<RuleRow>& rows)
+std::string table(const Case& of, const std::vector<BeyondRows>& beyond)
+{
+    if (beyond.empty()) return "";
+    std::string out = fmt::format(
+        "\noutside what its policy was trained for\n{:<24}{:<16}{:>14}{:>7}{:>6}{:>8}{:>8}"
+        "{:>10}{:>10}{:>14}\n",
+        "", "", "setting", "steps", "rej.", "solves", "iter.", "error", "at end", "left to rule");
+    for (const BeyondRows& problem : beyond) {
+        std::string_view name = problem.what;
+        for (const RuleRow& row : problem.rows) {
+            const StepTrial& t = row.trial;
+            out += fmt::format("{:<24}{:<16}", name, row.rule);
+            name = "";
+            if (!row.reached) {
+                out += fmt::format("{:>14}\n", "not reached");
+                continue;
+            }
+            out += fmt::format("{:>14}{:>7}{:>6}{:>8}{:>8}{:>10.2e}{:>10.2e}{:>14}\n", row.setting,
+                               t.steps, t.rejected, t.solves, t.iterations, t.error, t.final_error,
+                               t.asked > 0 ? fmt::format("{} of {}", t.handed_over, t.asked) : "-");
+        }
+    }
+    return out + std::string(policy_advice(of.system)) + '\n';
+}
+
+Json json(const std::vector<RuleRow>& rows)
 {
     Json list = Json::array();
     for (const RuleRow& row : rows) {
@@ -320,18 +582,33 @@ Json json(const Case& of, const std::vector<RuleRow>& rows)
         list.push_back({{"rule", row.rule},
                         {"setting", row.setting},
                         {"reached", row.reached},
+                        {"given_up", row.given_up},
                         {"steps", t.steps},
                         {"rejected", t.rejected},
                         {"solves", t.solves},
                         {"iterations", t.iterations},
+                        {"asked", t.asked},
+                        {"handed_over", t.handed_over},
                         {"seconds", row.seconds},
                         {"error", t.error},
                         {"final_error", t.final_error}});
     }
-    return {{"system", of.system},
-            {"problem", of.problem.description},
-            {"target", of.target},
-            {"rules", std::move(list)}};
+    return list;
+}
+
+Json json(const Case& of, const std::vector<RuleRow>& rows, const std::vector<BeyondRows>& beyond)
+{
+    Json out{{"system", of.system},
+             {"problem", of.problem.description},
+             {"target", of.target},
+             {"rules", json(rows)}};
+    for (const BeyondRows& problem : beyond) {
+        out["beyond"].push_back({{"what", problem.what},
+                                 {"problem", problem.description},
+                                 {"rules", json(problem.rows)}});
+    }
+    if (!beyond.empty()) out["advice"] = policy_advice(of.system);
+    return out;
 }
 
 }  // namespace
@@ -346,30 +623,46 @@ int compare_step_control(const CompareRequest& request, const std::string& syste
     } else if (std::find(known.begin(), known.end(), system) == known.end()) {
         throw unknown("system of compare step-control", system, known);
     }
-    if (!request.set.empty() && system != "fault") {
-        throw BadInput("--set of compare step-control needs --system fault");
+    if (!request.set.empty() && system.empty()) {
+        throw BadInput("--set of compare step-control needs a --system");
     }
+    LongRun progress;
     // All is checked before anything is run.
     std::vector<Case> cases;
     for (const std::string& name : wanted) {
-        cases.push_back(case_of(name, request));
+        cases.push_back(case_of(name, request, progress));
         (void)named_policy(cases.back().layout, std::nullopt);
         (void)shipped_actor(name);
     }
+    const Interrupts interrupts;
+    const RunWatch watch(0.25);
     bool all = true;
     Json list = Json::array();
-    for (const Case& each : cases) {
-        const std::vector<RuleRow> rows = rows_of(each);
+    for (Case& each : cases) {
+        if (Interrupts::any()) break;
+        std::vector<RuleRow> rows;
+        std::vector<BeyondRows> beyond;
+        each.problem = interruptible(std::move(each.problem));
+        try {
+            add_rows(each, rows, progress);
+            add_beyond(each, beyond, progress);
+        } catch (const Interrupted&) {
+            if (rows.empty()) break;
+        }
+        progress.clear();
         all = all && std::all_of(rows.begin(), rows.end(), [](const RuleRow& r) {
                   return r.reached || is_yardstick(r.rule);
               });
         if (request.json) {
-            list.push_back(json(each, rows));
+            list.push_back(json(each, rows, beyond));
         } else {
-            print(table(each, rows) + '\n');
+            print(table(each, rows) + table(each, beyond) + '\n');
         }
     }
-    if (request.json) print(json_text({{"cases", std::move(list)}}));
+    Json out{{"cases", std::move(list)}};
+    if (Interrupts::any()) out["incomplete"] = Interrupts::cause();
+    if (request.json) print(json_text(out));
+    if (Interrupts::any()) return ended_early("within the comparison");
     return all ? 0 : 1;
 }
 

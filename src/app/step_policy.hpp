@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "ricochet/learn/step_control.hpp"
 
@@ -39,6 +40,15 @@ int train_policy(const TrainPolicyRequest& request);
 /// Random problems of that system, for training or held out.
 /// @throws BadInput naming the systems that have some.
 [[nodiscard]] learn::StepFamily step_family(const std::string& system, std::uint64_t seed);
+
+/// The file of the policy that `named_policy` takes.
+/// @throws BadInput if it is not there.
+[[nodiscard]] std::filesystem::path policy_file(const StepLayout& layout,
+                                                const std::optional<std::string>& given);
+
+/// One sentence or two: what policies of a system were trained on, and when not to use the one that
+/// comes along. Empty for a system without.
+[[nodiscard]] std::string_view policy_advice(std::string_view system);
 
 /// The policy that the user named, or the one that comes along for the system.
 /// @throws BadInput or ModelError if it is not there, or not for that system and its inputs.

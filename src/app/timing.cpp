@@ -9,6 +9,7 @@ namespace ricochet::app {
 
 Timing summarise(std::vector<double> seconds)
 {
+    if (seconds.empty()) seconds.push_back(std::nan(""));
     std::sort(seconds.begin(), seconds.end());
     const std::size_t n = seconds.size();
     return {.median = seconds[n / 2], .lower = seconds[n / 4], .upper = seconds[3 * n / 4]};

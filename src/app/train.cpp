@@ -13,6 +13,7 @@
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
+#include "keep_model.hpp"
 #include "progress_bar.hpp"
 #include "report.hpp"
 #include "ricochet/learn/checkpoint.hpp"
@@ -123,10 +124,8 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     if (std::find(kinds.begin(), kinds.end(), training.kind) == kinds.end()) {
         throw unknown(fmt::format("kind of network for {}", system.name), training.kind, kinds);
     }
-    check_replaceable("--out", request.out);
     const bool own_checkpoint = training.checkpoint.empty();
-    if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
-    check_replaceable("--checkpoint", training.checkpoint);
+    claim_training(request.out, training.checkpoint, training.resume);
     ProgressBar bar;
     const Interrupts watch;
     const auto train_it = [&](const TrainingRequest& wanted,
@@ -146,33 +145,34 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
     if (report.outcome == learn::TrainingOutcome::stopped) {
         // What it misses has not been measured: no model yet.
         if (report.iterations > 0 || training.resume) {
-            fmt::print(stderr,
-                       "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
-                       training.checkpoint.string());
+            say_what_is_kept(training.checkpoint, report.checkpoint_trouble);
         } else {
             fmt::print(stderr,
                        "ricochet: interrupted before the training began; nothing is kept\n");
         }
         return 1;
     }
-    const bool sound =
-        report.trial.misses == 0 && report.outcome != learn::TrainingOutcome::diverged;
-    const bool write = sound || request.allow_misses;
-    if (write) save_model(trained.model, request.out);
-    if (own_checkpoint && write) {
-        std::error_code ignored;
-        fs::remove(training.checkpoint, ignored);
-    }
-    if (request.json) {
-        auto object = Json::parse(learn::to_json(report));
-        object["model"] = write ? Json(request.out.string()) : Json();
-        print(json_text(object));
-    } else {
-        print(text(report));
-    }
+    const bool diverged = report.outcome == learn::TrainingOutcome::diverged;
+    const bool write = !diverged && (report.trial.misses == 0 || request.allow_misses);
+    deliver({[&] {
+                 if (!write) return;
+                 keep_model(trained.model, request.out, training.checkpoint);
+                 std::error_code ignored;
+                 if (own_checkpoint) fs::remove(training.checkpoint, ignored);
+             },
+             [&] {
+                 if (!request.json) return print(text(report));
+                 auto object = Json::parse(learn::to_json(report));
+                 object["model"] = write ? Json(request.out.string()) : Json();
+                 print(json_text(object));
+             }});
     if (write) {
         fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
         return 0;
+    }
+    if (diverged) {
+        fmt::print(stderr, "ricochet: {}, and no model was written\n", describe(report.outcome));
+        return 1;
     }
     fmt::print(stderr,
                "ricochet: events are missed and no model was written; --allow-misses writes the "
@@ -189,6 +189,30 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
 
 }  // namespace
 
+void claim_training(const fs::path& out, fs::path& checkpoint, bool resume)
+{
+    if (checkpoint.empty()) {
+        checkpoint = out;
+        checkpoint += ".checkpoint";
+    }
+    Claims claims;
+    claims.replaces("--out", out);
+    claims.keeps("--checkpoint", checkpoint, resume);
+}
+
+void say_what_is_kept(const fs::path& checkpoint, const std::string& trouble)
+{
+    std::error_code error;
+    if (!trouble.empty()) fmt::print(stderr, "ricochet: {}\n", printable(trouble));
+    if (fs::exists(checkpoint, error)) {
+        fmt::print(stderr,
+                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+                   checkpoint.string());
+    } else {
+        fmt::print(stderr, "ricochet: interrupted; nothing is kept\n");
+    }
+}
+
 int train(const TrainRequest& request)
 {
     const SystemEntry& system = find_system(request.system);
@@ -198,10 +222,8 @@ int train(const TrainRequest& request)
     }
     TrainingRequest training = request.training;
     training.kind = kind_named(system, *system.training, training.kind);
-    check_replaceable("--out", request.out);
     const bool own_checkpoint = training.checkpoint.empty();
-    if (own_checkpoint) training.checkpoint = request.out.string() + ".checkpoint";
-    check_replaceable("--checkpoint", training.checkpoint);
+    claim_training(request.out, training.checkpoint, training.resume);
 
     ProgressBar bar;
     learn::Progress last;
@@ -216,15 +238,15 @@ int train(const TrainRequest& request)
 
     const learn::Report& report = trained.report;
     const bool stopped = Interrupts::any() && last.iteration < last.total;
-    const bool sound = trained.misses_none() && report.outcome != learn::TrainingOutcome::diverged;
-    const bool write = sound || request.allow_misses;
-    if (write) save_model(trained.model, request.out);
-    if (own_checkpoint && write && !stopped) {
-        std::error_code ignored;
-        fs::remove(training.checkpoint, ignored);
-    }
-
-    print(request.json ? json(report, request.out, write) : text(report, last));
+    const bool diverged = report.outcome == learn::TrainingOutcome::diverged;
+    const bool write = !diverged && (trained.misses_none() || request.allow_misses);
+    deliver({[&] {
+                 if (!write) return;
+                 keep_model(trained.model, request.out, training.checkpoint);
+                 std::error_code ignored;
+                 if (own_checkpoint && !stopped) fs::remove(training.checkpoint, ignored);
+             },
+             [&] { print(request.json ? json(report, request.out, write) : text(report, last)); }});
     if (write) {
         fmt::print(stderr, "ricochet: {} is in '{}'\n", stopped ? "the best so far" : "the model",
                    request.out.string());
@@ -233,16 +255,14 @@ int train(const TrainRequest& request)
     }
     std::error_code error;
     const bool kept = fs::exists(training.checkpoint, error);
-    if (!write && !stopped && kept) {
+    if (!write && !diverged && !stopped && kept) {
         fmt::print(stderr,
                    "ricochet: the best is kept in '{}'; the same command with --resume "
                    "--allow-misses writes it\n",
                    training.checkpoint.string());
     }
     if (stopped) {
-        fmt::print(stderr,
-                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
-                   training.checkpoint.string());
+        say_what_is_kept(training.checkpoint, report.checkpoint_trouble);
     }
     return write && !stopped ? 0 : 1;
 }

@@ -16,6 +16,15 @@ struct TrainRequest {
     bool json = false;
 };
 
+/// The files of a training; an empty checkpoint becomes the one beside the model.
+/// @throws BadInput if they cannot be what they are to be.
+void claim_training(const std::filesystem::path& out, std::filesystem::path& checkpoint,
+                    bool resume);
+
+/// Of what was interrupted: where it goes on from, on standard error.
+/// @param trouble  why its last checkpoint could not be written; empty: it was
+void say_what_is_kept(const std::filesystem::path& checkpoint, const std::string& trouble);
+
 /// Trains, shows progress on standard error, prints the report and writes the
 /// model. Ctrl-C stops the training and keeps the best so far; a checkpoint beside
 /// the model, or where the request says, lets it be resumed.

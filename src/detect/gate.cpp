@@ -94,6 +94,8 @@ GateRecipe gate_recipe(std::string_view spelled)
     refuse_recipe(spelled);
 }
 
+namespace gates {
+
 Gate::Gate(Model model)
     : classifier_(std::make_shared<const Classifier>(std::move(model))),
       recipe_(gate_recipe(classifier_->model().recipe)),
@@ -140,6 +142,8 @@ void Gate::check_step(double smallest, double largest) const
     }
 }
 
+}  // namespace gates
+
 namespace detail {
 
 void check_gate_system(const Model& model, std::string_view name)
@@ -181,7 +185,7 @@ void check_certified(const Model& model)
     }
 }
 
-void check_gate_kind(const Gate& gate, bool horizon)
+void check_gate_kind(const gates::Gate& gate, bool horizon)
 {
     if (gate.is_horizon() == horizon) return;
     throw std::invalid_argument(

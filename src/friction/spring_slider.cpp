@@ -60,6 +60,7 @@ std::string_view describe(SliderOutcome outcome) noexcept
             return "the step fell below the spacing of times; loosen rtol";
         case SliderOutcome::step_limit: return "the number of steps reached its limit";
         case SliderOutcome::non_finite: return "the state is not finite";
+        case SliderOutcome::cancelled: return "the run was cancelled";
     }
     return "";
 }
@@ -113,6 +114,9 @@ public:
         double h = options_.step > 0 ? options_.step : options_.first_step;
         while (out_.state.t < t_end) {
             if (out_.steps >= options_.max_steps) return stop(SliderOutcome::step_limit);
+            if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+                return stop(SliderOutcome::cancelled);
+            }
             const double stop_at = std::min(t_end, slider_.load.next_corner(out_.state.t));
             const double room = stop_at - out_.state.t;
             // A step that would leave less than a millionth of itself goes to the end.

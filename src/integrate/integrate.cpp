@@ -44,6 +44,14 @@ void throw_unknown_mode(std::size_t mode, std::size_t modes)
         "integrate: mode must be below the system's mode_count = {}, got {}", modes, mode));
 }
 
+void throw_flow_does_not_fit(std::size_t components)
+{
+    throw std::invalid_argument(
+        fmt::format("integrate: flow resized dxdt at the start; expected the {} components of the "
+                    "state, written in place",
+                    components));
+}
+
 void throw_forward_only()
 {
     throw std::invalid_argument(

@@ -19,6 +19,8 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::wrong_bound: return "wrong_bound";
         case Outcome::not_converged: return "not_converged";
         case Outcome::time_event_not_ahead: return "time_event_not_ahead";
+        case Outcome::wrong_dimension: return "wrong_dimension";
+        case Outcome::stalled: return "stalled";
     }
     return "unknown";
 }
@@ -61,6 +63,13 @@ std::string_view describe(Outcome outcome) noexcept
             return "asked for the time event after the one that has just happened, the system "
                    "returned a time that is not ahead; let next_time_event(t) exclude t, also "
                    "where t is rounded, and return infinity where there is none";
+        case Outcome::wrong_dimension:
+            return "the flow resized dxdt, or a reset, rest or time_reset shortened the state and "
+                   "left the mode as it was; write into the components that are there, or declare "
+                   "`static constexpr bool changes_dimension = true`";
+        case Outcome::stalled:
+            return "stall_steps steps advanced the time by less than 1e-9 of the span; end the run "
+                   "earlier, let events that accumulate come to rest, or raise stall_steps";
     }
     return "unknown outcome";
 }

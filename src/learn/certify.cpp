@@ -9,6 +9,7 @@
 
 #include "branch_and_bound.hpp"
 #include "certify_checkpoint.hpp"
+#include "checkpoint_file.hpp"
 #include "proof.hpp"
 #include "ricochet/learn/random.hpp"
 
@@ -126,7 +127,7 @@ public:
         } catch (const std::bad_alloc&) {
             outcome = CertifyOutcome::out_of_memory;
         }
-        if (!o_.checkpoint.empty()) save(all_, key_, o_.checkpoint);
+        keep_([this] { save(all_, key_, o_.checkpoint); });
         return result(outcome);
     }
 
@@ -289,10 +290,10 @@ private:
         Proof proof(statement, grow(statement, frontier_boxes), o_.max_unproved, begun);
         auto saved = Clock::now();
         proof.run(o_.threads, [&](std::uint64_t boxes) {
-            if (!o_.checkpoint.empty() && seconds_since(saved) > checkpoint_every) {
+            if (seconds_since(saved) > checkpoint_every) {
                 const double before = begun.seconds;
                 begun.seconds += seconds_since(start);
-                save(all_, key_, o_.checkpoint);
+                keep_([this] { save(all_, key_, o_.checkpoint); });
                 begun.seconds = before;
                 saved = Clock::now();
             }
@@ -380,7 +381,8 @@ private:
                       .estimates = all_.estimates,
                       .counterexample = outcome == CertifyOutcome::refuted ? counterexample_
                                                                            : std::vector<double>{},
-                      .seconds = seconds_since(start_)};
+                      .seconds = seconds_since(start_),
+                      .checkpoint_trouble = keep_.trouble()};
         return out;
     }
 
@@ -395,6 +397,7 @@ private:
     Estimate last_estimate_{};
     std::vector<double> counterexample_{};
     Clock::time_point start_ = Clock::now();
+    Keeper keep_{o_.checkpoint};
 };
 
 }  // namespace

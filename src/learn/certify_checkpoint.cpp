@@ -3,12 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
+
+#include "../files/read_file.hpp"
+#include "../files/strict_json.hpp"
 
 namespace ricochet::learn {
 
@@ -27,12 +31,21 @@ Json json(const std::vector<std::vector<Interval>>& boxes)
     return out;
 }
 
-std::vector<std::vector<Interval>> boxes_of(const Json& from)
+/// @throws std::out_of_range for what is no count
+std::uint64_t count_of(const nlohmann::json& from)
+{
+    if (!from.is_number_unsigned()) throw std::out_of_range("no count");
+    return from.get<std::uint64_t>();
+}
+
+/// @throws std::out_of_range for boxes of different dimensions
+std::vector<std::vector<Interval>> boxes_of(const nlohmann::json& from)
 {
     std::vector<std::vector<Interval>> out;
-    for (const Json& box : from) {
+    for (const nlohmann::json& box : from) {
+        if (box.size() != from.front().size()) throw std::out_of_range("other dimensions");
         out.emplace_back();
-        for (const Json& range : box) {
+        for (const nlohmann::json& range : box) {
             out.back().push_back({range.at(0).get<double>(), range.at(1).get<double>()});
         }
     }
@@ -44,7 +57,7 @@ Json json(const Estimate& e)
     return Json::array({e.boxes, e.seconds, e.unproved, e.error});
 }
 
-Estimate estimate_of(const Json& from)
+Estimate estimate_of(const nlohmann::json& from)
 {
     return {.boxes = from.at(0).get<double>(),
             .seconds = from.at(1).get<double>(),
@@ -57,9 +70,9 @@ Json json(const Attempt& a)
     return Json::array({a.number, a.highest, a.spread, a.closest});
 }
 
-Attempt attempt_of(const Json& from)
+Attempt attempt_of(const nlohmann::json& from)
 {
-    return {.number = from.at(0).get<int>(),
+    return {.number = static_cast<int>(std::min<std::uint64_t>(count_of(from.at(0)), 1000)),
             .highest = from.at(1).get<double>(),
             .spread = from.at(2).get<double>(),
             .closest = from.at(3).get<double>()};
@@ -86,24 +99,26 @@ Json json(const Begun& begun)
     throw std::runtime_error(fmt::format("checkpoint '{}' {}", file.string(), what));
 }
 
+constexpr int deepest = 8;  ///< levels of JSON: lists of boxes in lists of parts
+
 constexpr std::string_view checkpoint_format = "ricochet certification 1";
 
-Begun begun_of(const Json& from)
+Begun begun_of(const nlohmann::json& from)
 {
     Begun out{.threshold = from.at("threshold").get<double>(),
               .lowering = from.at("lowering").get<double>(),
               .estimate = estimate_of(from.at("estimate")),
               .seconds = from.at("seconds").get<double>()};
-    out.done.resize(std::min<std::size_t>(from.at("parts").get<std::size_t>(), 2 * frontier_boxes));
-    for (const Json& part : from.at("done")) {
+    out.done.resize(std::min<std::size_t>(count_of(from.at("parts")), 2 * frontier_boxes));
+    for (const nlohmann::json& part : from.at("done")) {
         Tally tally;
-        tally.boxes = part.at(1).get<std::uint64_t>();
+        tally.boxes = count_of(part.at(1));
         tally.unproved = boxes_of(part.at(3));
         constexpr double inf = std::numeric_limits<double>::infinity();
         if (!tally.unproved.empty()) {  // JSON has no infinity: without a bound it is null
             tally.lowest = part.at(2).is_null() ? -inf : part.at(2).get<double>();
         }
-        out.done.at(part.at(0).get<std::size_t>()) = std::move(tally);
+        out.done.at(count_of(part.at(0))) = std::move(tally);
     }
     return out;
 }
@@ -133,7 +148,12 @@ void save(const Progressed& all, const std::string& key, const std::filesystem::
         std::ofstream stream(fresh, std::ios::binary | std::ios::trunc);
         stream << out.dump() << '\n';
         stream.close();
-        if (!stream) refuse(file, "cannot be written");
+        if (!stream) {
+            const int why = errno;
+            std::error_code ignored;
+            std::filesystem::remove(fresh, ignored);
+            refuse(file, "cannot be written: " + std::generic_category().message(why));
+        }
     }
     std::error_code error;
     std::filesystem::rename(fresh, file, error);
@@ -142,10 +162,10 @@ void save(const Progressed& all, const std::string& key, const std::filesystem::
 
 Progressed load(const std::string& key, const std::filesystem::path& file)
 {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) refuse(file, "cannot be read");
+    const std::string text = ricochet::detail::read_file(
+        file, [&](const std::string& why) { refuse(file, "cannot be read: " + why); });
     try {
-        const Json from = Json::parse(in);
+        const nlohmann::json from = ricochet::detail::parse_strictly(text, deepest);
         if (from.at("format") != checkpoint_format) {
             refuse(file, "is not a certification of this version");
         }
@@ -153,18 +173,21 @@ Progressed load(const std::string& key, const std::filesystem::path& file)
             refuse(file, "belongs to another model, another guard or other options");
         }
         Progressed out;
-        for (const Json& level : from.at("levels")) {
+        for (const nlohmann::json& level : from.at("levels")) {
             out.levels.push_back({.margin = level.at("margin").get<double>(),
                                   .threshold = level.at("threshold").get<double>(),
-                                  .boxes = level.at("boxes").get<std::uint64_t>(),
+                                  .boxes = count_of(level.at("boxes")),
                                   .seconds = level.at("seconds").get<double>(),
                                   .unproved = boxes_of(level.at("unproved"))});
         }
-        for (const Json& e : from.at("estimates")) out.estimates.push_back(estimate_of(e));
+        for (const nlohmann::json& e : from.at("estimates"))
+            out.estimates.push_back(estimate_of(e));
         if (!from.at("attempt").is_null()) out.attempt = attempt_of(from.at("attempt"));
         if (!from.at("current").is_null()) out.current = begun_of(from.at("current"));
         return out;
-    } catch (const Json::exception&) {
+    } catch (const ricochet::detail::JsonTrouble&) {
+        refuse(file, "is cut short or has been altered");
+    } catch (const nlohmann::json::exception&) {
         refuse(file, "is cut short or has been altered");
     } catch (const std::out_of_range&) {
         refuse(file, "is cut short or has been altered");

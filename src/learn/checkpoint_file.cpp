@@ -1,9 +1,13 @@
 #include "checkpoint_file.hpp"
 
+#include <cerrno>
+#include <cstddef>
 #include <fstream>
-#include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <system_error>
+
+#include "../files/read_file.hpp"
 
 namespace ricochet::learn {
 
@@ -77,6 +81,19 @@ void refuse_checkpoint(const std::filesystem::path& file, const std::string& wha
     throw std::runtime_error("checkpoint '" + file.string() + "' " + what);
 }
 
+namespace {
+
+/// Half of a checkpoint is of no use to anybody.
+[[noreturn]] void refuse_unwritten(const std::filesystem::path& file,
+                                   const std::filesystem::path& fresh, const std::string& why)
+{
+    std::error_code ignored;
+    std::filesystem::remove(fresh, ignored);
+    refuse_checkpoint(file, "cannot be written: " + why);
+}
+
+}  // namespace
+
 void write_checkpoint(std::string_view first_line, const Writer& writer,
                       const std::filesystem::path& file)
 {
@@ -88,18 +105,31 @@ void write_checkpoint(std::string_view first_line, const Writer& writer,
         std::ofstream out(fresh, std::ios::binary | std::ios::trunc);
         out << first_line << writer.bytes() << tail.bytes();
         out.close();
-        if (!out) refuse_checkpoint(file, "cannot be written");
+        if (!out) refuse_unwritten(file, fresh, std::generic_category().message(errno));
     }
     std::error_code error;
     std::filesystem::rename(fresh, file, error);
-    if (error) refuse_checkpoint(file, "cannot be written: " + error.message());
+    if (error) refuse_unwritten(file, fresh, error.message());
+}
+
+Keeper::Keeper(const std::filesystem::path& file) : keeps_(!file.empty())
+{
+    if (!keeps_) return;
+    std::filesystem::path part = file;
+    part += ".part";
+    std::error_code ignored;
+    const bool there = std::filesystem::exists(part, ignored);
+    if (!std::ofstream(part, std::ios::binary | std::ios::app)) {
+        refuse_checkpoint(file, "cannot be written: " + std::generic_category().message(errno));
+    }
+    if (!there) std::filesystem::remove(part, ignored);
 }
 
 std::string read_checkpoint(std::string_view first_line, const std::filesystem::path& file)
 {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) refuse_checkpoint(file, "cannot be read");
-    const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    const std::string bytes = ricochet::detail::read_file(
+        file, [&](const std::string& why) { refuse_checkpoint(file, "cannot be read: " + why); },
+        std::numeric_limits<std::ptrdiff_t>::max(), first_line);
     std::string_view rest = bytes;
     if (!rest.starts_with(first_line)) {
         refuse_checkpoint(file, "is not a training checkpoint of this version");

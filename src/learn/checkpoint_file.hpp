@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -75,6 +76,35 @@ private:
 /// @throws std::runtime_error naming the file if it cannot be written.
 void write_checkpoint(std::string_view first_line, const Writer& writer,
                       const std::filesystem::path& file);
+
+/// Keeps a training in its checkpoint, time after time. A disk that is full later does not end the
+/// training: what could not be written is remembered, and tried again with the next checkpoint.
+class Keeper {
+public:
+    /// @param file  empty: nothing is kept
+    /// @throws std::runtime_error naming the file if it could not be written now
+    explicit Keeper(const std::filesystem::path& file);
+
+    /// Calls `save`, which writes the checkpoint.
+    template <class Save>
+    void operator()(const Save& save)
+    {
+        if (!keeps_) return;
+        try {
+            save();
+            trouble_.clear();
+        } catch (const std::runtime_error& error) {
+            trouble_ = error.what();
+        }
+    }
+
+    /// Why the last checkpoint could not be written; empty: it was.
+    [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
+
+private:
+    bool keeps_;
+    std::string trouble_{};
+};
 
 /// The bytes between the first line and the checksum.
 /// @throws std::runtime_error naming the file if it cannot be read, begins with

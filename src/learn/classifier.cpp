@@ -13,6 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "checkpoint_file.hpp"
 #include "ricochet/learn/checkpoint.hpp"
 #include "ricochet/learn/trainable_mlp.hpp"
 
@@ -248,7 +249,7 @@ public:
                     break;
                 }
                 if (iteration_ != 0 && (last || iteration_ % options_.checkpoint_every == 0)) {
-                    save();
+                    keep_([this] { save(); });
                 }
                 if (progress && !progress({.iteration = now.iteration,
                                            .total = now.total,
@@ -256,7 +257,7 @@ public:
                                            .misses = now.misses,
                                            .seconds = seconds_})) {
                     if (!last) outcome = TrainingOutcome::stopped;
-                    save();
+                    keep_([this] { save(); });
                     break;
                 }
             }
@@ -385,6 +386,7 @@ private:
         report.validation = assess(model, sets_.validation);
         report.held_out = assess(model, sets_.test);
         report.outcome = outcome;
+        report.checkpoint_trouble = keep_.trouble();
         if (outcome != TrainingOutcome::diverged && !trained.misses_none()) {
             report.outcome = TrainingOutcome::misses_remain;
         }
@@ -393,7 +395,6 @@ private:
 
     void save() const
     {
-        if (options_.checkpoint.empty()) return;
         save_checkpoint({.fingerprint = fingerprint_,
                          .iteration = iteration_,
                          .seconds = seconds_,
@@ -411,8 +412,11 @@ private:
     {
         Checkpoint checkpoint = load_checkpoint(options_.checkpoint);
         const std::size_t n = network_.parameters().size();
+        const bool fits =
+            std::all_of(checkpoint.hard.begin(), checkpoint.hard.end(),
+                        [this](std::uint64_t i) { return i < training_.labels.size(); });
         if (checkpoint.fingerprint != fingerprint_ || checkpoint.parameters.size() != n ||
-            checkpoint.best_parameters.size() != n) {
+            checkpoint.best_parameters.size() != n || !fits) {
             throw std::runtime_error("train: checkpoint '" + options_.checkpoint.string() +
                                      "' belongs to other data or options");
         }
@@ -446,6 +450,7 @@ private:
     std::vector<double> best_;
     double best_threshold_ = 0;
     Score best_score_;
+    Keeper keep_{options_.checkpoint};
 
     std::vector<double> batch_states_;
     std::vector<std::uint8_t> batch_labels_;

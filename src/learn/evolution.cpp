@@ -172,20 +172,21 @@ public:
             const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
             s_.seconds = before + spent.count();
             outcome = ended();
-            if (!options_.checkpoint.empty() && s_.seconds - saved >= checkpoint_interval) {
-                save();
+            if (s_.seconds - saved >= checkpoint_interval) {
+                keep_([this] { save(); });
                 saved = s_.seconds;
             }
             if (progress && !progress(report()) && !outcome) outcome = EvolutionOutcome::stopped;
         }
-        if (!options_.checkpoint.empty()) save();
+        keep_([this] { save(); });
         return {.outcome = *outcome,
                 .x = s_.best,
                 .score = s_.best_score,
                 .mean = s_.mean,
                 .evaluations = static_cast<std::size_t>(s_.evaluations),
                 .generations = static_cast<std::size_t>(s_.generations),
-                .seconds = s_.seconds};
+                .seconds = s_.seconds,
+                .checkpoint_trouble = keep_.trouble()};
     }
 
 private:
@@ -359,8 +360,12 @@ private:
             refuse_checkpoint(options_.checkpoint,
                               "is of another search: problem, start, population, spread or seed differ");
         }
+        const std::size_t n = s_.mean.size();
         fields([&reader](auto& member) { reader.get(member); }, s_);
         reader.finish();
+        for (const auto* list : {&s_.mean, &s_.deviation, &s_.step_path, &s_.path, &s_.best}) {
+            if (list->size() != n) refuse_checkpoint(options_.checkpoint, "has been altered");
+        }
     }
 
     const Objective& score_;
@@ -373,6 +378,7 @@ private:
     std::vector<std::vector<double>> samples_;  ///< standard normal
     std::vector<std::vector<double>> tried_;
     std::vector<std::size_t> order_;  ///< best first
+    Keeper keep_{options_.checkpoint};
 };
 
 }  // namespace

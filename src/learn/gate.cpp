@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "checkpoint_file.hpp"
 #include "ricochet/learn/assessment.hpp"
 #include "ricochet/learn/checkpoint.hpp"
 #include "ricochet/learn/random.hpp"
@@ -208,7 +209,7 @@ public:
                     return false;
                 }
                 keep_round(round);
-                if (!options_.checkpoint.empty()) save(round, i, since_best, adam);
+                keep_([&] { save(round, i, since_best, adam); });
                 if (progress && !progress({.iteration = round * options_.iterations + i,
                                            .total = options_.rounds * options_.iterations,
                                            .loss = loss,
@@ -276,6 +277,7 @@ public:
     {
         GateReport report;
         report.outcome = outcome_;
+        report.checkpoint_trouble = keep_.trouble();
         report.iterations = iterations_;
         report.seconds = seconds_;
         report.training_states = training_.size();
@@ -325,7 +327,11 @@ private:
                           found.best_parameters.size() == found.round + 1 &&
                           found.best_thresholds.size() == found.round + 1 &&
                           found.parameters.size() == network_.parameters().size() &&
-                          found.iteration <= options_.iterations;
+                          found.iteration <= options_.iterations &&
+                          std::all_of(found.best_parameters.begin(), found.best_parameters.end(),
+                                      [&](const auto& p) {
+                                          return p.empty() || p.size() == found.parameters.size();
+                                      });
         if (!fits) {
             throw std::runtime_error(
                 fmt::format("checkpoint '{}' is of a gate with other data or options",
@@ -630,6 +636,7 @@ private:
     TrainingOutcome outcome_ = TrainingOutcome::finished;
     std::uint64_t fingerprint_ = 0;
     std::optional<GateCheckpoint> resumed_;
+    Keeper keep_{options_.checkpoint};
     std::vector<std::vector<double>> best_parameters_, best_thresholds_;  ///< of every round
 };
 

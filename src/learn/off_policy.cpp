@@ -106,7 +106,8 @@ public:
                 .curve = curve_,
                 .steps = static_cast<std::size_t>(s_.step),
                 .episodes = static_cast<std::size_t>(s_.episodes),
-                .seconds = s_.seconds};
+                .seconds = s_.seconds,
+                .checkpoint_trouble = keep_.trouble()};
     }
 
 private:
@@ -227,7 +228,7 @@ private:
              .seconds = s_.seconds});
         s_.returns = 0;
         s_.returned = 0;
-        if (!options_.checkpoint.empty()) save();
+        keep_([this] { save(); });
         if (progress && !progress(curve_.back(), good_)) return PolicyOutcome::stopped;
         return std::nullopt;
     }
@@ -337,9 +338,14 @@ private:
                 reader.get(*x);
             }
         }
-        buffer_.load(reader);
+        const bool fits = buffer_.load(reader);
         learner_.load(reader);
         reader.finish();
+        const std::size_t n = environment_.observations;
+        if (!fits || s_.observation.size() != n || s_.lowest.size() != n ||
+            s_.highest.size() != n) {
+            refuse_checkpoint(file, "has been altered");
+        }
     }
 
     /// Acts again as in the episode that was interrupted.
@@ -374,6 +380,7 @@ private:
     Model good_;         ///< finite
     std::string message_;
     std::optional<PolicyOutcome> found_;  ///< at the start of an episode
+    Keeper keep_{options_.checkpoint};
 };
 
 }  // namespace

@@ -37,7 +37,7 @@ public:
     FaultRun(const StrikeSlipFault& fault, double t_end, const StepWorldOptions& options)
         : t_end_(t_end),
           options_(options),
-          reference_(detail::reference_of(fault, t_end, 0)),
+          reference_(detail::reference_of(fault, t_end, 0, options.watch)),
           runs_(fault)
     {
         const bool doubling = options.estimate == ErrorEstimate::doubling;
@@ -80,6 +80,7 @@ public:
         return out;
     }
 
+    [[nodiscard]] double done() const { return motion_->t() / t_end_; }
     [[nodiscard]] const StepView& view() const { return motion_->view(); }
     /// Share of the squared error so far, at the end with what is left.
     double squares(bool ended)
@@ -184,6 +185,7 @@ public:
         return out;
     }
 
+    [[nodiscard]] double done() const { return motion_->state().t / t_end_; }
     [[nodiscard]] const StepView& view() const { return view_; }
     double squares(bool ended)
     {
@@ -268,7 +270,9 @@ public:
                 : -attempt.work / options_.work_unit - options_.lambda * (squares - squares_);
         squares_ = squares;
         out.terminal = ended_;
-        out.truncated = !ended_ && attempts_ >= options_.max_attempts;
+        const bool cut =
+            attempts_ >= options_.max_attempts || (options_.watch && !options_.watch(run_.done()));
+        out.truncated = !ended_ && cut;
         observe(observation, attempt.error, attempt.solved ? 0 : 1);
         return out;
     }

@@ -25,11 +25,12 @@ using detail::FaultReference;
 /// A fault, its reference, and what runs have left behind for the next ones.
 class FaultProblem {
 public:
-    FaultProblem(const StrikeSlipFault& fault, double t_end, double polynomial_bound)
+    FaultProblem(const StrikeSlipFault& fault, double t_end, double polynomial_bound,
+                 const StepWatch& watch)
         : fault_(fault),
           t_end_(t_end),
           bound_(polynomial_bound),
-          reference_(detail::reference_of(fault, t_end, polynomial_bound))
+          reference_(detail::reference_of(fault, t_end, polynomial_bound, watch))
     {
     }
 
@@ -39,17 +40,18 @@ public:
         Comparison comparison(reference_, t_end_ / fault_.time_unit());
         const bool doubling = rule.estimate == ErrorEstimate::doubling;
         const bool constant = std::holds_alternative<ConstantStep>(rule.controller);
-        const Rupture r =
-            runs->simulate({.t_end = t_end_,
-                            .step = first_step(rule, usual_step * fault_.time_unit()),
-                            .max_steps = 4000},
-                           {.controller = rule.controller,
-                            .estimate = constant ? ErrorEstimate::none : rule.estimate,
-                            .norm = doubling ? FaultNorm::components : FaultNorm::fields,
-                            .rtol = rule.tolerance,
-                            .atol = 1e-3 * rule.tolerance,
-                            .h_max = constant ? t_end_ : 0,
-                            .observer = [&](const BatheStep& step) { comparison.look(step); }});
+        RuptureOptions options{.t_end = t_end_,
+                               .step = first_step(rule, usual_step * fault_.time_unit()),
+                               .max_steps = 4000};
+        if (rule.watch) options.progress = [&](double t) { return rule.watch(t / t_end_); };
+        const Rupture r = runs->simulate(
+            options, {.controller = rule.controller,
+                      .estimate = constant ? ErrorEstimate::none : rule.estimate,
+                      .norm = doubling ? FaultNorm::components : FaultNorm::fields,
+                      .rtol = rule.tolerance,
+                      .atol = 1e-3 * rule.tolerance,
+                      .h_max = constant ? t_end_ : 0,
+                      .observer = [&](const BatheStep& step) { comparison.look(step); }});
         give_back(std::move(runs));
         const RuptureStatistics& s = r.statistics;
         StepTrial out{.ended = r.outcome == RuptureOutcome::reached_end ||
@@ -106,9 +108,10 @@ std::optional<double> time_of_rupture(const StrikeSlipFault& fault, double after
 
 }  // namespace
 
-StepProblem fault_problem(const StrikeSlipFault& fault, double t_end, double polynomial_bound)
+StepProblem fault_problem(const StrikeSlipFault& fault, double t_end, double polynomial_bound,
+                          const StepWatch& watch)
 {
-    auto problem = std::make_shared<FaultProblem>(fault, t_end, polynomial_bound);
+    auto problem = std::make_shared<FaultProblem>(fault, t_end, polynomial_bound, watch);
     return {.description = fmt::format("fault of {0} x {0} elements, side {1:.0f} m",
                                        fault.elements(), fault.parameters().side),
             .group = fault.elements(),

@@ -67,6 +67,7 @@ struct SmallProblem {
             at.step(motion, [&](std::size_t i, const StateOf<System>& w) {
                 sum += (w - reference[i]).squaredNorm();
             });
+            if (rule.watch && !rule.watch(motion.state().t / t_end)) break;
         }
         const SetValuedStatistics& s = motion.statistics();
         StepTrial out{.ended = motion.outcome() == SetValuedOutcome::reached_end,

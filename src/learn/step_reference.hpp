@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "ricochet/learn/step_control.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/fault_bathe.hpp"
@@ -68,12 +69,13 @@ private:
 };
 
 inline FaultReference reference_of(const StrikeSlipFault& fault, double t_end,
-                                   double polynomial_bound)
+                                   double polynomial_bound, const StepWatch& watch = {})
 {
     RuptureOptions options{.t_end = t_end,
                            .step = 0.01 * fault.time_unit(),
                            .rtol = std::numeric_limits<double>::infinity(),
                            .polynomial_bound = polynomial_bound};
+    if (watch) options.progress = [&](double t) { return watch(t / t_end); };
     for (std::size_t i = 1; i <= fault_samples; ++i) {
         options.snapshot_times.push_back(i == fault_samples
                                              ? t_end

@@ -22,7 +22,7 @@ double first_step(const StepRule& rule, double usual_step)
 }
 
 SearchedSteps search_steps(const StepProblem& problem, std::size_t count, std::size_t evaluations,
-                           std::uint64_t seed, unsigned threads)
+                           std::uint64_t seed, unsigned threads, const StepWatch& watch)
 {
     // Even steps as far as the motion goes: some end at rest, long before their time.
     const StepTrial even = problem.run({.controller = ConstantStep{}});
@@ -41,7 +41,11 @@ SearchedSteps search_steps(const StepProblem& problem, std::size_t count, std::s
                 std::max(0.0, static_cast<double>(trial.steps) / static_cast<double>(count) - 1);
             return std::log(std::max(trial.error, 1e-12)) + 10 * more + (trial.ended ? 0 : 10);
         },
-        start, {.spread = 0.6, .seed = seed, .max_evaluations = evaluations, .threads = threads});
+        start, {.spread = 0.6, .seed = seed, .max_evaluations = evaluations, .threads = threads},
+        [&](const EvolutionProgress& p) {
+            return !watch ||
+                   watch(static_cast<double>(p.evaluations) / static_cast<double>(evaluations));
+        });
     SearchedSteps out{.lengths = lengths_of(found.x), .trial = {}};
     out.trial = problem.run(prescribed(out.lengths));
     return out;

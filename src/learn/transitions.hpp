@@ -53,13 +53,16 @@ public:
         writer.put(numbers_);
     }
 
-    void load(Reader& reader)
+    /// Whether what was read is a buffer of this width and capacity.
+    [[nodiscard]] bool load(Reader& reader)
     {
         std::uint64_t next = 0;
         reader.get(next);
         reader.get(numbers_);
         next_ = static_cast<std::size_t>(next);
         size_ = numbers_.size() / width_;
+        return numbers_.size() % width_ == 0 && size_ <= capacity_ &&
+               next_ == (size_ < capacity_ ? size_ : next_ % capacity_);
     }
 
 private:

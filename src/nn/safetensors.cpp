@@ -1,5 +1,7 @@
 #include "ricochet/nn/safetensors.hpp"
 
+#include "../files/read_file.hpp"
+#include "../files/strict_json.hpp"
 #include "ricochet/nn/classifier.hpp"
 #include "ricochet/nn/pack.hpp"
 
@@ -16,7 +18,7 @@
 #include <limits>
 #include <map>
 #include <random>
-#include <set>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -141,36 +143,12 @@ std::string describe(const std::vector<std::uint64_t>& shape)
     return text + "]";
 }
 
-/// JSON in which no object has a key twice and no value lies deeper than needed.
 json parse_json(std::string_view text, const Refusal& refuse)
 {
-    std::vector<std::set<std::string>> keys;
-    const auto inspect = [&](int depth, json::parse_event_t event, json& value) {
-        switch (event) {
-            case json::parse_event_t::object_start: keys.emplace_back(); [[fallthrough]];
-            case json::parse_event_t::array_start:
-                if (depth >= max_depth) {
-                    refuse("header", "at most " + std::to_string(max_depth) + " levels of JSON",
-                           "more");
-                }
-                break;
-            case json::parse_event_t::object_end: keys.pop_back(); break;
-            case json::parse_event_t::key: {
-                const auto& key = value.get_ref<const std::string&>();
-                if (!keys.back().insert(key).second)
-                    refuse("header: key " + in_quotes(key) + " appears twice");
-                break;
-            }
-            default: break;
-        }
-        return true;
-    };
     try {
-        return json::parse(text, inspect);
-    } catch (const json::parse_error& error) {
-        refuse("header", "JSON", "an error at its byte " + std::to_string(error.byte));
-    } catch (const json::exception&) {
-        refuse("header", "JSON", "a number out of range");
+        return detail::parse_strictly(text, max_depth);
+    } catch (const detail::JsonTrouble& trouble) {
+        refuse(std::string("header: ") + trouble.what());
     }
 }
 
@@ -792,21 +770,8 @@ Model parse_model(std::span<const std::byte> bytes, std::string_view name,
 Model load_model(const std::filesystem::path& path, const LoadOptions& options)
 {
     const Refusal refuse(path.string());
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) {
-        refuse(error ? error.message() : "expected a file, found something else");
-    }
-    const std::uintmax_t size = std::filesystem::file_size(path, error);
-    if (error) refuse(error.message());
-    if (size > max_file) {
-        refuse("file", "at most " + std::to_string(max_file) + " bytes", std::to_string(size));
-    }
-    std::ifstream file(path, std::ios::binary);
-    if (!file) refuse("cannot be opened: " + last_error());
-    std::vector<std::byte> bytes(static_cast<std::size_t>(size));
-    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    if (!file) refuse("cannot be read: " + last_error());
-    return parse_model(bytes, path.string(), options);
+    const std::string text = detail::read_file(path, refuse, max_file);
+    return parse_model(std::as_bytes(std::span(text)), path.string(), options);
 }
 
 std::vector<std::byte> to_safetensors(const Model& model, const LoadOptions& options)

@@ -164,7 +164,8 @@ std::optional<PhaseCause> cause_after(Outcome outcome) noexcept
         case Outcome::outside_mode:
         case Outcome::endless_cascade:
         case Outcome::conflicting_resets:
-        case Outcome::step_underflow: return PhaseCause::stuck;
+        case Outcome::step_underflow:
+        case Outcome::stalled: return PhaseCause::stuck;
         default: return std::nullopt;
     }
 }
@@ -173,6 +174,7 @@ HandOverOutcome in_hand_over(Outcome outcome) noexcept
 {
     switch (outcome) {
         case Outcome::reached_end: return HandOverOutcome::reached_end;
+        case Outcome::stalled:
         case Outcome::step_limit: return HandOverOutcome::step_limit;
         case Outcome::cancelled: return HandOverOutcome::cancelled;
         case Outcome::step_underflow: return HandOverOutcome::step_underflow;

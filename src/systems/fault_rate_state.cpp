@@ -60,7 +60,7 @@ public:
           options_(options),
           how_(how),
           law_(friction.law),
-          table_(detail::sdirk_table(how.order)),
+          table_(&detail::sdirk_table(how.order)),
           normal_(normal_forces(fault, friction)),
           stiffness_(fault, options.polynomial_bound > 0 ? options.polynomial_bound : 1e-4),
           stage_(law_, fault, stiffness_, normal_,
@@ -144,21 +144,51 @@ private:
         return m.u.allFinite() && m.v.allFinite() && m.xi.allFinite();
     }
 
-    /// A step from `now_` to `next_`; of order 1 under error control two halves of it, whose
-    /// difference from the whole is the estimate.
+    /// A step from `now_` to `next_`. Of order 1 under error control it is two halves, whose
+    /// difference from the whole is the estimate; one of order 4 that leaves elements creeping is
+    /// taken anew with order 2.
     bool attempt(double h)
     {
         residual_ = 0;
-        if (how_.order > 1 || !controlled()) return take(now_, h, next_);
-        return take(now_, h, coarse_) && take(now_, h / 2, half_) && take(half_, h / 2, next_);
+        table_ = &detail::sdirk_table(how_.order);
+        if (how_.order == 1 && controlled()) {
+            return take(now_, h, coarse_) && take(now_, h / 2, half_) && take(half_, h / 2, next_);
+        }
+        if (!take(now_, h, next_)) return false;
+        if (how_.order < 4 || !leaves_creeping()) return true;
+        ++out_.handed_over;
+        table_ = &detail::sdirk_table(2);
+        return take(now_, h, next_);
     }
+
+    /// Whether an element that a stage found at rest is still being braked at the end of the step.
+    /// The motion that S brakes to rest, v' = -S for v > 0, has a spurious stable equilibrium under
+    /// order 4: with q = v / (S h / 4) between 1 and 2 the first stage leaves (q - 1), the next
+    /// three rest, and the last is 2.09 - 0.757 q, which q = 1.19 repeats for ever. Order 2 brings
+    /// every q below 3.4 to rest. What is too slow to count in the error is let pass.
+    [[nodiscard]] bool leaves_creeping() const
+    {
+        const double counts = 0.01 * std::min(options_.rtol, 1e-3) * size_of_velocity() /
+                              std::sqrt(static_cast<double>(next_.v.size()));
+        for (Index k = 0; k < next_.v.size(); ++k) {
+            const double v = next_.v[k];
+            if (std::abs(v) < counts || v * next_.acceleration[k] >= 0) continue;
+            for (std::size_t i = 0; i + 1 < table_->stages; ++i) {
+                if (std::abs(rates_[i].u[k] + plate_) < at_rest * std::abs(v)) return true;
+            }
+        }
+        return false;
+    }
+
+    /// Over the velocity at the end of the step: friction at rest falls by decades within a stage.
+    static constexpr double at_rest = 1e-3;
 
     bool take(const Motion& from, double h, Motion& to)
     {
-        const double g = table_.gamma * h;
+        const double g = table_->gamma * h;
         stiffness_.set_length(g);
         at_.v = from.v;
-        for (std::size_t i = 0; i < table_.stages; ++i) {
+        for (std::size_t i = 0; i < table_->stages; ++i) {
             before_stage(from, h, i);
             ++out_.rupture.statistics.solves;
             const FaultStageReport report = stage_.solve(equation_, at_);
@@ -174,7 +204,7 @@ private:
             r.v = (at_.v - v_before_) / g;
             r.xi = (at_.xi - equation_.xi) / g;
         }
-        const StageRates& last = rates_[table_.stages - 1];
+        const StageRates& last = rates_[table_->stages - 1];
         to.u = u_before_ + g * last.u;
         to.v = at_.v;
         to.xi = at_.xi;
@@ -189,7 +219,7 @@ private:
         v_before_ = from.v;
         equation_.xi = from.xi;
         for (std::size_t j = 0; j < i; ++j) {
-            const double a = h * table_.a[i][j];
+            const double a = h * table_->a[i][j];
             u_before_ += a * rates_[j].u;
             v_before_ += a * rates_[j].v;
             equation_.xi += a * rates_[j].xi;
@@ -202,10 +232,18 @@ private:
         }
     }
 
+    /// Of the whole field, over which its error is taken.
+    [[nodiscard]] double size_of_velocity() const
+    {
+        const double least = 1e-6 * law_.parameters().v_star / fault_.velocity_unit();
+        return std::max(next_.v.norm(), now_.v.norm()) +
+               brief * std::max(next_.acceleration.norm(), now_.acceleration.norm()) +
+               std::sqrt(static_cast<double>(next_.v.size())) * least;
+    }
+
     /// Over what is allowed.
     [[nodiscard]] double error_of() const
     {
-        const double least = 1e-6 * law_.parameters().v_star / fault_.velocity_unit();
         double of_u = 0;
         double of_v = 0;
         double of_xi = 0;
@@ -215,12 +253,12 @@ private:
             double xi = next_.xi[k] - coarse_.xi[k];
             if (how_.order > 1) {
                 u = v = xi = 0;
-                for (std::size_t i = 0; i < table_.stages; ++i) {
-                    u += table_.error[i] * rates_[i].u[k];
-                    v += table_.error[i] * rates_[i].v[k];
-                    xi += table_.error[i] * rates_[i].xi[k];
+                for (std::size_t i = 0; i < table_->stages; ++i) {
+                    u += table_->error[i] * rates_[i].u[k];
+                    v += table_->error[i] * rates_[i].v[k];
+                    xi += table_->error[i] * rates_[i].xi[k];
                 }
-                const double h = stiffness_.length() / table_.gamma;
+                const double h = stiffness_.length() / table_->gamma;
                 u *= h, v *= h, xi *= h;
             }
             u /= std::abs(next_.u[k]) + distance_;
@@ -229,9 +267,7 @@ private:
             of_xi += xi * xi;
         }
         const double root_n = std::sqrt(static_cast<double>(next_.v.size()));
-        const double size = std::max(next_.v.norm(), now_.v.norm()) +
-                            brief * std::max(next_.acceleration.norm(), now_.acceleration.norm());
-        const double v = std::sqrt(of_v) / (size + root_n * least);
+        const double v = std::sqrt(of_v) / size_of_velocity();
         return std::max(v, std::sqrt(std::max(of_u, of_xi)) / root_n) / options_.rtol;
     }
 
@@ -241,7 +277,7 @@ private:
 
     [[nodiscard]] double growth(double error) const
     {
-        const double order = how_.order == 4 ? 4 : 2;  // of the estimate
+        const double order = table_->stages > 2 ? 4 : 2;  // of the estimate
         return 0.9 * std::pow(std::max(error, 1e-10), -1 / order);
     }
 
@@ -338,7 +374,7 @@ private:
     const RuptureOptions& options_;
     const RateStateOptions& how_;
     Law law_;
-    const detail::SdirkTable& table_;
+    const detail::SdirkTable* table_;  ///< of the step that is taken
     RateStateRupture out_;
     VectorXd normal_, stress_;
     StageStiffness stiffness_;

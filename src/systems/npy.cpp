@@ -7,13 +7,12 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 
+#include "../files/read_file.hpp"
 #include "ricochet/systems/fault_kernel.hpp"
 
 namespace ricochet {
@@ -29,11 +28,16 @@ namespace {
 std::string_view value_of(const std::filesystem::path& file, std::string_view header,
                           std::string_view key, std::string_view end)
 {
-    const std::size_t at = header.find(fmt::format("'{}':", key));
+    const std::string name = fmt::format("'{}':", key);
+    const std::size_t at = header.find(name);
     if (at == std::string_view::npos) refuse(file, fmt::format("no '{}' in its header", key));
-    std::string_view rest = header.substr(at + key.size() + 3);
+    std::string_view rest = header.substr(at + name.size());
+    if (rest.find(name) != std::string_view::npos) {
+        refuse(file, fmt::format("'{}' appears twice in its header", key));
+    }
     rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
-    return rest.substr(0, rest.find_first_of(end));
+    const std::string_view value = rest.substr(0, rest.find_first_of(end));
+    return value.substr(0, value.find_last_not_of(' ') + 1);
 }
 
 /// "(100, 100" to 100; anything but two equal numbers is refused.
@@ -58,9 +62,10 @@ struct Header {
     std::size_t data = 0;  ///< offset
 };
 
+constexpr std::string_view magic = "\x93NUMPY";
+
 Header header_of(const std::filesystem::path& file, std::string_view bytes)
 {
-    constexpr std::string_view magic = "\x93NUMPY";
     if (bytes.size() < 12 || !bytes.starts_with(magic)) refuse(file, "is no NumPy file (.npy)");
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(bytes[i]); };
     if (byte(6) < 1 || byte(6) > 3) {
@@ -72,12 +77,19 @@ Header header_of(const std::filesystem::path& file, std::string_view bytes)
     const std::size_t start = wide ? 12 : 10;
     if (length > bytes.size() - start) refuse(file, "ends within its header");
     const std::string_view header = bytes.substr(start, length);
+    if (!header.starts_with('{') || header.find('}') == std::string_view::npos) {
+        refuse(file, "expected a header in braces");
+    }
     const std::string_view type = value_of(file, header, "descr", ",}");
     if (type != "'<f8'" && type != "'<f4'") {
         refuse(file, fmt::format("expected numbers of type '<f8' or '<f4', found {}", type));
     }
+    const std::string_view order = value_of(file, header, "fortran_order", ",}");
+    if (order != "True" && order != "False") {
+        refuse(file, fmt::format("expected a fortran_order of True or False, found {}", order));
+    }
     return {.side = side_of(file, value_of(file, header, "shape", ")")),
-            .fortran = value_of(file, header, "fortran_order", ",}") == "True",
+            .fortran = order == "True",
             .single = type == "'<f4'",
             .data = start + length};
 }
@@ -96,13 +108,9 @@ Eigen::MatrixXd matrix(const char* data, std::uint64_t side)
 Eigen::MatrixXd read_npy_square(const std::filesystem::path& file)
 {
     static_assert(std::endian::native == std::endian::little);
-    std::error_code error;
-    if (std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error)) {
-        refuse(file, "expected a file, found something else");
-    }
-    std::ifstream in(file, std::ios::binary);
-    if (!in) refuse(file, "cannot be read");
-    const std::string bytes(std::istreambuf_iterator<char>(in), {});
+    const std::string bytes = detail::read_file(
+        file, [&](const std::string& why) { refuse(file, "cannot be read: " + why); },
+        std::numeric_limits<std::ptrdiff_t>::max(), magic);
     const Header header = header_of(file, bytes);
     const std::uint64_t expected = header.side * header.side * (header.single ? 4 : 8);
     if (bytes.size() - header.data != expected) {
@@ -112,6 +120,7 @@ Eigen::MatrixXd read_npy_square(const std::filesystem::path& file)
     const char* data = bytes.data() + header.data;
     Eigen::MatrixXd out =
         header.single ? matrix<float>(data, header.side) : matrix<double>(data, header.side);
+    if (!out.allFinite()) refuse(file, "has entries that are no numbers, or infinite");
     if (!header.fortran) out.transposeInPlace();
     return out;
 }

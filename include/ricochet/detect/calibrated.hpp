@@ -33,7 +33,7 @@ namespace ricochet {
 namespace detail {
 
 /// @throws std::invalid_argument unless the gate is of the kind that is wanted.
-void check_gate_kind(const Gate& gate, bool horizon);
+void check_gate_kind(const gates::Gate& gate, bool horizon);
 /// @throws std::invalid_argument: no step is kept.
 void check_longest_stretch(std::size_t steps);
 
@@ -41,7 +41,7 @@ void check_longest_stretch(std::size_t steps);
 template <class Base>
 class AsksGate : public Base {
 public:
-    [[nodiscard]] const Gate& gate() const noexcept { return gate_; }
+    [[nodiscard]] const gates::Gate& gate() const noexcept { return gate_; }
 
     /// As `Gate::check`.
     template <class System, class X>
@@ -53,14 +53,14 @@ public:
 protected:
     /// @throws std::invalid_argument if the gate is of the other kind, or as `Base`.
     template <class... Arguments>
-    AsksGate(Gate gate, bool horizon, const Arguments&... arguments)
+    AsksGate(gates::Gate gate, bool horizon, const Arguments&... arguments)
         : Base(arguments...), gate_(std::move(gate))
     {
         check_gate_kind(gate_, horizon);
     }
 
 private:
-    Gate gate_;
+    gates::Gate gate_;
 };
 
 }  // namespace detail
@@ -75,7 +75,8 @@ public:
 
     /// @param longest_stretch  steps without a check, at most; as many starts are kept
     /// @throws std::invalid_argument for a level gate, or if there is no stretch.
-    explicit Calibrated(Gate gate, std::size_t longest_stretch = 256, const Exact& exact = {})
+    explicit Calibrated(gates::Gate gate, std::size_t longest_stretch = 256,
+                        const Exact& exact = {})
         : Base(std::move(gate), true, exact), longest_(longest_stretch)
     {
         detail::check_longest_stretch(longest_);
@@ -95,9 +96,10 @@ public:
     /// Time [s] without a check from here; a billionth longer than the horizon, which is a
     /// number of steps, so that rounding does not cut off the last of them.
     template <class System, class X>
-    [[nodiscard]] Gate::Answer horizon(const System& system, Mode mode, double t, const X& x) const
+    [[nodiscard]] gates::Gate::Answer horizon(const System& system, Mode mode, double t,
+                                              const X& x) const
     {
-        Gate::Answer answer = this->gate().ask(system, mode, t, x);
+        gates::Gate::Answer answer = this->gate().ask(system, mode, t, x);
         answer.cleared *= 1 + 1e-9;
         return answer;
     }
@@ -112,7 +114,7 @@ public:
     static constexpr Evidence put_off = Evidence::gated;
 
     /// @throws std::invalid_argument for a horizon gate, or as `Planned`.
-    explicit CalibratedBounds(Gate gate, const PlannerOptions& options = {},
+    explicit CalibratedBounds(gates::Gate gate, const PlannerOptions& options = {},
                               const Exact& exact = {})
         : detail::AsksGate<Planned<Exact>>(std::move(gate), false, options, exact)
     {
@@ -126,8 +128,8 @@ public:
 
     /// A value that no guard is seen to be below; 0: nothing is known.
     template <class System, class X>
-    [[nodiscard]] Gate::Answer level(const System& system, std::size_t /*which*/, Mode mode,
-                                     double t, const X& x) const
+    [[nodiscard]] gates::Gate::Answer level(const System& system, std::size_t /*which*/, Mode mode,
+                                            double t, const X& x) const
     {
         return this->gate().ask(system, mode, t, x);
     }
@@ -139,14 +141,15 @@ public:
     static constexpr bool keeps_events = true;
 
     /// @throws std::invalid_argument for a level gate, or as `Planned`.
-    explicit Foreseen(Gate gate, const PlannerOptions& options = {}, const Exact& exact = {})
+    explicit Foreseen(gates::Gate gate, const PlannerOptions& options = {}, const Exact& exact = {})
         : detail::AsksGate<Planned<Exact>>(std::move(gate), true, options, exact)
     {
     }
 
     /// When [s] to look at last.
     template <class System, class X>
-    [[nodiscard]] Gate::Answer horizon(const System& system, Mode mode, double t, const X& x) const
+    [[nodiscard]] gates::Gate::Answer horizon(const System& system, Mode mode, double t,
+                                              const X& x) const
     {
         return this->gate().ask(system, mode, t, x);
     }

@@ -62,8 +62,8 @@ public:
 
     /// A value that the guard is proved to be above; 0: none.
     template <class System, class X>
-    [[nodiscard]] Gate::Answer level(const System& system, std::size_t which, Mode mode, double t,
-                                     const X& x) const
+    [[nodiscard]] gates::Gate::Answer level(const System& system, std::size_t which, Mode mode,
+                                            double t, const X& x) const
     {
         if (which != 0 || mode != 0) return {};
         std::array<double, GateRecipe::most> features;

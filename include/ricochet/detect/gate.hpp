@@ -49,6 +49,8 @@ void check_gate_model(const Model& model, const System& system)
 
 }  // namespace detail
 
+namespace gates {
+
 /// Immutable, shared by threads and copies; asking it allocates nothing.
 class Gate {
 public:
@@ -105,5 +107,7 @@ private:
     GateRecipe recipe_;
     bool horizon_;
 };
+
+}  // namespace gates
 
 }  // namespace ricochet

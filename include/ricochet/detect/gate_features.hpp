@@ -76,8 +76,7 @@ namespace detail {
 template <class System, class X>
 void flow_features(const System& system, Mode mode, double t, const X& x, double* out)
 {
-    thread_local X rate;  // so that a state sized at run time is allocated once
-    assign(rate, x);
+    X rate = x;
     call_flow(system, mode, t, x, rate);
     for_each_component(x, [&](auto i) { out[i] = rate[i]; });
 }

@@ -27,6 +27,7 @@
 #include "ricochet/detect/cover.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/bounds.hpp"
+#include "ricochet/hybrid/debug_checks.hpp"
 
 namespace ricochet {
 
@@ -45,11 +46,7 @@ struct PlannerOptions {
     /// that is wrong, negative or no number ends the run as `Outcome::wrong_bound`. Without this,
     /// too, a guard that is found beyond its surface where a bound has excluded it does, at the
     /// end of the run at the latest.
-#ifdef NDEBUG
-    bool check_bounds = false;
-#else
-    bool check_bounds = true;
-#endif
+    bool check_bounds = detail::is_debug_build();
 };
 
 namespace detail {

@@ -5,6 +5,8 @@
 // with slip rate V [m/s] and the state theta [s], which follows an evolution law.
 #pragma once
 
+#include "ricochet/hybrid/arithmetic.hpp"
+
 namespace ricochet {
 
 /// The defaults are those of S. Liu, K. Bhattacharya and N. Lapusta, Learning a potential

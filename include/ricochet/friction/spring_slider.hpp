@@ -1,6 +1,7 @@
 // A block on a spring whose far end is moved, with rate-and-state friction: stick-slip.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -65,6 +66,7 @@ enum class SliderOutcome {
     step_underflow,  ///< no step above 1e-14 t met the tolerance
     step_limit,
     non_finite,
+    cancelled,  ///< `SliderOptions::cancelled` was set
 };
 [[nodiscard]] std::string_view describe(SliderOutcome outcome) noexcept;
 
@@ -77,6 +79,8 @@ struct SliderOptions {
     double threshold = 0;      ///< [m/s] of onset and arrest; 0: not looked for
     std::size_t samples = 0;   ///< evenly over the run, both ends included; 0: none
     std::size_t max_steps = 10'000'000;
+    /// Set from another thread or a signal handler, it ends the run after the step in progress.
+    const std::atomic<bool>* cancelled = nullptr;
 };
 
 struct SliderRun {

@@ -73,6 +73,11 @@ template <class Law>
 [[nodiscard]] StageResponse implicit_response(const Law& law, double h, double v, double before,
                                               double start)
 {
+    if constexpr (Law::effect == DirectEffect::log) {
+        // Below the smallest double the log form has no value.
+        constexpr double none = std::numeric_limits<double>::quiet_NaN();
+        if (!(v > 0)) return {none, none, none, none};
+    }
     const double xi = implicit_state(law, h, v, before, start);
     const FrictionAndRateGradient g = law.gradient(v, xi);
     const double xi_y = v * h * g.rate_v / (1 - h * g.rate_xi);
@@ -243,6 +248,7 @@ template <class Elimination>
     for (int i = 1; i <= most_stage_iterations; ++i) {
         const double v = v_star * std::exp(search.y());
         const StageResponse r = eliminate(search.y(), v, e.xi);
+        if (std::isnan(r.friction)) return out;
         const double inertia = e.c * v;
         const double grip = e.normal_force * r.friction;
         const double gap = inertia + grip - e.force;

@@ -10,6 +10,8 @@
 #include <tuple>
 #include <utility>
 
+#include "ricochet/hybrid/arithmetic.hpp"
+
 namespace ricochet::detail {
 
 /// Number of components where the type fixes it, else 0.

@@ -4,7 +4,13 @@
 // them would be passed over in silence: a guard that is not const, a reset that returns
 // no mode, a function that counts its guards but is not told which. Here every such
 // member is looked at once per system, templates and overloads too, and is refused with
-// a sentence. A member whose own requires-clause does not hold is as good as absent.
+// a sentence. So is a member that cannot be called at all, because it is private or its own
+// requires-clause does not hold, and one whose name is a slip away from a known one. A
+// system that means all its names as they are says so:
+//
+//     static constexpr bool unchecked_names = true
+//
+// A class that is final cannot be asked for names.
 #pragma once
 
 #include <concepts>
@@ -56,6 +62,32 @@ struct NamesTwice : System, Names {};
 template <class System>
 struct NamesTwice<System, true> : Names {};
 
+/// The same of names that are likely misspellings.
+struct NearNames {
+#define RICOCHET_FUNCTION(wrong, right) int wrong;
+#define RICOCHET_VALUE(wrong, right) int wrong;
+#include "ricochet/hybrid/misspellings.inc"
+#undef RICOCHET_FUNCTION
+#undef RICOCHET_VALUE
+};
+
+template <class System, bool final = std::is_final_v<System>>
+struct NearNamesTwice : System, NearNames {};
+
+template <class System>
+struct NearNamesTwice<System, true> : NearNames {};
+
+/// None of those names is in use.
+template <class System>
+concept SpeltWell = requires
+{
+#define RICOCHET_FUNCTION(wrong, right) &NearNamesTwice<System>::wrong;
+#define RICOCHET_VALUE(wrong, right) &NearNamesTwice<System>::wrong;
+#include "ricochet/hybrid/misspellings.inc"
+#undef RICOCHET_FUNCTION
+#undef RICOCHET_VALUE
+};
+
 // What can be asked of one name: whether a class has a member of it, how it can be
 // called, whether it has an address, whether it is a number or another value.
 #define RICOCHET_NAME(name)                                                                   \
@@ -69,6 +101,8 @@ struct NamesTwice<System, true> : Names {};
         };                                                                                    \
         template <class System>                                                               \
         static constexpr bool addressable = requires { &System::name; };                      \
+        template <class System>                                                               \
+        static constexpr bool type = requires { typename System::name; };                     \
         template <class System>                                                               \
         static constexpr bool number = requires(const System& system) {                       \
             requires std::is_arithmetic_v<std::remove_cvref_t<decltype(system.name)>>;        \
@@ -129,6 +163,18 @@ template <class Name, class System, class X>
         return Declaration::not_const;
     } else {
         return Name::template addressable<System> ? Declaration::does_not_fit : Declaration::absent;
+    }
+}
+
+/// A member of this name is there, but nothing outside can use it.
+template <class Name, class System, class X>
+[[nodiscard]] constexpr bool is_hidden() noexcept
+{
+    if constexpr (std::is_final_v<System> || !Name::template named<System> || Name::template type<System>) {
+        return false;
+    } else {
+        return !CallableSomehow<Name, System, X> && !Name::template addressable<System> &&
+               !Name::template value<System>;
     }
 }
 
@@ -361,13 +407,39 @@ template <class System, class X>
     return value_declaration<Name_unilateral, System, fits>();
 }
 
-/// Refuses what does not fit, with a sentence for each.
+/// Refuses names that are likely misspellings, with a sentence for each. A data member with a
+/// name near to that of a function has its own purpose, as a nested type has.
+template <class System>
+struct NearNamesOf {
+#define RICOCHET_FUNCTION(wrong, right)                                                              \
+    static_assert(requires { &NearNamesTwice<System>::wrong; } || requires { typename System::wrong; } || \
+                      requires(const System& system) { requires !std::is_function_v<std::remove_reference_t<decltype((system.wrong))>>; }, \
+                  "ricochet: found a member `" #wrong "`, which nothing calls; rename it to `" #right "`, or declare " \
+                  "static constexpr bool unchecked_names = true if it is meant");
+#define RICOCHET_VALUE(wrong, right)                                                                 \
+    static_assert(requires { &NearNamesTwice<System>::wrong; } || requires { typename System::wrong; }, \
+                  "ricochet: found a member `" #wrong "`, which nothing reads; rename it to `" #right "`, or declare " \
+                  "static constexpr bool unchecked_names = true if it is meant");
+#include "ricochet/hybrid/misspellings.inc"
+#undef RICOCHET_FUNCTION
+#undef RICOCHET_VALUE
+    static constexpr bool checked = true;
+};
+
+/// Refuses what does not fit, with a sentence for each. True, so that a static_assert makes
+/// the compiler look here before it looks elsewhere.
 template <class System, class X>
-constexpr void check_declarations()
+constexpr bool check_declarations()
 {
+    constexpr bool checks_names = !requires { requires System::unchecked_names; };
+    if constexpr (checks_names && !SpeltWell<System>) static_assert(NearNamesOf<System>::checked);
 #define RICOCHET_CHECK(name, expected)                                                        \
     {                                                                                         \
         constexpr Declaration found = name##_declaration<System, X>();                        \
+        static_assert(!checks_names || !is_hidden<Name_##name, System, X>(),                  \
+                      "ricochet: found a " #name " that cannot be used: it is private, or its " \
+                      "requires-clause does not hold; expected " expected "; or declare "      \
+                      "static constexpr bool unchecked_names = true if that is meant");        \
         static_assert(found != Declaration::not_const,                                        \
                       "ricochet: found a " #name " that is not const; expected " expected);   \
         static_assert(found != Declaration::does_not_fit,                                     \
@@ -408,6 +480,7 @@ constexpr void check_declarations()
     if constexpr (CountsGuards<System>) {
         static_assert(Guarded<System, X>, "ricochet: found guard_count, but neither guard(which, [mode,] t, x) nor guards([mode,] t, x, g) that fits the state");
     }
+    return true;
 }
 
 }  // namespace ricochet::detail

@@ -99,6 +99,7 @@ class Filippov : public detail::FilippovState<Fields> {
     using Surfaces = detail::Surfaces;
 
 public:
+    static constexpr bool unchecked_names = true;  // time events only where the fields have them
     static constexpr bool forward_only = true;  ///< runs backward in time are refused
     static constexpr std::size_t surface_count = Fields::surface_count;
     static constexpr std::size_t guards_per_surface = 4;

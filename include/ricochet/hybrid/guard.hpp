@@ -14,6 +14,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "ricochet/hybrid/arithmetic.hpp"
+
 namespace ricochet {
 
 /// The discrete state of a hybrid system, counted from 0. Systems name their modes

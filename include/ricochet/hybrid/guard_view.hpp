@@ -172,16 +172,13 @@ private:
     [[nodiscard]] double one_of_all(double t, const V& x) const
     {
         constexpr std::size_t fixed = fixed_guard_count<System, X>();
-        if constexpr (fixed == counted_at_run_time) {
-            thread_local std::vector<double> all;
-            all.resize(guard_count_of<X>(*system_));
-            detail::call_guards(*system_, mode_, t, x, std::span<double>(all));
-            return all[which_];
-        } else {
-            std::array<double, fixed> all;
-            detail::call_guards(*system_, mode_, t, x, std::span<double>(all));
-            return all[which_];
-        }
+        constexpr std::size_t on_stack = fixed == counted_at_run_time ? 256 : fixed;
+        const std::size_t count = guard_count_of<X>(*system_);
+        std::array<double, on_stack> few;
+        std::vector<double> many(count > on_stack ? count : 0);
+        const std::span<double> all(count > on_stack ? many.data() : few.data(), count);
+        detail::call_guards(*system_, mode_, t, x, all);
+        return all[which_];
     }
 
     const System* system_;

@@ -16,7 +16,7 @@ namespace ricochet {
 /// A step from `start()` to `start()` + h of a one-step method. `restep` is the
 /// method's own map from the start of the step, `interpolate` its dense output.
 template <class S, class X>
-concept Step = requires(const S& step, double s, X& x, X& dxdt, const X& at) {
+concept MethodStep = requires(const S& step, double s, X& x, X& dxdt, const X& at) {
     { step.time(s) } -> std::convertible_to<double>;  // t at offset s
     { step.h() } -> std::convertible_to<double>;
     { step.x0() } -> std::convertible_to<const X&>;
@@ -32,7 +32,7 @@ concept Step = requires(const S& step, double s, X& x, X& dxdt, const X& at) {
 
 /// A step whose dense output is a polynomial that can be had a component at a time.
 template <class S, class X>
-concept DenseStep = Step<S, X> && requires(const S& step) {
+concept DenseStep = MethodStep<S, X> && requires(const S& step) {
     { step.dense() } -> std::convertible_to<DenseParts<X>>;
 };
 

@@ -30,7 +30,11 @@
 //     enabled(which, mode)      whether the guard is looked at in that mode
 //     mode_count, mode_name(mode)
 //
-// A reset may also change the dimension of a state that is sized at run time.
+// A reset may also change the dimension of a state that is sized at run time: longer at any
+// time, shorter together with the mode, or, in a system that declares it, at any time, too:
+//
+//     static constexpr bool changes_dimension = true
+//
 // Events at known times:
 //
 //     next_time_event(t)        the first after t, t excluded, or infinity
@@ -41,8 +45,8 @@
 // speed_bound and others, see hybrid/bounds.hpp.
 //
 // All functions are const and free of side effects; t is in seconds. A function of one
-// of these names that fits none of the forms is refused by the compiler, see
-// hybrid/declarations.hpp. Guards written
+// of these names that fits none of the forms, and one of a name that is nearly one of
+// these, is refused by the compiler, see hybrid/declarations.hpp. Guards written
 // for any x that has `x[i]` are located without the rest of the state. A system
 // without a guard is integrated as a plain ordinary differential equation: none of
 // the machinery of events is compiled in.
@@ -50,10 +54,12 @@
 
 #include <concepts>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <type_traits>
 
+#include "ricochet/hybrid/components.hpp"
 #include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet {
@@ -404,13 +410,35 @@ namespace detail {
 
 // --- calling whichever form a system has ---
 
+/// x' into `dxdt`. A flow that gives it another dimension has made a mistake: then `dxdt` is
+/// filled with NaN in the dimension of x, so that nothing is read beyond its end, and the
+/// result is false.
 template <class System, class X>
-[[gnu::always_inline]] inline void call_flow(const System& system, [[maybe_unused]] Mode mode, double t, const X& x, X& dxdt)
+[[gnu::always_inline]] inline bool call_flow(const System& system, [[maybe_unused]] Mode mode, double t, const X& x, X& dxdt)
 {
     if constexpr (ModedFlow<System, X>) {
         system.flow(mode, t, x, dxdt);
     } else {
         system.flow(t, x, dxdt);
+    }
+    if constexpr (fixed_size<X>() == 0) {
+        if (dxdt.size() != x.size()) [[unlikely]] {
+            dxdt = x;
+            for_each_component(x, [&](auto i) { dxdt[i] = std::numeric_limits<double>::quiet_NaN(); });
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Whether a reset may leave `after` where the state was `before`.
+template <class System, class X>
+[[nodiscard]] constexpr bool fits_dimension(const X& before, const X& after, bool same_mode) noexcept
+{
+    if constexpr (fixed_size<X>() > 0 || requires { requires System::changes_dimension; }) {
+        return true;
+    } else {
+        return after.size() >= before.size() || !same_mode;
     }
 }
 

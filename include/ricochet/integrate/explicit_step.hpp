@@ -173,7 +173,7 @@ public:
     void flow(double s, const X& x, X& dxdt) const
     {
         ++flow_calls_;
-        call_flow(*system_, mode_, time(s), x, dxdt);
+        flow_fits_ &= call_flow(*system_, mode_, time(s), x, dxdt);
         if (backward_) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
     }
 
@@ -266,6 +266,8 @@ public:
         assign(at.rate, rate0_);
     }
 
+    /// Whether the flow has given its rate the dimension of the state, always.
+    [[nodiscard]] bool flow_fits() const noexcept { return flow_fits_; }
     [[nodiscard]] std::uint64_t flow_calls() const noexcept { return flow_calls_; }
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
 
@@ -301,10 +303,12 @@ private:
             const Instant start = start_;
             const std::uint64_t calls = flow_calls_;
             const std::uint64_t resteps = resteps_;
+            const bool fits = flow_fits_;
             *this = ExplicitStep(*system_, start.value, x, mode, backward);
             start_ = start;
             flow_calls_ = calls;
             resteps_ = resteps;
+            flow_fits_ = flow_fits_ && fits;
         }
         assign(x0_, x);
         assign(remainder_, zero_);
@@ -345,6 +349,7 @@ private:
         const X& x;
         const X& rate;
         const X& zero;
+        bool& flow_fits;
     };
 
     /// The departure w after a step of length s, with its rate there and the error
@@ -360,11 +365,13 @@ private:
             });
             ++calls;
             if (from.backward) {
-                call_flow(from.system, from.mode, from.start.plus(-offset), at, departure_rate);
+                from.flow_fits &=
+                    call_flow(from.system, from.mode, from.start.plus(-offset), at, departure_rate);
                 for_each_component(
                     from.x, [&](auto i) { departure_rate[i] = -departure_rate[i] - from.rate[i]; });
             } else {
-                call_flow(from.system, from.mode, from.start.plus(offset), at, departure_rate);
+                from.flow_fits &=
+                    call_flow(from.system, from.mode, from.start.plus(offset), at, departure_rate);
                 for_each_component(from.x, [&](auto i) { departure_rate[i] -= from.rate[i]; });
             }
         };
@@ -402,9 +409,9 @@ private:
             X w_own{};
             X rate_own{};
             X error_own{};
-            flow_calls_ +=
-                depart<with_error>(own, {*system_, start_, mode_, backward_, x, rate0, zero}, s, at,
-                                   w_own, rate_own, error_own);
+            flow_calls_ += depart<with_error>(
+                own, {*system_, start_, mode_, backward_, x, rate0, zero, flow_fits_}, s, at, w_own,
+                rate_own, error_own);
             assign(w, w_own);
             if constexpr (is_fsal<Stepper>) assign(rate, rate_own);
             if constexpr (with_error) assign(error, error_own);
@@ -413,8 +420,8 @@ private:
             }
         } else {
             flow_calls_ += depart<with_error>(
-                stepper, {*system_, start_, mode_, backward_, x0_, rate0_, zero_}, s, at_, w, rate,
-                error);
+                stepper, {*system_, start_, mode_, backward_, x0_, rate0_, zero_, flow_fits_}, s,
+                at_, w, rate, error);
         }
     }
 
@@ -449,6 +456,7 @@ private:
     mutable X w_slope1_ = zero_;
     mutable std::array<X, inner_nodes> inner_w_, inner_rate_;
     mutable bool dense_ready_ = false;
+    mutable bool flow_fits_ = true;
     mutable std::uint64_t flow_calls_ = 0;
     mutable std::uint64_t resteps_ = 0;
 };

@@ -1,6 +1,7 @@
 // A whole run in one call.
 #pragma once
 
+#include "ricochet/integrate/refused_calls.hpp"
 #include "ricochet/integrate/simulation.hpp"
 
 namespace ricochet {
@@ -42,7 +43,7 @@ requires NotIntegrable<System, X> Run<X> integrate(const System&, const X&, cons
                   "ricochet: found a start that is no state; expected std::array, std::vector or a "
                   "vector of Eigen, of double");
     if constexpr (StateVector<X>) {
-        detail::check_declarations<System, X>();
+        static_assert(detail::check_declarations<System, X>());
         static_assert(detail::flow_declaration<System, X>() != detail::Declaration::absent,
                       "ricochet: found no flow that fits the state; expected void flow([Mode,] "
                       "double t, const State& x, State& dxdt) const");

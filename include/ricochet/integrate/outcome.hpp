@@ -20,6 +20,8 @@ enum class Outcome {
     wrong_bound,           ///< a guard broke a bound that the system declares for it
     not_converged,         ///< a set-valued stage could not be solved however short the step
     time_event_not_ahead,  ///< `next_time_event(t)` returned a time that is not after t
+    wrong_dimension,       ///< the flow or a reset left a state of another dimension
+    stalled,               ///< `Options::stall_steps` steps hardly advanced the time
 };
 
 /// The enumerator's name, e.g. "reached_end".

@@ -59,6 +59,8 @@ namespace detail {
 /// @throws std::invalid_argument: a guard is not finite at the start.
 [[noreturn]] void throw_start_guard_not_finite(std::size_t which, std::string_view name, double t,
                                                double guard);
+/// @throws std::invalid_argument: the flow gives its rate another dimension at the start.
+[[noreturn]] void throw_flow_does_not_fit(std::size_t components);
 /// @throws std::invalid_argument: the start mode is none of the system's.
 [[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
 /// @throws std::invalid_argument: a run backward in time of a system that has none.
@@ -74,6 +76,7 @@ template <class System, class X, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>
 class Simulation {
+    static_assert(detail::check_declarations<System, X>());
     using Method = typename Stepping::method;
     using CurrentStep = detail::ExplicitStep<Method, System, X>;
     using Guard = GuardView<System, X>;
@@ -119,6 +122,7 @@ public:
           locator_(locator),
           resolution_(options),
           backward_(options.t_end < options.t_start),
+          components_(static_cast<std::size_t>(x0.size())),
           step_(system, options.t_start, x0, options.mode, backward_),
           bank_(system, backward_),
           search_(x0, bank_.size()),
@@ -131,6 +135,9 @@ public:
             h_next_ = std::min(h_next_, options_.h_max);
         }
         refuse_bad_modes();
+        if (!step_.flow_fits()) {
+            detail::throw_flow_does_not_fit(static_cast<std::size_t>(x0.size()));
+        }
         if constexpr (guarded) refuse_bad_guards();
         if constexpr (requires { requires System::forward_only; }) {
             if (backward_) detail::throw_forward_only();
@@ -251,19 +258,22 @@ public:
 
     /// All that the future depends on. A simulation of the same system with the same
     /// options, stepping, detector and locator that restores it goes on with the same
-    /// bits. What was recorded is not part of it.
+    /// bits; only its end, its sample times and what it records may be others. What was
+    /// recorded is not part of it.
     [[nodiscard]] Snapshot save()
     {
         Snapshot snapshot;
+        snapshot.run = properties();
         visit_state(detail::SnapshotWriter(snapshot));
         return snapshot;
     }
 
-    /// @throws std::invalid_argument if the snapshot is of another kind of simulation, or
-    /// no state of one; then nothing has changed.
+    /// @throws std::invalid_argument naming what does not agree if the snapshot is of another
+    /// run, or no state of one; then nothing has changed.
     void restore(const Snapshot& snapshot)
     {
         const Snapshot old = save();
+        detail::require_same_run(snapshot.run, old.run);
         try {
             detail::SnapshotReader reader(snapshot);
             visit_state(reader);
@@ -274,6 +284,7 @@ public:
             throw;
         }
         step_.restart(place_);
+        next_review_ = 0;
         show_all();
         if constexpr (guarded) search_.begin(step_.x0());
         if constexpr (puts_off) planner_.restore(bank_);
@@ -292,7 +303,6 @@ private:
 
     static const Options& checked(const Options& options, const X& x0)
     {
-        detail::check_declarations<System, X>();
         detail::check_bound_declarations<System, X>();
         validate(options, !error_controlled);
         if (x0.size() == 0) detail::throw_start_empty();
@@ -304,17 +314,49 @@ private:
         return options;
     }
 
+    [[nodiscard]] std::vector<RunProperty> properties() const
+    {
+        using namespace detail;
+        return properties_of_run({.system = name_of_system(*system_),
+                                  .stepping = plain_type_name(written_type<Stepping>()),
+                                  .detector = plain_type_name(written_type<Detector>()),
+                                  .locator = plain_type_name(written_type<Locator>()),
+                                  .components = components_,
+                                  .guards = bank_.size(),
+                                  .error_controlled = error_controlled},
+                                 options_);
+    }
+
+    /// Of a snapshot that has been read.
     void refuse_bad_place() const
     {
+        const auto require = [](bool fulfilled, std::string_view what) {
+            if (!fulfilled) detail::throw_snapshot_is_no_state(what);
+        };
+        const auto components = static_cast<std::size_t>(place_.x.size());
+        constexpr bool may_shrink = Moded<System, X> || requires
+        {
+            requires System::changes_dimension;
+        };
+        require(components >= (may_shrink ? 1 : components_) &&
+                    place_.remainder.size() == place_.x.size() &&
+                    place_.rate.size() == place_.x.size(),
+                "the number of components");
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(place_.t.value);
+        require(std::isfinite(place_.t.value) && std::fabs(place_.t.remainder) <= ulp &&
+                    !lies_before(options_.t_end, place_.t.value) &&
+                    !lies_before(place_.t.value, options_.t_start),
+                "the time");
+        require(ended_ || (detail::all_finite(place_.x) && detail::all_finite(place_.remainder) &&
+                           detail::all_finite(place_.rate)),
+                "the state");
+        require(h_next_ > 0 && std::isfinite(h_next_) &&
+                    (!error_controlled || h_next_ <= options_.h_max),
+                "the next step");
+        require(ended_ || lies_before(place_.t.value, time_event_) || !timed,
+                "the next time event");
         const std::size_t modes = mode_count_of(*system_);
-        const bool sizes = place_.x.size() > 0 && place_.remainder.size() == place_.x.size() &&
-                           place_.rate.size() == place_.x.size();
-        const bool finite = std::isfinite(place_.t.value) && std::isfinite(h_next_) &&
-                            h_next_ > 0 && (ended_ || detail::all_finite(place_.x));
-        if (!sizes || !finite || (modes > 0 && place_.mode >= modes) ||
-            lies_before(options_.t_end, place_.t.value)) {
-            detail::throw_snapshot_does_not_fit();
-        }
+        require(modes == 0 || place_.mode < modes, "the mode");
     }
 
     [[nodiscard]] Planner make_planner([[maybe_unused]] const X& x0) const
@@ -422,7 +464,7 @@ private:
     {
         const double remaining = step_.until(options_.t_end);
         if (!(remaining > 0)) return reach_end();
-        if (run_.statistics.steps == options_.max_steps) return end(Outcome::step_limit);
+        if (run_.statistics.steps >= next_review_ && !may_take_more_steps()) return;
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
             if (is_tentative()) take_back();
             return end(Outcome::cancelled);
@@ -437,6 +479,35 @@ private:
             }
             pass();
         }
+    }
+
+    /// Whether the run may go on after as many steps; decides when it is asked next.
+    [[gnu::noinline]] bool may_take_more_steps()
+    {
+        const std::uint64_t steps = run_.statistics.steps;
+        if (steps >= options_.max_steps) {
+            end(Outcome::step_limit);
+        } else if (next_review_ > 0 && !is_tentative() && stands_still()) {
+            end(Outcome::stalled);
+        }
+        reviewed_ = step_.start().value;
+        const std::uint64_t stride = options_.stall_steps;
+        next_review_ =
+            stride > 0 && options_.max_steps - steps > stride ? steps + stride : options_.max_steps;
+        return !ended_;
+    }
+
+    /// Whether time has hardly advanced since the last review.
+    [[nodiscard]] bool stands_still() const noexcept
+    {
+        const double span = std::fabs(options_.t_end - options_.t_start);
+        return std::fabs(step_.until(reviewed_)) < 1e-9 * span;
+    }
+
+    /// A failure of a step, or what lies behind it.
+    void end_step(Outcome outcome) noexcept
+    {
+        end(step_.flow_fits() ? outcome : Outcome::wrong_dimension);
     }
 
     void reach_end()
@@ -671,7 +742,7 @@ private:
         } else {
             step_.attempt(h);
             if (!step_.end_is_finite()) {
-                end(Outcome::non_finite);
+                end_step(Outcome::non_finite);
                 return false;
             }
             return true;
@@ -698,7 +769,7 @@ private:
             time_event_due_ = false;
             largest = 1;
             if (h < smallest_step()) {
-                end(finite ? Outcome::step_underflow : Outcome::non_finite);
+                end_step(finite ? Outcome::step_underflow : Outcome::non_finite);
                 return false;
             }
         }
@@ -1005,10 +1076,18 @@ private:
             end(Outcome::conflicting_resets, resets_.conflict().first);
         } else if (modes > 0 && resets_.mode() >= modes) {
             end(Outcome::unknown_mode, first_member());
+        } else if (!fits_dimension(search_.before(), resets_.after(),
+                                   resets_.mode() == step_.mode())) {
+            end(Outcome::wrong_dimension, first_member());
         } else if (!detail::all_finite(resets_.after()) || resets_.after().size() == 0) {
             end(Outcome::non_finite, first_member());
         }
         return !ended_;
+    }
+
+    [[nodiscard]] static bool fits_dimension(const X& before, const X& after, bool same_mode)
+    {
+        return detail::fits_dimension<System>(before, after, same_mode);
     }
 
     /// Whether the events of a member accumulate here. It comes to rest, or the run
@@ -1054,7 +1133,14 @@ private:
                     .bracket = {step_.time(0), t},
                     .slope = 0,
                     .error = error});
-            if (!detail::all_finite(after)) return end(Outcome::non_finite, i);
+            const std::size_t modes = mode_count_of(*system_);
+            if (modes > 0 && mode_after >= modes) return end(Outcome::unknown_mode, i);
+            if (!fits_dimension(before, after, mode_after == mode)) {
+                return end(Outcome::wrong_dimension, i);
+            }
+            if (!detail::all_finite(after) || after.size() == 0) {
+                return end(Outcome::non_finite, i);
+            }
             step_.restart(ahead, 0, after, mode_after);
             bank_[i].intervals = {};
             bank_[i].band = 0;
@@ -1432,12 +1518,30 @@ private:
         visit(resting_);
         visit(ended_);
         visit(run_.outcome);
-        visit(next_sample_);
+        visit_samples(visit);
         if constexpr (guarded) bank_.visit(visit);
         if constexpr (puts_off) {
             visit(last_h_);
             visit(newly_armed_);
             planner_.visit(visit);
+        }
+    }
+
+    /// The next sample is the first that is neither behind nor written already.
+    template <class Visitor>
+    void visit_samples(Visitor&& visit)
+    {
+        const auto& times = options_.sample_times;
+        double written = next_sample_ > 0 ? times[next_sample_ - 1] : -infinity;
+        if (backward_ && next_sample_ == 0) written = infinity;
+        visit(written);
+        if constexpr (!std::remove_cvref_t<Visitor>::saves) {
+            next_sample_ = 0;
+            while (next_sample_ < times.size() &&
+                   (lies_before(times[next_sample_], place_.t.value) ||
+                    !lies_before(written, times[next_sample_]))) {
+                ++next_sample_;
+            }
         }
     }
 
@@ -1451,6 +1555,7 @@ private:
     Locator locator_;
     detail::EventResolution resolution_;
     bool backward_;
+    std::size_t components_;  ///< of the state at the start
     CurrentStep step_;
     Bank bank_;
     Search search_;
@@ -1460,6 +1565,8 @@ private:
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
     bool watching_ = false;    ///< with their rates: every step is checked
     std::size_t careful_steps_ = 0;  ///< without looking ahead
+    std::uint64_t next_review_ = 0;  ///< of the number of steps, against the options
+    double reviewed_ = 0;            ///< [s] time of the last review
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
     bool is_last_ = false;

@@ -1,36 +1,107 @@
-// A run, saved: everything its future depends on, as numbers.
+// A run, saved: everything its future depends on, as numbers, and the run it belongs to.
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include "ricochet/hybrid/components.hpp"
+#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/outcome.hpp"
 
 namespace ricochet {
+
+/// What two runs have to have in common if one is to go on where the other was saved, as text:
+/// {"method", "FixedStep<Odeint<euler>>"}, {"rtol", "1e-08"}.
+struct RunProperty {
+    std::string name;
+    std::string value;
+
+    [[nodiscard]] bool operator==(const RunProperty&) const = default;
+};
 
 /// What `Simulation::save` returns. Real numbers and the rest, in the order in which
 /// the simulation lists them.
 struct Snapshot {
+    std::vector<RunProperty> run;  ///< the run that it belongs to
     std::vector<double> numbers;
     std::vector<std::uint64_t> counts;
 
     [[nodiscard]] bool operator==(const Snapshot&) const = default;
 };
 
-/// The snapshot as text, its numbers in hexadecimal so that no bit is lost.
+/// The snapshot as text, its numbers in hexadecimal so that no bit is lost, with a checksum.
 [[nodiscard]] std::string to_text(const Snapshot& snapshot);
 
-/// @throws std::invalid_argument if `text` is not what `to_text` writes.
+/// @throws std::invalid_argument if `text` is not what `to_text` has written, to the letter.
 [[nodiscard]] Snapshot snapshot_from_text(std::string_view text);
 
 namespace detail {
 
 /// @throws std::invalid_argument: the snapshot does not fit the simulation.
 [[noreturn]] void throw_snapshot_does_not_fit();
+/// @throws std::invalid_argument: `what` has a value that it has in no run.
+[[noreturn]] void throw_snapshot_is_no_state(std::string_view what);
+
+/// The name of a type as the compiler writes it, somewhere in this text.
+template <class T>
+[[nodiscard]] constexpr const char* written_type() noexcept
+{
+    return __PRETTY_FUNCTION__;
+}
+
+/// That name without namespaces, the same from every compiler: `Planned<Extremum>`.
+[[nodiscard]] std::string plain_type_name(std::string_view written);
+
+/// The name that a system declares, else that of its type.
+template <class System>
+[[nodiscard]] std::string name_of_system(const System& system)
+{
+    if constexpr (requires {
+                      {
+                          system.name
+                          } -> std::convertible_to<std::string_view>;
+                  }) {
+        return std::string(std::string_view(system.name));
+    } else {
+        return plain_type_name(written_type<System>());
+    }
+}
+
+/// What a run is made of.
+struct RunParts {
+    std::string system;
+    std::string stepping, detector, locator;
+    std::size_t components = 0;  ///< of the state at the start
+    std::size_t guards = 0;
+    bool error_controlled = false;
+};
+
+[[nodiscard]] std::vector<RunProperty> properties_of_run(const RunParts& parts,
+                                                         const Options& options);
+/// @throws std::invalid_argument naming the first property that the two do not share.
+void require_same_run(const std::vector<RunProperty>& saved, const std::vector<RunProperty>& here);
+
+/// Whether a flag, a count or an enumerator may have this value.
+[[nodiscard]] constexpr bool may_be(Side, std::uint64_t value) noexcept
+{
+    return value <= static_cast<std::uint64_t>(Side::above);
+}
+[[nodiscard]] inline bool may_be(Outcome, std::uint64_t value) noexcept
+{
+    return value < 256 && name(static_cast<Outcome>(value)) != "unknown";
+}
+template <std::unsigned_integral T>
+[[nodiscard]] constexpr bool may_be(T, std::uint64_t value) noexcept
+{
+    return value <= std::numeric_limits<T>::max();
+}
 
 class SnapshotWriter {
 public:
@@ -51,7 +122,7 @@ public:
     template <class X>
     void state(const X& x)
     {
-        (*this)(x.size());
+        (*this)(static_cast<std::size_t>(x.size()));
         for_each_component(x, [&](auto i) { snapshot_->numbers.push_back(x[i]); });
     }
 
@@ -73,7 +144,9 @@ public:
             value = snapshot_->numbers[number_++];
         } else {
             if (count_ == snapshot_->counts.size()) throw_snapshot_does_not_fit();
-            value = static_cast<T>(snapshot_->counts[count_++]);
+            const std::uint64_t count = snapshot_->counts[count_++];
+            if (!may_be(T{}, count)) throw_snapshot_is_no_state("a flag or a count");
+            value = static_cast<T>(count);
         }
     }
 

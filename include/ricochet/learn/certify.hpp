@@ -159,6 +159,8 @@ struct CertifyReport {
     std::vector<Estimate> estimates{};       ///< of these, and of the one that was not
     std::vector<double> counterexample{};    ///< if refuted
     double seconds = 0;                      ///< of everything, searches and estimates included
+    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    std::string checkpoint_trouble{};
 };
 
 /// A model with its certificate, which has the levels that were finished; none: empty. The

@@ -88,6 +88,8 @@ struct Report {
     Assessment validation;            ///< the set the threshold was chosen on
     Assessment held_out;              ///< the test set
     std::optional<Assessment> fresh;  ///< new balanced states, band included
+    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    std::string checkpoint_trouble{};
 };
 
 struct Trained {

@@ -88,6 +88,8 @@ struct EvolutionResult {
     std::size_t evaluations = 0;
     std::size_t generations = 0;
     double seconds = 0;
+    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    std::string checkpoint_trouble{};
 };
 
 /// Minimises `score`, starting at x0, which is itself tried first.

@@ -129,6 +129,8 @@ struct GateReport {
     std::uint64_t events = 0;         ///< in all runs before the trial
     double looks = 1;                 ///< exact looks per step, as expected from the validation set
     GateTrial trial;
+    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    std::string checkpoint_trouble{};
 };
 
 struct TrainedGate {

@@ -83,6 +83,8 @@ struct TrainedPolicy {
     std::size_t steps = 0;  ///< done
     std::size_t episodes = 0;
     double seconds = 0;
+    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    std::string checkpoint_trouble{};
 };
 
 }  // namespace ricochet::learn

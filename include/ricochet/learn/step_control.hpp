@@ -30,6 +30,9 @@ class StrikeSlipFault;
 
 namespace ricochet::learn {
 
+/// What is told how far something has come, as a share; false ends it.
+using StepWatch = std::function<bool(double done)>;
+
 /// A rule with its tolerance, or with the length of constant steps.
 struct StepRule {
     StepController controller = ErrorStep{.order = 3, .reject_above = 100};
@@ -37,6 +40,8 @@ struct StepRule {
     ErrorEstimate estimate = ErrorEstimate::embedded;
     /// The first step, or all of them with `ConstantStep`, over that of the problem.
     double step = 1;
+    /// Told after every step what share of the time is done; false ends the run before its end.
+    StepWatch watch{};
 };
 
 /// [s] The first step of a rule on a problem whose usual step is that.
@@ -84,9 +89,10 @@ struct FaultFamilyOptions {
 /// references are explicit runs with steps far shorter.
 [[nodiscard]] StepFamily fault_family(const FaultFamilyOptions& options = {});
 
-/// A fault as a problem, its reference from an explicit run until `t_end` [s].
+/// A fault as a problem, its reference from an explicit run until `t_end` [s], which is watched.
+/// @throws std::runtime_error if that run ends early.
 [[nodiscard]] StepProblem fault_problem(const StrikeSlipFault& fault, double t_end,
-                                        double polynomial_bound = 0);
+                                        double polynomial_bound = 0, const StepWatch& watch = {});
 
 /// Sliding modes: gain, frequency and start up and down by 2, amplitude 0.4 to 0.95 of the gain;
 /// they slide for 30 to 85 % of the time. Work is counted in solves, the reference is the solution.
@@ -165,7 +171,7 @@ struct SearchedSteps {
 /// happens to fall, and is no proof that there is none better.
 [[nodiscard]] SearchedSteps search_steps(const StepProblem& problem, std::size_t count,
                                          std::size_t evaluations, std::uint64_t seed = 1,
-                                         unsigned threads = 2);
+                                         unsigned threads = 2, const StepWatch& watch = {});
 
 struct StepTrainingOptions {
     std::uint64_t seed = 1;

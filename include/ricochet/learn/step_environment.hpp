@@ -59,6 +59,8 @@ struct StepWorldOptions {
     /// A fault's episode ends when nothing moves any more, nor will. The source goes on.
     bool until_rest = false;
     std::uint64_t max_attempts = 20'000;  ///< then an episode is cut
+    /// Told of the reference's run and of an episode after every step; false ends them.
+    StepWatch watch{};
 };
 
 /// The source's own.

@@ -173,7 +173,7 @@ public:
     }
 
     /// New states on which the gate is wrong or nearly so, and states near them.
-    [[nodiscard]] GateSamples hard(const Gate& gate, std::size_t events, std::uint64_t seed)
+    [[nodiscard]] GateSamples hard(const gates::Gate& gate, std::size_t events, std::uint64_t seed)
     {
         const GateSamples fresh = sample(events, training_.states / 4, seed);
         Random random(seed ^ 0x9e3779b9U);
@@ -579,7 +579,7 @@ template <class System, class X, class Stepping>
         const std::size_t events =
             training.hard_events > 0 ? training.hard_events : training.events;
         const GateSamples hard =
-            runs.hard(Gate(complete()), events, training.seed + 2'000'003 * (round + 2));
+            runs.hard(gates::Gate(complete()), events, training.seed + 2'000'003 * (round + 2));
         if (runs.stopped()) break;
         trainer.add(hard);
     }
@@ -587,12 +587,13 @@ template <class System, class X, class Stepping>
     trained.report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (runs.stopped()) return stop();
-    if (training.fresh_events == 0 || trained.report.outcome == TrainingOutcome::stopped) {
-        return trained;
-    }
+    // Of weights that are no numbers nothing is to be measured.
+    const bool usable = trained.report.outcome != TrainingOutcome::stopped &&
+                        trained.report.outcome != TrainingOutcome::diverged;
+    if (training.fresh_events == 0 || !usable) return trained;
     const std::uint64_t fresh = training.seed + 7'000'003;
     GateTrial& trial = trained.report.trial;
-    const Gate gate(trained.model);
+    const gates::Gate gate(trained.model);
     if (training.kind == GateKind::horizon) {
         trial = runs.compare(Calibrated(gate), training.fresh_events, fresh);
     } else if constexpr (Bounded<System, X>) {

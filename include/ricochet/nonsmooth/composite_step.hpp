@@ -251,7 +251,7 @@ private:
     StageMethod method_ = StageMethod::cases;
     StageScratch<System> scratch_;
     detail::StageNewton<System> newton_;
-    Stage<System> stage_;
+    detail::Stage<System> stage_;
     Vector f_;  // f_n
     State middle_;
     Branches branches_;

@@ -88,6 +88,8 @@ template <BoxSet Box>
 
 }  // namespace detail
 
+namespace sets {
+
 /// [lower, upper], either of which may be infinite. As a set of reactions: a relay
 /// (sign), Coulomb friction of one direction. As a set of states: stops, a saturation.
 class IntervalSet {
@@ -399,6 +401,8 @@ private:
 
     std::tuple<Sets...> sets_;
 };
+
+}  // namespace sets
 
 /// What is wrong with `set`, nothing if it is fine or does not say.
 template <ConvexSet Set>

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/hybrid/debug_checks.hpp"
 #include "ricochet/integrate/step_controllers.hpp"
 #include "ricochet/nonsmooth/minimal_selection.hpp"
 #include "ricochet/nonsmooth/step_layout.hpp"
@@ -138,9 +139,9 @@ public:
         start_branches_.setConstant(now_.reaction.size(), Branch::inside);
         restart(options.t_start, w0);
         before_ = now_;
-#ifndef NDEBUG
-        check_projection(system.reaction_set(options.t_start, w0));
-#endif
+        if (detail::is_debug_build()) {
+            check_projection(system.reaction_set(options.t_start, w0));
+        }
     }
 
     /// Goes on from (t, w) as from a start: after a jump, or when an event-driven

@@ -18,6 +18,8 @@
 
 namespace ricochet {
 
+namespace detail {
+
 template <class System>
 struct Stage {
     double t = 0;
@@ -26,6 +28,8 @@ struct Stage {
     double sigma = 1;
     StateOf<System> q;
 };
+
+}  // namespace detail
 
 /// What became of a stage.
 struct StageReport {
@@ -65,7 +69,7 @@ struct StageFactor {
     typename Matrices::Action influence;   // sigma S^-1 G
     typename Matrices::Delassus delassus;  // E influence
 
-    void compute(const Matrices& m, const Stage<System>& stage)
+    void compute(const Matrices& m, const detail::Stage<System>& stage)
     {
         c = stage.c, kappa = stage.kappa, sigma = stage.sigma;
         if constexpr (direct) {
@@ -120,7 +124,7 @@ struct StageScratch {
 
     /// The factor of S at (t, w): an earlier one where f is affine and the weights are
     /// the same.
-    StageFactor<System>& factor(const Stage<System>& stage, const State& w)
+    StageFactor<System>& factor(const detail::Stage<System>& stage, const State& w)
     {
         if constexpr (detail::is_affine<System>()) {
             for (auto& known : factors) {
@@ -169,7 +173,7 @@ struct StageScratch {
 
     /// The residual of (w, r), with f = f(t, w) given; tells which law is worst.
     template <class Set>
-    StageReport residual(const Stage<System>& stage, const Set& set, const State& w,
+    StageReport residual(const detail::Stage<System>& stage, const Set& set, const State& w,
                          const State& f_at, const Reaction& r)
     {
         base.noalias() = stage.c * (m.mass() * w);

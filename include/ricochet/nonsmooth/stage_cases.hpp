@@ -14,8 +14,9 @@ using BranchesOf = typename LinearInequality<reaction_size<System>>::Branches;
 /// The residual on frozen branches: the equation, and the bounds where they were taken
 /// from an earlier iterate.
 template <class System, class Set>
-[[nodiscard]] StageReport without_law(StageScratch<System>& scratch, const Stage<System>& stage,
-                                      const Set& set, const BranchesOf<System>& branches)
+[[nodiscard]] StageReport without_law(StageScratch<System>& scratch,
+                                      const detail::Stage<System>& stage, const Set& set,
+                                      const BranchesOf<System>& branches)
 {
     const double scale = std::max({(stage.c * (scratch.m.mass() * scratch.trial)).template lpNorm<Eigen::Infinity>(),
                                    stage.q.template lpNorm<Eigen::Infinity>(),
@@ -40,11 +41,11 @@ template <class System, class Set>
 /// Starts from (w, reaction) and overwrites them; on failure they are what was reached.
 /// `frozen`: stay on these branches, whether the solution lies on them or not.
 template <class System>
-[[nodiscard]] StageReport solve_cases(StageScratch<System>& scratch, const Stage<System>& stage,
+[[nodiscard]] StageReport solve_cases(StageScratch<System>& scratch,
+                                      const detail::Stage<System>& stage,
                                       const StageOptions& options, StateOf<System>& w,
                                       ReactionOf<System>& reaction, BranchesOf<System>& branches,
-                                      bool frozen = false)
-    requires BoxSet<SetOf<System>>
+                                      bool frozen = false) requires BoxSet<SetOf<System>>
 {
     const auto& m = scratch.m;
     auto& inequality = scratch.inequality;

@@ -19,8 +19,9 @@ namespace ricochet::detail {
 /// Learning-based adaptive time-integration for nonsmooth dynamics, and its code.)
 template <class System>
 [[nodiscard]] StageReport solve_fixed_point(StageScratch<System>& scratch,
-                                            const Stage<System>& stage, const StageOptions& options,
-                                            StateOf<System>& w, ReactionOf<System>& reaction)
+                                            const detail::Stage<System>& stage,
+                                            const StageOptions& options, StateOf<System>& w,
+                                            ReactionOf<System>& reaction)
 {
     const auto& m = scratch.m;
     m.offset(stage.t, scratch.s);

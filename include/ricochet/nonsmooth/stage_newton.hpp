@@ -36,9 +36,9 @@ public:
         reaction_.setZero(k);
     }
 
-    [[nodiscard]] StageReport solve(StageScratch<System>& scratch, const Stage<System>& stage,
-                                    const StageOptions& options, StateOf<System>& w,
-                                    ReactionOf<System>& reaction)
+    [[nodiscard]] StageReport solve(StageScratch<System>& scratch,
+                                    const detail::Stage<System>& stage, const StageOptions& options,
+                                    StateOf<System>& w, ReactionOf<System>& reaction)
     {
         scratch_of_stage_ = &scratch;
         stage_ = &stage;
@@ -146,7 +146,7 @@ private:
     }
 
     StageScratch<System>* scratch_of_stage_ = nullptr;
-    const Stage<System>* stage_ = nullptr;
+    const detail::Stage<System>* stage_ = nullptr;
     double scale_ = 1;
     Vector x_;
     Matrix v_;

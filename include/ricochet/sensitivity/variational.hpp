@@ -72,6 +72,8 @@ class Variational
 
 public:
     using State = std::vector<double>;
+    static constexpr bool unchecked_names = true;  // some members are absent where the system's are
+    static constexpr bool changes_dimension = requires { requires System::changes_dimension; };
 
     /// @param options  tolerances of the run, by which grazing is told from crossing
     /// @throws std::invalid_argument for directions that make no sense, and whatever
@@ -205,6 +207,10 @@ public:
         } else {
             next = detail::ResetSet{fired}.apply(system(), mode, t, after, conflict);
         }
+        if (!detail::fits_dimension<System>(before, after, next == mode)) {
+            y.clear();  // refused by the loop
+            return mode;
+        }
         if (conflict.any()) {
             detail::for_each_component(after, [&](auto i) { after[i] = nan; });
         }
@@ -231,8 +237,13 @@ public:
     [[nodiscard]] Mode rest(std::size_t which, Mode mode, double t,
                             State& y) const requires Resting<System, X>
     {
-        X after = head(y);
+        const X before = head(y);
+        X after = before;
         const Mode next = detail::call_rest(system(), which, mode, t, after);
+        if (!detail::fits_dimension<System>(before, after, next == mode)) {
+            y.clear();
+            return mode;
+        }
         transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
             // The limit of the events moves as the last of them does.
             const detail::EventTime time = last.any ? detail::EventTime{Undefined::no, last.dt}
@@ -258,8 +269,13 @@ public:
     }
     [[nodiscard]] Mode time_reset(Mode mode, double t, State& y) const requires Timed<System>
     {
-        X after = head(y);
+        const X before = head(y);
+        X after = before;
         const Mode next = detail::call_time_reset(system(), mode, t, after);
+        if (!detail::fits_dimension<System>(before, after, next == mode)) {
+            y.clear();
+            return mode;
+        }
         transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
             return saltation_.pass_set(FiredGuards({}, true), after, motion, last);
         });

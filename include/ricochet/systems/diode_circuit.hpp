@@ -61,9 +61,9 @@ public:
         a.setZero();
         a.diagonal() << p_.capacitance_1, p_.capacitance_2, p_.inductance;
     }
-    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
+    [[nodiscard]] sets::IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
     {
-        return IntervalSet::symmetric(p_.current);
+        return sets::IntervalSet::symmetric(p_.current);
     }
 
     /// For policies that choose steps: they are measured over sqrt(inductance capacitance_2).

@@ -66,9 +66,9 @@ public:
     void mass(Eigen::Matrix2d& a) const { a << 1, 0, 0, p_.mass; }
     void observe(Eigen::Matrix<double, 1, 2>& e) const { e << 0, 1; }
     void offset(double /*t*/, Scalar& s) const { s[0] = p_.belt_speed; }
-    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& w) const
+    [[nodiscard]] sets::IntervalSet reaction_set(double /*t*/, const Vector& w) const
     {
-        return IntervalSet::symmetric(friction(std::abs(w[1] - p_.belt_speed)));
+        return sets::IntervalSet::symmetric(friction(std::abs(w[1] - p_.belt_speed)));
     }
     /// F on one side of y = 0, smooth beyond it.
     [[nodiscard]] double branch_bound(double /*t*/, const Vector& w, int /*which*/,

@@ -44,9 +44,9 @@ public:
         j.setZero();
         j(2, 0) = j(3, 1) = 1;
     }
-    [[nodiscard]] Ball<2> reaction_set(double /*t*/, const Vector& /*w*/) const
+    [[nodiscard]] sets::Ball<2> reaction_set(double /*t*/, const Vector& /*w*/) const
     {
-        return Ball<2>(p_.friction * p_.gravity * std::cos(p_.slope));
+        return sets::Ball<2>(p_.friction * p_.gravity * std::cos(p_.slope));
     }
 
     [[nodiscard]] const Parameters& parameters() const noexcept { return p_; }

@@ -61,12 +61,12 @@ public:
     {
         s << -p_.plate_speed * p_.plate_frequency * std::sin(p_.plate_frequency * t), 0;
     }
-    [[nodiscard]] Box<2> reaction_set(double /*t*/, const Vector& /*w*/) const
+    [[nodiscard]] sets::Box<2> reaction_set(double /*t*/, const Vector& /*w*/) const
     {
         const double weight = p_.mass * p_.gravity;
         const double force = p_.friction * weight;
         const double torque = p_.resistance * weight;
-        return Box<2>({-force, -torque}, {force, torque});
+        return sets::Box<2>({-force, -torque}, {force, torque});
     }
 
     /// When it begins to roll [s] after a start with spin 0 at `faster` > 0 [m/s] than the plate,

@@ -48,9 +48,9 @@ public:
     {
         j(0, 0) = 0;
     }
-    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
+    [[nodiscard]] sets::IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
     {
-        return IntervalSet::symmetric(p_.gain);
+        return sets::IntervalSet::symmetric(p_.gain);
     }
 
     /// For policies that choose steps: they are measured over the disturbance's radian.

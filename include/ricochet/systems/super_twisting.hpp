@@ -50,9 +50,9 @@ public:
         j << -p_.gain_1 / (2 * root), 1, 0, 0;
     }
     void act(Eigen::Matrix<double, 2, 1>& g) const { g << 0, 1; }
-    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
+    [[nodiscard]] sets::IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
     {
-        return IntervalSet::symmetric(p_.gain_2);
+        return sets::IntervalSet::symmetric(p_.gain_2);
     }
 
 private:

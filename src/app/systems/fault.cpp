@@ -9,11 +9,14 @@
 
 #include "../files.hpp"
 #include "../input.hpp"
+#include "../interrupt.hpp"
 #include "../json_text.hpp"
 #include "../plot.hpp"
 #include "../report.hpp"
+#include "../run_watch.hpp"
 #include "../simulate.hpp"
 #include "../step_policy.hpp"
+#include "../step_progress.hpp"
 #include "entries.hpp"
 #include "fault.hpp"
 #include "ricochet/systems/fault_bathe.hpp"
@@ -128,6 +131,7 @@ RuptureOptions options(const SystemEntry& system, const SimulateRequest& request
     if (run.step && !run.rtol) out.rtol = std::numeric_limits<double>::infinity();
     if (run.rtol) out.rtol = *run.rtol;
     if (run.max_steps) out.max_steps = *run.max_steps;
+    out.progress = [](double) { return !Interrupts::any(); };
     if (request.plot) {
         constexpr int pictures = 120;
         for (int i = 0; i <= pictures; ++i) {
@@ -178,6 +182,7 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
         out["statistics"]["iterations"] = s.iterations;
         if (how.controller == "learned") out["statistics"]["handed_over"] = s.handed_over;
     }
+    if (r.outcome == RuptureOutcome::cancelled) out["incomplete"] = Interrupts::cause();
     if (request.kernel) out["kernel"] = request.kernel->string();
     if (request.samples) {
         const MeanSamples samples = sampled(r, asked.t_end, *request.samples);
@@ -287,22 +292,43 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
     const Integration how = integration(request.run);
     RuptureOptions asked = options(system, request);
     validate(asked);
-    if (request.csv) check_writable("--csv", *request.csv);
-    if (request.plot) check_plot(*request.plot);
+    Claims claims;
+    if (request.kernel) claims.reads("--kernel", *request.kernel);
+    if (how.controller == "learned") {
+        claims.reads("the model", policy_file(fault_step_layout(), request.run.model));
+    }
+    claim_results(claims, request);
+    const Interrupts interrupts;
     const auto start = std::chrono::steady_clock::now();
     const StrikeSlipFault fault(fault_parameters(values, request.kernel));
     const bool implicit = how.integrator != "explicit";
     constexpr double usual = 0.125 / 0.8660254037844386;  // 0.125 s at 3 km
     if (implicit && asked.step == 0) asked.step = usual * fault.time_unit();
-    const Rupture r =
-        implicit ? ricochet::simulate(fault, asked, how.bathe) : ricochet::simulate(fault, asked);
+    LongRun progress;
+    const RuptureOptions watched = shown(asked, progress, "simulate fault");
+    const Rupture r = [&] {
+        const RunWatch watch(0.25);
+        return implicit ? ricochet::simulate(fault, watched, how.bathe)
+                        : ricochet::simulate(fault, watched);
+    }();
+    progress.clear();
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    print(request.json ? json(system, values, fault, asked, how, r, request, taken.count())
-                       : text(system, fault, r, taken.count()));
-    if (request.csv) {
-        write_file(*request.csv, csv(sampled(r, asked.t_end, request.samples.value_or(1001))));
-    }
-    if (request.plot) draw_rupture(fault, asked, r, *request.plot);
+    const bool cancelled = r.outcome == RuptureOutcome::cancelled;
+    if (cancelled) asked.t_end = r.t;  // of samples and pictures
+    deliver(
+        {[&] {
+             print(request.json ? json(system, values, fault, asked, how, r, request, taken.count())
+                                : text(system, fault, r, taken.count()));
+         },
+         [&] {
+             if (!request.csv) return;
+             const std::string table = csv(sampled(r, asked.t_end, request.samples.value_or(1001)));
+             write_file(*request.csv, cancelled ? table + incomplete_line() : table);
+         },
+         [&] {
+             if (request.plot) draw_rupture(fault, asked, r, *request.plot);
+         }});
+    if (cancelled) return ended_early(fmt::format("at t = {} s", r.t));
     return r.outcome == RuptureOutcome::reached_end || r.outcome == RuptureOutcome::at_rest ? 0 : 1;
 }
 

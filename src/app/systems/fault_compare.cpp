@@ -11,8 +11,11 @@
 #include "../compare.hpp"
 #include "../files.hpp"
 #include "../input.hpp"
+#include "../interrupt.hpp"
 #include "../json_text.hpp"
 #include "../report.hpp"
+#include "../run_watch.hpp"
+#include "../step_progress.hpp"
 #include "../timing.hpp"
 #include "fault.hpp"
 #include "ricochet/systems/fault_bathe.hpp"
@@ -42,6 +45,7 @@ struct WayTaken {
 RuptureOptions sampled(double t_end, double step, double rtol = inf)
 {
     RuptureOptions out{.t_end = t_end, .step = step, .rtol = rtol};
+    out.progress = [](double) { return !Interrupts::any(); };
     for (int i = 1; i <= samples; ++i) out.snapshot_times.push_back(t_end * i / samples);
     return out;
 }
@@ -99,12 +103,14 @@ double velocity_error(const Rupture& run, const Rupture& exact)
     return std::sqrt(of_error / of_all);
 }
 
-WayTaken measure(const StrikeSlipFault& fault, const Way& way, const Rupture& exact)
+WayTaken measure(const StrikeSlipFault& fault, const Way& way, const Rupture& exact,
+                 LongRun& progress)
 {
     WayTaken row{.label = way.label, .run = {}};
+    const RuptureOptions options = shown(way.options, progress, way.label);
     const auto start = std::chrono::steady_clock::now();
-    row.run = way.bathe ? ricochet::simulate(fault, way.options, *way.bathe)
-                        : ricochet::simulate(fault, way.options);
+    row.run = way.bathe ? ricochet::simulate(fault, options, *way.bathe)
+                        : ricochet::simulate(fault, options);
     row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     row.slip_error = std::abs(row.run.mean_slip / exact.mean_slip - 1);
     row.velocity_error = velocity_error(row.run, exact);
@@ -149,10 +155,12 @@ std::string json(const StrikeSlipFault& fault, const Rupture& exact,
                            {"slip_error", row.slip_error},
                            {"velocity_error", row.velocity_error}});
     }
-    return json_text({{"system", "fault"},
-                      {"elements", fault.elements()},
-                      {"reference_mean_slip", exact.mean_slip},
-                      {"methods", std::move(methods)}});
+    Json out{{"system", "fault"},
+             {"elements", fault.elements()},
+             {"reference_mean_slip", exact.mean_slip},
+             {"methods", std::move(methods)}};
+    if (Interrupts::any()) out["incomplete"] = Interrupts::cause();
+    return json_text(out);
 }
 
 }  // namespace
@@ -175,19 +183,31 @@ int compare_fault(const SystemEntry& system, const CompareRequest& request)
         throw BadInput(fmt::format("compare fault takes at most {0} x {0} elements, got {1}", most,
                                    parameters.elements));
     }
+    const Interrupts interrupts;
+    const RunWatch watch(0.25);
     const StrikeSlipFault fault(parameters);
     const double scale = fault.time_unit() / 0.8660254037844386;  // 1 at 3 km
     const double t_end = system.t_end * scale;
     RuptureOptions finest = sampled(t_end, 0.0078125 * scale);
     finest.polynomial_bound = 1e-7;
-    const Rupture exact = ricochet::simulate(fault, finest);
+    LongRun progress;
+    const Rupture exact = ricochet::simulate(fault, shown(finest, progress, "reference"));
     std::vector<WayTaken> rows;
     bool ended = true;
-    for (const Way& way : ways(t_end, scale)) {
-        rows.push_back(measure(fault, way, exact));
+    const std::vector<Way> all = ways(t_end, scale);
+    for (const Way& way : all) {
+        if (Interrupts::any()) break;
+        rows.push_back(measure(fault, way, exact, progress));
         ended = ended && rows.back().run.outcome == RuptureOutcome::at_rest;
     }
+    progress.clear();
+    const bool complete = !Interrupts::any();
+    if (!complete && !rows.empty()) rows.pop_back();
+    if (!complete && rows.empty()) return ended_early("before anything was compared");
     print(request.json ? json(fault, exact, rows) : text(fault, exact, rows));
+    if (!complete) {
+        return ended_early(fmt::format("after {} of {} methods", rows.size(), all.size()));
+    }
     return ended ? 0 : 1;
 }
 

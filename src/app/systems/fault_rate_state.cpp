@@ -11,10 +11,13 @@
 
 #include "../files.hpp"
 #include "../input.hpp"
+#include "../interrupt.hpp"
 #include "../json_text.hpp"
 #include "../plot.hpp"
 #include "../report.hpp"
+#include "../run_watch.hpp"
 #include "../simulate.hpp"
+#include "../step_progress.hpp"
 #include "entries.hpp"
 #include "fault.hpp"
 #include "ricochet/systems/fault_rate_state.hpp"
@@ -104,6 +107,7 @@ RuptureOptions options_of(const RunRequest& run)
         if (!run.rtol) out.rtol = std::numeric_limits<double>::infinity();
     }
     if (run.max_steps) out.max_steps = *run.max_steps;
+    out.progress = [](double) { return !Interrupts::any(); };
     return out;
 }
 
@@ -152,10 +156,12 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
                {"rejected", s.rejected},
                {"stages", s.solves},
                {"unsolved_stages", r.unsolved},
+               {"handed_over", r.handed_over},
                {"newton_iterations", s.iterations},
                {"inner_iterations", r.inner},
                {"stiffness_products", s.products}}},
              {"memory_estimate", StrikeSlipFault::memory(fault.parameters())}};
+    if (rupture.outcome == RuptureOutcome::cancelled) out["incomplete"] = Interrupts::cause();
     if (request.kernel) out["kernel"] = request.kernel->string();
     if (request.samples) {
         const MeanSamples samples = sampled(rupture, asked.t_end, *request.samples);
@@ -192,11 +198,12 @@ std::string text(const SystemEntry& system, const StrikeSlipFault& fault, const 
     out += fmt::format("mean slip {:.6g} m; the fastest element slips at {:.4g} m/s\n",
                        r.rupture.mean_slip, r.fastest.back());
     out += fmt::format(
-        "{} steps, {} rejected; {} stages in {} Newton iterations, {} unsolved; residual {:.2g}\n"
+        "{} steps, {} rejected, {} handed over to order 2; {} stages in {} Newton iterations, {} "
+        "unsolved; residual {:.2g}\n"
         "{} products with K; sqrt(K) by a polynomial of degree {}, within {:.2g}\n"
         "{:.3g} s of time\n",
-        s.steps, s.rejected, s.solves, s.iterations, r.unsolved, r.residual, s.products, s.degree,
-        s.bound, seconds);
+        s.steps, s.rejected, r.handed_over, s.solves, s.iterations, r.unsolved, r.residual,
+        s.products, s.degree, s.bound, seconds);
     return out;
 }
 
@@ -288,23 +295,46 @@ int simulate_rate_state_fault(const SystemEntry& system, const SimulateRequest& 
     validate(asked);
     validate(friction);
     validate(how);
-    if (request.csv) check_writable("--csv", *request.csv);
-    if (request.plot) check_plot(*request.plot);
+    Claims claims;
+    if (request.kernel) claims.reads("--kernel", *request.kernel);
+    claim_results(claims, request);
+    const Interrupts interrupts;
     const auto start = std::chrono::steady_clock::now();
     const StrikeSlipFault fault(fault_parameters(values, request.kernel));
-    const RateStateRupture r = ricochet::simulate(fault, asked, friction, how);
+    LongRun progress;
+    RateStateRupture r = [&] {
+        const RunWatch watch(0.25);
+        return ricochet::simulate(fault, shown(asked, progress, "simulate fault"), friction, how);
+    }();
+    progress.clear();
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    print(request.json ? json(system, values, fault, asked, r, request, taken.count())
-                       : text(system, fault, r, taken.count()));
-    if (request.csv) {
-        write_file(*request.csv,
-                   "t [s],mean slip [m],mean velocity [m/s],fastest [m/s]\n" + csv(r, ','));
-    }
-    if (request.plot) {
-        // When the earthquakes are is known only now: the run is repeated for its pictures.
-        asked.snapshot_times = times_of_pictures(r);
-        draw_cycle(fault, ricochet::simulate(fault, asked, friction, how), *request.plot);
-    }
+    const bool cancelled = r.rupture.outcome == RuptureOutcome::cancelled;
+    if (cancelled) asked.t_end = r.rupture.t;  // of samples
+    deliver({[&] {
+                 print(request.json ? json(system, values, fault, asked, r, request, taken.count())
+                                    : text(system, fault, r, taken.count()));
+             },
+             [&] {
+                 if (!request.csv) return;
+                 write_file(*request.csv,
+                            "t [s],mean slip [m],mean velocity [m/s],fastest [m/s]\n" +
+                                csv(r, ',') + (cancelled ? incomplete_line() : ""));
+             },
+             [&] {
+                 if (!request.plot) return;
+                 // When the earthquakes are is known only now: the run is repeated for its
+                 // pictures, of which an interrupted one has none.
+                 asked.snapshot_times = times_of_pictures(r);
+                 if (!cancelled) {
+                     const RuptureOptions again =
+                         shown(asked, progress, "simulate fault for its pictures");
+                     r.rupture.snapshots =
+                         ricochet::simulate(fault, again, friction, how).rupture.snapshots;
+                     progress.clear();
+                 }
+                 draw_cycle(fault, r, *request.plot);
+             }});
+    if (cancelled) return ended_early(fmt::format("at t = {} s", r.rupture.t));
     return r.rupture.outcome == RuptureOutcome::reached_end ? 0 : 1;
 }
 

@@ -114,7 +114,7 @@ template <class System, class Vector>
     };
     look(motion.state());
     auto outcome = SetValuedOutcome::running;
-    while (outcome == SetValuedOutcome::running) {
+    while (outcome == SetValuedOutcome::running && !o.cancelled->load(std::memory_order_relaxed)) {
         outcome = motion.statistics().steps < o.max_steps ? motion.advance()
                                                           : SetValuedOutcome::step_limit;
         if (outcome != SetValuedOutcome::not_converged) look(motion.state());

@@ -96,6 +96,20 @@ template <class System, class Stepping>
     return shown(HandOver<System, Stepping>(system, w0, options).take());
 }
 
+/// As `motion.run`. @return `running` if it was cancelled
+template <class Motion, class Observer>
+[[nodiscard]] SetValuedOutcome run_until_cancelled(const Options& options, Motion& motion,
+                                                   const Observer& observer)
+{
+    observer(motion.state());
+    for (;;) {
+        const SetValuedOutcome outcome = motion.advance();
+        const bool goes_on = outcome == SetValuedOutcome::running;
+        if (goes_on || outcome == SetValuedOutcome::reached_end) observer(motion.state());
+        if (!goes_on || options.cancelled->load(std::memory_order_relaxed)) return outcome;
+    }
+}
+
 /// Bathe's steps, or backward Euler's; samples are straight lines between nodes.
 template <class System>
 [[nodiscard]] TimedRun run_by_steps(const System& system, const StateOf<System>& w0,
@@ -145,8 +159,7 @@ template <class System>
         }
         branches = after;
     };
-    const SetValuedOutcome outcome = motion.run(look);
-    out.run.outcome = as_outcome(outcome);
+    out.run.outcome = as_outcome(run_until_cancelled(settings.options, motion, look));
     out.run.t = motion.state().t;
     out.run.x = plain(motion.state().w);
     out.run.mode = branch_mode<System>(branches);

@@ -1,0 +1,63 @@
+#include "keep_model.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "files.hpp"
+#include "ricochet/nn/safetensors.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A name that is still free: "ball.kept.safetensors", "ball.kept-2.safetensors", ...
+std::optional<fs::path> free_name(const fs::path& directory, const fs::path& file)
+{
+    constexpr int most = 100;
+    for (int i = 1; i <= most; ++i) {
+        fs::path name = directory / file.stem();
+        name += i == 1 ? std::string(".kept") : fmt::format(".kept-{}", i);
+        name += file.extension();
+        std::error_code error;
+        if (!fs::exists(name, error) && !error) return name;
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+void keep_model(const Model& model, const fs::path& file, const fs::path& checkpoint)
+{
+    const auto why_not = [&model](const fs::path& where) -> std::string {
+        try {
+            save_model(model, where);
+            return {};
+        } catch (const ModelError& error) {
+            return error.what();
+        }
+    };
+    const std::string why = why_not(file);
+    if (why.empty()) return;
+    std::error_code error;
+    const fs::path beside = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    for (const fs::path& directory : {beside, fs::temp_directory_path(error)}) {
+        const std::optional<fs::path> name = free_name(directory, file.filename());
+        if (name && why_not(*name).empty()) {
+            throw WriteError(fmt::format("{}; the model is in '{}'", why, name->string()));
+        }
+    }
+    throw WriteError(
+        fs::exists(checkpoint, error)
+            ? fmt::format("{}; the training is kept in '{}', from which the same command with "
+                          "--resume writes the model",
+                          why, checkpoint.string())
+            : fmt::format("{}, and there is no room for the model elsewhere", why));
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,79 @@
+// What is done of something that takes long, on standard error.
+#pragma once
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "ricochet/systems/fault_rupture.hpp"
+
+namespace ricochet::app {
+
+/// Silent for two seconds. Then a line that is redrawn on a terminal; elsewhere a line at once and
+/// further ones at growing intervals, so that a log of an hour has some dozens.
+class LongRun {
+public:
+    LongRun() = default;
+    ~LongRun() { clear(); }
+    LongRun(const LongRun&) = delete;
+    LongRun& operator=(const LongRun&) = delete;
+
+    /// @param done  share of what `label` names
+    void show(std::string_view label, double done)
+    {
+        const double now = seconds();
+        if (now < next_) return;
+        const std::string line =
+            fmt::format("{}, {:.0f} %, {:.0f} s", label, 100 * std::clamp(done, 0.0, 1.0), now);
+        if (terminal_) {
+            fmt::print(stderr, "\r{}\x1b[K", line);
+            std::fflush(stderr);
+            drawn_ = true;
+            next_ = now + 0.1;
+        } else {
+            fmt::print(stderr, "ricochet: {}\n", line);
+            next_ = now + std::max(patience, 0.2 * now);
+        }
+    }
+
+    /// The line is free again for something else.
+    void clear()
+    {
+        if (drawn_) fmt::print(stderr, "\r\x1b[K");
+        drawn_ = false;
+    }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    static constexpr double patience = 2;  // [s]
+
+    [[nodiscard]] double seconds() const
+    {
+        return std::chrono::duration<double>(Clock::now() - start_).count();
+    }
+
+    Clock::time_point start_ = Clock::now();
+    bool terminal_ = isatty(STDERR_FILENO) == 1;
+    bool drawn_ = false;
+    double next_ = patience;  // [s]
+};
+
+/// The same run, with what is done of it shown.
+[[nodiscard]] inline RuptureOptions shown(RuptureOptions options, LongRun& progress,
+                                          std::string label)
+{
+    options.progress = [&progress, label = std::move(label), t_end = options.t_end,
+                        asked = std::move(options.progress)](double t) {
+        progress.show(label, t / t_end);
+        return !asked || asked(t);
+    };
+    return options;
+}
+
+}  // namespace ricochet::app

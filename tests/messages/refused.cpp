@@ -1,0 +1,124 @@
+// What is refused at compile time. A line `// CASE n: text` says what the first error of case n
+// contains; 0 compiles. `run.sh` looks.
+
+#include <array>
+#include <cstddef>
+
+#include "ricochet/integrate/integrate.hpp"
+
+using namespace ricochet;
+using X = std::array<double, 2>;
+
+struct Falling {
+    using State = X;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    double guard(double, const X& x) const { return x[0]; }
+};
+
+/// Names of their own purpose.
+struct Allowed : Falling {
+    struct Rest {
+    };
+    double gard = 1, lower = 0;
+    std::array<double, 3> gurds{};
+    int resets = 0;
+    void enable() const {}
+};
+
+/// Names that are meant.
+struct Unchecked : Falling {
+    static constexpr bool unchecked_names = true;
+    void Reset() const {}
+
+private:
+    [[maybe_unused]] double rest = 1;
+};
+
+struct System : Falling {
+// CASE 1: found a member `unilatral`, which nothing reads; rename it to `unilateral`
+#if CASE == 1
+    bool unilatral = true;
+// CASE 2: found a member `gaurd_rate`, which nothing calls; rename it to `guard_rate`
+#elif CASE == 2
+    double gaurd_rate(double, const X&, const X& dxdt) const { return dxdt[0]; }
+// CASE 3: found a member `Reset`, which nothing calls; rename it to `reset`
+#elif CASE == 3
+    void Reset(double, X& x) const { x[1] = -x[1]; }
+// CASE 4: found a member `nextTimeEvent`, which nothing calls; rename it to `next_time_event`
+#elif CASE == 4
+    double nextTimeEvent(double t) const { return t + 1; }
+// CASE 5: found a reset that cannot be used: it is private
+#elif CASE == 5
+private:
+    void reset(double, X& x) const { x[1] = -x[1]; }
+// CASE 6: found a member `Guard_rate`, which nothing calls; rename it to `guard_rate`
+#elif CASE == 6
+private:
+    template <class V>
+    double Guard_rate(double, const V&, const V& dxdt) const
+    {
+        return dxdt[0];
+    }
+// CASE 7: found a rest that cannot be used: it is private, or its requires-clause does not hold
+#elif CASE == 7
+    template <class V>
+    void rest(double, V& x) const requires(sizeof(V) > 1000)
+    {
+        x = {};
+    }
+// CASE 8: found a guard_rate that is not const
+#elif CASE == 8
+    double guard_rate(double, const X&, const X& dxdt) { return dxdt[0]; }
+// CASE 9: found a reset that takes std::size_t first, in a system without guard_count
+#elif CASE == 9
+    Mode reset(std::size_t, double, X&) const { return 0; }
+// CASE 10: found a unilateral whose parameters or result do not fit
+#elif CASE == 10
+    bool unilateral() const { return true; }
+// CASE 11: found a member `sped_bound`, which nothing calls; rename it to `speed_bound`
+#elif CASE == 11
+    double sped_bound(double, const X& x) const { return x[1]; }
+#endif
+};
+
+// CASE 12: found a member `Flow`, which nothing calls; rename it to `flow`
+struct OtherFlow {
+    using State = X;
+    void Flow(double, const X& x, X& dxdt) const { dxdt = x; }
+};
+
+struct Stateless {
+    void flow(double, const X& x, X& dxdt) const { dxdt = x; }
+};
+
+int main()
+{
+    [[maybe_unused]] const Falling falling;
+    [[maybe_unused]] const X x0{10, 0};
+#if CASE == 0
+    (void)integrate(falling, {10, 0}, {.t_end = 1, .rtol = 1e-6, .sample_times = {0.5}});
+    (void)integrate(Allowed{}, x0, {.t_end = 1}, FixedStep<Rk4>{});
+    (void)integrate(Unchecked{}, {}, {.t_end = 1});
+#elif CASE == 12
+    (void)integrate(OtherFlow{}, x0, {.t_end = 1});
+// CASE 13: found a start with another number of components than System::State
+#elif CASE == 13
+    (void)integrate(falling, {10, 0, 1}, {.t_end = 1});
+// CASE 14: found a start with another number of components than System::State
+#elif CASE == 14
+    (void)integrate(Falling{}, {10}, {.t_end = 1}, FixedStep<Rk4>{});
+// CASE 15: found an option that there is not
+#elif CASE == 15
+    (void)integrate(falling, {10, 0}, {.t_end = 1, .rtoll = 1e-6});
+// CASE 16: found an option that there is not
+#elif CASE == 16
+    const auto run = integrate(Falling{}, x0, {.tend = 1, .hmax = 0.1}, FixedStep<Rk4>{});
+    return run.x[0] > 0;
+// CASE 17: declares no State
+#elif CASE == 17
+    (void)integrate(Stateless{}, {10, 0}, {.t_end = 1});
+// CASE 18: compiled with -ffast-math or -ffinite-math-only
+#else
+    (void)integrate(System{}, x0, {.t_end = 1});
+#endif
+}

@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Compiles every case of refused.cpp with every compiler given, and compares the first error
+# with the sentence that the case asks for.
+# usage: run.sh SOURCE_TREE INCLUDE_FLAGS COMPILER...
+set -uo pipefail
+source=$(realpath "$1") flags=$2
+shift 2
+file="$source/tests/messages/refused.cpp"
+failed=0
+
+# first_error COMPILER FLAGS...: nothing where it compiles.
+first_error() {
+    "$@" -std=c++20 -Wall -Wextra -fsyntax-only -I"$source/include" $flags "$file" 2>&1 |
+        grep -m 1 -E 'error:|warning:'
+}
+expect() { # WHAT FOUND EXPECTED
+    local fits=no
+    if [ -n "$3" ]; then
+        [[ $2 == *"$3"* ]] && fits=yes
+    elif [ -z "$2" ]; then
+        fits=yes
+    fi
+    if [ $fits = no ]; then
+        printf '%s\n  expected %s\n  found    %s\n' "$1" "${3:-no error}" "${2:-no error}"
+        failed=1
+    fi
+}
+
+for compiler in "$@"; do
+    expect "$compiler, case 0" "$(first_error "$compiler" -DCASE=0)" ''
+    while IFS= read -r line; do
+        number=${line%%:*} text=${line#*: }
+        extra=()
+        [[ $text == *fast-math* ]] && extra=(-ffast-math)
+        expect "$compiler, case $number" \
+            "$(first_error "$compiler" "-DCASE=$number" "${extra[@]}")" "$text"
+    done < <(sed -nE 's|^// CASE ([0-9]+: .*)|\1|p' "$file")
+    expect "$compiler, -ffinite-math-only" \
+        "$(first_error "$compiler" -DCASE=0 -ffinite-math-only)" 'ricochet: compiled with'
+    expect "$compiler, allowed" "$(first_error "$compiler" -DCASE=0 -ffast-math \
+        -DRICOCHET_ALLOW_FINITE_MATH)" ''
+done
+[ $failed = 0 ] && echo "every case is refused with its sentence first"
+exit $failed

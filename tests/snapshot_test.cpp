@@ -1,0 +1,197 @@
+// A snapshot says which run it is of, and is read only where it makes sense.
+
+#include "ricochet/integrate/snapshot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "refusal.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/locate/toms748.hpp"
+
+namespace ricochet {
+namespace {
+
+using X = std::array<double, 2>;
+
+struct Ball {
+    using State = X;
+    bool unilateral = true;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
+    void reset(double, X& x) const { x = {0, -0.8 * x[1]}; }
+};
+
+/// As the ball, but of another type, or of another name.
+struct Droplet : Ball {};
+struct Named : Ball {
+    std::string name = "marble";
+};
+
+struct Decay {
+    void flow(double, const std::vector<double>& x, std::vector<double>& dxdt) const
+    {
+        for (std::size_t i = 0; i < x.size(); ++i) dxdt[i] = -x[i];
+    }
+};
+
+const Options options{.t_end = 4, .step = 0.01};
+
+template <class System, class Stepping = ErrorControlled<Dopri5>, class... Choices>
+std::string refused_by(const Snapshot& snapshot, const System& system, const Options& asked,
+                       const Stepping& stepping = {}, const Choices&... choices)
+{
+    Simulation<System, X, Stepping, Choices...> simulation(system, X{1, 0}, asked, stepping,
+                                                           choices...);
+    return refusal([&] { simulation.restore(snapshot); });
+}
+
+Snapshot after_some_steps()
+{
+    const Ball ball;
+    Simulation<Ball, X> simulation(ball, X{1, 0}, options);
+    for (int i = 0; i < 9; ++i) simulation.step();
+    return simulation.save();
+}
+
+TEST(Snapshot, BelongsToOneKindOfRun)
+{
+    const Snapshot saved = after_some_steps();
+    EXPECT_EQ(refused_by(saved, Ball{}, options), "accepted");
+    // Where the run ends, its first step and what it keeps are free.
+    EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 9, .step = 0.1, .record_steps = true}),
+              "accepted");
+
+    const std::string ours = "snapshot: it is of a run with ";
+    EXPECT_EQ(refused_by(saved, Droplet{}, options),
+              ours + "system = Ball, and this one has system = Droplet");
+    EXPECT_EQ(refused_by(saved, Named{}, options),
+              ours + "system = Ball, and this one has system = marble");
+    EXPECT_EQ(refused_by(saved, Ball{}, options, ErrorControlled<Fehlberg78>{}),
+              ours +
+                  "stepping = ErrorControlled<Odeint<runge_kutta_dopri5>>, and this one has "
+                  "stepping = ErrorControlled<Odeint<runge_kutta_fehlberg78>>");
+    EXPECT_EQ(refused_by(saved, Ball{}, options, ErrorControlled<Dopri5>{}, Ends{}),
+              ours + "detector = Extremum, and this one has detector = Ends");
+    EXPECT_EQ(refused_by(saved, Ball{}, options, ErrorControlled<Dopri5>{}, Extremum{}, Toms748{}),
+              ours + "locator = Newton, and this one has locator = Toms748");
+    EXPECT_EQ(refused_by(saved, Ball{}, {.t_start = 1e-9, .t_end = 4}),
+              ours + "t_start = 0, and this one has t_start = 1e-09");
+    EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = -4}),
+              ours + "direction = forward, and this one has direction = backward");
+    EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .rtol = 1e-6}),
+              ours + "rtol = 1e-08, and this one has rtol = 1e-06");
+    EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .event_tolerance = 1e-6}),
+              ours + "event_tolerance = 0, and this one has event_tolerance = 1e-06");
+    EXPECT_NE(refused_by(saved, Ball{}, {.t_end = 1e-3}).find("the time"), std::string::npos);
+
+    Snapshot nameless = saved;
+    nameless.run.clear();
+    EXPECT_EQ(refused_by(nameless, Ball{}, options),
+              "snapshot: it does not say of which run it is");
+
+    using V = std::vector<double>;
+    const Decay decay;
+    Simulation<Decay, V> two(decay, V{1, 2}, {.t_end = 1});
+    Simulation<Decay, V> three(decay, V{1, 2, 3}, {.t_end = 1});
+    EXPECT_EQ(refusal([&] { three.restore(two.save()); }),
+              ours + "components at the start = 2, and this one has components at the start = 3");
+}
+
+TEST(Snapshot, TypesAreNamedAlikeByEveryCompiler)
+{
+    const auto plain = detail::plain_type_name;
+    EXPECT_EQ(plain("constexpr const char* ricochet::detail::written_type() [with T = "
+                    "ricochet::{anonymous}::Ball]"),
+              "Ball");
+    EXPECT_EQ(plain("const char *ricochet::detail::written_type() [T = ricochet::(anonymous "
+                    "namespace)::Ball]"),
+              "Ball");
+    EXPECT_EQ(plain("f() [with T = main()::Own<a::B, c::D<e::F> >::Inner]"), "Inner");
+    EXPECT_EQ(plain("f() [T = ricochet::Planned<ricochet::Extremum>]"), "Planned<Extremum>");
+    EXPECT_EQ(plain("f() [T = a::Pair<b::X, c::Y<d::Z>>]"), "Pair<X, Y<Z>>");
+}
+
+TEST(Snapshot, AChangedTextIsRefused)
+{
+    const std::string text = to_text(after_some_steps());
+    EXPECT_EQ(snapshot_from_text(text), after_some_steps());
+    std::mt19937_64 random(5);
+    for (int i = 0; i < 2000; ++i) {
+        std::string changed = text;
+        const std::size_t at = random() % text.size();
+        switch (random() % 4) {
+            case 0: changed[at] = static_cast<char>(random() % 256); break;
+            case 1: changed.erase(at, 1 + random() % 20); break;
+            case 2: changed.insert(at, 1, static_cast<char>('0' + random() % 10)); break;
+            default: changed.resize(at);
+        }
+        if (changed == text) continue;
+        EXPECT_NE(refusal([&] { (void)snapshot_from_text(changed); }), "accepted") << changed;
+    }
+    EXPECT_NE(refusal([] {
+                  (void)snapshot_from_text("ricochet-snapshot 1 35 12\n");
+              }).find("an earlier version"),
+              std::string::npos);
+}
+
+TEST(Snapshot, NumbersThatAreNoStateAreRefusedAndChangeNothing)
+{
+    const Ball ball;
+    Simulation<Ball, X> simulation(ball, X{1, 0}, options);
+    for (int i = 0; i < 9; ++i) simulation.step();
+    const Snapshot good = simulation.save();
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const double infinity = std::numeric_limits<double>::infinity();
+    // Time, its remainder, the state, its remainder, its rate and the next step.
+    for (std::size_t i = 0; i <= 8; ++i) {
+        for (const double wrong : {nan, infinity, -infinity}) {
+            Snapshot bad = good;
+            bad.numbers[i] = wrong;
+            EXPECT_NE(refusal([&] { simulation.restore(bad); }), "accepted") << i << ' ' << wrong;
+        }
+    }
+    for (const auto& [at, wrong] : {std::pair{0, -1e-3}, {0, 4.1}, {1, 1.0}, {8, -1.0}, {8, 0.0}}) {
+        Snapshot bad = good;
+        bad.numbers[static_cast<std::size_t>(at)] = wrong;
+        EXPECT_NE(refusal([&] { simulation.restore(bad); }), "accepted") << at << ' ' << wrong;
+    }
+    // No flag, side, outcome or mode is as large; a count of events may be.
+    int taken = 0;
+    for (std::size_t i = 0; i < good.counts.size(); ++i) {
+        Snapshot bad = good;
+        bad.counts[i] = std::numeric_limits<std::uint64_t>::max() - 7;
+        taken += refusal([&] { simulation.restore(bad); }) == "accepted";
+        simulation.restore(good);
+    }
+    EXPECT_LE(taken, 2);
+    EXPECT_EQ(simulation.save(), good);
+}
+
+TEST(Snapshot, SampleTimesAreThoseOfTheRunThatGoesOn)
+{
+    const Ball ball;
+    Options sampled = options;
+    sampled.sample_times = {0.1, 0.2, 3};
+    Simulation<Ball, X> whole(ball, X{1, 0}, sampled);
+    while (whole.t() < 1) whole.step();
+    const Snapshot saved = whole.save();
+    sampled.sample_times = {0.5, 1.5, 3};
+    Simulation<Ball, X> other(ball, X{1, 0}, sampled);
+    other.restore(saved);
+    const auto run = other.take();
+    EXPECT_EQ(run.trajectory.t, (std::vector<double>{1.5, 3}));
+    EXPECT_EQ(run.trajectory.x.back(), whole.take().trajectory.x.back());
+}
+
+}  // namespace
+}  // namespace ricochet
