@@ -74,6 +74,7 @@ public:
     using Reaction = ReactionOf<System>;
     using Branches = Eigen::Matrix<Branch, M, 1>;
     using Slacks = std::array<double, 2>;  ///< above the lower bound, below the upper one
+    using Rooms = std::array<double, 2 * static_cast<std::size_t>(M)>;  ///< of all reactions
 
     static constexpr bool forward_only = true;
     static constexpr std::size_t guard_count = 5 * static_cast<std::size_t>(M);
@@ -125,6 +126,12 @@ public:
         return mode < branch_modes && holds_[mask_of(mode)].determined;
     }
 
+    /// Whether a mode of branches holds any reaction.
+    [[nodiscard]] static constexpr bool holds(Mode mode) noexcept
+    {
+        return mode < branch_modes && mask_of(mode) != 0;
+    }
+
     [[nodiscard]] static GuardInfo guard_info(std::size_t which) noexcept
     {
         constexpr std::array<std::string_view, 4> names{"y falls to zero", "y rises to zero",
@@ -172,6 +179,28 @@ public:
         Reaction r;
         reactions(mode, t, w, free, r);
         return r;
+    }
+
+    /// How far every held reaction is from its bounds, and the rate of the motion. Infinite
+    /// where there is no bound, and for reactions that are not held. Returns what rounding of
+    /// the terms may make of them.
+    double rooms(Mode mode, double t, const Vector& w, Vector& rate, Rooms& rooms) const
+    {
+        Reaction r;
+        reactions(mode, t, w, rate, r);
+        const double terms =
+            holds_[mask_of(mode)].largest * rate.template lpNorm<Eigen::Infinity>();
+        rate += lever_.lazyProduct(r);
+        rooms.fill(std::numeric_limits<double>::infinity());
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (!is_held(i, mode)) continue;
+            const auto k = static_cast<std::size_t>(i);
+            const double lower = bound(t, w, i, Branch::lower);
+            const double upper = bound(t, w, i, Branch::upper);
+            if (!std::isinf(lower)) rooms[2 * k] = r[i] - lower;
+            if (!std::isinf(upper)) rooms[2 * k + 1] = upper - r[i];
+        }
+        return negligible * (terms + r.template lpNorm<Eigen::Infinity>());
     }
 
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
@@ -331,6 +360,7 @@ private:
     /// The inverse of the block of D = E A^-1 G of the held reactions, zero elsewhere.
     struct Hold {
         typename Matrices::Delassus inverse;
+        double largest = 0;
         bool determined = true;
     };
 
@@ -353,6 +383,7 @@ private:
         hold.determined = lu.isInvertible();
         if (!hold.determined) return;
         block = lu.inverse();
+        hold.largest = block.cwiseAbs().maxCoeff();
         for (Eigen::Index i = 0; i < count; ++i) {
             for (Eigen::Index j = 0; j < count; ++j) hold.inverse(at(i), at(j)) = block(i, j);
         }

@@ -20,6 +20,7 @@
 
 #include "ricochet/integrate/simulation.hpp"
 #include "ricochet/nonsmooth/branch_modes.hpp"
+#include "ricochet/nonsmooth/held_reactions.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {
@@ -167,6 +168,15 @@ struct ModesOf<System> {
     using type = BranchModes<System>;
 };
 
+template <class System>
+struct HeldOf {
+    struct type {};
+};
+template <Branching System>
+struct HeldOf<System> {
+    using type = HeldReactions<System>;
+};
+
 }  // namespace detail
 
 /// `Stepping` of the event-driven phases: `ErrorControlled<Method>`, or `FixedStep<Method>` with
@@ -281,15 +291,89 @@ private:
         detail::ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
         bool chatters = false;
         bool released = false;
-        while (!chatters && !released && simulation->step() &&
-               simulation->mode() < Modes::branch_modes) {
+        Place before;
+        held_.forget();
+        while (!chatters && !released) {
+            note_place(*simulation, before);
+            const bool going = simulation->step();
+            if (Modes::holds(before.mode) && !follows_held(before, *simulation)) {
+                return go_back(simulation->finish(), before);
+            }
+            if (!going || simulation->mode() >= Modes::branch_modes) break;
             released = options_.until_released &&
                        is_released(Modes::branches_of(simulation->mode()), simulation->t(),
                                    Modes::vector(simulation->x()));
             chatters = watch(simulation->t(), simulation->run().statistics.events);
+            if (!chatters && !released && may_lengthen()) {
+                note_place(*simulation, before);
+                return go_back(simulation->finish(), before);
+            }
         }
         finish_events(simulation->finish(), chatters);
         if (released && !set_valued_) end_with(HandOverOutcome::released);
+    }
+
+    /// Where an event-driven step begins, and what had been recorded until then.
+    struct Place {
+        double t = 0;
+        Vector w;
+        Mode mode = 0;
+        std::size_t events = 0;
+        std::size_t samples = 0;
+    };
+
+    template <class Loop>
+    static void note_place(const Loop& simulation, Place& place)
+    {
+        place.t = simulation.t();
+        place.w = Modes::vector(simulation.x());
+        place.mode = simulation.mode();
+        place.events = simulation.run().events.size();
+        place.samples = simulation.run().trajectory.t.size();
+    }
+
+    /// Whether a step was short enough for the reactions that hold; if not, steps are as short
+    /// as that takes from now on.
+    template <class Loop>
+    [[nodiscard]] bool follows_held(const Place& before, const Loop& simulation)
+    {
+        const double fraction = held_.fraction(modes_, before.mode, before.t, before.w,
+                                               simulation.t(), Modes::vector(simulation.x()));
+        if (fraction == 1) return true;
+        const double shorter = fraction * (simulation.t() - before.t);
+        // Below that the motion has no smoothness that steps could follow.
+        if (shorter <= 1e-9 * (options_.t_end - options_.t_start)) return true;
+        longest_step_ = shorter;
+        easy_steps_ = 0;
+        return false;
+    }
+
+    /// Whether so many steps in a row were shorter than need be that longer ones are tried.
+    [[nodiscard]] bool may_lengthen() noexcept
+    {
+        if (std::isinf(longest_step_)) return false;
+        easy_steps_ = held_.is_easy() ? easy_steps_ + 1 : 0;
+        if (easy_steps_ < 8) return false;
+        easy_steps_ = 0;
+        longest_step_ *= 4;
+        if (longest_step_ > options_.t_end - run_.state.t) {
+            longest_step_ = std::numeric_limits<double>::infinity();
+        }
+        return true;
+    }
+
+    /// Goes on from `before` with steps of another length; what was recorded later is dropped.
+    template <class X>
+    void go_back(Run<X>&& done, const Place& before)
+    {
+        done.statistics.events -= done.events.size() - before.events;
+        done.events.resize(before.events);
+        done.trajectory.t.resize(before.samples);
+        done.trajectory.x.resize(before.samples);
+        collect(done);
+        run_.state.t = before.t;
+        run_.state.w = before.w;
+        run_.mode = before.mode;
     }
 
     [[nodiscard]] Options event_options() const
@@ -298,7 +382,9 @@ private:
                                                 steps_taken());
         options.mode = run_.mode;
         if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
-            options.step = options_.set_valued.step;
+            options.step = std::min(options_.set_valued.step, longest_step_);
+        } else if (longest_step_ < options_.h_max) {
+            options.step = options.h_max = longest_step_;
         }
         return options;
     }
@@ -306,15 +392,7 @@ private:
     template <class X>
     void finish_events(Run<X>&& done, bool chatters)
     {
-        if (run_.events.empty()) run_.events.reserve(done.events.size());
-        for (const Event<X>& event : done.events) {
-            if (event.mode_after != Modes::empty) run_.events.push_back(converted(event));
-        }
-        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
-            run_.trajectory.t.push_back(done.trajectory.t[i]);
-            run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
-        }
-        detail::add(run_.statistics.event_driven, done.statistics);
+        collect(done);
         Vector& w = run_.state.w;
         run_.state.t = done.t;
         w = Modes::vector(done.x);
@@ -334,6 +412,21 @@ private:
         run_.mode = done.mode;
         if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
         end_with(detail::in_hand_over(done.outcome));
+    }
+
+    /// What an event-driven phase recorded.
+    template <class X>
+    void collect(const Run<X>& done)
+    {
+        if (run_.events.empty()) run_.events.reserve(done.events.size());
+        for (const Event<X>& event : done.events) {
+            if (event.mode_after != Modes::empty) run_.events.push_back(converted(event));
+        }
+        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
+            run_.trajectory.t.push_back(done.trajectory.t[i]);
+            run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
+        }
+        detail::add(run_.statistics.event_driven, done.statistics);
     }
 
     void end_with_empty_set()
@@ -528,6 +621,10 @@ private:
     State sample_;
     HandOverRun<System> run_;
     static constexpr std::uint64_t most_patience = std::uint64_t{1} << 20;
+    using Held = typename detail::HeldOf<System>::type;
+    [[no_unique_address]] Held held_;
+    double longest_step_ = std::numeric_limits<double>::infinity();  // of the event-driven kind
+    int easy_steps_ = 0;
     std::uint64_t patience_ = 1;
     std::uint64_t chatter_patience_ = 10;  // by trial; 1 hands back amid the chattering
     bool chatters_ = false;
