@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <numbers>
 
@@ -462,13 +463,19 @@ TEST(HandOver, EveryExitFromRestIsFound)
 
 TEST(HandOver, TwoSinesAsALoadMoveARelayFromRest)
 {
-    // The motion depends on the load alone; steps of a thousandth of the run miss no change.
+    // The motion depends on the load alone; steps of a thousandth of the run miss no change. An
+    // exit where the load hardly passes the bound may be followed by changes from bound to bound
+    // within a rounding of its time, in one run and not in the other: they are left out.
+    const auto exits_and_returns = [](const auto& run) {
+        return std::count_if(run.events.begin(), run.events.end(),
+                             [](const auto& event) { return event.kind != EventKind::mode; });
+    };
     for (int i = 0; i < 20; ++i) {
         const Loaded system{.slow = 0.7, .fast = 0.3 + 0.02 * i, .frequency = 3 + 0.7 * i};
         const auto run = hand_over(system, one(0), {.t_end = 20});
         const auto fine = hand_over(system, one(0), {.t_end = 20, .h_max = 0.02});
         ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
-        EXPECT_EQ(run.events.size(), fine.events.size());
+        EXPECT_EQ(exits_and_returns(run), exits_and_returns(fine));
         EXPECT_NEAR(run.state.w[0], fine.state.w[0], 1e-8);
     }
 }

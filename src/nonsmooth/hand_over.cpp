@@ -101,8 +101,8 @@ HandOverOptions completed(HandOverOptions options, bool locate)
             options.set_valued.step);
     double last = options.t_start;
     for (const double t : options.sample_times) {
-        require(t >= last && t <= options.t_end, "sample_times must ascend from t_start to t_end",
-                t);
+        require(!(t > options.t_end), "sample_times must not lie beyond t_end", t);
+        require(t >= last, "sample_times must ascend from t_start to t_end", t);
         last = t;
     }
     const double span = options.t_end - options.t_start;

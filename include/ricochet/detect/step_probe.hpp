@@ -24,7 +24,8 @@ struct Location {
     double root = 0;                                          ///< the best guess between them
     double root_remainder = 0;                                ///< what rounding left out of it
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< rate of the guard there
-    double error = 0;  ///< [s] width of the bracket, or more where rounding in g is coarser
+    double error = 0;   ///< [s] width of the bracket, or more where rounding in g is coarser
+    bool jump = false;  ///< a change of sign without a zero: a pole, or a jump of the guard
 };
 
 /// The narrowest bracket worth having at offset s of a step of length h: neighbouring
@@ -160,6 +161,24 @@ public:
         } else {
             sample.rate = value_and_rate(sample.s).rate;
         }
+    }
+
+    /// What 8 units in the last place of the time and of each component of the state make of
+    /// the guard at offset s.
+    [[nodiscard]] double rounding(double s)
+    {
+        constexpr double nudge = 1e-8;
+        const double t = step_->time(s);
+        place(s);
+        const double g = guard_->value(t, space_->x);
+        double sensitivity = std::fabs(guard_->value(t * (1 + nudge), space_->x) - g);
+        detail::for_each_component(space_->x, [&](auto i) {
+            const double kept = space_->x[i];
+            space_->x[i] = kept * (1 + nudge);
+            sensitivity += std::fabs(guard_->value(t, space_->x) - g);
+            space_->x[i] = kept;
+        });
+        return 8 * std::numeric_limits<double>::epsilon() * (sensitivity / nudge);
     }
 
     /// Detection looked at the polynomial. Where the step's own map disagrees with it

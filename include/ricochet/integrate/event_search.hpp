@@ -61,6 +61,12 @@ struct Note {
     Location where;
 };
 
+/// How a guard changes its sign at a place that a locator found.
+[[nodiscard]] inline EventKind kind_of(const Location& where) noexcept
+{
+    return where.jump ? EventKind::jump : EventKind::crossing;
+}
+
 /// A guard that acts, found to leave its side inside a step.
 struct Hit {
     std::size_t guard = 0;
@@ -100,7 +106,7 @@ public:
     {
         return static_cast<std::uint64_t>(std::count_if(
             notes_.begin(), notes_.end(),
-            [i](const Note& note) { return note.guard == i && note.kind == EventKind::crossing; }));
+            [i](const Note& note) { return note.guard == i && note.kind != EventKind::touch; }));
     }
     [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
 
@@ -174,10 +180,8 @@ public:
                 if (!counted) ++disabled;
             }
             if (counted) {
-                notes_.push_back({.guard = i,
-                                  .kind = EventKind::crossing,
-                                  .side = finding.side,
-                                  .where = where});
+                notes_.push_back(
+                    {.guard = i, .kind = kind_of(where), .side = finding.side, .where = where});
             }
             const bool stays = record.from > 0 && !(where.root > record.from);
             pass(bank, i, side, where, probe);
@@ -191,8 +195,7 @@ public:
     /// Notes a located crossing of a guard that acts, but did not change anything.
     void note(std::size_t i, Side side)
     {
-        notes_.push_back(
-            {.guard = i, .kind = EventKind::crossing, .side = side, .where = where(i)});
+        notes_.push_back({.guard = i, .kind = kind_of(where(i)), .side = side, .where = where(i)});
     }
 
     /// A guard that has crossed without consequence goes on from there.
@@ -350,8 +353,11 @@ private:
         probe.agree_on(finding.hi);
         const double tolerance = std::max(resolution.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
-        return bank[i].info.boolean ? Bisection{}.locate(probe, finding.lo, finding.hi, tolerance)
-                                    : locator.locate(probe, finding.lo, finding.hi, tolerance);
+        if (!bank[i].info.boolean) return locator.locate(probe, finding.lo, finding.hi, tolerance);
+        // A guard of which only the sign means anything jumps by its nature.
+        Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
+        where.jump = false;
+        return where;
     }
 
     [[gnu::noinline]] void touched(Bank& bank, std::size_t i, Side side, double s)

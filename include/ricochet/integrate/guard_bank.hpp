@@ -66,6 +66,7 @@ struct GuardRecord {
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     double band = 0;            ///< |g| where it fired: it counts as being on its surface
+    bool jumped = false;        ///< its last event was a jump
     bool estimated = false;     ///< the band is what location left, not a value of the guard
     double from = 0;            ///< [s] offset in the step up to which it has been looked at
     std::uint64_t events = 0;
@@ -131,7 +132,11 @@ public:
             sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
         }
         if (Detector::uses_rates) {
-            for (std::size_t i = 0; i < size(); ++i) note_size(i, g0_[i]);
+            for (std::size_t i = 0; i < size(); ++i) {
+                // Beside a pole that it has just passed, a guard has no size of its own.
+                const bool beside_pole = records_[i].fired && records_[i].jumped;
+                if (!beside_pole) note_size(i, g0_[i]);
+            }
         }
     }
 

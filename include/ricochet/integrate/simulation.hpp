@@ -134,6 +134,8 @@ public:
             if (options_.step == 0) h_next_ = detail::initial_step(step_, options_);
             h_next_ = std::min(h_next_, options_.h_max);
         }
+        first_step_ = h_next_;
+        flight_start_ = options_.t_start;
         refuse_bad_modes();
         if (!step_.flow_fits()) {
             detail::throw_flow_does_not_fit(static_cast<std::size_t>(x0.size()));
@@ -353,6 +355,9 @@ private:
         require(h_next_ > 0 && std::isfinite(h_next_) &&
                     (!error_controlled || h_next_ <= options_.h_max),
                 "the next step");
+        require(first_step_ > 0 && std::isfinite(first_step_), "the first step");
+        require(std::isfinite(flight_start_) && longest_step_ >= 0 && std::isfinite(longest_step_),
+                "the last event");
         require(ended_ || lies_before(place_.t.value, time_event_) || !timed,
                 "the next time event");
         const std::size_t modes = mode_count_of(*system_);
@@ -1007,9 +1012,25 @@ private:
         emit_samples(s);
         record_step(s);
         record_notes(s);
+        limit_next_step(t);
         fire({.located = true, .on_time = on_time});
         if (on_time && !ended_) find_time_event();
         cascade();
+    }
+
+    /// The step after an event at `t` is at most twice the flight before it, or the first
+    /// step: no further than what is known of the motion reaches, wherever the end lies. Events
+    /// that follow at once shorten it by no more than error control would at each of them.
+    void limit_next_step(double t) noexcept
+    {
+        if constexpr (error_controlled) {
+            const double flight = std::fabs(t - flight_start_);
+            if (flight > resolution_.window(t)) {
+                longest_step_ = std::max(2 * flight, rule_.smallest * longest_step_);
+                flight_start_ = t;
+            }
+            h_next_ = std::min(h_next_, std::max(first_step_, longest_step_));
+        }
     }
 
     /// How far from its surface a guard that has just fired may be. A guard with declared
@@ -1018,6 +1039,12 @@ private:
     {
         detail::GuardRecord& record = bank_[i];
         const Location& where = search_.where(i);
+        record.jumped = where.jump;
+        if (where.jump) {  // the state is beyond, and the guard anything but small
+            record.estimated = false;
+            record.band = 0;
+            return;
+        }
         const double residue = 2 * std::fabs(where.slope) * where.error;
         record.estimated = Bounded<System, X> && !record.info.boolean && std::isfinite(residue) &&
                            search_.at() == where.root && !search_.late();
@@ -1409,6 +1436,7 @@ private:
         if (!options_.record_events) return;
         const Location where = located ? search_.where(i) : Location{};
         record({.t = t,
+                .kind = detail::kind_of(where),
                 .guard = i,
                 .mode_before = step_.mode(),
                 .mode_after = resets_.mode(),
@@ -1514,6 +1542,9 @@ private:
         visit(place_.mode);
         for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
         visit(h_next_);
+        visit(first_step_);
+        visit(flight_start_);
+        visit(longest_step_);
         visit(time_event_);
         visit(resting_);
         visit(ended_);
@@ -1561,6 +1592,9 @@ private:
     Search search_;
     [[no_unique_address]] Planner planner_;
     double h_next_ = 0;
+    double first_step_ = 0;    ///< [s]
+    double flight_start_ = 0;  ///< [s] time of the last event
+    double longest_step_ = 0;  ///< [s] after it
     double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
     bool watching_ = false;    ///< with their rates: every step is checked
