@@ -50,6 +50,9 @@ struct Check {
 /// The fault and the rules for its steps.
 [[nodiscard]] std::vector<Check> checks_of_part_8_fault();
 
+/// Inclusions where several relays, contacts and diodes meet.
+[[nodiscard]] std::vector<Check> checks_of_part_8_hand_over();
+
 /// The sliding mode and the diode circuit, handed over: changes, times, states.
 [[nodiscard]] Measured hand_over_sliding_mode();
 [[nodiscard]] Measured hand_over_circuit();

@@ -181,26 +181,44 @@ public:
         return r;
     }
 
-    /// How far every held reaction is from its bounds, and the rate of the motion. Infinite
-    /// where there is no bound, and for reactions that are not held. Returns what rounding of
-    /// the terms may make of them.
-    double rooms(Mode mode, double t, const Vector& w, Vector& rate, Rooms& rooms) const
+    /// How far every held reaction is from its bounds; infinite where there is no bound, and for
+    /// reactions that are not held. Writes the rate of the motion and the reactions, too.
+    void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const
     {
-        Reaction r;
+        constexpr double infinity = std::numeric_limits<double>::infinity();
         reactions(mode, t, w, rate, r);
-        const double terms =
-            holds_[mask_of(mode)].largest * rate.template lpNorm<Eigen::Infinity>();
         rate += lever_.lazyProduct(r);
-        rooms.fill(std::numeric_limits<double>::infinity());
-        for (Eigen::Index i = 0; i < M; ++i) {
-            if (!is_held(i, mode)) continue;
+        const auto set = [&] {
+            if constexpr (detail::ContinuesBounds<System>) {
+                return 0;
+            } else {
+                return matrices_.system().reaction_set(t, w);
+            }
+        }();
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
             const auto k = static_cast<std::size_t>(i);
-            const double lower = bound(t, w, i, Branch::lower);
-            const double upper = bound(t, w, i, Branch::upper);
+            rooms[2 * k] = rooms[2 * k + 1] = infinity;
+            if (rest % 3 != 1) continue;
+            double lower, upper;
+            if constexpr (detail::ContinuesBounds<System>) {
+                lower = bound(t, w, i, Branch::lower);
+                upper = bound(t, w, i, Branch::upper);
+            } else {
+                lower = set.lower(k);
+                upper = set.upper(k);
+            }
             if (!std::isinf(lower)) rooms[2 * k] = r[i] - lower;
             if (!std::isinf(upper)) rooms[2 * k + 1] = upper - r[i];
         }
-        return negligible * (terms + r.template lpNorm<Eigen::Infinity>());
+    }
+
+    /// What rounding of the terms may make of the held reactions.
+    [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
+    {
+        const double free = (rate - lever_.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
+        return negligible *
+               (holds_[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
     }
 
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
@@ -276,10 +294,19 @@ public:
         int arrived = 0;
         Branches held = branches;
         Vector w = vector(x);
+        // Reactions at a bound whose y is zero as well, as of contacts that depend on one another.
+        const Branches zero = zero_branches(t, w);
+        int undecided = 0;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (zero[i] != Branch::inside || branches[i] == Branch::inside) continue;
+            held[i] = Branch::inside;
+            ++undecided;
+        }
         for (const std::size_t which : fired) {
             if (which >= first_set_guard) return empty;
             const auto i = static_cast<Eigen::Index>(which / 4);
             if (which % 4 < 2) {
+                if (held[i] == Branch::inside) --undecided;
                 held[i] = Branch::inside;
                 ++arrived;
             } else {
@@ -290,7 +317,7 @@ public:
         hold(held, t, w);
         Eigen::Map<Vector>(x.data()) = w;
         if (faulty(t, w) >= 0) return empty;
-        if (left + arrived > 1 && left > 0) return several;
+        if (left + arrived + undecided > 1 && left > 0) return several;
         if (left == 1) return checked(mode_of(branches));
         return settle(held, t, w);
     }
@@ -303,16 +330,23 @@ public:
     [[nodiscard]] Mode mode_at(double t, Vector& w) const
     {
         (void)minimal_selection(matrices_, t, w);
+        const Branches held = zero_branches(t, w);
+        hold(held, t, w);
+        return settle(held, t, w);
+    }
+
+    /// The branches that the signs of y ask for; inside where y is zero up to rounding.
+    [[nodiscard]] Branches zero_branches(double t, const Vector& w) const
+    {
         const Reaction y = observed(t, w);
         const Reaction size = matrices_.observe().cwiseAbs() * w.cwiseAbs() + offset(t).cwiseAbs();
-        Branches held;
+        Branches out;
         for (Eigen::Index i = 0; i < M; ++i) {
             const double rounding = 16 * std::numeric_limits<double>::epsilon() * size[i];
             const bool zero = std::abs(y[i]) <= rounding;
-            held[i] = zero ? Branch::inside : y[i] > 0 ? Branch::lower : Branch::upper;
+            out[i] = zero ? Branch::inside : y[i] > 0 ? Branch::lower : Branch::upper;
         }
-        hold(held, t, w);
-        return settle(held, t, w);
+        return out;
     }
 
     /// Puts every held y at zero, along the reactions that hold it.
@@ -558,6 +592,7 @@ private:
         if (!inequality.solve(r, rate, next)) return several;
         int doubtful = 0;
         Eigen::Index which = 0;
+        double size = 0;
         for (Eigen::Index i = 0; i < M; ++i) {
             if (at[i] != Branch::inside) {
                 next[i] = at[i];
@@ -572,16 +607,19 @@ private:
             if (clear) continue;
             ++doubtful;
             which = i;
+            size = terms;
         }
         if (doubtful == 0) return checked(mode_of(next));
         if (doubtful > 1) return several;
         const bool up =
             r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
-        return bend(next, which, up, t, w);
+        return bend(next, which, up, size, t, w);
     }
 
-    /// Reaction i is at its upper or lower bound and y_i does not move. Does it leave?
-    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double t, const Vector& w) const
+    /// Reaction i is at its upper or lower bound and y_i does not move. It leaves if the motion
+    /// bends away from y_i = 0 by more than the rounding of its `terms`.
+    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double terms, double t,
+                            const Vector& w) const
     {
         next[i] = up ? Branch::upper : Branch::lower;
         const Mode leaving = mode_of(next);
@@ -601,7 +639,8 @@ private:
             return y;
         };
         const double bending = rate_of_y(step) - rate_of_y(-step);
-        if (up ? bending < 0 : bending > 0) return checked(leaving);
+        const double noise = 4 * negligible * terms;
+        if (up ? bending < -noise : bending > noise) return checked(leaving);
         next[i] = Branch::inside;
         return checked(mode_of(next));
     }

@@ -21,6 +21,7 @@
 #include "ricochet/integrate/simulation.hpp"
 #include "ricochet/nonsmooth/branch_modes.hpp"
 #include "ricochet/nonsmooth/held_reactions.hpp"
+#include "ricochet/nonsmooth/law.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {
@@ -34,6 +35,7 @@ enum class HandOverOutcome {
     cancelled,        ///< `HandOverOptions::cancelled` was set
     not_handed_over,  ///< a set-valued phase was due, and `HandOverOptions::events_only`
     released,         ///< no reaction is held any more, and `HandOverOptions::until_released`
+    law_violated,     ///< a set-valued step ended with a reaction that contradicts its y
 };
 
 [[nodiscard]] std::string_view name(HandOverOutcome outcome) noexcept;
@@ -43,13 +45,14 @@ enum class HandOverOutcome {
 /// Why a phase began.
 enum class PhaseCause {
     start,
-    no_modes,      ///< the set is no box, or has more than four reactions
-    no_flow,       ///< y' = 0 does not determine the held reactions
-    several,       ///< changes coincide, and rates do not tell what follows
-    accumulation,  ///< infinitely many switchings in finite time
-    chattering,    ///< more switchings in a short time than can be worth locating
-    stuck,         ///< the event-driven loop could not go on
-    released,      ///< event-driven again: every branch is plain
+    no_modes,       ///< the set is no box, or has more than four reactions
+    no_flow,        ///< y' = 0 does not determine the held reactions
+    several,        ///< changes coincide, and rates do not tell what follows
+    accumulation,   ///< infinitely many switchings in finite time
+    chattering,     ///< more switchings in a short time than can be worth locating
+    stuck,          ///< the event-driven loop could not go on
+    contradiction,  ///< an event-driven step contradicted the law of a reaction
+    released,       ///< event-driven again: every branch is plain
 };
 
 [[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
@@ -297,7 +300,13 @@ private:
             note_place(*simulation, before);
             const bool going = simulation->step();
             if (Modes::holds(before.mode) && !follows_held(before, *simulation)) {
-                return go_back(simulation->finish(), before);
+                go_back(simulation->finish(), before);
+                if (held_.starts_beyond()) go_by_steps(PhaseCause::contradiction);
+                return;
+            }
+            if (contradicts(simulation->mode(), simulation->t(), simulation->x())) {
+                go_back(simulation->finish(), before);
+                return go_by_steps(PhaseCause::contradiction);
             }
             if (!going || simulation->mode() >= Modes::branch_modes) break;
             released = options_.until_released &&
@@ -337,14 +346,33 @@ private:
     template <class Loop>
     [[nodiscard]] bool follows_held(const Place& before, const Loop& simulation)
     {
-        const double fraction = held_.fraction(modes_, before.mode, before.t, before.w,
-                                               simulation.t(), Modes::vector(simulation.x()));
+        const double fraction =
+            held_.fraction(modes_, before.mode, before.t, before.w, simulation.t(),
+                           Modes::vector(simulation.x()), options_.event_tolerance);
+        if (held_.starts_beyond()) return false;
         if (fraction == 1) return true;
         const double shorter = fraction * (simulation.t() - before.t);
         // Below that the motion has no smoothness that steps could follow.
         if (shorter <= 1e-9 * (options_.t_end - options_.t_start)) return true;
         longest_step_ = shorter;
         easy_steps_ = 0;
+        return false;
+    }
+
+    /// Whether a y is on the wrong side of its reaction, which is at a bound, by more than the
+    /// error of a step.
+    template <class X>
+    [[nodiscard]] bool contradicts(Mode mode, double t, const X& x) const
+    {
+        if (mode >= Modes::branch_modes) return false;
+        const Vector w = Modes::vector(x);
+        const Reaction y = modes_.observed(t, w);
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < y.size(); ++i, rest /= 3) {
+            if (rest % 3 == 0 ? !(y[i] < 0) : rest % 3 == 1 || !(y[i] > 0)) continue;
+            const double size = w.template lpNorm<Eigen::Infinity>();
+            if (std::abs(y[i]) > 10 * (options_.atol + options_.rtol * size)) return true;
+        }
         return false;
     }
 
@@ -355,7 +383,7 @@ private:
         easy_steps_ = held_.is_easy() ? easy_steps_ + 1 : 0;
         if (easy_steps_ < 8) return false;
         easy_steps_ = 0;
-        longest_step_ *= 4;
+        longest_step_ *= 2;
         if (longest_step_ > options_.t_end - run_.state.t) {
             longest_step_ = std::numeric_limits<double>::infinity();
         }
@@ -502,7 +530,9 @@ private:
             const bool switched = motion_.statistics().switches != switches;
             emit_samples(false);
             if (switched) record_switch();
-            if (outcome != SetValuedOutcome::running) {
+            if (outcome != SetValuedOutcome::not_converged && breaks_law()) {
+                end_with(HandOverOutcome::law_violated);
+            } else if (outcome != SetValuedOutcome::running) {
                 if (outcome == SetValuedOutcome::not_converged) run_.failure = motion_.failure();
                 end_with(detail::in_hand_over(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
@@ -522,24 +552,32 @@ private:
                     run_.mode = Modes::mode_of(motion_.branches());
                     end_with(HandOverOutcome::released);
                 }
-                if (!ended_ && steps >= patience_ && is_plain(switched)) {
-                    release();
-                    break;
-                }
+                if (!ended_ && steps >= patience_ && is_plain(switched) && release()) break;
             }
         }
         run_.statistics.set_valued_time += motion_.state().t - from;
         if (set_valued_) run_.state = motion_.state();
     }
 
+    /// Solvers leave a millionth of a millionth.
+    [[nodiscard]] bool breaks_law() const
+    {
+        const State& now = motion_.state();
+        return law_violation(motion_.matrices(), now.t, now.w, now.reaction,
+                             options_.set_valued.step) > 1e-6;
+    }
+
     /// Whether the branches are those of a mode that flows, and no y so near to zero that its
     /// sign is an accident.
     [[nodiscard]] bool is_plain(bool switched) requires branching
     {
-        const auto& branches = motion_.branches();
-        const State& now = motion_.state();
-        return modes_.flows(Modes::mode_of(branches)) &&
-               (switched || are_clear(branches, now.t, now.w));
+        auto branches = motion_.branches();
+        if (!modes_.flows(Modes::mode_of(branches))) return false;
+        // Of the y that has just been left the branch says which way it goes.
+        if (switched) {
+            branches[static_cast<Eigen::Index>(motion_.last_switch().reaction)] = Branch::inside;
+        }
+        return are_clear(branches, motion_.state().t, motion_.state().w);
     }
 
     /// Whether every y of a reaction at a bound is farther from zero than errors reach.
@@ -563,19 +601,29 @@ private:
         return !(branches.array() == Branch::inside).any() && are_clear(branches, t, w);
     }
 
-    void release() requires branching
+    /// Hands back to events, unless rates and reactions do not tell how the motion goes on.
+    [[nodiscard]] bool release() requires branching
     {
-        run_.state = motion_.state();
         auto branches = motion_.branches();
-        const Mode mode = Modes::mode_of(branches);
-        const Reaction y = modes_.observed(run_.state.t, run_.state.w);
+        double t = motion_.state().t;
+        Vector w = motion_.state().w;
+        const Reaction y = modes_.observed(t, w);
         // A y that has just been left is zero; which way it goes, its branch says.
         for (Eigen::Index i = 0; i < y.size(); ++i) {
             const bool wrong = branches[i] == Branch::lower ? y[i] < 0 : y[i] > 0;
             if (wrong) branches[i] = Branch::inside;
         }
-        modes_.hold(branches, run_.state.t, run_.state.w);
+        modes_.hold(branches, t, w);
+        Mode mode = Modes::several;
+        try {
+            mode = modes_.mode_at(t, w);
+        } catch (const std::invalid_argument&) {
+        }
+        if (mode >= Modes::branch_modes) return false;
+        run_.state = motion_.state();
+        run_.state.w = w;
         go_by_events(mode, PhaseCause::released);
+        return true;
     }
 
     void record_switch()

@@ -102,7 +102,7 @@ template <Inclusion System>
     Reaction reaction;
     reaction.setZero(m.reactions());
     if constexpr (BoxSet<SetOf<System>>) {
-        if (m.reactions() <= most_cases) {
+        if (m.reactions() <= most_cases || detail::has_dependent_reactions(m)) {
             LinearInequality<reaction_size<System>> inequality;
             inequality.w = delassus;
             inequality.y0 = rate;
