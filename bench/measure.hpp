@@ -44,6 +44,9 @@ struct Check {
 /// Rate-and-state friction.
 [[nodiscard]] std::vector<Check> checks_of_part_7();
 
+/// Events where guards accumulate, decay, or move faster than the state.
+[[nodiscard]] std::vector<Check> checks_of_part_8_events();
+
 /// Saved runs, potential files, runs that cannot go on.
 [[nodiscard]] std::vector<Check> checks_of_part_8_saved();
 

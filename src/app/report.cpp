@@ -57,6 +57,8 @@ Json json(const Statistics& s)
 {
     return {{"steps", s.steps},
             {"rejected", s.rejected},
+            {"refined_steps", s.refined_steps},
+            {"unresolved_steps", s.unresolved_steps},
             {"resteps", s.resteps},
             {"flow_calls", s.flow_calls},
             {"guard_calls", s.guard_calls},

@@ -100,6 +100,30 @@ public:
         }
     }
 
+    /// The guard and its rate at offset s on the step's polynomial, whatever the path.
+    [[nodiscard]] GuardSample dense_value_and_rate(double s)
+    {
+        const double t = step_->time(s);
+        if constexpr (by_component) {
+            GuardSample sample{.s = s, .value = guard_->value(t, view(s))};
+            if constexpr (Guard::template sees_rate<View, RateView>) {
+                sample.rate = guard_->rate(t, view(s), RateView(step_->dense(), s), step_->h());
+            } else {
+                const double delta = 1e-5 * step_->h();
+                sample.rate =
+                    (dense_value(s + delta).value - dense_value(s - delta).value) / (2 * delta);
+            }
+            return sample;
+        } else {
+            step_->interpolate(s, space_->x);
+            step_->flow(s, space_->x, space_->dxdt);
+            placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
+            return {.s = s,
+                    .value = guard_->value(t, space_->x),
+                    .rate = guard_->rate(t, space_->x, space_->dxdt, step_->h())};
+        }
+    }
+
     /// The guard and its rate at offset s.
     [[nodiscard]] GuardSample value_and_rate(double s)
     {
@@ -118,6 +142,9 @@ public:
                 .value = guard_->value(t, space_->x),
                 .rate = guard_->rate(t, space_->x, space_->dxdt, step_->h())};
     }
+
+    /// Whether samples are taken from the step's polynomial.
+    [[nodiscard]] bool on_polynomial() const noexcept { return path_ == Path::dense; }
 
     /// The guard at offset s, on the straight line through `sample`, the last that
     /// `value_and_rate` took, or on the polynomial.
@@ -164,21 +191,18 @@ public:
     }
 
     /// What 8 units in the last place of the time and of each component of the state make of
-    /// the guard at offset s.
+    /// the guard at offset s, by its slopes.
     [[nodiscard]] double rounding(double s)
     {
         constexpr double nudge = 1e-8;
-        const double t = step_->time(s);
-        place(s);
-        const double g = guard_->value(t, space_->x);
-        double sensitivity = std::fabs(guard_->value(t * (1 + nudge), space_->x) - g);
-        detail::for_each_component(space_->x, [&](auto i) {
-            const double kept = space_->x[i];
-            space_->x[i] = kept * (1 + nudge);
-            sensitivity += std::fabs(guard_->value(t, space_->x) - g);
-            space_->x[i] = kept;
-        });
-        return 8 * std::numeric_limits<double>::epsilon() * (sensitivity / nudge);
+        return 8 * std::numeric_limits<double>::epsilon() / nudge * nudged(s, nudge);
+    }
+
+    /// What 64 units in the last place of the time and of each component of the state make of
+    /// the guard at offset s, at a kink, too.
+    [[nodiscard]] double blur(double s)
+    {
+        return nudged(s, 64 * std::numeric_limits<double>::epsilon());
     }
 
     /// Detection looked at the polynomial. Where the step's own map disagrees with it
@@ -200,17 +224,23 @@ private:
 
     [[nodiscard]] View view(double s) const { return View(step_->dense(), s); }
 
-    [[nodiscard]] GuardSample dense_value_and_rate(double s)
+    /// By how much the guard at offset s changes in all with relative changes of the time and
+    /// of one component of the state after the other.
+    [[nodiscard]] double nudged(double s, double nudge)
     {
         const double t = step_->time(s);
-        GuardSample sample{.s = s, .value = guard_->value(t, view(s))};
-        if constexpr (Guard::template sees_rate<View, RateView>) {
-            sample.rate = guard_->rate(t, view(s), RateView(step_->dense(), s), step_->h());
-        } else {
-            const double delta = 1e-5 * step_->h();
-            sample.rate = (value(s + delta).value - value(s - delta).value) / (2 * delta);
-        }
-        return sample;
+        if (!(placed_ == s)) place(s);
+        State& x = space_->x;
+        const double g = guard_->value(t, x);
+        double changes = std::fabs(guard_->value(t * (1 + nudge), x) - g);
+        detail::for_each_component(x, [&](auto i) {
+            const double kept = x[i];
+            if (kept == 0) return;
+            x[i] = kept * (1 + nudge);
+            changes += std::fabs(guard_->value(t, x) - g);
+            x[i] = kept;
+        });
+        return changes;
     }
 
     /// Brings the state at offset s into the workspace.

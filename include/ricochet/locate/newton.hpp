@@ -208,6 +208,21 @@ private:
         return lo.s + u * width;
     }
 
+    /// Halves a bracket that had to be widened far from where the slope at `sample`, which a
+    /// kink may have spoilt, predicted the root.
+    template <class Probe>
+    static void halve_along(Probe& probe, const GuardSample& sample, double tolerance,
+                            GuardSample& lo, GuardSample& hi)
+    {
+        const double narrow = std::max(tolerance, 2 * probe.finest(hi.s));
+        while (hi.s - lo.s > narrow) {
+            const double s = lo.s + (hi.s - lo.s) / 2;
+            if (!(s > lo.s && s < hi.s)) return;
+            const GuardSample at = probe.along_the_flow(sample, s);
+            (probe.has_left(at) ? hi : lo) = at;
+        }
+    }
+
     /// Brackets the root predicted from `sample` as narrowly as rounding in the
     /// guard allows: from the predicted root outwards until the side changes. False
     /// if it does not change within the bracket: the prediction was wrong, or the guard is
@@ -247,7 +262,10 @@ private:
                 if (noise > 0) return false;
             }
             (toward < 0 ? hi : lo) = at;
-            if (toward == -direction) return true;
+            if (toward == -direction) {
+                if (margin > widest / 256) halve_along(probe, sample, tolerance, lo, hi);
+                return true;
+            }
             direction = toward;
             s += toward * margin;
             margin *= 2;
