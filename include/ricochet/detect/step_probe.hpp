@@ -116,7 +116,13 @@ public:
             return sample;
         } else {
             step_->interpolate(s, space_->x);
-            step_->flow(s, space_->x, space_->dxdt);
+            if constexpr (DenseStep<Step, State>) {
+                // The polynomial's own: a flow that jumps does not agree with it.
+                const RateView rate(step_->dense(), s);
+                detail::for_each_component(space_->x, [&](auto i) { space_->dxdt[i] = rate[i]; });
+            } else {
+                step_->flow(s, space_->x, space_->dxdt);
+            }
             placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
             return {.s = s,
                     .value = guard_->value(t, space_->x),

@@ -31,7 +31,8 @@ public:
         nodes_.clear();
         divided_ = unresolved_ = nearly_cubic_ = false;
         if (!std::isfinite(start.rate) || !std::isfinite(end.rate)) return;
-        divide(probe, start, end, smallest_part * probe.step().h());
+        noise_ = -1;
+        divide(probe, start, end, smallest_part * probe.step().h(), 0);
     }
 
     /// The first node beyond offset s and before `end`, else null.
@@ -54,9 +55,11 @@ private:
     static constexpr double smallest_part = 0x1p-12;  ///< of the step
     /// Where a stretch is divided: nowhere that a symmetry of the guard could single out.
     static constexpr double cut = 0.4142135;
+    static constexpr int shallow = 3;  ///< divisions before rounding is thought of
 
     template <class Probe>
-    void divide(Probe& probe, const GuardSample& start, const GuardSample& end, double smallest)
+    void divide(Probe& probe, const GuardSample& start, const GuardSample& end, double smallest,
+                int depth)
     {
         const double width = end.s - start.s;
         const CubicLook look(start.value, start.rate, end.value, end.rate, width);
@@ -71,20 +74,24 @@ private:
         if (look.stays_clear(deviation) || look.keeps_shape(deviation)) return;
         if (look.size() + deviation <= whole_.touch) return;
         if (width <= smallest) {
-            // Rounding has no shape, and a kink keeps its own however short the part.
+            // A kink keeps its shape however short the part.
             unresolved_ = unresolved_ || !(deviation <= 0x1p-24 * look.size());
             return;
         }
+        // Rounding has none.
+        if (depth >= shallow && !(noise_ >= 0)) noise_ = probe.blur(end.s);
+        if (deviation <= noise_) return;
         const GuardSample middle = probe.dense_value_and_rate(start.s + cut * width);
         divided_ = true;
-        divide(probe, start, middle, smallest);
+        divide(probe, start, middle, smallest, depth + 1);
         nodes_.push_back(middle);
-        divide(probe, middle, end, smallest);
+        divide(probe, middle, end, smallest, depth + 1);
     }
 
     std::size_t guard_ = nobody;
     Watch whole_;  ///< the stretch that is divided
     std::vector<GuardSample> nodes_;
+    double noise_ = -1;  ///< of the guard by rounding of the state; below 0: not asked for
     bool divided_ = false;
     bool nearly_cubic_ = false;
     bool unresolved_ = false;
