@@ -89,10 +89,11 @@ template <int M>
     Tally tally;
     for (std::uint64_t seed = 0; seed < seeds; ++seed) {
         const auto system = random_inclusion<M>(family, seed);
-        const ReferenceMotion reference(system, 10'000, samples);
+        // Small or accumulating motions take backward Euler more steps.
+        const ReferenceMotion reference(system, system.reactions > 2 ? 10'000 : 50'000, samples);
         ++tally.systems;
-        // Neither motion is known where backward Euler has not converged.
-        if (!reference.solved || reference.uncertainty > 2e-3 * reference.size) {
+        // The motion is not known where backward Euler has not converged.
+        if (!reference.solved || reference.uncertainty > 1e-2 * reference.size) {
             ++tally.unclear;
             continue;
         }

@@ -88,6 +88,20 @@ TEST(RandomInclusions, ControllersAndWeakeningFriction)
     follow_family(InclusionFamily::weakening);
 }
 
+TEST(RandomInclusions, ARelayTwoIntegrationsAwayIsCrossedAtAnySpeed)
+{
+    // At x2 of 2 and more a reaction without influence on x1' was taken for one that holds it.
+    auto system = random_inclusion<4>(InclusionFamily::twisting, 0);
+    for (const double speed : {1.0, 3.0, 100.0, 1e6}) {
+        system.start[0] = -0.1 * speed;
+        system.start[1] = speed;
+        system.t_end = 0.2;
+        const auto run = run_of<4>(system, 1000);
+        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        EXPECT_FALSE(run.phases.size() > 1) << name(run.phases[1].cause) << " at " << speed;
+    }
+}
+
 TEST(RandomInclusions, ThreeMassesWithFiveContactsEnd)
 {
     // More reactions than have modes: set-valued steps from the start, whose stages are singular

@@ -584,7 +584,7 @@ private:
             if (at[i] == Branch::lower) inequality.upper[i] = inequality.lower[i];
             if (at[i] == Branch::upper) inequality.lower[i] = inequality.upper[i];
             // A reaction without influence on y' is all or nothing.
-            if (delassus_(i, i) == 0) inequality.w(i, i) = std::numeric_limits<double>::min();
+            if (delassus_(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
         }
         Branches next = at;
         Reaction r = inequality.lower;

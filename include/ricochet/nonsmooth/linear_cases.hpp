@@ -31,6 +31,10 @@ struct LinearInequality {
     using Matrix = Eigen::Matrix<double, M, M>;
     using Branches = Eigen::Matrix<Branch, M, 1>;
 
+    /// Stands for W_ii where a reaction has no influence on its y, so that one that is asked for
+    /// is all or nothing; the smallest double would overflow in y / W_ii.
+    static constexpr double no_influence = 1e-100;
+
     Confines confines = Confines::reaction;
     Matrix w;               ///< W
     Vector y0;

@@ -135,7 +135,7 @@ template <Inclusion System>
                 inequality.lower[i] = lower;
                 inequality.upper[i] = upper;
                 // Without influence on y' a reaction that is asked for is all or nothing.
-                if (delassus(i, i) == 0) inequality.w(i, i) = std::numeric_limits<double>::min();
+                if (delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
             }
             typename LinearInequality<reaction_size<System>>::Branches branches;
             branches.setConstant(m.reactions(), Branch::inside);
