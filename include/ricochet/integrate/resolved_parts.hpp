@@ -1,6 +1,7 @@
 // A step divided until a cubic through the ends of each part tells what the guard does.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -84,7 +85,8 @@ private:
         const GuardSample middle = probe.dense_value_and_rate(start.s + cut * width);
         divided_ = true;
         divide(probe, start, middle, smallest, depth + 1);
-        nodes_.push_back(middle);
+        // A node that cannot be told from the surface is no end of a part.
+        if (std::fabs(middle.value) > std::max(noise_, whole_.touch)) nodes_.push_back(middle);
         divide(probe, middle, end, smallest, depth + 1);
     }
 
