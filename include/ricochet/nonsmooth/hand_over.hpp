@@ -146,6 +146,32 @@ private:
     std::uint64_t mark_ = 0;
 };
 
+/// Whether a y that switches stays within the error of the steps: more than 400 events in a row
+/// between which it goes no farther from zero. Their times are then accidents of rounding, and the
+/// events of an accumulation need not become denser.
+class FlutterWatch {
+public:
+    /// After so many events, the last of them at t; `speed()` is then that of the y concerned, and
+    /// `resolved` what a step resolves of it.
+    template <class Speed>
+    [[nodiscard]] bool operator()(std::uint64_t events, double t, double resolved,
+                                  const Speed& speed)
+    {
+        if (events == seen_) return false;
+        // A parabola between two zeros.
+        const bool flutters = events == seen_ + 1 && speed() * (t - t_) / 4 <= resolved;
+        in_a_row_ = flutters ? in_a_row_ + 1 : 0;
+        seen_ = events;
+        t_ = t;
+        return in_a_row_ > 400;
+    }
+
+private:
+    std::uint64_t seen_ = 0;
+    int in_a_row_ = 0;
+    double t_ = 0;
+};
+
 /// The options as they will be used.
 /// @throws std::invalid_argument naming the option.
 [[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
@@ -292,11 +318,13 @@ private:
             return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
         }
         detail::ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
+        detail::FlutterWatch unresolved;
         bool chatters = false;
+        bool flutters = false;
         bool released = false;
         Place before;
         held_.forget();
-        while (!chatters && !released) {
+        while (!chatters && !flutters && !released) {
             note_place(*simulation, before);
             const bool going = simulation->step();
             if (Modes::holds(before.mode) && !follows_held(before, *simulation)) {
@@ -313,12 +341,17 @@ private:
                        is_released(Modes::branches_of(simulation->mode()), simulation->t(),
                                    Modes::vector(simulation->x()));
             chatters = watch(simulation->t(), simulation->run().statistics.events);
-            if (!chatters && !released && may_lengthen()) {
+            const auto& events = simulation->run().events;
+            if (!events.empty()) {
+                flutters = unresolved(events.size(), events.back().t, resolution(simulation->x()),
+                                      [&] { return speed_after(events.back()); });
+            }
+            if (!chatters && !flutters && !released && may_lengthen()) {
                 note_place(*simulation, before);
                 return go_back(simulation->finish(), before);
             }
         }
-        finish_events(simulation->finish(), chatters);
+        finish_events(simulation->finish(), chatters, flutters);
         if (released && !set_valued_) end_with(HandOverOutcome::released);
     }
 
@@ -359,6 +392,26 @@ private:
         return false;
     }
 
+    /// Of the y whose zero was an event; infinite where the event was another.
+    template <class X>
+    [[nodiscard]] double speed_after(const Event<X>& event) const
+    {
+        if (event.guard % 4 >= 2 || event.mode_after >= Modes::branch_modes) {
+            return std::numeric_limits<double>::infinity();
+        }
+        X rate;
+        modes_.flow(event.mode_after, event.t, event.after, rate);
+        const auto i = static_cast<Eigen::Index>(event.guard / 4);
+        return std::abs(modes_.matrices().observe().row(i).dot(Modes::vector(rate)));
+    }
+
+    /// What a step resolves of y.
+    template <class X>
+    [[nodiscard]] double resolution(const X& x) const
+    {
+        return options_.atol + options_.rtol * Modes::vector(x).template lpNorm<Eigen::Infinity>();
+    }
+
     /// Whether a y is on the wrong side of its reaction, which is at a bound, by more than the
     /// error of a step.
     template <class X>
@@ -370,8 +423,7 @@ private:
         Mode rest = mode;
         for (Eigen::Index i = 0; i < y.size(); ++i, rest /= 3) {
             if (rest % 3 == 0 ? !(y[i] < 0) : rest % 3 == 1 || !(y[i] > 0)) continue;
-            const double size = w.template lpNorm<Eigen::Infinity>();
-            if (std::abs(y[i]) > 10 * (options_.atol + options_.rtol * size)) return true;
+            if (std::abs(y[i]) > 10 * resolution(x)) return true;
         }
         return false;
     }
@@ -418,8 +470,9 @@ private:
     }
 
     template <class X>
-    void finish_events(Run<X>&& done, bool chatters)
+    void finish_events(Run<X>&& done, bool chatters, bool flutters)
     {
+        const std::size_t fluttering = flutters ? done.events.back().guard : no_guard;
         collect(done);
         Vector& w = run_.state.w;
         run_.state.t = done.t;
@@ -429,11 +482,18 @@ private:
             return go_by_steps(cause_of(done.mode));
         }
         if (chatters) return go_by_steps(PhaseCause::chattering);
+        const auto accumulate = [&](std::size_t guard) {
+            auto branches = Modes::branches_of(done.mode);
+            branches[static_cast<Eigen::Index>(guard / 4)] = Branch::inside;
+            modes_.hold(branches, done.t, w);
+        };
+        if (flutters) {
+            accumulate(fluttering);
+            return go_by_steps(PhaseCause::accumulation);
+        }
         if (const auto cause = detail::cause_after(done.outcome)) {
             if (*cause == PhaseCause::accumulation && done.guard != no_guard) {
-                auto branches = Modes::branches_of(done.mode);
-                branches[static_cast<Eigen::Index>(done.guard / 4)] = Branch::inside;
-                modes_.hold(branches, done.t, w);
+                accumulate(done.guard);
             }
             return go_by_steps(*cause);
         }
