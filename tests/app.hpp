@@ -123,7 +123,10 @@ protected:
         EXPECT_EQ(result.out, "");
         EXPECT_EQ(files(), before);
         EXPECT_TRUE(result.err.starts_with("ricochet: ")) << result.err;
-        EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+        // A slow machine may be told that the program is still at work.
+        const auto lines = std::count(result.err.begin(), result.err.end(), '\n');
+        const bool patient = result.err.starts_with("ricochet: still running");
+        EXPECT_EQ(lines, patient ? 2 : 1) << result.err;
         for (const std::string& piece : pieces) {
             EXPECT_NE(result.err.find(piece), std::string::npos)
                 << "no '" << piece << "' in: " << result.err;

@@ -205,7 +205,7 @@ TEST_F(Robust, AModelThatCannotBeWrittenIsKeptElsewhere)
                       "--kind",        "any-step",      "--iterations", "20000",
                       "--allow-misses"};
     const pid_t child = start(words);
-    wait_for_handler(child, SIGINT);
+    wait_for_handler(child, SIGINT, Milliseconds(300));
     // What comes into the way while the training runs.
     fs::create_directory(work() / "ball.safetensors");
     const Result result = wait_for(child);
