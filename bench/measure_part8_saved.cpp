@@ -10,49 +10,37 @@
 #include <vector>
 
 #include "measure.hpp"
-#include "refusal.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/friction/additive_pair.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/locate/toms748.hpp"
+#include "saved_systems.hpp"
 
 namespace ricochet::bench {
 
 namespace {
 
-using X = std::array<double, 2>;
-using V = std::vector<double>;
+using test::Ball;
+using test::changed;
+using test::Droplet;
+using test::Losing;
+using test::Sawtooth;
+using X = Ball::State;
 
-struct Ball {
-    using State = X;
-    bool unilateral = true;
-    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
-    [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
-    void reset(double, X& x) const { x = {0, -0.8 * x[1]}; }
-};
-struct Droplet : Ball {};
-
-constexpr int steps_before = 9;
 const Options ball_options{.t_end = 4};
 
 Snapshot saved_ball()
 {
-    const Ball ball;
-    Simulation<Ball, X> simulation(ball, X{1, 0}, ball_options);
-    for (int i = 0; i < steps_before; ++i) simulation.step();
-    return simulation.save();
+    return test::saved_ball(ball_options);
 }
 
 // --- snapshots ---
 
-template <class System, class Stepping = ErrorControlled<Dopri5>, class... Choices>
-bool takes(const System& system, const Options& options, const Stepping& stepping = {},
-           const Choices&... choices)
+template <class System, class... Choices>
+bool takes(const System& system, const Options& options, const Choices&... choices)
 {
-    Simulation<System, X, Stepping, Choices...> simulation(system, X{1, 0}, options, stepping,
-                                                           choices...);
-    return refusal([&] { simulation.restore(saved_ball()); }) == "accepted";
+    return test::refused_by(saved_ball(), system, options, choices...) == "accepted";
 }
 
 Measured refuse_other_runs()
@@ -89,17 +77,10 @@ Measured refuse_changed_texts()
     int tried = 0;
     int taken = 0;
     for (int i = 0; i < 100'000; ++i) {
-        std::string changed = text;
-        const std::size_t at = random() % text.size();
-        switch (random() % 4) {
-            case 0: changed[at] = static_cast<char>(random() % 256); break;
-            case 1: changed.erase(at, 1 + random() % 20); break;
-            case 2: changed.insert(at, 1, static_cast<char>('0' + random() % 10)); break;
-            default: changed.resize(at);
-        }
-        if (changed == text) continue;
+        const std::string other = changed(text, random);
+        if (other == text) continue;
         ++tried;
-        taken += refusal([&] { (void)snapshot_from_text(changed); }) == "accepted";
+        taken += refusal([&] { (void)snapshot_from_text(other); }) == "accepted";
     }
     return {.pass = taken == 0, .text = fmt::format("{} of {} taken", taken, tried)};
 }
@@ -144,45 +125,17 @@ Measured run_hostile_snapshots()
 
 // --- states that lose a component ---
 
-struct Losing {
-    using State = V;
-    enum Where { in_flow, in_reset, in_rest, in_time_reset, to_nothing };
-    Where where;
-
-    void flow(double t, const V& x, V& dxdt) const
-    {
-        dxdt = {x.at(1), -9.81};
-        if (where == in_flow && t > 0.2) dxdt.pop_back();
-    }
-    [[nodiscard]] double guard(double, const V& x) const { return x.at(0) + 0 * x.at(1); }
-    void reset(double, V& x) const
-    {
-        x = {0, -0.5 * x.at(1)};
-        if (where == in_reset) x.pop_back();
-        if (where == to_nothing) x.clear();
-    }
-    void rest(double, V& x) const
-    {
-        x = {0, 0};
-        if (where == in_rest) x.pop_back();
-    }
-    [[nodiscard]] double next_time_event(double t) const { return t < 0.1 ? 0.1 : 1e9; }
-    void time_reset(double, V& x) const
-    {
-        if (where == in_time_reset) x.pop_back();
-    }
-};
-
 Measured lose_components()
 {
     int runs = 0;
     int named = 0;
-    for (const auto where : {Losing::in_flow, Losing::in_reset, Losing::in_rest,
+    for (const auto where : {Losing::in_late_flow, Losing::in_reset, Losing::in_rest,
                              Losing::in_time_reset, Losing::to_nothing}) {
         for (const bool fixed : {false, true}) {
             const Options options{.t_end = 5, .step = 0.01};
-            const auto run = fixed ? integrate(Losing{where}, V{1, 0}, options, FixedStep<Rk4>{})
-                                   : integrate(Losing{where}, V{1, 0}, options);
+            const auto run =
+                fixed ? integrate(Losing{where}, Losing::State{1, 0}, options, FixedStep<Rk4>{})
+                      : integrate(Losing{where}, Losing::State{1, 0}, options);
             ++runs;
             named += run.outcome == Outcome::wrong_dimension && run.x.size() == 2;
         }
@@ -191,13 +144,6 @@ Measured lose_components()
 }
 
 // --- time that stands still ---
-
-struct Sawtooth {
-    using State = std::array<double, 1>;
-    void flow(double, const State&, State& dxdt) const { dxdt = {1}; }
-    [[nodiscard]] double guard(double, const State& x) const { return 1e-16 - x[0]; }
-    void reset(double, State& x) const { x[0] = 0; }
-};
 
 Measured stand_still()
 {

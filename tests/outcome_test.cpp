@@ -8,43 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "refusal.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "saved_systems.hpp"
 
 namespace ricochet {
 namespace {
 
+using test::Losing;
+using test::Sawtooth;
 using V = std::vector<double>;
-
-/// A ball whose functions can be made to lose a component of the state.
-struct Losing {
-    using State = V;
-    enum Where { nowhere, in_flow, in_late_flow, in_reset, in_rest, in_time_reset, to_nothing };
-    Where where = nowhere;
-
-    void flow(double t, const V& x, V& dxdt) const
-    {
-        dxdt = {x[1], -9.81};
-        if (where == in_flow || (where == in_late_flow && t > 0.2)) dxdt.pop_back();
-    }
-    [[nodiscard]] double guard(double, const V& x) const { return x.at(0) + 0 * x.at(1); }
-    void reset(double, V& x) const
-    {
-        x = {0, -0.5 * x.at(1)};
-        if (where == in_reset) x.pop_back();
-        if (where == to_nothing) x.clear();
-    }
-    void rest(double, V& x) const
-    {
-        x = {0, 0};
-        if (where == in_rest) x.pop_back();
-    }
-    [[nodiscard]] double next_time_event(double t) const { return t < 0.1 ? 0.1 : 1e9; }
-    void time_reset(double, V& x) const
-    {
-        if (where == in_time_reset) x.pop_back();
-    }
-};
 
 TEST(WrongDimension, ALostComponentEndsTheRunBeforeItIsRead)
 {
@@ -92,15 +64,6 @@ TEST(WrongDimension, AStateGetsShorterWhereThatIsDeclared)
     EXPECT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_EQ(run.x.size(), 2u);
 }
-
-/// x' = 1 without an end: a guard that turns x back every 1e-16 s.
-struct Sawtooth {
-    using State = std::array<double, 1>;
-    double period = 1e-16;  // [s]
-    void flow(double, const State&, State& dxdt) const { dxdt = {1}; }
-    [[nodiscard]] double guard(double, const State& x) const { return period - x[0]; }
-    void reset(double, State& x) const { x[0] = 0; }
-};
 
 TEST(Stalled, ARunWhoseTimeStandsStillEnds)
 {

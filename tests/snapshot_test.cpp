@@ -13,26 +13,22 @@
 #include <utility>
 #include <vector>
 
-#include "refusal.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/toms748.hpp"
+#include "saved_systems.hpp"
 
 namespace ricochet {
 namespace {
 
-using X = std::array<double, 2>;
+using test::Ball;
+using test::changed;
+using test::Droplet;
+using test::refused_by;
+using test::saved_ball;
+using X = Ball::State;
 
-struct Ball {
-    using State = X;
-    bool unilateral = true;
-    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
-    [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
-    void reset(double, X& x) const { x = {0, -0.8 * x[1]}; }
-};
-
-/// As the ball, but of another type, or of another name.
-struct Droplet : Ball {};
+/// Of another name.
 struct Named : Ball {
     std::string name = "marble";
 };
@@ -46,26 +42,9 @@ struct Decay {
 
 const Options options{.t_end = 4, .step = 0.01};
 
-template <class System, class Stepping = ErrorControlled<Dopri5>, class... Choices>
-std::string refused_by(const Snapshot& snapshot, const System& system, const Options& asked,
-                       const Stepping& stepping = {}, const Choices&... choices)
-{
-    Simulation<System, X, Stepping, Choices...> simulation(system, X{1, 0}, asked, stepping,
-                                                           choices...);
-    return refusal([&] { simulation.restore(snapshot); });
-}
-
-Snapshot after_some_steps()
-{
-    const Ball ball;
-    Simulation<Ball, X> simulation(ball, X{1, 0}, options);
-    for (int i = 0; i < 9; ++i) simulation.step();
-    return simulation.save();
-}
-
 TEST(Snapshot, BelongsToOneKindOfRun)
 {
-    const Snapshot saved = after_some_steps();
+    const Snapshot saved = saved_ball(options);
     EXPECT_EQ(refused_by(saved, Ball{}, options), "accepted");
     // Where the run ends, its first step and what it keeps are free.
     EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 9, .step = 0.1, .record_steps = true}),
@@ -123,20 +102,13 @@ TEST(Snapshot, TypesAreNamedAlikeByEveryCompiler)
 
 TEST(Snapshot, AChangedTextIsRefused)
 {
-    const std::string text = to_text(after_some_steps());
-    EXPECT_EQ(snapshot_from_text(text), after_some_steps());
+    const std::string text = to_text(saved_ball(options));
+    EXPECT_EQ(snapshot_from_text(text), saved_ball(options));
     std::mt19937_64 random(5);
     for (int i = 0; i < 2000; ++i) {
-        std::string changed = text;
-        const std::size_t at = random() % text.size();
-        switch (random() % 4) {
-            case 0: changed[at] = static_cast<char>(random() % 256); break;
-            case 1: changed.erase(at, 1 + random() % 20); break;
-            case 2: changed.insert(at, 1, static_cast<char>('0' + random() % 10)); break;
-            default: changed.resize(at);
-        }
-        if (changed == text) continue;
-        EXPECT_NE(refusal([&] { (void)snapshot_from_text(changed); }), "accepted") << changed;
+        const std::string other = changed(text, random);
+        if (other == text) continue;
+        EXPECT_NE(refusal([&] { (void)snapshot_from_text(other); }), "accepted") << other;
     }
     EXPECT_NE(refusal([] {
                   (void)snapshot_from_text("ricochet-snapshot 1 35 12\n");
