@@ -29,7 +29,8 @@ std::vector<Check> all_checks()
           ricochet::bench::checks_of_part_3(), ricochet::bench::checks_of_part_4(),
           ricochet::bench::checks_of_part_5(), ricochet::bench::checks_of_part_6(),
           ricochet::bench::checks_of_part_7(), ricochet::bench::checks_of_part_8_saved(),
-          ricochet::bench::checks_of_part_8_fault()}) {
+          ricochet::bench::checks_of_part_8_events(), ricochet::bench::checks_of_part_8_fault(),
+          ricochet::bench::checks_of_part_8_hand_over()}) {
         checks.insert(checks.end(), part.begin(), part.end());
     }
     return checks;

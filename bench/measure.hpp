@@ -44,11 +44,17 @@ struct Check {
 /// Rate-and-state friction.
 [[nodiscard]] std::vector<Check> checks_of_part_7();
 
+/// Events where guards accumulate, decay, or move faster than the state.
+[[nodiscard]] std::vector<Check> checks_of_part_8_events();
+
 /// Saved runs, potential files, runs that cannot go on.
 [[nodiscard]] std::vector<Check> checks_of_part_8_saved();
 
 /// The fault and the rules for its steps.
 [[nodiscard]] std::vector<Check> checks_of_part_8_fault();
+
+/// Inclusions where several relays, contacts and diodes meet.
+[[nodiscard]] std::vector<Check> checks_of_part_8_hand_over();
 
 /// The sliding mode and the diode circuit, handed over: changes, times, states.
 [[nodiscard]] Measured hand_over_sliding_mode();

@@ -502,5 +502,95 @@ TEST(HardEvents, AnEventAtTheEndOfAStepHasTheStateOfTheStep)
     }
 }
 
+/// x'' = -x with a pole at x = 0.3, where the speed grows by a kick.
+struct Pole {
+    using State = std::array<double, 2>;
+
+    bool resets = true;
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const
+    {
+        return {.crossing = Crossing::either, .resets = resets};
+    }
+    template <class X>
+    void flow(double, const X& x, X& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+    template <class X>
+    [[nodiscard]] double guard(double, const X& x) const
+    {
+        return 1 / (x[0] - 0.3);
+    }
+    void reset(double, State& x) const { x[1] += std::copysign(1e-3, x[1]); }
+};
+
+TEST(HardEvents, APoleIsPassedAsAJumpAndDoesNotHideTheNext)
+{
+    // From 1 at rest, 0.3 is passed twice in each of three turns. Beside the pole the guard is
+    // 1e16, of which the event, with its band and its size, must not leave anything behind.
+    for (const bool resets : {true, false}) {
+        const auto run = integrate(Pole{.resets = resets}, {1.0, 0.0},
+                                   {.t_end = 18.8, .rtol = 1e-9, .atol = 1e-9});
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        ASSERT_EQ(run.events.size(), 6u);
+        for (const auto& event : run.events) {
+            EXPECT_EQ(event.kind, EventKind::jump);
+            // On the other side already, by some units in the last place; of an event that is only
+            // recorded the state is the polynomial's, which is off by the error of the step.
+            EXPECT_NEAR(event.before[0], 0.3, resets ? 1e-14 : 1e-9);
+            EXPECT_NE(event.before[0], 0.3);
+        }
+        EXPECT_NEAR(run.events[0].t, std::acos(0.3), 1e-8);
+    }
+}
+
+/// A ball that is dropped from 1 m and loses a tenth of its speed at every impact.
+struct Ball {
+    using State = X;
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
+    void reset(double, X& x) const { x = {0, -0.9 * x[1]}; }
+    void rest(double, X& x) const { x = {0, 0}; }
+};
+
+TEST(HardEvents, ImpactsDoNotDependOnHowFarTheEndLies)
+{
+    // All of them happen within 8.6 s, and the longest of their flights is the second, 0.81 s:
+    // steps of more than two flights are never taken.
+    std::vector<double> expected;
+    for (const double t_end : {30.0, 31.0, 1e3, 1e6, 1e9, 1e15, 1e100, 1e300}) {
+        for (const double h_max : {1.7, 5.0, 1e3, 1e300}) {
+            const auto run = integrate(Ball{}, {1, 0}, {.t_end = t_end, .h_max = h_max});
+            std::vector<double> impacts;
+            for (const auto& event : run.events) impacts.push_back(event.t);
+            EXPECT_EQ(run.outcome, Outcome::reached_end);
+            if (expected.empty()) expected = impacts;
+            EXPECT_EQ(impacts, expected) << "t_end " << t_end << ", h_max " << h_max;
+        }
+    }
+    EXPECT_GT(expected.size(), 200u);
+}
+
+TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
+{
+    // At rest at the origin, under a force that grows with the time: x = t^3 / 6 meets 1.
+    struct Pushed {
+        void flow(double t, const X& x, X& dxdt) const { dxdt = {x[1], t}; }
+        [[nodiscard]] double guard(double, const X& x) const { return 1 - x[0]; }
+    };
+    std::vector<double> times;
+    for (const double t_end : {2.0, 30.0, 1e9, 1e300}) {
+        const auto run = integrate(Pushed{}, X{0, 0}, {.t_end = t_end, .stop_at_event = true});
+        EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
+        times.push_back(run.t);
+    }
+    EXPECT_NEAR(times[1], std::cbrt(6), 1e-8);
+    EXPECT_EQ(times[2], times[1]);
+    EXPECT_EQ(times[3], times[1]);
+}
+
 }  // namespace
 }  // namespace ricochet

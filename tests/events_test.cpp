@@ -721,6 +721,27 @@ TEST(Events, ATimeEventAndAStateEventThatCoincideAreOneSet)
     }
 }
 
+TEST(Events, AResetThatContradictsATimeEventIsNamedWithIt)
+{
+    struct Both {
+        std::size_t guard_count = 2;
+        void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+        [[nodiscard]] double guard(std::size_t which, double, const X& x) const
+        {
+            return (which == 0 ? 0.9 : 0.3) - x[0];
+        }
+        void reset(std::size_t, double, X& x) const { x[1] = 2; }
+        [[nodiscard]] double next_time_event(double t) const { return t < 0.3 ? 0.3 : 1e300; }
+        void time_reset(double, X& x) const { x[1] = 1; }
+    };
+    const auto run = integrate(Both{}, X{0, 0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{});
+    EXPECT_EQ(run.outcome, Outcome::conflicting_resets);
+    EXPECT_EQ(run.guard, 1u);
+    EXPECT_EQ(run.other_guard, time_event_reset);
+    EXPECT_EQ(run.x[1], 0);
+    EXPECT_NE(describe(run.outcome).find("a guard and a time event"), std::string_view::npos);
+}
+
 // --- sets, cascades ---
 
 /// Two guards on one surface whose resets write the same component.

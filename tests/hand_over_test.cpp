@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <numbers>
 
@@ -423,6 +424,72 @@ TEST(HandOver, StepsOfBothKindsCountTowardsTheLimit)
     EXPECT_LE(run.statistics.event_driven.steps + run.statistics.set_valued.attempted, 700u);
     EXPECT_EQ(hand_over(SlidingMode{}, one(0.15), {.t_end = 1, .max_steps = 0}).outcome,
               HandOverOutcome::step_limit);
+}
+
+// --- reactions that move while everything is held ---
+
+/// w' = load + r with r in [-1, 1], from rest.
+struct Loaded {
+    static constexpr int state_size = 1;
+    static constexpr int reaction_size = 1;
+    double slow = 0, fast = 0, frequency = 0;
+    void smooth(double t, const One&, One& f) const
+    {
+        f[0] = slow * std::sin(t) + fast * std::sin(frequency * t);
+    }
+    static IntervalSet reaction_set(double, const One&) { return IntervalSet::symmetric(1); }
+};
+
+TEST(HandOver, EveryExitFromRestIsFound)
+{
+    // w' = 0 between the changes, so that nothing but the reaction limits the step. In each half
+    // of a period the load passes 1 at asin(1 / 1.05), and w is back at 0 before its end.
+    const Loaded system{.fast = 1.05, .frequency = 10};
+    constexpr double half = std::numbers::pi / 10;
+    constexpr int halves = 120;
+    const auto run = hand_over(system, one(0), {.t_end = halves * half});
+
+    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.events.size(), 2u * halves);
+    for (std::size_t i = 0; i < halves; ++i) {
+        EXPECT_EQ(run.events[2 * i].kind, EventKind::slip);
+        EXPECT_NEAR(run.events[2 * i].t, std::asin(1 / 1.05) / 10 + static_cast<double>(i) * half,
+                    1e-9);
+        EXPECT_EQ(run.events[2 * i + 1].kind, EventKind::stick);
+    }
+    // About ten steps for each change; a step that is repeated counts.
+    EXPECT_LE(run.statistics.event_driven.steps, 5000u);
+}
+
+TEST(HandOver, TwoSinesAsALoadMoveARelayFromRest)
+{
+    // The motion depends on the load alone; steps of a thousandth of the run miss no change. An
+    // exit where the load hardly passes the bound may be followed by changes from bound to bound
+    // within a rounding of its time, in one run and not in the other: they are left out.
+    const auto exits_and_returns = [](const auto& run) {
+        return std::count_if(run.events.begin(), run.events.end(),
+                             [](const auto& event) { return event.kind != EventKind::mode; });
+    };
+    for (int i = 0; i < 20; ++i) {
+        const Loaded system{.slow = 0.7, .fast = 0.3 + 0.02 * i, .frequency = 3 + 0.7 * i};
+        const auto run = hand_over(system, one(0), {.t_end = 20});
+        const auto fine = hand_over(system, one(0), {.t_end = 20, .h_max = 0.02});
+        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        EXPECT_EQ(exits_and_returns(run), exits_and_returns(fine));
+        EXPECT_NEAR(run.state.w[0], fine.state.w[0], 1e-8);
+    }
+}
+
+TEST(HandOver, ALoadOfTheSizeOfTheBoundIsHeldInLongSteps)
+{
+    // The room of the reaction is a rounding, and no reason for short steps.
+    for (const double load : {1.0, std::nextafter(1.0, 0.0), -1.0}) {
+        const auto system = pushed(load, [](double) { return IntervalSet::symmetric(1); });
+        const auto run = hand_over(system, one(0), {.t_end = 100});
+        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        EXPECT_EQ(run.state.w[0], 0);
+        EXPECT_LE(run.statistics.event_driven.steps, 50u);
+    }
 }
 
 // --- ends and bad input ---

@@ -105,6 +105,39 @@ TYPED_TEST_P(LocatorSuite, AJumpIsLocatedAlthoughItHasNoSlope)
     EXPECT_LE(where.lo, 0.7);
     EXPECT_GE(where.hi, 0.7);
     EXPECT_LE(where.hi - where.lo, 2e-15);
+    EXPECT_TRUE(where.jump);
+}
+
+TYPED_TEST_P(LocatorSuite, APoleIsNoCrossing)
+{
+    const HostStep step(
+        1.0, [](double s) { return 1 / (0.3 - s); },
+        [](double s) { return 1 / (0.3 - s) / (0.3 - s); });
+    const Location where = locate<TypeParam>(step, Side::above);
+    EXPECT_TRUE(where.jump);
+    EXPECT_LE(where.lo, 0.3);
+    EXPECT_GT(where.hi, 0.3);  // where the guard is finite again
+    EXPECT_EQ(where.root, where.hi);
+    EXPECT_LE(where.hi - where.lo, 2e-16);
+}
+
+TYPED_TEST_P(LocatorSuite, ASteepCrossingIsNoJumpAtAnyTolerance)
+{
+    // 1000 steep where it crosses, and 1 at both ends of the step.
+    const HostStep step(
+        1.0, [](double s) { return std::tanh(1000 * (0.3 - s)); },
+        [](double s) { return -1000 / std::pow(std::cosh(1000 * (0.3 - s)), 2); });
+    for (const double tolerance : {0.0, 1e-9, 1e-6, 1e-3}) {
+        EXPECT_FALSE(locate<TypeParam>(step, Side::above, tolerance).jump) << tolerance;
+    }
+}
+
+TYPED_TEST_P(LocatorSuite, AFlightThatEndsWithTheStepIsNoJump)
+{
+    // On the surface at the start and the end: the guard's ends say nothing of its size.
+    const HostStep step(
+        1.0, [](double s) { return s * (1 - s) - 1e-17; }, [](double s) { return 1 - 2 * s; });
+    EXPECT_FALSE(locate<TypeParam>(step, Side::above).jump);
 }
 
 TYPED_TEST_P(LocatorSuite, ASaturatedGuardIsLocatedAllTheSame)
@@ -141,6 +174,8 @@ REGISTER_TYPED_TEST_SUITE_P(LocatorSuite, ClosesToNeighbouringOffsets, TheBracke
                             AStartOnTheSurfaceIsNotTheEvent, AVeryShortFlightInALongStepIsFound,
                             AFlatCrossingIsLocatedToTheRoundingOfTheGuard,
                             AJumpIsLocatedAlthoughItHasNoSlope, ASaturatedGuardIsLocatedAllTheSame,
-                            APlateauAtZeroIsEnteredAtItsEdge, TheNumberOfStepsTakenIsBounded);
+                            APoleIsNoCrossing, ASteepCrossingIsNoJumpAtAnyTolerance,
+                            AFlightThatEndsWithTheStepIsNoJump, APlateauAtZeroIsEnteredAtItsEdge,
+                            TheNumberOfStepsTakenIsBounded);
 
 }  // namespace ricochet::test

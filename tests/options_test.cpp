@@ -63,5 +63,15 @@ TEST(Options, SampleTimesMustAscendWithinTheRun)
     EXPECT_NE(refusal({.t_end = 1, .sample_times = {nan}}), "accepted");
 }
 
+TEST(Options, ASampleTimeBeyondTheEndIsCalledThat)
+{
+    EXPECT_EQ(refusal({.t_end = 1, .sample_times = {0.5, 1.5}}),
+              "integrate: sample time 1.5 lies beyond the end of the run, t_end = 1");
+    EXPECT_EQ(refusal({.t_end = -1, .sample_times = {-0.5, -1.5}}),
+              "integrate: sample time -1.5 lies beyond the end of the run, t_end = -1");
+    EXPECT_EQ(refusal({.t_end = 1, .sample_times = {0.5, 0.25}}),
+              "integrate: sample_times must go from 0 towards 1, got 0.25 after 0.5");
+}
+
 }  // namespace
 }  // namespace ricochet

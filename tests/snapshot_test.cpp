@@ -124,8 +124,9 @@ TEST(Snapshot, NumbersThatAreNoStateAreRefusedAndChangeNothing)
     const Snapshot good = simulation.save();
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const double infinity = std::numeric_limits<double>::infinity();
-    // Time, its remainder, the state, its remainder, its rate and the next step.
-    for (std::size_t i = 0; i <= 8; ++i) {
+    // Time, its remainder, the state, its remainder, its rate, the next step, the first, and of the
+    // last event its time and the longest step after it.
+    for (std::size_t i = 0; i <= 11; ++i) {
         for (const double wrong : {nan, infinity, -infinity}) {
             Snapshot bad = good;
             bad.numbers[i] = wrong;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <vector>
 
 #include "ricochet/learn/step_control.hpp"
@@ -117,6 +118,37 @@ TEST(StepTraining, ImprovesAndResumesToTheSameBits)
     EXPECT_EQ(again.search.score, once.search.score);
     EXPECT_EQ(again.model.layers.back().weight, once.model.layers.back().weight);
     EXPECT_EQ(again.model.domain.front().lower, once.model.domain.front().lower);
+    std::filesystem::remove_all(directory);
+}
+
+TEST(StepTraining, StopsInTheMidstOfARunAndResumesToTheSameBits)
+{
+    // In the classical rules that are run first, in the search, and after it.
+    const StepFamily family = sliding_mode_family(5, 1);
+    const auto directory =
+        std::filesystem::temp_directory_path() / ("step-stopping-" + std::to_string(getpid()));
+    std::filesystem::create_directories(directory);
+    StepTrainingOptions options{.seed = 7, .evaluations = 41, .threads = 1};
+    std::size_t asked = 0;
+    std::size_t most = std::numeric_limits<std::size_t>::max();
+    options.goes_on = [&] { return ++asked <= most; };
+    const TrainedStepPolicy once = train_step_policy(family, options);
+    const std::size_t all = asked;
+    for (const double share : {0.001, 0.5, 0.8, 0.999}) {
+        options.checkpoint = directory / std::to_string(share);
+        options.resume = false;
+        most = static_cast<std::size_t>(share * static_cast<double>(all));
+        asked = 0;
+        const TrainedStepPolicy part = train_step_policy(family, options);
+        EXPECT_EQ(part.search.outcome, EvolutionOutcome::stopped);
+        EXPECT_LE(asked, most + 3) << "asked on after it was told to stop";
+        options.resume = std::filesystem::exists(options.checkpoint);
+        EXPECT_EQ(options.resume, share > 0.01);
+        most = std::numeric_limits<std::size_t>::max();
+        const TrainedStepPolicy again = train_step_policy(family, options);
+        EXPECT_EQ(again.search.x, once.search.x);
+        EXPECT_EQ(again.model.domain.front().lower, once.model.domain.front().lower);
+    }
     std::filesystem::remove_all(directory);
 }
 

@@ -30,6 +30,7 @@ std::string_view name(EventKind kind)
         case EventKind::mode: return "mode";
         case EventKind::stick: return "stick";
         case EventKind::slip: return "slip";
+        case EventKind::jump: return "jump";
     }
     return "crossing";
 }
@@ -56,6 +57,8 @@ Json json(const Statistics& s)
 {
     return {{"steps", s.steps},
             {"rejected", s.rejected},
+            {"refined_steps", s.refined_steps},
+            {"unresolved_steps", s.unresolved_steps},
             {"resteps", s.resteps},
             {"flow_calls", s.flow_calls},
             {"guard_calls", s.guard_calls},
@@ -96,6 +99,13 @@ std::string label(const Component& component)
 std::string_view cause(const SystemEntry& system, const PlainEvent& event)
 {
     return event.guard == no_guard ? name(event.kind) : system.guards.at(event.guard).name;
+}
+
+/// Whose reset contradicts that of the guard that ended the run.
+std::string_view opponent(const SystemEntry& system, const PlainRun& run)
+{
+    return run.other_guard == time_event_reset ? std::string_view("time event")
+                                               : system.guards.at(run.other_guard).name;
 }
 
 /// "floor", "floor, touch", "too-cold: off -> on"
@@ -218,6 +228,7 @@ std::string to_json(const SystemEntry& system, const RunSettings& settings, cons
     out["state"] = run.x;
     if (!system.modes.empty()) out["mode"] = system.modes.at(run.mode);
     if (run.guard != no_guard) out["ended_by"] = system.guards.at(run.guard).name;
+    if (run.other_guard != no_guard) out["conflicts_with"] = opponent(system, run);
     out["events"] = std::move(events);
     out["statistics"] = json(run.statistics);
     add_set_valued(out, settings, timed);
@@ -249,9 +260,10 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     out += fmt::format("{} at t = {} s, {}\n", ricochet::name(run.outcome), run.t,
                        fmt::join(state, ", "));
     if (run.outcome != Outcome::reached_end) {
-        const std::string guard = run.guard == no_guard
-                                      ? ""
-                                      : fmt::format("guard {}: ", system.guards.at(run.guard).name);
+        std::string guard =
+            run.guard == no_guard ? "" : fmt::format("guard {}", system.guards.at(run.guard).name);
+        if (run.other_guard != no_guard) guard += fmt::format(" and {}", opponent(system, run));
+        if (!guard.empty()) guard += ": ";
         out += run.outcome == Outcome::cancelled
                    ? fmt::format("  incomplete: {}\n", Interrupts::cause())
                    : fmt::format("  {}{}\n", guard, describe(run.outcome));

@@ -180,6 +180,7 @@ Outcome as_outcome(HandOverOutcome outcome) noexcept
 {
     switch (outcome) {
         case HandOverOutcome::reached_end: return Outcome::reached_end;
+        case HandOverOutcome::law_violated:
         case HandOverOutcome::not_converged: return Outcome::not_converged;
         case HandOverOutcome::step_underflow: return Outcome::step_underflow;
         case HandOverOutcome::step_limit: return Outcome::step_limit;

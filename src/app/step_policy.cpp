@@ -10,6 +10,7 @@
 
 #include "files.hpp"
 #include "input.hpp"
+#include "interrupt.hpp"
 #include "json_text.hpp"
 #include "keep_model.hpp"
 #include "model_lookup.hpp"
@@ -128,8 +129,10 @@ int train_policy(const TrainPolicyRequest& request)
     if (!request.trainer.empty() && request.trainer != "evolution") return train_actor(request);
     if (request.alpha) throw BadInput("--alpha is of --trainer tqc and td3");
     const std::uint64_t seed = request.seed.value_or(1);
-    learn::StepTrainingOptions options{
-        .seed = seed, .checkpoint = checked_checkpoint(request), .resume = request.resume};
+    learn::StepTrainingOptions options{.seed = seed,
+                                       .checkpoint = checked_checkpoint(request),
+                                       .resume = request.resume,
+                                       .goes_on = [] { return !Interrupts::any(); }};
     if (request.evaluations) options.evaluations = *request.evaluations;
     if (request.seconds) options.seconds = *request.seconds;
     if (request.threads) options.threads = *request.threads;

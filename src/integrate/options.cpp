@@ -50,7 +50,12 @@ void validate(const Options& options, bool step_required)
     const bool backward = o.t_end < o.t_start;
     double previous = o.t_start;
     for (const double t : o.sample_times) {
-        if (!(backward ? t <= previous && t >= o.t_end : t >= previous && t <= o.t_end)) {
+        if (backward ? t < o.t_end : t > o.t_end) {
+            throw std::invalid_argument(
+                fmt::format("integrate: sample time {} lies beyond the end of the run, t_end = {}",
+                            t, o.t_end));
+        }
+        if (!(backward ? t <= previous : t >= previous)) {
             throw std::invalid_argument(
                 fmt::format("integrate: sample_times must go from {} towards {}, got {} after {}",
                             o.t_start, o.t_end, t, previous));

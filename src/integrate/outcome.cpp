@@ -40,8 +40,9 @@ std::string_view describe(Outcome outcome) noexcept
             return "resets triggered each other a hundred times at one instant; let each leave "
                    "the surfaces of the others, or give the system a sliding mode";
         case Outcome::conflicting_resets:
-            return "two guards fired together and their resets gave one component, or the mode, "
-                   "two values; declare reset(fired, t, x) to say what happens then";
+            return "two guards, or a guard and a time event, fired together and their resets gave "
+                   "one component, or the mode, two values; declare reset(fired, t, x) to say what "
+                   "happens then";
         case Outcome::unknown_mode: return "a reset returned a mode that is not below mode_count";
         case Outcome::step_underflow:
             return "the step fell below h_min without meeting the tolerance; "

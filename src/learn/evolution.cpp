@@ -165,10 +165,17 @@ public:
         const auto start = std::chrono::steady_clock::now();
         const double before = s_.seconds;
         double saved = before;
-        if (s_.evaluations == 0) try_start();
-        std::optional<EvolutionOutcome> outcome = ended();
+        std::optional<EvolutionOutcome> outcome;
+        if (s_.evaluations == 0 && !completes([this] { try_start(); })) {
+            outcome = EvolutionOutcome::stopped;
+        } else {
+            outcome = ended();
+        }
         while (!outcome) {
-            generation();
+            if (!completes([this] { generation(); })) {
+                outcome = EvolutionOutcome::stopped;
+                break;
+            }
             const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
             s_.seconds = before + spent.count();
             outcome = ended();
@@ -190,6 +197,20 @@ public:
     }
 
 private:
+    /// False if a score was given up in a part of the search, which is then as if not begun.
+    template <class Part>
+    [[nodiscard]] bool completes(const Part& part)
+    {
+        const Random::State random = s_.random;
+        try {
+            part();
+            return true;
+        } catch (const SearchStopped&) {
+            s_.random = random;
+            return false;
+        }
+    }
+
     void try_start()
     {
         keep_if_best(s_.best, score_(s_.best));

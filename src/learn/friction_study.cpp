@@ -13,6 +13,11 @@ namespace {
 constexpr double run_time = 2;  // [s]
 constexpr int per_second = 64;
 
+bool is(const std::atomic<bool>* cancelled)
+{
+    return cancelled && cancelled->load(std::memory_order_relaxed);
+}
+
 SliderCase stepped_load(Random& random)
 {
     SliderCase c;
@@ -78,11 +83,11 @@ FrictionHistory as_history(const SliderPath& path, const RateStateParameters& p)
 }
 
 SliderErrors compare(const AdditivePair& pair, const std::vector<SliderCase>& cases,
-                     const std::vector<SliderPath>& exact)
+                     const std::vector<SliderPath>& exact, const std::atomic<bool>* cancelled)
 {
     SliderErrors out;
     const auto count = static_cast<double>(cases.size());
-    for (std::size_t i = 0; i < cases.size(); ++i) {
+    for (std::size_t i = 0; i < cases.size() && !is(cancelled); ++i) {
         const SliderPath path = follow(pair, cases[i]);
         out.x += relative_error(path.x, exact[i].x) / count;
         out.v += relative_error(path.v, exact[i].v) / count;
@@ -96,13 +101,15 @@ SliderErrors compare(const AdditivePair& pair, const std::vector<SliderCase>& ca
 }  // namespace
 
 InternalVariables try_internal_variables(const FrictionData& data, int internal,
-                                         std::size_t histories, double seconds)
+                                         std::size_t histories, double seconds,
+                                         const std::atomic<bool>* cancelled)
 {
     const std::vector<FrictionHistory> some(
         data.training.begin(),
         data.training.begin() + static_cast<long>(std::min(histories, data.training.size())));
-    const LearnedFriction fit =
-        train_friction(some, {.internal = internal, .iterations = 200, .seconds = seconds});
+    const LearnedFriction fit = train_friction(
+        some,
+        {.internal = internal, .iterations = 200, .seconds = seconds, .cancelled = cancelled});
     const double f_star = RateStateParameters{}.f_star;
     return {.internal = internal,
             .parameters = fit.parameters(),
@@ -111,7 +118,8 @@ InternalVariables try_internal_variables(const FrictionData& data, int internal,
             .test = assess(fit, data.test, f_star)};
 }
 
-Transfer transfer_to_sliders(const LearnedFriction& fit, std::uint64_t seed, double seconds)
+Transfer transfer_to_sliders(const LearnedFriction& fit, std::uint64_t seed, double seconds,
+                             const std::atomic<bool>* cancelled)
 {
     if (!fit.pair()) {
         throw std::invalid_argument(
@@ -122,17 +130,20 @@ Transfer transfer_to_sliders(const LearnedFriction& fit, std::uint64_t seed, dou
     std::vector<SliderCase> cases;
     std::vector<SliderPath> exact;
     for (int i = 0; i < 10; ++i) {
+        if (is(cancelled)) return {};
         cases.push_back(stepped_load(random));
         exact.push_back(follow(law, cases.back()));
     }
     std::vector<FrictionHistory> others;
     for (int i = 0; i < 24; ++i) {
+        if (is(cancelled)) return {};
         others.push_back(as_history(follow(law, stepped_load(random)), law.parameters()));
     }
-    const LearnedFriction further =
-        train_further(fit, others, {.iterations = 40, .seconds = seconds, .target = 1e-9});
-    return {.as_trained = compare(*fit.pair(), cases, exact),
-            .further_trained = compare(*further.pair(), cases, exact)};
+    const LearnedFriction further = train_further(
+        fit, others,
+        {.iterations = 40, .seconds = seconds, .target = 1e-9, .cancelled = cancelled});
+    return {.as_trained = compare(*fit.pair(), cases, exact, cancelled),
+            .further_trained = compare(*further.pair(), cases, exact, cancelled)};
 }
 
 SliderVelocities slider_velocities(const SliderCase& slider, int order, int steps_in_64th)

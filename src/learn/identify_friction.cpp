@@ -109,7 +109,8 @@ Eigen::VectorXd start(const Histories& histories, double v_star)
 
 }  // namespace
 
-IdentifiedFriction identify_ageing_law(const Histories& histories, double v_star)
+IdentifiedFriction identify_ageing_law(const Histories& histories, double v_star,
+                                       const std::atomic<bool>* cancelled)
 {
     if (histories.empty()) {
         throw std::invalid_argument("identify_ageing_law: expected histories, got none");
@@ -131,8 +132,8 @@ IdentifiedFriction identify_ageing_law(const Histories& histories, double v_star
                                      Eigen::VectorXd* gradient) {
         return sum_of_squares(histories, v_star, at, normal, gradient);
     };
-    const LevenbergMarquardtReport report =
-        levenberg_marquardt(problem, p, {.iterations = 60, .damping = 1e-6});
+    const LevenbergMarquardtReport report = levenberg_marquardt(
+        problem, p, {.iterations = 60, .damping = 1e-6, .cancelled = cancelled});
 
     Eigen::MatrixXd normal(5, 5);
     Eigen::VectorXd gradient(5);

@@ -20,6 +20,9 @@ LevenbergMarquardtReport levenberg_marquardt(const SumOfSquares& problem, Eigen:
                                              const LevenbergMarquardtOptions& options)
 {
     const double start = processor_time();
+    const auto cancelled = [&] {
+        return options.cancelled && options.cancelled->load(std::memory_order_relaxed);
+    };
     LevenbergMarquardtReport report;
     Eigen::MatrixXd normal(p.size(), p.size());
     Eigen::VectorXd gradient(p.size());
@@ -28,7 +31,7 @@ LevenbergMarquardtReport levenberg_marquardt(const SumOfSquares& problem, Eigen:
     double damping = options.damping;
     double growth = 2;
     while (report.trials < 4 * options.iterations && report.iterations < options.iterations &&
-           processor_time() - start < options.seconds) {
+           processor_time() - start < options.seconds && !cancelled()) {
         if (report.sum <= options.target) {
             report.converged = true;
             break;

@@ -207,8 +207,45 @@ std::string name_of(const StepFamily& family)
 
 }  // namespace
 
-TrainedStepPolicy train_step_policy(const StepFamily& family, const StepTrainingOptions& options,
-                                    const EvolutionCallback& progress)
+StepFamily stoppable(StepFamily family, std::function<bool()> goes_on)
+{
+    for (StepProblem& problem : family.problems) {
+        problem.run = [run = std::move(problem.run), goes_on](const StepRule& rule) {
+            if (!goes_on()) throw SearchStopped{};
+            StepRule watched = rule;
+            watched.watch = [&](double done) {
+                return goes_on() && (!rule.watch || rule.watch(done));
+            };
+            StepTrial trial = run(watched);
+            if (!goes_on()) throw SearchStopped{};
+            return trial;
+        };
+    }
+    return family;
+}
+
+namespace {
+
+/// What the policy and the classical rule meet on the family, a tenth wider.
+auto domain_of(const StepFamily& family, const std::vector<double>& x)
+{
+    StepRanges seen;
+    for (const std::vector<double>& weights : {x, std::vector<double>{}}) {
+        LearnedStep rule = rule_of(family.layout, weights);
+        rule.seen = &seen;
+        for (const StepProblem& problem : family.problems) {
+            for (const double tolerance : family.tolerances) {
+                for (const double factor : {4.0, 1.0, 0.25}) {
+                    (void)problem.run({.controller = rule, .tolerance = factor * tolerance});
+                }
+            }
+        }
+    }
+    return seen.domain(0.1);
+}
+
+TrainedStepPolicy train_on(const StepFamily& family, const StepTrainingOptions& options,
+                           const EvolutionCallback& progress)
 {
     const StepScore score(family, options.threads);
     const Start start = start_of(options.seed);
@@ -231,20 +268,27 @@ TrainedStepPolicy train_step_policy(const StepFamily& family, const StepTraining
         progress);
     out.model = step_policy_model(family.layout, out.search.x);
     out.model.seed = options.seed;
-    StepRanges seen;
-    for (const std::vector<double>& weights : {out.search.x, std::vector<double>{}}) {
-        LearnedStep rule = rule_of(family.layout, weights);
-        rule.seen = &seen;
-        for (const StepProblem& problem : family.problems) {
-            for (const double tolerance : family.tolerances) {
-                for (const double factor : {4.0, 1.0, 0.25}) {
-                    (void)problem.run({.controller = rule, .tolerance = factor * tolerance});
-                }
-            }
-        }
+    try {
+        out.model.domain = domain_of(family, out.search.x);
+    } catch (const SearchStopped&) {
+        out.search.outcome = EvolutionOutcome::stopped;
     }
-    out.model.domain = seen.domain(0.1);
     return out;
+}
+
+}  // namespace
+
+TrainedStepPolicy train_step_policy(const StepFamily& family, const StepTrainingOptions& options,
+                                    const EvolutionCallback& progress)
+{
+    if (!options.goes_on) return train_on(family, options, progress);
+    try {
+        return train_on(stoppable(family, options.goes_on), options, progress);
+    } catch (const SearchStopped&) {  // before the search, or after it
+        TrainedStepPolicy out;
+        out.search.outcome = EvolutionOutcome::stopped;
+        return out;
+    }
 }
 
 }  // namespace ricochet::learn

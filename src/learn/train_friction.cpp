@@ -239,6 +239,7 @@ void move_by_adam(FrictionModel& model, const std::vector<const FrictionHistory*
     Adam adam(static_cast<std::size_t>(p.size()), {});
     Eigen::VectorXd gradient(p.size());
     for (int i = 0; i < options.adam_iterations; ++i) {
+        if (options.cancelled && options.cancelled->load(std::memory_order_relaxed)) return;
         std::vector<const FrictionHistory*> batch;
         for (int k = 0; k < 8; ++k) batch.push_back(histories[random.below(histories.size())]);
         (void)sum_of_squares(model, batch, p, nullptr, &gradient);
@@ -265,7 +266,8 @@ LearnedFriction fit(std::unique_ptr<FrictionModel> model, Eigen::VectorXd p,
         levenberg_marquardt(problem, p,
                             {.iterations = options.iterations,
                              .seconds = options.seconds - (processor_time() - start),
-                             .target = count * options.target * options.target});
+                             .target = count * options.target * options.target,
+                             .cancelled = options.cancelled});
     model->set(p);
     PairDomain& domain = model->domain;
     domain = {std::numeric_limits<double>::infinity(), 0, 0, 0};

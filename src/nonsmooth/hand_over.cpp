@@ -15,6 +15,7 @@ std::string_view name(HandOverOutcome outcome) noexcept
         case HandOverOutcome::cancelled: return "cancelled";
         case HandOverOutcome::not_handed_over: return "not_handed_over";
         case HandOverOutcome::released: return "released";
+        case HandOverOutcome::law_violated: return "law_violated";
     }
     return "unknown";
 }
@@ -34,6 +35,9 @@ std::string_view describe(HandOverOutcome outcome) noexcept
         case HandOverOutcome::not_handed_over:
             return "events alone do not lead on from here; allow set-valued steps";
         case HandOverOutcome::released: return "every reaction is at a bound, as was asked for";
+        case HandOverOutcome::law_violated:
+            return "a step ended with a reaction that contradicts its law; look at reaction_set, "
+                   "which must be a function of time and state, or try a shorter step";
     }
     return "unknown outcome";
 }
@@ -48,6 +52,7 @@ std::string_view name(PhaseCause cause) noexcept
         case PhaseCause::accumulation: return "accumulation";
         case PhaseCause::chattering: return "chattering";
         case PhaseCause::stuck: return "stuck";
+        case PhaseCause::contradiction: return "contradiction";
         case PhaseCause::released: return "released";
     }
     return "unknown";
@@ -101,8 +106,8 @@ HandOverOptions completed(HandOverOptions options, bool locate)
             options.set_valued.step);
     double last = options.t_start;
     for (const double t : options.sample_times) {
-        require(t >= last && t <= options.t_end, "sample_times must ascend from t_start to t_end",
-                t);
+        require(!(t > options.t_end), "sample_times must not lie beyond t_end", t);
+        require(t >= last, "sample_times must ascend from t_start to t_end", t);
         last = t;
     }
     const double span = options.t_end - options.t_start;

@@ -24,13 +24,12 @@ struct Question {
     CaveBody::Attitude at{};
     CaveBody::Search search{};
 };
-/// Without constructors, so that a thread can have it from its start.
 struct Answer {
     std::uint32_t face, other_face;
     double distance;
     double point[3], other_point[3];
 };
-using Last = detail::LastAnswer<Question, Answer>;
+using Last = detail::LastAnswers<Question, Answer>;
 
 Pose pose_of(const CaveBody::Attitude& at) noexcept
 {
@@ -92,11 +91,11 @@ struct CaveBody::Shapes {
     {
     }
 
-    std::uint64_t number = detail::unique_number();
     geometry::Triangles cave;
     geometry::Triangles body;
     std::vector<geometry::Ball> balls;
     std::optional<geometry::DistanceGrid<3>> table{};
+    mutable Last last{};
 };
 
 CaveBody::CaveBody(const Parameters& parameters)
@@ -147,27 +146,27 @@ CaveBody::CaveBody(const Parameters& parameters, const geometry::Mesh& cave,
 
 NearestFaces CaveBody::nearest(Search search, const Attitude& at) const noexcept
 {
-    Last& last = Last::of(shapes_->number);
+    Last::Loan last(shapes_->last);
     NearestFaces found;
-    if (last.owner == shapes_->number) {
-        const Answer& a = last.answer;
+    if (last->known) {
+        const Answer& a = last->answer;
         found.face = a.face;
         found.other_face = a.other_face;
         found.distance = a.distance;
         found.point = Vector3d(a.point[0], a.point[1], a.point[2]);
         found.other_point = Vector3d(a.other_point[0], a.other_point[1], a.other_point[2]);
-        if (last.question.at == at && last.question.search == search) return found;
+        if (last->question.at == at && last->question.search == search) return found;
     }
     const Pose pose = pose_of(at);
     found = search == Search::tree ? shapes_->cave.nearest(shapes_->body, pose, found)
                                    : shapes_->cave.nearest_brute(shapes_->body, pose);
-    last.owner = shapes_->number;
-    last.question = {at, search};
-    last.answer = {found.face,
-                   found.other_face,
-                   found.distance,
-                   {found.point(0), found.point(1), found.point(2)},
-                   {found.other_point(0), found.other_point(1), found.other_point(2)}};
+    last->known = true;
+    last->question = {at, search};
+    last->answer = {found.face,
+                    found.other_face,
+                    found.distance,
+                    {found.point(0), found.point(1), found.point(2)},
+                    {found.other_point(0), found.other_point(1), found.other_point(2)}};
     return found;
 }
 

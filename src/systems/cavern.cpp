@@ -25,7 +25,7 @@ struct Question {
     Point2 p{};
     Cavern::Search search{};
 };
-using Last = detail::LastAnswer<Question, NearestOnSegment>;
+using Last = detail::LastAnswers<Question, NearestOnSegment>;
 
 constexpr int waves = 24;
 
@@ -79,9 +79,9 @@ void check(const Cavern::Parameters& p)
 struct Cavern::Rock {
     explicit Rock(const std::vector<Point2>& vertices) : wall(vertices) {}
 
-    std::uint64_t number = detail::unique_number();
     Outline wall;
     std::optional<geometry::DistanceGrid<2>> table{};
+    mutable Last last{};
 };
 
 Cavern::Cavern(const Parameters& parameters)
@@ -125,16 +125,16 @@ Cavern::Cavern(const Parameters& parameters, std::shared_ptr<const Rock> rock)
 
 NearestOnSegment Cavern::nearest(Search search, Point2 p) const noexcept
 {
-    Last& last = Last::of(rock_->number);
-    if (last.owner == rock_->number && last.question.p.x == p.x && last.question.p.y == p.y &&
-        last.question.search == search) {
-        return last.answer;
+    Last::Loan last(rock_->last);
+    if (last->known && last->question.p.x == p.x && last->question.p.y == p.y &&
+        last->question.search == search) {
+        return last->answer;
     }
-    const std::uint32_t hint = last.owner == rock_->number ? last.answer.segment : 0;
+    const std::uint32_t hint = last->known ? last->answer.segment : 0;
     const geometry::Segments& edges = rock_->wall.edges();
     const NearestOnSegment found =
         search == Search::tree ? edges.nearest(p, hint) : edges.nearest_brute(p);
-    last = {rock_->number, {p, search}, found};
+    *last.operator->() = {true, {p, search}, found};
     return found;
 }
 

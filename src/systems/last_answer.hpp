@@ -1,36 +1,78 @@
-// The last answer of a dear question, kept by each thread.
+// The last answer of an expensive question, kept by the system that was asked.
 //
 // A guard and its rate ask for the same nearest point, and the next question is near the last.
-// What is remembered is an answer to exactly the same question, or a hint; neither
-// changes a result, so systems stay values without mutable state.
+// What is remembered is an answer to exactly the same question, or a hint; neither changes a
+// result, so systems stay values that threads may share.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <optional>
+#include <thread>
 
 namespace ricochet::detail {
 
-/// A number that nobody else in this process has. Copies of a value share it.
-inline std::uint64_t unique_number() noexcept
-{
-    static std::atomic<std::uint64_t> last{0};
-    return ++last;
-}
-
+/// Threads that share a system find their own answers again, but for those whose numbers fall
+/// together: of these one at a time remembers, and the others ask as if for the first time.
 template <class Question, class Answer>
-struct LastAnswer {
-    std::uint64_t owner = 0;
-    Question question{};
-    Answer answer{};
+class LastAnswers {
+public:
+    struct Memory {
+        bool known = false;  ///< there was a question
+        Question question{};
+        Answer answer{};
+    };
 
-    /// The slot of an owner. Owners may share one, and then only forget.
-    [[nodiscard]] static LastAnswer& of(std::uint64_t owner) noexcept
+private:
+    struct alignas(64) Slot {
+        std::atomic<bool> lent{false};
+        Memory memory{};
+    };
+
+public:
+    LastAnswers() = default;
+    /// A copy has not been asked yet.
+    LastAnswers(const LastAnswers& /*other*/) noexcept {}
+    LastAnswers& operator=(const LastAnswers& /*other*/) noexcept { return *this; }
+
+    /// What the calling thread asked last, on loan.
+    class Loan {
+    public:
+        explicit Loan(LastAnswers& all) noexcept : slot_(&all.slots_[number_of_thread()])
+        {
+            if (slot_->lent.exchange(true, std::memory_order_acquire)) {
+                slot_ = nullptr;
+                own_.emplace();
+            }
+        }
+        ~Loan()
+        {
+            if (slot_) slot_->lent.store(false, std::memory_order_release);
+        }
+        Loan(const Loan&) = delete;
+        Loan& operator=(const Loan&) = delete;
+
+        [[nodiscard]] Memory* operator->() noexcept { return slot_ ? &slot_->memory : &*own_; }
+
+    private:
+        Slot* slot_;
+        std::optional<Memory> own_{};
+    };
+
+private:
+    static constexpr std::size_t count = 8;
+
+    [[nodiscard]] static std::size_t number_of_thread() noexcept
     {
-        thread_local constinit std::array<LastAnswer, 8> slots{};
-        return slots[owner % slots.size()];
+        const auto id =
+            static_cast<std::uint64_t>(std::hash<std::thread::id>{}(std::this_thread::get_id()));
+        return static_cast<std::size_t>((id * 0x9e3779b97f4a7c15u) >> 61);  // Fibonacci hashing
     }
+
+    std::array<Slot, count> slots_{};
 };
 
 }  // namespace ricochet::detail

@@ -34,8 +34,8 @@ struct Answer {
     ArmScene::Contact contact{};
     std::array<std::uint32_t, most> edges{};  ///< nearest to each link: hints
 };
-using Last = detail::LastAnswer<Question, Answer>;
-using LastTorques = detail::LastAnswer<double, std::array<double, most>>;
+using Last = detail::LastAnswers<Question, Answer>;
+using LastTorques = detail::LastAnswers<double, std::array<double, most>>;
 
 /// The ends of the links; the first is the base.
 std::array<Point2, most + 1> ends(const double* angles, std::size_t n, double length) noexcept
@@ -73,9 +73,10 @@ double distance_to(const Outline& polygon, const Segment2& link)
 struct ArmScene::Place {
     explicit Place(const std::vector<Segment2>& all) : edges(all) {}
 
-    std::uint64_t number = detail::unique_number();
     geometry::Segments edges;
     std::optional<geometry::DistanceGrid<2>> table{};
+    mutable Last last{};
+    mutable LastTorques last_torques{};
 };
 
 ArmScene::ArmScene(const Parameters& parameters, std::size_t joints)
@@ -197,18 +198,18 @@ void ArmScene::place(const std::vector<std::vector<Point2>>& obstacles)
     place_ = std::move(place);
 }
 
-const double* ArmScene::torques(double t) const noexcept
+std::array<double, ArmScene::most_joints> ArmScene::torques(double t) const noexcept
 {
-    LastTorques& last = LastTorques::of(place_->number);
-    if (last.owner != place_->number || last.question != t) {
+    LastTorques::Loan last(place_->last_torques);
+    if (!last->known || last->question != t) {
         for (std::size_t i = 0; i < n_; ++i) {
             const Joint& j = joints_[i];
-            last.answer[i] = j.drive * std::sin(j.frequency * t + j.phase);
+            last->answer[i] = j.drive * std::sin(j.frequency * t + j.phase);
         }
-        last.owner = place_->number;
-        last.question = t;
+        last->known = true;
+        last->question = t;
     }
-    return last.answer.data();
+    return last->answer;
 }
 
 std::size_t ArmScene::obstacle_edges() const noexcept
@@ -218,22 +219,20 @@ std::size_t ArmScene::obstacle_edges() const noexcept
 
 ArmScene::Contact ArmScene::contact(Search search, const double* angles) const noexcept
 {
-    Last& last = Last::of(place_->number);
-    const bool mine = last.owner == place_->number;
-    if (mine && last.question.search == search &&
-        std::equal(angles, angles + n_, last.question.angles.begin())) {
-        return last.answer.contact;
+    Last::Loan last(place_->last);
+    if (last->known && last->question.search == search &&
+        std::equal(angles, angles + n_, last->question.angles.begin())) {
+        return last->answer.contact;
     }
-    if (!mine) last.answer = {};
     const auto joints = ends(angles, n_, link_);
     Contact best{.distance = infinity, .link = 0, .point = {}, .normal = {}};
     NearestPair nearest;
     // The link that was nearest goes first, and bounds what the others look at.
-    const std::uint32_t first = last.answer.contact.link < n_ ? last.answer.contact.link : 0;
+    const std::uint32_t first = last->answer.contact.link < n_ ? last->answer.contact.link : 0;
     for (std::uint32_t k = 0; k < n_; ++k) {
         const std::uint32_t link = k == 0 ? first : k <= first ? k - 1 : k;
         const Segment2 s{joints[link], joints[link + 1]};
-        std::uint32_t& hint = last.answer.edges[link];
+        std::uint32_t& hint = last->answer.edges[link];
         // A little beyond the nearest so far, so that of links as near the first wins.
         const double limit = best.distance * (1 + 1e-15);
         if (search == Search::tree && k > 0 && lower_bound_of(s) > limit) continue;
@@ -256,10 +255,10 @@ ArmScene::Contact ArmScene::contact(Search search, const double* angles) const n
     } else {
         best.normal = {1, 0};
     }
-    last.owner = place_->number;
-    std::copy(angles, angles + n_, last.question.angles.begin());
-    last.question.search = search;
-    last.answer.contact = best;
+    last->known = true;
+    std::copy(angles, angles + n_, last->question.angles.begin());
+    last->question.search = search;
+    last->answer.contact = best;
     return best;
 }
 

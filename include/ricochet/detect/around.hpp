@@ -10,6 +10,7 @@ template <class Exact>
 class Around {
 public:
     static constexpr bool uses_rates = Exact::uses_rates;
+    static constexpr bool looks_inside = LooksInside<Exact>;
     static constexpr Evidence evidence = Exact::evidence;  ///< of a step it has looked at
 
     explicit Around(const Exact& exact) : exact_(exact) {}

@@ -53,6 +53,7 @@ struct GuardCubic {
 
 struct Extremum {
     static constexpr bool uses_rates = true;
+    static constexpr bool looks_inside = true;  ///< compares each step with the cubic of its ends
     static constexpr Evidence evidence = Evidence::checked;  ///< of a step not suspected
 
     /// Whether a step deserves a look, in the guard times `sign`, positive on its
@@ -94,7 +95,7 @@ struct Extremum {
         if (side == Side::plateau) return Finding::clear(Evidence::checked);
 
         const detail::GuardCubic cubic(sign, watch.start, watch.end);
-        const bool on_surface = std::fabs(cubic.v1) <= watch.touch;
+        const bool on_surface = is_on_surface(probe, watch, watch.end);
         // A stretch that ends inside the step ends at an event, which others have looked at.
         const bool whole = watch.end.s == probe.step().h();
         const bool returns = on_surface && whole && turns_back(probe, watch, cubic);
@@ -119,6 +120,20 @@ struct Extremum {
     }
 
 private:
+    /// Whether a sample cannot be told from zero: by the rounding of the guard's values, or
+    /// of the terms that it is made of.
+    template <class Probe>
+    [[nodiscard]] static bool is_on_surface(Probe& probe, const Watch& watch,
+                                            const GuardSample& sample)
+    {
+        const double size = std::fabs(sample.value);
+        if (size <= watch.touch) return true;
+        return size <= near * watch.scale && size <= probe.blur(sample.s);
+    }
+
+    /// Of the scale of the guard, below which rounding of its terms is thought of.
+    static constexpr double near = 1e-3;
+
     /// Whether a guard that is across its surface, or on it, and falls at this rate will turn
     /// at once: within the rounding of a rate. One that is not yet there may be overlooked
     /// at the end of a step, and is looked at from the start of the next.
@@ -136,7 +151,7 @@ private:
                                                         const detail::GuardCubic& cubic)
     {
         const double sign = watch.side == Side::above ? 1 : -1;
-        const double width = watch.end.s - watch.start.s;
+        const double width = probe.step().h();
         for (const double part : {1.0 / 64, 1.0 / 8, 1.0}) {
             const double beyond = sign * probe.value(watch.end.s + part * width).value;
             if (std::fabs(beyond) > watch.touch) return beyond > 0;
@@ -159,12 +174,15 @@ private:
         const double s2 = watch.start.s + width * cubic.critical(false);
         const GuardSample lowest = probe.value_and_rate(s1);
         const GuardSample highest = probe.value_and_rate(s2);
-        if (s1 < s2 && leaving_counts && std::fabs(lowest.value) <= watch.touch &&
-            std::fabs(cubic.v0) > watch.touch && !has_left(side, highest.value)) {
+        const bool dips = s1 < s2 && !has_left(side, highest.value);
+        const bool touches = dips && is_on_surface(probe, watch, lowest);
+        // It has to rise again, by more than the rounding of a flat root.
+        const bool rises =
+            std::fabs(highest.value) > std::max(watch.touch, 2 * std::fabs(lowest.value));
+        if (touches && rises && leaving_counts && std::fabs(cubic.v0) > watch.touch) {
             return Finding::touching(side, lowest);
         }
-        const bool pair = s1 < s2 && has_left(side, lowest.value) &&
-                          std::fabs(lowest.value) > watch.touch && !has_left(side, highest.value);
+        const bool pair = dips && has_left(side, lowest.value) && !touches;
         if (leaving_counts) {
             return Finding::leaving(side, watch.start, pair ? lowest : watch.end);
         }
@@ -190,10 +208,12 @@ private:
             }
             const double width = hi.s - lo.s;
             const GuardSample dip = probe.value_and_rate(lo.s + width * cubic.critical(true));
-            if (std::fabs(dip.value) <= watch.touch) {
-                // In the band at an end, it is there that the guard touches.
+            if (is_on_surface(probe, watch, dip)) {
+                // In the band at an end, it is there that the guard touches; and where it goes
+                // on falling it has not turned.
                 const double nearest = std::min(std::fabs(cubic.v0), std::fabs(cubic.v1));
-                return nearest <= watch.touch || !counts(watch.side, probe.guard().crossing())
+                return nearest <= watch.touch || cubic.v1 <= std::fabs(dip.value) ||
+                               !counts(watch.side, probe.guard().crossing())
                            ? Finding::clear(Evidence::checked)
                            : Finding::touching(watch.side, dip);
             }
@@ -201,33 +221,77 @@ private:
             return pair(probe, watch, dip);
         }
         const double sign = watch.side == Side::above ? 1 : -1;
-        const double resolution = 1e-9 * (hi.s - lo.s);
+        // A kink has its extremum in a point, which only the polynomial gives exactly.
+        const double resolution = probe.on_polynomial() ? probe.finest(hi.s) : 1e-9 * (hi.s - lo.s);
         GuardSample lowest = hi;
-        for (int i = 0; i < 60 && hi.s - lo.s > resolution; ++i) {
-            const detail::GuardCubic shape(sign, lo, hi);
+        for (int i = 0; i < most_samples && hi.s - lo.s > resolution; ++i) {
             const double width = hi.s - lo.s;
-            const double u = i % 8 == 7 ? 0.5 : shape.critical(true);
-            const GuardSample sample = probe.value_and_rate(lo.s + u * width);
+            double s = lo.s + turn(sign, lo, hi, i) * width;
+            if (!(s > lo.s && s < hi.s)) s = lo.s + width / 2;
+            if (!(s > lo.s && s < hi.s)) break;  // neighbouring doubles
+            const GuardSample sample = probe.value_and_rate(s);
             const double value = sign * sample.value;
             const double rate = sign * sample.rate;
-            if (value <= -watch.touch && value <= 0) return pair(probe, watch, sample);
+            if (value <= 0 && !is_on_surface(probe, watch, sample)) {
+                return pair(probe, watch, sample);
+            }
             if (!std::isfinite(value) || !std::isfinite(rate)) break;
-            lowest = sample;
+            if (sign * lowest.value >= value) lowest = sample;
             // What is still to come: a parabola falls by rate^2 / (2 curvature).
             const double bend = std::min(rate - sign * lo.rate, sign * hi.rate - rate) / width;
-            const double fall = bend > 0 ? rate * rate / (2 * bend) : std::fabs(rate) * width;
-            if (value > watch.touch + 4 * fall) return Finding::clear(Evidence::checked);
+            double fall = bend > 0 ? rate * rate / (2 * bend) : std::fabs(rate) * width;
+            if (width <= coarse_part * probe.step().h() && !is_rated(probe)) {
+                fall = std::max(fall, steepest(lo, sample, hi) * width);
+            }
+            if (value > watch.touch + 4 * fall && (value > near * watch.scale + 4 * fall ||
+                                                   value > probe.blur(sample.s) + 4 * fall)) {
+                return Finding::clear(Evidence::checked);
+            }
             if (fall <= watch.touch / 64) break;
             (rate <= 0 ? lo : hi) = sample;
         }
-        if (std::fabs(lowest.value) > watch.touch) {
+        if (!is_on_surface(probe, watch, lowest)) {
             return has_left(watch.side, lowest.value) ? pair(probe, watch, lowest)
                                                       : Finding::clear(Evidence::checked);
         }
-        if (!counts(watch.side, probe.guard().crossing())) {
+        // One that falls from its surface to its surface has not been away.
+        const bool stays = watch.departs && is_on_surface(probe, watch, watch.start);
+        if (stays || !counts(watch.side, probe.guard().crossing())) {
             return Finding::clear(Evidence::checked);
         }
         return Finding::touching(watch.side, lowest);
+    }
+
+    static constexpr int most_samples = 80;
+
+    /// Of a step, below which a rate that is a difference over 1e-5 of it rounds a kink off.
+    static constexpr double coarse_part = 1e-3;
+
+    template <class Probe>
+    [[nodiscard]] static constexpr bool is_rated(const Probe& probe) noexcept
+    {
+        if constexpr (requires { probe.guard().is_rated; }) {
+            return probe.guard().is_rated;
+        } else {
+            return true;
+        }
+    }
+
+    /// The larger of the slopes between three samples.
+    [[nodiscard]] static double steepest(const GuardSample& a, const GuardSample& b,
+                                         const GuardSample& c) noexcept
+    {
+        return std::max(std::fabs((b.value - a.value) / (b.s - a.s)),
+                        std::fabs((c.value - b.value) / (c.s - b.s)));
+    }
+
+    /// Where to look for the turn of the guard times `sign`, which falls at `lo` and rises at
+    /// `hi`, as a fraction of the stretch: the minimum of the cubic. Where that does not
+    /// converge soon there is a kink or a flat place, and the stretch is halved.
+    [[nodiscard]] static double turn(double sign, const GuardSample& lo, const GuardSample& hi,
+                                     int i) noexcept
+    {
+        return i < 7 ? detail::GuardCubic(sign, lo, hi).critical(true) : 0.5;
     }
 
     /// The guard leaves its side before `beyond` and is back at the end.

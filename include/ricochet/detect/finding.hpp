@@ -7,13 +7,23 @@
 
 namespace ricochet {
 
+/// A detector that asks for one evaluation of every guard inside each step, so that a guard
+/// that the step does not resolve is found out.
+template <class Detector>
+concept LooksInside = requires
+{
+    requires Detector::looks_inside;
+};
+
 /// The guard over a step or the rest of one: the side on which it is armed, and its
 /// samples at both ends. A detector fills in `side_after`.
 struct Watch {
     Side side = Side::plateau;
     GuardSample start;
     GuardSample end;
-    double touch = 0;                 ///< |g| at an extremum that counts as being on the surface
+    double touch = 0;      ///< |g| at an extremum that counts as being on the surface, at least
+    double scale = 0;      ///< the largest |g| that the ends of the step suggest
+    bool departs = false;  ///< an event of the guard, or what enabled it, is at the start
     Side side_after = Side::plateau;  ///< at the end, if the stretch is clear
 };
 

@@ -24,7 +24,8 @@ struct Location {
     double root = 0;                                          ///< the best guess between them
     double root_remainder = 0;                                ///< what rounding left out of it
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< rate of the guard there
-    double error = 0;  ///< [s] width of the bracket, or more where rounding in g is coarser
+    double error = 0;   ///< [s] width of the bracket, or more where rounding in g is coarser
+    bool jump = false;  ///< a change of sign without a zero: a pole, or a jump of the guard
 };
 
 /// The narrowest bracket worth having at offset s of a step of length h: neighbouring
@@ -99,6 +100,36 @@ public:
         }
     }
 
+    /// The guard and its rate at offset s on the step's polynomial, whatever the path.
+    [[nodiscard]] GuardSample dense_value_and_rate(double s)
+    {
+        const double t = step_->time(s);
+        if constexpr (by_component) {
+            GuardSample sample{.s = s, .value = guard_->value(t, view(s))};
+            if constexpr (Guard::template sees_rate<View, RateView>) {
+                sample.rate = guard_->rate(t, view(s), RateView(step_->dense(), s), step_->h());
+            } else {
+                const double delta = 1e-5 * step_->h();
+                sample.rate =
+                    (dense_value(s + delta).value - dense_value(s - delta).value) / (2 * delta);
+            }
+            return sample;
+        } else {
+            step_->interpolate(s, space_->x);
+            if constexpr (DenseStep<Step, State>) {
+                // The polynomial's own: a flow that jumps does not agree with it.
+                const RateView rate(step_->dense(), s);
+                detail::for_each_component(space_->x, [&](auto i) { space_->dxdt[i] = rate[i]; });
+            } else {
+                step_->flow(s, space_->x, space_->dxdt);
+            }
+            placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
+            return {.s = s,
+                    .value = guard_->value(t, space_->x),
+                    .rate = guard_->rate(t, space_->x, space_->dxdt, step_->h())};
+        }
+    }
+
     /// The guard and its rate at offset s.
     [[nodiscard]] GuardSample value_and_rate(double s)
     {
@@ -117,6 +148,9 @@ public:
                 .value = guard_->value(t, space_->x),
                 .rate = guard_->rate(t, space_->x, space_->dxdt, step_->h())};
     }
+
+    /// Whether samples are taken from the step's polynomial.
+    [[nodiscard]] bool on_polynomial() const noexcept { return path_ == Path::dense; }
 
     /// The guard at offset s, on the straight line through `sample`, the last that
     /// `value_and_rate` took, or on the polynomial.
@@ -162,13 +196,32 @@ public:
         }
     }
 
-    /// Detection looked at the polynomial. Where the step's own map disagrees with it
-    /// about the far end of the bracket, as it can near tangency, the polynomial is
-    /// used from here on.
-    void agree_on(const GuardSample& hi)
+    /// What 8 units in the last place of the time and of each component of the state make of
+    /// the guard at offset s, by its slopes.
+    [[nodiscard]] double rounding(double s)
     {
-        if (path_ == Path::dense || hi.s == step_->h()) return;
-        if (!has_left(value(hi.s))) path_ = Path::dense;
+        constexpr double nudge = 1e-8;
+        return 8 * std::numeric_limits<double>::epsilon() / nudge * nudged(s, nudge);
+    }
+
+    /// What 64 units in the last place of the time and of each component of the state make of
+    /// the guard at offset s, at a kink, too.
+    [[nodiscard]] double blur(double s)
+    {
+        return nudged(s, 64 * std::numeric_limits<double>::epsilon());
+    }
+
+    /// Detection looked at the polynomial. Where the step's own map disagrees with it about the
+    /// near end of the bracket, the bracket starts where the stretch does; about the far end,
+    /// as it can near tangency, the polynomial is used from here on.
+    void agree_on(GuardSample& lo, const GuardSample& hi, const GuardSample& start)
+    {
+        if (path_ == Path::dense) return;
+        if (hi.s != step_->h() && !has_left(value(hi.s))) {
+            path_ = Path::dense;
+        } else if (lo.s != start.s && has_left(value(lo.s))) {
+            lo = start;
+        }
     }
 
     /// Narrowest useful bracket near offset s.
@@ -181,17 +234,23 @@ private:
 
     [[nodiscard]] View view(double s) const { return View(step_->dense(), s); }
 
-    [[nodiscard]] GuardSample dense_value_and_rate(double s)
+    /// By how much the guard at offset s changes in all with relative changes of the time and
+    /// of one component of the state after the other.
+    [[nodiscard]] double nudged(double s, double nudge)
     {
         const double t = step_->time(s);
-        GuardSample sample{.s = s, .value = guard_->value(t, view(s))};
-        if constexpr (Guard::template sees_rate<View, RateView>) {
-            sample.rate = guard_->rate(t, view(s), RateView(step_->dense(), s), step_->h());
-        } else {
-            const double delta = 1e-5 * step_->h();
-            sample.rate = (value(s + delta).value - value(s - delta).value) / (2 * delta);
-        }
-        return sample;
+        if (!(placed_ == s)) place(s);
+        State& x = space_->x;
+        const double g = guard_->value(t, x);
+        double changes = std::fabs(guard_->value(t * (1 + nudge), x) - g);
+        detail::for_each_component(x, [&](auto i) {
+            const double kept = x[i];
+            if (kept == 0) return;
+            x[i] = kept * (1 + nudge);
+            changes += std::fabs(guard_->value(t, x) - g);
+            x[i] = kept;
+        });
+        return changes;
     }
 
     /// Brings the state at offset s into the workspace.

@@ -17,10 +17,20 @@ enum class EventKind : std::uint8_t {
     mode,          ///< a reaction went from one of its bounds to the other
     stick,         ///< a reaction at a bound began to hold
     slip,          ///< a reaction that held met a bound
+    jump,          ///< the guard changed sign without a zero: it jumped, or has a pole there
 };
+
+/// Whether a guard is on its other side after such an event.
+[[nodiscard]] constexpr bool changes_sign(EventKind kind) noexcept
+{
+    return kind == EventKind::crossing || kind == EventKind::jump;
+}
 
 /// `Event::guard` of an event that no guard made.
 inline constexpr std::size_t no_guard = static_cast<std::size_t>(-1);
+
+/// In the place of a guard: the reset of a time event, where a guard's contradicts it.
+inline constexpr std::size_t time_event_reset = static_cast<std::size_t>(-2);
 
 /// Two times [s] between which the guard leaves its armed side: still on it at `lo`,
 /// across the surface or on it at `hi`. They are located as offsets from the start

@@ -110,6 +110,9 @@ public:
     static constexpr bool sees_rate =
         detail::RateAlone<System, V, D>&& detail::RateAlone<System, V, detail::NegatedView<D>>;
 
+    /// Whether the system gives its rate; else it is a difference quotient.
+    static constexpr bool is_rated = RatedGuard<System, X>;
+
     [[nodiscard]] const System& system() const noexcept { return *system_; }
     [[nodiscard]] std::size_t which() const noexcept { return which_; }
     [[nodiscard]] Mode mode() const noexcept { return mode_; }

@@ -19,6 +19,7 @@
 #include "ricochet/hybrid/event.hpp"
 #include "ricochet/integrate/guard_bank.hpp"
 #include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/resolved_parts.hpp"
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/newton.hpp"
 
@@ -39,6 +40,9 @@ public:
     {
         return absolute_ + relative_ * std::fabs(t);
     }
+
+    /// Whether events are located to neighbouring doubles, wherever they are.
+    [[nodiscard]] bool is_finest() const noexcept { return absolute_ == 0 && relative_ == 0; }
 
     /// Events no further apart [s] cannot be told apart.
     [[nodiscard]] double blur(double t) const noexcept
@@ -61,6 +65,12 @@ struct Note {
     Location where;
 };
 
+/// How a guard changes its sign at a place that a locator found.
+[[nodiscard]] inline EventKind kind_of(const Location& where) noexcept
+{
+    return where.jump ? EventKind::jump : EventKind::crossing;
+}
+
 /// A guard that acts, found to leave its side inside a step.
 struct Hit {
     std::size_t guard = 0;
@@ -78,19 +88,29 @@ class EventSearch {
     using Probe = StepProbe<GuardView<System, X>, CurrentStep>;
 
 public:
-    EventSearch(const X& like, std::size_t guards)
-        : space_(like), before_(like), hits_(guards), members_(guards)
+    EventSearch(const X& like, std::size_t guards, const EventResolution& resolution)
+        : space_(like),
+          before_(like),
+          hits_(guards),
+          members_(guards),
+          finest_(resolution.is_finest())
     {
     }
 
     /// Starts on another step; the state may have changed its dimension.
     void begin(const X& like)
     {
-        if (space_.x.size() != like.size()) {
-            space_ = ProbeSpace<X>(like);
-            before_ = like;
-        }
+        fit(like);
         notes_.clear();
+        parts_.clear();
+        refined_ = unresolved_ = false;
+    }
+
+    /// A state of the dimension of `like` to work with, when no search is going on.
+    [[nodiscard]] X& space(const X& like)
+    {
+        fit(like);
+        return space_.x;
     }
 
     [[nodiscard]] GuardList<std::size_t, fixed>& members() noexcept { return members_; }
@@ -100,9 +120,13 @@ public:
     {
         return static_cast<std::uint64_t>(std::count_if(
             notes_.begin(), notes_.end(),
-            [i](const Note& note) { return note.guard == i && note.kind == EventKind::crossing; }));
+            [i](const Note& note) { return note.guard == i && note.kind != EventKind::touch; }));
     }
     [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
+
+    /// Whether a guard was resolved by dividing the step; and whether that was not enough.
+    [[nodiscard]] bool refined() const noexcept { return refined_; }
+    [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
 
     /// Whether the set was only found at a step after the one that held it.
     [[nodiscard]] bool late() const noexcept { return late_; }
@@ -159,8 +183,7 @@ public:
         Probe probe(guard, step, space_, record.info.boolean ? Path::restep : Path::dense);
         int stalled = 0;
         for (int round = 0; round < most_rounds; ++round) {
-            Watch watch{
-                .side = record.side, .start = bank.start(i), .end = end, .touch = bank.touch(i)};
+            Watch watch = bank.watch(i, step, end);
             const Finding finding = next_finding(probe, watch, bank, i, detector);
             if (finding.touch) continue;
             if (!finding.hit) return;
@@ -174,10 +197,8 @@ public:
                 if (!counted) ++disabled;
             }
             if (counted) {
-                notes_.push_back({.guard = i,
-                                  .kind = EventKind::crossing,
-                                  .side = finding.side,
-                                  .where = where});
+                notes_.push_back(
+                    {.guard = i, .kind = kind_of(where), .side = finding.side, .where = where});
             }
             const bool stays = record.from > 0 && !(where.root > record.from);
             pass(bank, i, side, where, probe);
@@ -191,8 +212,7 @@ public:
     /// Notes a located crossing of a guard that acts, but did not change anything.
     void note(std::size_t i, Side side)
     {
-        notes_.push_back(
-            {.guard = i, .kind = EventKind::crossing, .side = side, .where = where(i)});
+        notes_.push_back({.guard = i, .kind = kind_of(where(i)), .side = side, .where = where(i)});
     }
 
     /// A guard that has crossed without consequence goes on from there.
@@ -247,7 +267,7 @@ public:
         const double reach = std::max(resolution.blur(step.time(sample.s)), rounding);
         // A guard that acts must be located in the set; one that only notifies may be as far
         // from its surface as the rounding of its largest values.
-        const double band = bank[i].acting ? 0 : bank.touch(i);
+        const double band = bank[i].acting ? 0 : bank.touch(i, step.h());
         return std::fabs(sample.value) <= std::max(std::fabs(sample.rate) * reach, band);
     }
 
@@ -293,6 +313,14 @@ private:
     }
     || requires(const System& system, double t, const X& x) { system.enabled(t, x); };
 
+    void fit(const X& like)
+    {
+        if (space_.x.size() != like.size()) {
+            space_ = ProbeSpace<X>(like);
+            before_ = like;
+        }
+    }
+
     /// Both ends of the stretch are on the surface: so is all of a plateau between, of
     /// which the middle and a place that no symmetry singles out are looked at.
     [[nodiscard]] static bool is_plateau(Probe& probe, const Watch& watch)
@@ -311,7 +339,34 @@ private:
     {
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
         if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
-        return heed(bank, i, watch, detector.examine(probe, watch));
+        if (!bank.looked()) return heed(bank, i, watch, detector.examine(probe, watch));
+        return heed(bank, i, watch, next_in_parts(probe, watch, i, detector));
+    }
+
+    /// The detector's answers on the parts of a stretch, up to the first that is not clear.
+    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, std::size_t i,
+                                        const Detector& detector)
+    {
+        parts_.resolve(probe, i, watch);
+        refined_ = refined_ || parts_.divided();
+        unresolved_ = unresolved_ || parts_.unresolved();
+        const Watch whole = watch;
+        const GuardSample end = watch.end;
+        const bool plain =
+            finest_ && parts_.nearly_cubic() && whole.start.s == parts_.whole().start.s;
+        while (const GuardSample* node = parts_.next(watch.start.s, end.s)) {
+            watch.end = *node;
+            Finding finding = detector.examine(probe, watch);
+            if (plain && finding.hit && finding.hi.s == node->s && stays_beyond(whole, *node)) {
+                finding.lo = whole.start;
+                finding.hi = whole.end;
+            }
+            if (finding.hit || finding.touch) return finding;
+            watch.side = watch.side_after;
+            watch.start = *node;
+        }
+        watch.end = end;
+        return detector.examine(probe, watch);
     }
 
     /// Nothing more can be said of the stretch: what is left after an event at the end
@@ -330,6 +385,29 @@ private:
         return false;
     }
 
+    /// Whether a guard that has left its side by `node` does nothing else in what is left of
+    /// the stretch, which then is a bracket as good as any part of it.
+    [[nodiscard]] bool stays_beyond(const Watch& whole, GuardSample node) const noexcept
+    {
+        if constexpr (!LooksInside<Detector>) {
+            return false;
+        } else {
+            const double sign = sign_of(whole.side);
+            if (std::fabs(whole.start.value) <= whole.touch) return false;
+            if (!Detector::leaves_plainly(sign, whole.start, whole.end, whole.touch)) return false;
+            for (;;) {
+                const GuardSample* next = parts_.next(node.s, whole.end.s);
+                const GuardSample to = next ? *next : whole.end;
+                if (Detector::suspects(-sign, node.value, node.rate, to.value, to.rate,
+                                       to.s - node.s)) {
+                    return false;
+                }
+                if (!next) return true;
+                node = *next;
+            }
+        }
+    }
+
     [[nodiscard]] Finding heed(Bank& bank, std::size_t i, const Watch& watch,
                                const Finding& finding)
     {
@@ -342,16 +420,19 @@ private:
         return finding;
     }
 
-    [[nodiscard]] static Location find(Probe& probe, const Finding& finding, const Bank& bank,
+    [[nodiscard]] static Location find(Probe& probe, Finding finding, const Bank& bank,
                                        std::size_t i, const Locator& locator,
                                        const EventResolution& resolution)
     {
         if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
-        probe.agree_on(finding.hi);
+        probe.agree_on(finding.lo, finding.hi, bank.start(i));
         const double tolerance = std::max(resolution.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
-        return bank[i].info.boolean ? Bisection{}.locate(probe, finding.lo, finding.hi, tolerance)
-                                    : locator.locate(probe, finding.lo, finding.hi, tolerance);
+        if (!bank[i].info.boolean) return locator.locate(probe, finding.lo, finding.hi, tolerance);
+        // A guard of which only the sign means anything jumps by its nature.
+        Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
+        where.jump = false;
+        return where;
     }
 
     [[gnu::noinline]] void touched(Bank& bank, std::size_t i, Side side, double s)
@@ -389,10 +470,7 @@ private:
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
-            Watch watch{.side = record.side,
-                        .start = bank.start(i),
-                        .end = bank.end(i, step.h()),
-                        .touch = bank.touch(i)};
+            Watch watch = bank.watch(i, step, bank.end(i, step.h()));
             const Finding finding = next_finding(probe, watch, bank, i, detector);
             if (finding.touch) continue;
             if (!finding.hit) return;
@@ -440,8 +518,9 @@ private:
         Probe probe(guard, step, space_);
         const Side side = bank[i].side;
         if (bank[i].from == 0 && !bank[i].info.boolean && counts(side, guard.crossing()) &&
+            bank.is_plain(i, step.h()) &&
             Detector::leaves_plainly(sign_of(side), bank.start(i), bank.end(i, step.h()),
-                                     bank.touch(i))) {
+                                     bank.touch(i, step.h()))) {
             probe.watch(side);
             const double tolerance =
                 std::max(resolution.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
@@ -461,10 +540,7 @@ private:
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
-            Watch watch{.side = bank[i].side,
-                        .start = bank.start(i),
-                        .end = bank.end(i, step.h()),
-                        .touch = bank.touch(i)};
+            Watch watch = bank.watch(i, step, bank.end(i, step.h()));
             const Finding finding = next_finding(probe, watch, bank, i, detector);
             if (finding.touch) continue;
             if (!finding.hit) return false;
@@ -597,6 +673,10 @@ private:
     GuardList<Hit, fixed> hits_;
     GuardList<std::size_t, fixed> members_;
     std::vector<Note> notes_;
+    bool finest_;
+    ResolvedParts parts_;
+    bool refined_ = false;
+    bool unresolved_ = false;
     Evidence evidence_ = Detector::evidence;
     bool late_ = false;
     double at_ = 0;

@@ -121,6 +121,24 @@ public:
         }
     }
 
+    /// As `interpolate`, without further evaluations of the flow: on the cubic through both
+    /// ends where the method has no dense output of its own.
+    [[gnu::noinline]] void peek(double s, X& x) const
+    {
+        if constexpr (has_dense_output) {
+            advancing_.calc_state(s, x, zero_, zero_, 0.0, w_, w_rate1_, h_);
+            add_tangent(s, x);
+        } else {
+            const double u = s / h_;
+            const double value = u * u * (3 - 2 * u);
+            const double slope = h_ * u * u * (u - 1);
+            for_components([&](auto i) {
+                const double w = value * w_[i] + slope * (rate1_[i] - rate0_[i]);
+                x[i] = x0_[i] + (s * rate0_[i] + (w + remainder_[i]));
+            });
+        }
+    }
+
     /// The step as a polynomial of the order that the method reaches over many steps.
     /// Its inner nodes are computed when it is first asked for.
     [[nodiscard]] DenseParts<X> dense() const

@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "ricochet/detect/cubic_look.hpp"
 #include "ricochet/detect/finding.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/bounds.hpp"
@@ -59,12 +60,18 @@ struct GuardRecord {
     bool enabled = true;
     bool newly_enabled = false;
     bool fired = false;
-    bool rested = false;           ///< its events have accumulated
+    bool turned = false;   ///< its last reset has sent it back from the surface
+    double departure = 0;  ///< [1/s] its rate after the last reset
+    double rated_over =
+        std::numeric_limits<double>::quiet_NaN();  ///< [s] scale of that rate; NaN: stale
+    bool again = false;            ///< it is back inside the window of its last event
     Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
     bool acting = false;           ///< resets, or may end the run; else a notification
     bool asleep = false;           ///< its check is put off: nothing in the bank is of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
+    bool jumped = false;        ///< its last event was a jump
+    bool departs = false;       ///< the smooth phase in hand started at its event, or enabled it
     double band = 0;            ///< |g| where it fired: it counts as being on its surface
     bool estimated = false;     ///< the band is what location left, not a value of the guard
     double from = 0;            ///< [s] offset in the step up to which it has been looked at
@@ -85,11 +92,27 @@ class GuardBank {
     static constexpr bool puts_off = puts_off_checks<Detector, System, X>();
 
 public:
+    /// Whether the scale of a guard is that of its largest value so far: for detectors that do
+    /// not ask for the rounding of the state, so that neighbouring steps agree on what a touch
+    /// is.
+    static constexpr bool remembers =
+        Detector::uses_rates && !LooksInside<Detector> && !Bounded<System, X>;
+
+    /// Guards with declared bounds, which may be dear, remember the sizes that smooth phases
+    /// started with: their brackets are not narrowed below the rounding of those.
+    static constexpr bool coarse = Detector::uses_rates && Bounded<System, X>;
+
+    /// Whether guards can be looked at inside a step.
+    static constexpr bool looks = LooksInside<Detector> && !Bounded<System, X>;
+
     GuardBank(const System& system, bool backward)
         : system_(&system), backward_(backward), count_(guard_count_of<X>(system))
     {
         if constexpr (fixed == counted_at_run_time) {
-            for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_, &sizes_})
+            if constexpr (looks) inside_.resize(count_);
+            if constexpr (looks) further_.resize(count_);
+            if constexpr (remembers || coarse) sizes_.resize(count_);
+            for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_})
                 numbers->resize(count_);
             records_.resize(count_);
         }
@@ -130,8 +153,12 @@ public:
         } else {
             sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
         }
-        if (Detector::uses_rates) {
-            for (std::size_t i = 0; i < size(); ++i) note_size(i, g0_[i]);
+        if constexpr (remembers || coarse) {
+            for (std::size_t i = 0; i < size(); ++i) {
+                // Beside a pole that it has just passed, a guard has no size of its own.
+                if (records_[i].fired && records_[i].jumped) continue;
+                sizes_[i] = std::fmax(std::fabs(g0_[i]), sizes_[i]);
+            }
         }
     }
 
@@ -155,36 +182,136 @@ public:
                rate1_);
     }
 
-    /// Whether any guard deserves a look.
+    /// Evaluates all guards inside a step, at its state `x` there.
+    template <class Step>
+    void sample_inside(const Step& step, const X& x, std::uint64_t& calls)
+    {
+        if constexpr (looks) {
+            sample_values(step.mode(), step.time(CubicLook::inside * step.h()), x, calls, inside_);
+            looked_ = true;
+            looked_further_ = false;
+        }
+    }
+
+    /// And once more, where one evaluation leaves doubts.
+    template <class Step>
+    void sample_further(const Step& step, const X& x, std::uint64_t& calls)
+    {
+        if constexpr (looks) {
+            sample_values(step.mode(), step.time(CubicLook::further * step.h()), x, calls,
+                          further_);
+            looked_further_ = true;
+        }
+    }
+
+    /// Whether any guard deserves a second evaluation inside the step, or a search.
+    [[nodiscard]] bool doubtful(double h) const noexcept
+    {
+        if constexpr (looks) {
+            if (looked_ && !waiting_ && !bands_) {
+                double any = 0;  // a double, so that the loop is vectorised
+                for (std::size_t i = 0; i < size(); ++i) {
+                    const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+                    const double e = look.deviation(CubicLook::inside, inside_[i]);
+                    const int low = !(look.lowest(sign_[i]) > CubicLook::doubt * e);
+                    const int suspected =
+                        Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+                    any = ((low | suspected) & (sign_[i] != 0)) != 0 ? 1.0 : any;
+                }
+                return any != 0;
+            }
+        }
+        return suspicious(h);
+    }
+
+    /// Whether a second evaluation inside the step can change what is thought of a guard: not
+    /// where the first met the cubic to nine digits, which is no coincidence.
+    [[nodiscard]] bool needs_second_look(double h) const noexcept
+    {
+        if constexpr (looks) {
+            for (std::size_t i = 0; i < size(); ++i) {
+                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+                const double e = look.deviation(CubicLook::inside, inside_[i]);
+                if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
+            }
+        }
+        return false;
+    }
+
+    /// Whether any guard deserves a search.
     [[nodiscard]] bool suspicious(double h) const noexcept
     {
         if (waiting_ && leaves_plateau()) return true;
-        if (bands_) [[unlikely]]
-            return suspicious_with_bands(h);
+        if (bands_ || looked()) return any_suspicious(h);
         double any = 0;  // a double, so that the loop is vectorised
         for (std::size_t i = 0; i < size(); ++i) {
-            const bool suspected =
+            const int suspected =
                 Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
-            any = (suspected & (sign_[i] != 0)) ? 1.0 : any;
+            const int lost = !is_finite(g1_[i]);
+            any = ((suspected | lost) & (sign_[i] != 0)) != 0 ? 1.0 : any;
         }
         return any != 0;
     }
 
+    /// Whether guard i may leave its side inside the step without its ends telling.
+    [[nodiscard]] bool hides(std::size_t i, double h) const noexcept
+    {
+        if constexpr (looks) {
+            const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            return !(look.lowest(sign_[i]) > CubicLook::most * deviation(look, i));
+        } else {
+            return false;
+        }
+    }
+
+    /// Whether guard i is in the step what the cubic through its ends says, as far as it has
+    /// been evaluated.
+    [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
+    {
+        if constexpr (looks) {
+            if (!looked_) return true;
+            const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            return 0x1p16 * deviation(look, i) <= look.size();
+        } else {
+            return true;
+        }
+    }
+
+    /// Whether the guards have been evaluated inside the step.
+    [[nodiscard]] bool looked() const noexcept { return looks && looked_; }
+
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
         const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
-        return sign_[i] != 0 &&
-               Detector::suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
+        return sign_[i] != 0 && (Detector::suspects(sign_[i], g0_[i] - band, rate0_[i],
+                                                    g1_[i] - band, rate1_[i], h) ||
+                                 !is_finite(g1_[i]) || (looked() && hides(i, h)));
     }
 
-    /// The first guard that is not a number at the end of the step, or `no_guard`.
-    [[nodiscard]] std::size_t first_nan(double h) const noexcept
+    /// The first guard that is not finite at the end of the step, or `no_guard`.
+    [[nodiscard]] std::size_t first_not_finite() const noexcept
     {
         for (std::size_t i = 0; i < size(); ++i) {
             const bool idle = !records_[i].enabled || records_[i].asleep;
-            if (!idle && std::isnan(g1_[i]) && (sign_[i] == 0 || suspicious(i, h))) return i;
+            if (!idle && !std::isfinite(g1_[i])) return i;
         }
         return no_guard;
+    }
+
+    /// A smooth phase starts at time t, with guards on their surfaces or not.
+    void begin_phase(double t) noexcept { armed_at_ = t; }
+
+    /// What is left to look at of guard i in the step, of which `end` is the end.
+    template <class Step>
+    [[nodiscard]] Watch watch(std::size_t i, const Step& step, const GuardSample& end) const
+    {
+        const GuardRecord& record = records_[i];
+        return {.side = record.side,
+                .start = start(i),
+                .end = end,
+                .touch = touch(i, step.h()),
+                .scale = scale(i, step.h()),
+                .departs = record.departs && record.from == 0 && step.time(0) == armed_at_};
     }
 
     [[nodiscard]] GuardSample start(std::size_t i) const noexcept
@@ -196,15 +323,15 @@ public:
         return {.s = h, .value = g1_[i], .rate = known(rate1_[i])};
     }
 
-    /// Half the width of the band around the surface that counts as being on it where
-    /// the rate is zero. The values of a guard with declared bounds may never be taken where
-    /// it is far away; its size is that of the values at which it was armed and of this step.
-    [[nodiscard]] double touch(std::size_t i) const noexcept
+    /// Half the width of the band around the surface that counts as being on it where the
+    /// rate is zero, as far as the rounding of the guard's values in the step goes. What the
+    /// rounding of the state adds to that is asked for where it matters (`StepProbe::rounding`).
+    [[nodiscard]] double touch(std::size_t i, [[maybe_unused]] double h) const noexcept
     {
-        if constexpr (Bounded<System, X>) {
-            return touch_of(i, std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
+        if constexpr (remembers) {
+            return touch_of(i, sizes_[i]);
         } else {
-            return touch_of(i, 0);
+            return touch_of(i, scale(i, h));
         }
     }
 
@@ -212,7 +339,16 @@ public:
     [[nodiscard]] double touch_of(std::size_t i, double largest) const noexcept
     {
         constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
-        return std::fmax(records_[i].info.touch, ulps * std::fmax(sizes_[i], largest));
+        return std::fmax(records_[i].info.touch, ulps * largest);
+    }
+
+    /// The largest |g| that the ends of a step of length h suggest.
+    [[nodiscard]] double scale(std::size_t i, double h) const noexcept
+    {
+        const double ends = std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i]));
+        if (!Detector::uses_rates) return ends;
+        return std::fmax(ends, std::fmax(std::fabs(g0_[i] + rate0_[i] * (h / 3)),
+                                         std::fabs(g1_[i] - rate1_[i] * (h / 3))));
     }
 
     void arm(std::size_t i, Side side) noexcept
@@ -226,7 +362,7 @@ public:
     /// further. 0 for any other.
     [[nodiscard]] double unresolved(std::size_t i, double h) const noexcept
     {
-        if constexpr (Bounded<System, X> && Detector::uses_rates) {
+        if constexpr (coarse) {
             const double size =
                 std::fmax(sizes_[i], std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
             const double rate = std::fmin(std::fabs(rate0_[i]), std::fabs(rate1_[i]));
@@ -295,7 +431,9 @@ public:
         if (Detector::uses_rates) {
             for (std::size_t i = 0; i < size(); ++i) {
                 rate0_[i] = rate1_[i];
-                if constexpr (!Bounded<System, X>) note_size(i, g1_[i]);
+                if constexpr (remembers) {
+                    sizes_[i] = std::fmax(std::fabs(g1_[i]), sizes_[i]);
+                }
             }
         }
         if (plateaus == 0) return;
@@ -340,21 +478,23 @@ public:
         for (std::size_t i = 0; i < size(); ++i) {
             GuardRecord& record = records_[i];
             visit(sign_[i]);
+            if constexpr (remembers || coarse) visit(sizes_[i]);
             visit(g0_[i]);
             visit(rate0_[i]);
             visit(record.enabled);
             visit(record.side);
-            visit(sizes_[i]);
             visit(record.events);
             visit(record.last);
             visit(record.last_side);
             visit(record.band);
-            visit(record.rested);
+            visit(record.turned);
+            visit(record.departs);
             visit(record.awaited);
             if constexpr (puts_off) visit(record.asleep);
             record.intervals.visit(visit);
         }
         visit(waiting_);
+        visit(armed_at_);
     }
 
     /// Guard i is on a plateau; if it leaves that away from `side`, it has its event.
@@ -371,7 +511,7 @@ public:
     {
         const GuardRecord& record = records_[i];
         if (record.side != Side::plateau || !record.enabled || record.asleep) return false;
-        if (std::isnan(g1_[i])) return true;
+        if (!std::isfinite(g1_[i])) return true;
         return record.awaited != Side::plateau && side_of(g1_[i]) == opposite(record.awaited) &&
                counts(record.awaited, record.info.crossing);
     }
@@ -387,18 +527,26 @@ private:
 
     using Doubles = PerGuard<double, fixed>;
 
-    [[gnu::noinline]] bool suspicious_with_bands(double h) const noexcept
+    [[nodiscard]] static constexpr bool is_finite(double g) noexcept
+    {
+        return std::fabs(g) <= std::numeric_limits<double>::max();
+    }
+
+    /// The largest deviation of guard i from the cubic through its ends that was seen.
+    [[nodiscard]] double deviation(const CubicLook& look, std::size_t i) const noexcept
+    {
+        const double e = look.deviation(CubicLook::inside, inside_[i]);
+        if (!looked_further_) return e;
+        const double other = look.deviation(CubicLook::further, further_[i]);
+        return other <= e ? e : other;  // NaN stays
+    }
+
+    [[gnu::noinline]] bool any_suspicious(double h) const noexcept
     {
         for (std::size_t i = 0; i < size(); ++i) {
             if (suspicious(i, h)) return true;
         }
         return false;
-    }
-
-    void note_size(std::size_t i, double g) noexcept
-    {
-        const double size = std::fabs(g);
-        sizes_[i] = size > sizes_[i] ? size : sizes_[i];
     }
 
     [[nodiscard]] static double known(double rate) noexcept
@@ -471,9 +619,15 @@ private:
     const System* system_;
     bool backward_;
     std::size_t count_;
+    double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     bool waiting_ = false;  ///< whether any guard may be on a plateau
     bool bands_ = false;    ///< whether any guard declares one
-    Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{}, sizes_{};
+    Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{};
+    bool looked_ = false;  ///< inside the step in hand
+    struct None {};
+    bool looked_further_ = false;
+    [[no_unique_address]] std::conditional_t<looks, Doubles, None> inside_{}, further_{};
+    [[no_unique_address]] std::conditional_t<remembers || coarse, Doubles, None> sizes_{};
     X there_{};
     PerGuard<GuardRecord, fixed> records_{};
 };

@@ -22,11 +22,13 @@ template <class CurrentStep>
     double size = 0;
     double speed = 0;
     for_each_component(x, [&](auto i) {
-        size = std::max(size, std::fabs(x[i]) / scale(i));
+        // A component that stands for "never" has no size.
+        if (std::fabs(x[i]) < 1e300) size = std::max(size, std::fabs(x[i]) / scale(i));
         speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
     });
-    const double span = std::fabs(options.t_end - options.t_start);
-    const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : 1e-6 * span;
+    // Where the state tells no time scale; how far the end lies tells none either.
+    const double least = 1e-6 * std::min(1.0, std::fabs(options.t_end - options.t_start));
+    const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : least;
     auto moved = x;
     auto rate = dxdt;
     move(moved, x, euler, dxdt);
@@ -35,10 +37,10 @@ template <class CurrentStep>
     for_each_component(
         x, [&](auto i) { bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i)); });
     const double fastest = std::max(speed, bend / euler);
-    const double h = fastest <= 1e-15 ? std::max(1e-6 * span, euler * 1e-3)
-                                      : std::pow(0.01 / fastest, 1.0 / order);
+    const double h =
+        fastest <= 1e-15 ? std::max(least, euler * 1e-3) : std::pow(0.01 / fastest, 1.0 / order);
     const double first = std::min(std::min(100 * euler, h), options.h_max);
-    return std::isfinite(first) && first > 0 ? first : 1e-6 * span;
+    return std::isfinite(first) && first > 0 ? first : least;
 }
 
 }  // namespace ricochet::detail

@@ -69,7 +69,7 @@ public:
                 mode_ = call_time_reset(system, mode, t, after_);
             } else {
                 assign(single_, before);
-                merge(time_writer, call_time_reset(system, mode, t, single_), mode, before);
+                merge(time_event_reset, call_time_reset(system, mode, t, single_), mode, before);
             }
         }
     }
@@ -79,15 +79,14 @@ public:
     [[nodiscard]] X& scratch() noexcept { return single_; }
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
 
-    /// Two guards that disagree; `no_guard` where there are none.
+    /// Two guards that disagree, or a guard and `time_event_reset`; `no_guard` where there are
+    /// none.
     [[nodiscard]] const std::pair<std::size_t, std::size_t>& conflict() const noexcept
     {
         return conflict_;
     }
 
 private:
-    static constexpr std::size_t time_writer = static_cast<std::size_t>(-2);
-
     /// Adds to `after_` what one reset has made of the state before, in `single_`.
     void merge(std::size_t writer, Mode mode_after, Mode mode, const X& before)
     {

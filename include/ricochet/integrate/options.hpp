@@ -38,6 +38,12 @@ struct Options {
     /// last place of t) happen together: one set, applied once.
     double event_window = 0;
 
+    /// Whether detectors that can (`LooksInside`) evaluate every guard once inside each step,
+    /// too, and divide a step in which a cubic through its ends does not tell what the guard
+    /// does. Without it a guard that moves faster than the state may be lost. Guards that
+    /// declare bounds, and may be expensive, are never looked at inside.
+    bool look_inside = true;
+
     bool stop_at_event = false;
     bool record_events = true;  ///< off: events are counted, not kept
     bool event_states = true;   ///< off: events without reset are kept without their states

@@ -11,7 +11,8 @@ enum class Outcome {
     zeno,  ///< events accumulate, or a motion presses on its guard, and no rest rule stops it
     outside_mode,          ///< a reset left the state behind a unilateral guard
     endless_cascade,       ///< resets kept triggering each other at one instant
-    conflicting_resets,    ///< two resets of one set wrote one component differently
+    conflicting_resets,    ///< two resets of one set, or one and a time event's, wrote one
+                           ///< component differently
     unknown_mode,          ///< a reset returned a mode that the system does not have
     step_underflow,        ///< no step above h_min met the tolerance
     step_limit,            ///< `Options::max_steps` steps were taken

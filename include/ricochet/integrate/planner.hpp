@@ -426,7 +426,9 @@ private:
         const double cleared = horizon(at, mode);
         look.unclear = gated && !(cleared > 0);
         if (look.unclear) look.judge = true;
-        const double ahead = std::max(detector_.hoped(at.bound, look.slope, reach), cleared);
+        // What would just close is left open by rounding.
+        const double hoped = (1 - 1e-12) * detector_.hoped(at.bound, look.slope, reach);
+        const double ahead = std::max(hoped, cleared);
         look.hoped = std::max(look.sure, at.time + (expects_level(look, bank[i].side) ? 0 : ahead));
     }
 

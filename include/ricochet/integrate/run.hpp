@@ -40,7 +40,8 @@ struct Run {
     State x{};     ///< state at that time
     Mode mode = 0;
     /// The guard that ended the run where one did, else `no_guard`; of two conflicting
-    /// resets the first, and the second in `other_guard`.
+    /// resets the first, and the second in `other_guard`, `time_event_reset` if it is a time
+    /// event's.
     std::size_t guard = no_guard;
     std::size_t other_guard = no_guard;
     std::vector<Event<State>> events;

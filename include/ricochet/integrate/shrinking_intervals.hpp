@@ -12,9 +12,10 @@
 namespace ricochet::detail {
 
 /// Recognises accumulating events: three intervals in a row that shrink, and a
-/// geometric remainder d q / (1 - q) that is no longer worth resolving. And events
-/// that do not advance time at all. Legal event trains, however fast, keep a
-/// remainder that is worth resolving.
+/// geometric remainder d q / (1 - q) that is no longer worth resolving, or excursions of
+/// the guard between two events that its rounding swallows. And events that do not advance
+/// time at all. Legal event trains, however fast, keep a remainder that is worth resolving
+/// and excursions that can be told from rounding.
 class ShrinkingIntervals {
 public:
     /// Takes note of an event at `t`, where a step would be of length `step` [s]; true
@@ -40,7 +41,47 @@ public:
         last_ = t;
         interval_ = interval;
         seen_ = std::min(seen_ + 1, 2u);
+        if (seen_ == 2) longest_ = std::max(longest_, interval);
         return false;
+    }
+
+    /// Whether a guard that leaves its surface at `rate` [1/s] after the event just noted is
+    /// going to rise so little, or for so short, compared with earlier excursions, that its
+    /// rounding may matter.
+    [[nodiscard]] bool is_low_at(double rate) const noexcept
+    {
+        return seen_ >= 2 && (rise(rate) <= 1e-3 * peak_ || interval_ <= 0.03 * longest_);
+    }
+
+    /// The guard turns back from its surface at `rate` [1/s] after the event just noted, which
+    /// is `low` or not; infinity: it does not turn back.
+    void depart(double rate, bool low) noexcept
+    {
+        excursion_ = seen_ >= 2 ? rise(rate) : std::numeric_limits<double>::infinity();
+        low_ = low;
+        if (!std::isfinite(excursion_)) return;
+        peak_ = std::max(peak_, excursion_);
+        decay_ = 1 - excursion_ / last_excursion_;
+        last_excursion_ = excursion_;
+        if (!low) usual_decay_ = decay_;
+    }
+
+    /// Whether the last departure was low.
+    [[nodiscard]] bool is_low() const noexcept { return low_; }
+
+    /// Between the last two events [s].
+    [[nodiscard]] double interval() const noexcept { return interval_; }
+
+    /// Whether excursions sink into the guard's `rounding`: at the end of a shrinking series,
+    /// or three in a row. What a reset leaves of the guard adds to every excursion: with
+    /// restitution e they stay at 1 / (1 - e^2) of it, and decay less than half as fast from
+    /// twice that on.
+    [[nodiscard]] bool fades(double rounding) noexcept
+    {
+        const bool sunk = excursion_ <= rounding;
+        const bool lingers = excursion_ <= 32 * rounding && decay_ < usual_decay_ / 2;
+        sunk_ = sunk || lingers ? sunk_ + 1 : 0;
+        return sunk_ >= 3 || (sunk && shrinking_ >= 3);
     }
 
     /// Whether what is left after the event just noted is below `tolerance` [s] or
@@ -51,8 +92,12 @@ public:
         return shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution());
     }
 
-    /// Extrapolated time [s] from the last event to the limit of all.
-    [[nodiscard]] double remainder() const noexcept { return interval_ * ratio_ / (1 - ratio_); }
+    /// Extrapolated time [s] from the last event to the limit of all; 0 where the intervals
+    /// do not shrink.
+    [[nodiscard]] double remainder() const noexcept
+    {
+        return ratio_ < 1 ? interval_ * ratio_ / (1 - ratio_) : 0;
+    }
 
     /// Calls `visit` with every number that makes up the state.
     template <class Visit>
@@ -67,9 +112,24 @@ public:
         visit(stalled_);
         visit(step_);
         visit(geometric_);
+        visit(excursion_);
+        visit(last_excursion_);
+        visit(peak_);
+        visit(longest_);
+        visit(decay_);
+        visit(usual_decay_);
+        visit(sunk_);
+        visit(low_);
     }
 
 private:
+    /// A parabola that leaves at `rate`, for an interval that shrinks as the last one did,
+    /// rises by rate * interval / 4.
+    [[nodiscard]] double rise(double rate) const noexcept
+    {
+        return std::fabs(rate) * interval_ * ratio_ / 4;
+    }
+
     [[nodiscard]] double resolution() const noexcept
     {
         return 16 * finest_bracket(last_.value, step_);
@@ -83,6 +143,14 @@ private:
     std::uint32_t seen_ = 0;
     std::uint32_t shrinking_ = 0;
     std::uint32_t stalled_ = 0;
+    double excursion_ = std::numeric_limits<double>::infinity();  ///< expected next
+    double last_excursion_ = std::numeric_limits<double>::infinity();
+    double peak_ = 0;         ///< the largest excursion
+    double longest_ = 0;      ///< [s] interval
+    double decay_ = 0;        ///< part that the last excursion has lost of the one before
+    double usual_decay_ = 0;  ///< as it was before rounding mattered
+    std::uint32_t sunk_ = 0;
+    bool low_ = false;
 };
 
 }  // namespace ricochet::detail

@@ -33,9 +33,9 @@
 #include "ricochet/integrate/explicit_step.hpp"
 #include "ricochet/integrate/guard_bank.hpp"
 #include "ricochet/integrate/initial_step.hpp"
+#include "ricochet/integrate/merged_resets.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/planner.hpp"
-#include "ricochet/integrate/merged_resets.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/integrate/step_control.hpp"
@@ -98,11 +98,15 @@ class Simulation {
     };
     using Planner = typename PlannerOf<puts_off, Detector>::type;
     static constexpr bool predicts =
-        requires(const Detector& detector, const CurrentStep& step, const Guard& guard) {
-            detector.clears(guard, step);
-        };
-    static constexpr bool asks = requires(const Detector& detector, const System& system,
-                                          const X& x) { detector.check(system, x, 0.0, 0.0); };
+        requires(const Detector& detector, const CurrentStep& step, const Guard& guard)
+    {
+        detector.clears(guard, step);
+    };
+    static constexpr bool asks =
+        requires(const Detector& detector, const System& system, const X& x)
+    {
+        detector.check(system, x, 0.0, 0.0);
+    };
     static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -125,7 +129,7 @@ public:
           components_(static_cast<std::size_t>(x0.size())),
           step_(system, options.t_start, x0, options.mode, backward_),
           bank_(system, backward_),
-          search_(x0, bank_.size()),
+          search_(x0, bank_.size(), resolution_),
           planner_(make_planner(x0)),
           resets_(x0)
     {
@@ -134,6 +138,8 @@ public:
             if (options_.step == 0) h_next_ = detail::initial_step(step_, options_);
             h_next_ = std::min(h_next_, options_.h_max);
         }
+        first_step_ = h_next_;
+        flight_start_ = options_.t_start;
         refuse_bad_modes();
         if (!step_.flow_fits()) {
             detail::throw_flow_does_not_fit(static_cast<std::size_t>(x0.size()));
@@ -219,7 +225,10 @@ public:
     template <class Observer>
     void run_to_end(Observer&& observe)
     {
-        constexpr bool watches_steps = requires { observe(std::as_const(*this)); };
+        constexpr bool watches_steps = requires
+        {
+            observe(std::as_const(*this));
+        };
         std::size_t seen = run_.events.size();
         show_all();
         while (!ended_) {
@@ -353,6 +362,9 @@ private:
         require(h_next_ > 0 && std::isfinite(h_next_) &&
                     (!error_controlled || h_next_ <= options_.h_max),
                 "the next step");
+        require(first_step_ > 0 && std::isfinite(first_step_), "the first step");
+        require(std::isfinite(flight_start_) && longest_step_ >= 0 && std::isfinite(longest_step_),
+                "the last event");
         require(ended_ || lies_before(place_.t.value, time_event_) || !timed,
                 "the next time event");
         const std::size_t modes = mode_count_of(*system_);
@@ -392,7 +404,10 @@ private:
 
     [[nodiscard]] static constexpr bool requires_previous() noexcept
     {
-        return requires(const System& system, double t) { system.previous_time_event(t); };
+        return requires(const System& system, double t)
+        {
+            system.previous_time_event(t);
+        };
     }
 
     void arm_at_start()
@@ -400,6 +415,7 @@ private:
         enable_guards();
         newly_armed_ = true;
         last_h_ = h_next_;
+        bank_.begin_phase(step_.time(0));
         bank_.sample_start(step_, calls(), h_next_);
         for (std::size_t i = 0; i < bank_.size(); ++i) {
             const detail::GuardRecord& record = bank_[i];
@@ -408,11 +424,13 @@ private:
             if (!std::isfinite(g)) {
                 detail::throw_start_guard_not_finite(i, record.info.name, options_.t_start, g);
             }
-            const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
+            const bool on_surface =
+                g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
             if (record.info.unilateral && g < 0 && !on_surface) {
                 detail::throw_start_outside_mode(i, record.info.name, options_.t_start, g);
             }
             if (on_surface) bank_[i].band = std::fabs(g);
+            bank_[i].departs = on_surface;
             bank_.arm(i, on_surface ? heading(i) : side_of(g));
             if (record.side == Side::plateau) {
                 bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
@@ -424,22 +442,24 @@ private:
         cascade();
     }
 
-    /// What rounding of the state, 8 units in the last place of each component, may make of
-    /// guard i at the start of the step.
+    /// What rounding of the time and of the state, 8 units in the last place of each
+    /// component, may make of guard i at the start of the step.
     [[nodiscard]] double rounding_of(std::size_t i)
     {
-        constexpr double nudge = 1e-8;
+        constexpr double nudge = 8 * std::numeric_limits<double>::epsilon();
         const auto guard = bank_.view(i, step_.mode(), calls());
-        const double g = guard.value(step_.time(0), step_.x0());
+        const double t = step_.time(0);
+        const double g = guard.value(t, step_.x0());
+        double rounding = std::fabs(guard.value(t * (1 + nudge), step_.x0()) - g);
         X near = step_.x0();
-        double sensitivity = 0;
         detail::for_each_component(near, [&](auto c) {
             const double kept = near[c];
+            if (kept == 0) return;
             near[c] = kept * (1 + nudge);
-            sensitivity += std::fabs(guard.value(step_.time(0), near) - g) / nudge;
+            rounding += std::fabs(guard.value(t, near) - g);
             near[c] = kept;
         });
-        return 8 * std::numeric_limits<double>::epsilon() * sensitivity;
+        return rounding;
     }
 
     // --- steps ---
@@ -740,13 +760,27 @@ private:
         if constexpr (error_controlled) {
             return take_controlled_step(h, h_next_);
         } else {
-            step_.attempt(h);
-            if (!step_.end_is_finite()) {
-                end_step(Outcome::non_finite);
-                return false;
-            }
-            return true;
+            return take_fixed_step(h);
         }
+    }
+
+    /// Shorter only where the motion ends within the step, at the surface of a guard.
+    [[nodiscard]] bool take_fixed_step(double h)
+    {
+        for (;;) {
+            step_.attempt(h);
+            if (step_.end_is_finite()) return true;
+            const double ahead = time_to_surface().ahead;
+            if (!(ahead <= h)) break;
+            if (ahead < smallest_step()) {
+                if (happen_where_flow_ends(h)) return false;
+                break;
+            }
+            is_last_ = time_event_due_ = false;
+            h = 0.9 * ahead;
+        }
+        end_step(Outcome::non_finite);
+        return false;
     }
 
     /// `proposed`: what the step would have been if nothing had cut it short.
@@ -764,14 +798,72 @@ private:
             }
             ++run_.statistics.rejected;
             const bool finite = std::isfinite(error);
-            h *= finite ? rule_.factor(error, order) : 0.1;
+            h = finite ? h * rule_.factor(error, order) : shorten_to_surface(h);
             is_last_ = false;
             time_event_due_ = false;
             largest = 1;
             if (h < smallest_step()) {
+                if (happen_where_flow_ends(h)) return false;
                 end_step(finite ? Outcome::step_underflow : Outcome::non_finite);
                 return false;
             }
+        }
+    }
+
+    /// A guard that acts or records, and when it reaches its surface at its present rate.
+    struct Approach {
+        std::size_t guard = no_guard;
+        double ahead = infinity;  ///< [s]
+    };
+
+    /// The first guard to reach its surface in the direction that counts.
+    [[nodiscard]] Approach time_to_surface()
+    {
+        Approach first;
+        if constexpr (guarded && !puts_off) {
+            for (std::size_t i = 0; i < bank_.size(); ++i) {
+                const detail::GuardRecord& record = bank_[i];
+                if (!record.enabled || record.info.boolean) continue;
+                if (!counts(record.side, record.info.crossing)) continue;
+                const double g = bank_.g0(i);
+                const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+                const double ahead = g * rate < 0 ? -g / rate : infinity;
+                if (ahead < first.ahead) first = {i, ahead};
+            }
+        }
+        return first;
+    }
+
+    /// The next length to try after one of h that left the domain of the flow or a guard: nine
+    /// tenths of the way to a surface that lies within it, else a tenth.
+    [[nodiscard]] double shorten_to_surface(double h)
+    {
+        const double ahead = time_to_surface().ahead;
+        return ahead <= h ? 0.9 * ahead : 0.1 * h;
+    }
+
+    /// The flow ends here, as it cannot be evaluated a step of h further on, and a guard reaches
+    /// its surface no later: its event happens at the start of the step.
+    [[nodiscard]] bool happen_where_flow_ends([[maybe_unused]] double h)
+    {
+        if constexpr (guarded && !puts_off) {
+            const Approach approach = time_to_surface();
+            const std::size_t i = approach.guard;
+            if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !counts_here(i)) {
+                return false;
+            }
+            if (!bank_[i].acting) {
+                record_jump(i, bank_[i].side);
+                return false;
+            }
+            for (std::size_t k = 0; k < bank_.size(); ++k) bank_[k].band = 0;
+            bank_[i].band = std::fabs(bank_.g0(i));
+            search_.members().clear();
+            search_.members().push_back(i);
+            cascade();
+            return true;
+        } else {
+            return false;
         }
     }
 
@@ -859,13 +951,31 @@ private:
         }
         if (bank_.size() == 0) return false;
         bank_.sample_end(step_, calls());
-        if (!bank_.suspicious(step_.h())) {
+        if (!any_suspicious()) {
             if (asked_ && !cleared) ++run_.statistics.false_alarms;
             run_.statistics.evidence.add(Detector::evidence);
             bank_.pass_on();
             return false;
         }
         return search(cleared);
+    }
+
+    /// Whether any guard deserves a search. Detectors that ask for it see the guards inside
+    /// the step, too; a second time where the first leaves doubts.
+    [[nodiscard]] bool any_suspicious()
+    {
+        if constexpr (Bank::looks) {
+            if (!options_.look_inside) return bank_.suspicious(step_.h());
+            X& x = search_.space(step_.x0());
+            step_.peek(detail::CubicLook::inside * step_.h(), x);
+            bank_.sample_inside(step_, x, calls());
+            if (!bank_.doubtful(step_.h())) return false;
+            if (bank_.needs_second_look(step_.h())) {
+                step_.peek(detail::CubicLook::further * step_.h(), x);
+                bank_.sample_further(step_, x, calls());
+            }
+        }
+        return bank_.suspicious(step_.h());
     }
 
     /// Whether the network predicts that the step is free of events.
@@ -879,7 +989,7 @@ private:
     /// The step may hold events: finds out, and deals with them.
     [[gnu::noinline]] bool search(bool cleared)
     {
-        const std::size_t broken = bank_.first_nan(step_.h());
+        const std::size_t broken = bank_.first_not_finite();
         if (broken != no_guard) {
             end(Outcome::non_finite, broken);
             return true;
@@ -909,8 +1019,15 @@ private:
         } else {
             record_notes(step_.h());
         }
+        count_refined();
         bank_.pass_on_after_events();
         return ended_;
+    }
+
+    void count_refined() noexcept
+    {
+        run_.statistics.refined_steps += search_.refined();
+        run_.statistics.unresolved_steps += search_.unresolved();
     }
 
     [[gnu::noinline]] void end_plateaus()
@@ -940,9 +1057,10 @@ private:
             const double t = step_.time(search_.at());
             if (!detail::call_enabled_at(*system_, i, step_.mode(), t, search_.before())) {
                 ++run_.statistics.disabled;
-            } else if (repeats(i, t)) {
+            } else if (repeats(i, t) && !bank_[i].info.unilateral && !turned_back(i)) {
                 ++run_.statistics.suppressed;
             } else {
+                bank_[i].again = repeats(i, t) && turned_back(i);
                 members[kept++] = i;
                 continue;
             }
@@ -951,12 +1069,19 @@ private:
         members.shrink(kept);
     }
 
-    /// The guard has just had its event in the same direction.
+    /// The guard has just had its event in the same direction. If it has not turned back
+    /// since, this is the same crossing, seen again because the reset moved the state by a
+    /// rounding; else it is a new event, and events accumulate.
     [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
     {
         const detail::GuardRecord& record = bank_[i];
-        return !record.info.unilateral && record.side == record.last_side &&
+        return record.side == record.last_side &&
                std::fabs(t - record.last) <= resolution_.window(t);
+    }
+
+    [[nodiscard]] bool turned_back(std::size_t i) const noexcept
+    {
+        return resets && bank_[i].info.resets && bank_[i].turned;
     }
 
     /// Computes what the resets of the members make of the state before.
@@ -1004,12 +1129,29 @@ private:
         mode_before_ = step_.mode();
         for (const std::size_t i : search_.members()) find_band(i, t);
         ++run_.statistics.steps;
+        count_refined();
         emit_samples(s);
         record_step(s);
         record_notes(s);
+        limit_next_step(t);
         fire({.located = true, .on_time = on_time});
         if (on_time && !ended_) find_time_event();
         cascade();
+    }
+
+    /// The step after an event at `t` is at most twice the flight before it, or the first
+    /// step: no further than what is known of the motion reaches, wherever the end lies. Events
+    /// that follow at once shorten it by no more than error control would at each of them.
+    void limit_next_step(double t) noexcept
+    {
+        if constexpr (error_controlled) {
+            const double flight = std::fabs(t - flight_start_);
+            if (flight > resolution_.window(t)) {
+                longest_step_ = std::max(2 * flight, rule_.smallest * longest_step_);
+                flight_start_ = t;
+            }
+            h_next_ = std::min(h_next_, std::max(first_step_, longest_step_));
+        }
     }
 
     /// How far from its surface a guard that has just fired may be. A guard with declared
@@ -1018,10 +1160,17 @@ private:
     {
         detail::GuardRecord& record = bank_[i];
         const Location& where = search_.where(i);
+        record.jumped = where.jump;
+        if (where.jump) {  // the state is beyond, and the guard anything but small
+            record.estimated = false;
+            record.band = 0;
+            return;
+        }
         const double residue = 2 * std::fabs(where.slope) * where.error;
         record.estimated = Bounded<System, X> && !record.info.boolean && std::isfinite(residue) &&
                            search_.at() == where.root && !search_.late();
-        record.band = record.estimated ? std::max(residue, bank_.touch(i)) : residue_of(i, t);
+        record.band =
+            record.estimated ? std::max(residue, bank_.touch(i, step_.h())) : residue_of(i, t);
     }
 
     /// |g| where the guard has fired, at the state before.
@@ -1096,17 +1245,60 @@ private:
     {
         bool rested = false;
         for (const std::size_t i : search_.members()) {
-            detail::GuardRecord& record = bank_[i];
-            const bool stalls = record.intervals.stalls(step_.start(), h_next_);
+            detail::ShrinkingIntervals& intervals = bank_[i].intervals;
+            const bool again = std::exchange(bank_[i].again, false);
+            const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
             const double tolerance = resolution_.tolerance(step_.start().value);
-            const bool resetting = resets && record.info.resets;
-            if (stalls || (resetting && record.intervals.accumulate(tolerance))) {
-                come_to_rest(i, stalls ? 0 : record.intervals.remainder());
+            const bool resetting = resets && bank_[i].info.resets;
+            if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
+                come_to_rest(i, stalls ? 0 : intervals.remainder());
                 rested = true;
             }
         }
         if (rested && !ended_ && !resting_) arm_all();
         return rested;
+    }
+
+    /// Notes how guard i leaves its surface after its reset. True if it is not going to rise
+    /// above its rounding any more.
+    [[nodiscard]] bool fades(std::size_t i)
+    {
+        detail::GuardRecord& record = bank_[i];
+        record.turned = false;
+        record.rated_over = stale;
+        record.intervals.depart(infinity, false);
+        if (record.info.boolean || !detail::call_enabled_in(*system_, i, step_.mode())) {
+            return false;
+        }
+        double rate = departure(i, h_next_);
+        const bool low = record.intervals.is_low_at(rate);
+        const double rounding = low ? rounding_of(i) : 0;
+        bool lost = false;
+        if constexpr (!RatedGuard<System, X>) {
+            if (low) {
+                double part = 1e-5 * h_next_;
+                if (std::fabs(rate) * part <= rounding) {
+                    part = std::max(part, low_part * record.intervals.interval());
+                    rate = departure(i, 1e5 * part);
+                }
+                // A difference of a unit in the last place does not tell which way it goes.
+                lost = std::fabs(rate) * part <= rounding / 8;
+                if (lost) rate = 0;
+            }
+        }
+        record.departure = rate;
+        record.rated_over = low ? stale : h_next_;
+        record.turned = lost || detail::sign_of(record.last_side) * rate > 0;
+        if (record.turned) record.intervals.depart(rate, low);
+        return low && record.intervals.fades(rounding);
+    }
+
+    /// The rate [1/s] of guard i at the start of the step; where it is a difference quotient,
+    /// over 1e-5 of `scale` [s].
+    [[nodiscard]] double departure(std::size_t i, double scale)
+    {
+        return bank_.view(i, step_.mode(), calls())
+            .rate(step_.time(0), step_.x0(), step_.rate0(), scale);
     }
 
     /// The limit of the events of guard i is `ahead` [s] from here.
@@ -1142,13 +1334,31 @@ private:
                 return end(Outcome::non_finite, i);
             }
             step_.restart(ahead, 0, after, mode_after);
+            for (const std::size_t k : search_.members()) {
+                bank_[k].rated_over = stale;
+            }
             bank_[i].intervals = {};
             bank_[i].band = 0;
-            bank_[i].rested = true;
             resting_ = bank_.size() == 1 && !Moded<System, X>;
+            if (resting_ && !stays_on_surface(i)) end(Outcome::zeno, i);
         } else {
             end(Outcome::zeno, i);
         }
+    }
+
+    /// Whether guard i stays where it is while the state stands still: its surface does not
+    /// move. Looked at from a thousandth of the time that is left to all of it.
+    [[nodiscard]] bool stays_on_surface(std::size_t i)
+    {
+        const auto guard = bank_.view(i, step_.mode(), calls());
+        const double span = step_.until(options_.t_end);
+        const double rounding = rounding_of(i);
+        const double g = guard.value(step_.time(0), step_.x0());
+        for (const double part : {0.001, 0.0381966, 0.381966, 1.0}) {
+            const double later = guard.value(step_.time(part * span), step_.x0());
+            if (!(std::fabs(later - g) <= rounding)) return false;
+        }
+        return true;
     }
 
     // --- arming ---
@@ -1181,6 +1391,7 @@ private:
         newly_armed_ = true;
         watching_ = false;
         last_h_ = h_next_;
+        bank_.begin_phase(step_.time(0));
         bank_.sample_start(step_, calls(), h_next_);
         for (std::size_t i = 0; i < bank_.size(); ++i) {
             if (!bank_[i].enabled) {
@@ -1207,12 +1418,15 @@ private:
         record.estimated = false;
         const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
         const bool on_surface = std::fabs(g) <= band;
+        record.departs = on_surface || record.fired || record.newly_enabled;
         const Side side = on_surface ? heading(i) : side_of(g);
         bank_.arm(i, side);
         record.from = 0;
-        if (side == Side::above) record.rested = false;
         if (side == Side::plateau) {
-            const Side from = record.info.unilateral ? Side::above : before;
+            const bool begins = record.newly_enabled && record.acting;
+            const Side from = record.info.unilateral ? Side::above
+                              : begins               ? side_left_by(record.info.crossing, before)
+                                                     : before;
             bank_.await(i, record.fired && !record.info.unilateral ? Side::plateau : from);
         }
         const bool kept_out = record.info.unilateral && side == Side::below;
@@ -1220,7 +1434,7 @@ private:
                              counts(before, record.info.crossing);
         const bool pressed = kept_out && on_surface;
         const bool arrived = on_surface && counts(opposite(side), record.info.crossing);
-        const bool fires = record.fired          ? pressed
+        const bool fires = record.fired           ? pressed
                            : record.newly_enabled ? record.acting && (arrived || pressed)
                                                   : flipped;
         if (fires && counts_here(i)) {
@@ -1236,10 +1450,27 @@ private:
         return !outside;
     }
 
+    /// The side that a crossing which counts leaves; `else_side` where both do.
+    [[nodiscard]] static constexpr Side side_left_by(Crossing crossing, Side else_side) noexcept
+    {
+        return crossing == Crossing::falling  ? Side::above
+               : crossing == Crossing::rising ? Side::below
+                                              : else_side;
+    }
+
     /// The side that a guard on its surface is about to be on.
     [[nodiscard]] Side heading(std::size_t i)
     {
-        const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+        const bool known = bank_[i].fired && bank_[i].rated_over == h_next_;
+        double rate = known ? bank_[i].departure : bank_.complete_rate0(i, step_, h_next_, calls());
+        if (known) bank_.set_rate0(i, rate);
+        bank_[i].rated_over = stale;
+        if constexpr (!RatedGuard<System, X>) {
+            if (bank_[i].fired && bank_[i].turned && bank_[i].intervals.is_low()) {
+                rate = bank_[i].departure;
+                bank_.set_rate0(i, rate);
+            }
+        }
         if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
         if (rate != 0 && bank_[i].fired) return side_of(rate);
         // The second derivative has the sign of the rate a little later. A rate that it
@@ -1409,6 +1640,7 @@ private:
         if (!options_.record_events) return;
         const Location where = located ? search_.where(i) : Location{};
         record({.t = t,
+                .kind = detail::kind_of(where),
                 .guard = i,
                 .mode_before = step_.mode(),
                 .mode_after = resets_.mode(),
@@ -1514,6 +1746,9 @@ private:
         visit(place_.mode);
         for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
         visit(h_next_);
+        visit(first_step_);
+        visit(flight_start_);
+        visit(longest_step_);
         visit(time_event_);
         visit(resting_);
         visit(ended_);
@@ -1546,6 +1781,10 @@ private:
     }
 
     static constexpr int most_levels = 100;
+    static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
+    /// Of the last flight of a guard: over so long the rounding of its small excursions is
+    /// magnified less by a difference quotient than over the usual 1e-5 of a step.
+    static constexpr double low_part = 0.05;
     static constexpr ErrorRule rule_{};
 
     const System* system_;
@@ -1561,6 +1800,9 @@ private:
     Search search_;
     [[no_unique_address]] Planner planner_;
     double h_next_ = 0;
+    double first_step_ = 0;    ///< [s]
+    double flight_start_ = 0;  ///< [s] time of the last event
+    double longest_step_ = 0;  ///< [s] after it
     double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
     bool watching_ = false;    ///< with their rates: every step is checked

@@ -64,12 +64,16 @@ struct EvolutionProgress {
 /// False stops the search; what was found is kept.
 using EvolutionCallback = std::function<bool(const EvolutionProgress&)>;
 
+/// Thrown by a score that is not to be waited for any longer: the search ends as `stopped`, and
+/// what was tried of the generation in progress is tried again when it is resumed.
+struct SearchStopped {};
+
 enum class EvolutionOutcome {
     max_evaluations,
     max_seconds,
     target,        ///< reached
     converged,     ///< to `least_spread`
-    stopped,       ///< by the callback
+    stopped,       ///< by the callback, or by `SearchStopped`
     none_allowed,  ///< no x had a score below infinity in `fruitless_generations` in a row
 };
 
@@ -97,7 +101,8 @@ struct EvolutionResult {
 /// On one machine the result follows from score, x0, population, spread, scales and
 /// seed, to the bit, however many threads run and however often the search was
 /// interrupted and resumed. A search that had ended at a limit goes on when it is
-/// resumed with a higher one. An exception thrown by `score` or `progress` ends the search.
+/// resumed with a higher one. Any other exception than `SearchStopped` thrown by `score` or
+/// `progress` is thrown on.
 /// @throws std::invalid_argument if x0 is empty or not finite, or an option is outside its range.
 /// @throws std::runtime_error if the checkpoint cannot be written or read, or is of another search.
 [[nodiscard]] EvolutionResult evolve(const Objective& score, std::span<const double> x0,

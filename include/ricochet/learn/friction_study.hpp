@@ -5,6 +5,7 @@
 // initial states) is fixed as `make_histories` and `slider_cases` say.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -21,8 +22,9 @@ struct InternalVariables {
     double seconds = 0;
     FrictionErrors training{}, test{};
 };
-[[nodiscard]] InternalVariables try_internal_variables(const FrictionData& data, int internal,
-                                                       std::size_t histories, double seconds);
+[[nodiscard]] InternalVariables try_internal_variables(
+    const FrictionData& data, int internal, std::size_t histories, double seconds,
+    const std::atomic<bool>* cancelled = nullptr);
 
 /// Table 2: mean relative L2 errors inside sliders, ten runs of 2 s.
 struct SliderErrors {
@@ -36,8 +38,10 @@ struct Transfer {
 /// Sliders at 1.5 to 4 times the critical stiffness whose load changes its velocity twice.
 /// @throws std::invalid_argument unless the fit is an additive pair with one internal
 /// variable.
+/// @param cancelled  true ends it within moments; what it returns then means nothing
 [[nodiscard]] Transfer transfer_to_sliders(const LearnedFriction& fit, std::uint64_t seed,
-                                           double seconds);
+                                           double seconds,
+                                           const std::atomic<bool>* cancelled = nullptr);
 
 /// Tables 3 and 4: the fixed steps, as the number of them in 1/64 s, so that all of them
 /// meet at common times: 2^-13.5, 2^-13, ..., 2^-11 s, but for less than one in a hundred.

@@ -1,6 +1,7 @@
 // The parameters of the ageing law from measured friction.
 #pragma once
 
+#include <atomic>
 #include <vector>
 
 #include "ricochet/friction/histories.hpp"
@@ -25,7 +26,9 @@ struct IdentifiedFriction {
 ///
 /// @throws std::invalid_argument for no history, one that `validate` refuses or without
 /// friction, or for friction that does not rise with rate and state.
+/// @param cancelled  true ends it with what was fitted so far
 [[nodiscard]] IdentifiedFriction identify_ageing_law(const std::vector<FrictionHistory>& histories,
-                                                     double v_star = 1e-4);
+                                                     double v_star = 1e-4,
+                                                     const std::atomic<bool>* cancelled = nullptr);
 
 }  // namespace ricochet::learn

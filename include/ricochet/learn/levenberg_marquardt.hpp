@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
 #include <functional>
 
 namespace ricochet::learn {
@@ -16,6 +17,7 @@ struct LevenbergMarquardtOptions {
     double target = 0;              ///< stop at this sum of squares
     double step_tolerance = 1e-14;  ///< stop when no parameter moves by more, relatively
     double damping = 1e-2;          ///< at the start, relative to the diagonal of J^T J
+    const std::atomic<bool>* cancelled = nullptr;  ///< true ends it after the sum in progress
 };
 
 struct LevenbergMarquardtReport {

@@ -180,6 +180,9 @@ struct StepTrainingOptions {
     unsigned threads = 2;
     std::filesystem::path checkpoint{};
     bool resume = false;
+    /// Asked at every step of every run, by several threads; false ends the training within
+    /// moments, as `EvolutionOutcome::stopped`.
+    std::function<bool()> goes_on{};
 };
 
 struct TrainedStepPolicy {
@@ -187,8 +190,12 @@ struct TrainedStepPolicy {
     EvolutionResult search;
 };
 
+/// The same family, whose runs throw `SearchStopped` as soon as `goes_on` returns false.
+[[nodiscard]] StepFamily stoppable(StepFamily family, std::function<bool()> goes_on);
+
 /// Searches the weights, from a network that returns zero. The domain of the model is what the
 /// policy and the classical rule met on the family, a tenth wider.
+/// A training that was stopped has no domain yet; its checkpoint has what was found.
 /// @throws as `evolve`.
 [[nodiscard]] TrainedStepPolicy train_step_policy(const StepFamily& family,
                                                   const StepTrainingOptions& options = {},

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -48,6 +49,7 @@ struct FrictionTrainingOptions {
     /// Moves by Adam's method first, each on a few histories; Levenberg-Marquardt goes on.
     int adam_iterations = 0;
     double adam_rate = 3e-3;
+    const std::atomic<bool>* cancelled = nullptr;  ///< true ends it with what was fitted so far
 };
 
 /// A fit, ready to use.

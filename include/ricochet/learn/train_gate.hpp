@@ -451,7 +451,7 @@ private:
             }
             if (run.run().events.empty()) return;
             const auto& event = run.run().events.front();
-            if (event.kind != EventKind::crossing || !(event.t > from.t)) return;
+            if (!changes_sign(event.kind) || !(event.t > from.t)) return;
             const double back = time_of_return(event);
             const Pending& state = pending_.front();
             out.append({state.features.data(), width_}, event.t - state.t, back - state.t,

@@ -11,8 +11,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "ricochet/detect/step_probe.hpp"
+#include "ricochet/locate/flat.hpp"
+#include "ricochet/locate/jump.hpp"
+#include "ricochet/locate/noise.hpp"
 
 namespace ricochet {
 
@@ -55,8 +59,14 @@ struct Newton {
     {
         const double reach = straight_part * (hi.s - lo.s);
         double s = first_guess(probe, lo, hi);
+        const detail::NoiseScale scale{.size = size_of(lo, hi), .h = hi.s - lo.s};
+        double size = detail::larger(detail::larger(0, lo.value), hi.value);
+        const double end = hi.s;
         double curvature = bend(lo, hi);
         double past = 0;
+        double last_distance = std::numeric_limits<double>::infinity();
+        double last_value = std::numeric_limits<double>::infinity();
+        int linear = 0;
         for (int slow = 0;;) {
             const double width = hi.s - lo.s;
             const double finest = probe.finest(hi.s);
@@ -71,21 +81,43 @@ struct Newton {
             const GuardSample sample = probe.value_and_rate(s);
             const bool beyond = probe.has_left(sample);
             curvature = std::max({curvature, bend(lo, sample), bend(sample, hi)});
+            const GuardSample replaced = beyond ? hi : lo;
             (beyond ? hi : lo) = sample;
             const double correction = -sample.value / sample.rate;
             const double distance = std::fabs(correction);
             // What a straight line neglects over that distance, as a shift in time.
-            const bool straight =
-                distance <= std::min(width, std::max(reach, finest)) &&
-                distance * distance * curvature <=
-                    std::fabs(sample.rate) * std::max(finest, tolerance) / 2;
-            if (straight && close_in(probe, sample, correction, tolerance, lo, hi)) {
-                const TwoSum predicted = two_sum(sample.s, correction);
-                const TwoSum root = predicted.value < lo.s   ? two_sum(lo.s, 0)
-                                    : predicted.value > hi.s ? two_sum(hi.s, 0)
-                                                             : predicted;
-                probe.settle((root.value - sample.s) + root.remainder);
-                return located(lo, hi, root);
+            const bool straight = distance <= std::min(width, std::max(reach, finest)) &&
+                                  distance * distance * curvature <=
+                                      std::fabs(sample.rate) * std::max(finest, tolerance) / 2;
+            if (straight) {
+                double noise = 0;
+                if (close_in(probe, sample, correction, tolerance, scale, lo, hi, noise)) {
+                    const TwoSum predicted = two_sum(sample.s, correction);
+                    const TwoSum root = predicted.value < lo.s   ? two_sum(lo.s, 0)
+                                        : predicted.value > hi.s ? two_sum(hi.s, 0)
+                                                                 : predicted;
+                    probe.settle((root.value - sample.s) + root.remainder);
+                    return located(probe, lo, hi, root, size, end);
+                }
+                if (noise > 0) return hidden(probe, lo, hi, end, sample.rate, noise);
+            } else if (scale.may_be(sample.value) &&
+                       std::fabs(last_value) < 16 * std::fabs(sample.value)) {
+                const double noise = detail::close_in_noise(probe, sample, s + correction,
+                                                            sample.value, scale, lo, hi);
+                if (noise > 0) return hidden(probe, lo, hi, end, sample.rate, noise);
+            }
+            last_value = sample.value;
+            // Not by half nearer, again and again: a root of higher order, a pole, or none.
+            linear = distance > 0.4 * last_distance && distance > 8 * finest ? linear + 1 : 0;
+            last_distance = distance;
+            if (linear == most_linear || !std::isfinite(correction)) {
+                linear = 0;
+                detail::narrow_by_values(probe, lo, hi, replaced, tolerance, 1e-3 * width, size);
+                probe.complete(lo);
+                probe.complete(hi);
+                s = hi.s - hi.value / hi.rate;
+                slow = 0;
+                continue;
             }
             // Converged from one side: reach for the other.
             past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
@@ -97,23 +129,73 @@ struct Newton {
                 slow = 0;
             }
         }
-        return located(lo, hi, {hi.s, 0});
+        return located(probe, lo, hi, {hi.s, 0}, size, end);
     }
 
 private:
     /// Of a bracket, along which the flow may be followed: its square is 9e-16.
     static constexpr double straight_part = 3e-8;
+    /// Corrections in sequence that are not by half shorter than the one before.
+    static constexpr int most_linear = 4;
 
-    [[nodiscard]] static Location located(const GuardSample& lo, const GuardSample& hi,
-                                          const TwoSum& root) noexcept
+    template <class Probe>
+    [[nodiscard]] static Location located(Probe& probe, const GuardSample& lo,
+                                          const GuardSample& hi, const TwoSum& root, double size,
+                                          double end)
     {
         const double rounding = std::fabs(hi.value / hi.rate);
+        Location where{.lo = lo.s,
+                       .hi = hi.s,
+                       .root = root.value,
+                       .root_remainder = root.remainder,
+                       .slope = hi.rate,
+                       .error = rounding > hi.s - lo.s ? rounding : hi.s - lo.s};
+        if (detail::may_jump(lo, hi, size)) [[unlikely]]
+            mark_jump(probe, lo, hi, size, end, where);
+        return where;
+    }
+
+    /// A guard that jumps has no slope there, and its root is the place beyond.
+    template <class Probe>
+    [[gnu::noinline]] static void mark_jump(Probe& probe, const GuardSample& lo,
+                                            const GuardSample& hi, double size, double end,
+                                            Location& where)
+    {
+        const double slope = (hi.value - lo.value) / (hi.s - lo.s);
+        for (const double rate : {lo.rate, hi.rate}) {
+            if (slope / rate > 0 && slope / rate <= 16) return;  // as steep as it says
+        }
+        if (!detail::jumps(probe, lo, hi, size)) return;
+        where = detail::jump_at(probe, lo, hi, end);
+    }
+
+    /// A root that the noise of the guard hides for as long as `noise` [s]. Along the flow the
+    /// guard has left its side at `hi`; that the state there has, too, is seen to.
+    template <class Probe>
+    [[nodiscard]] static Location hidden(Probe& probe, const GuardSample& lo, GuardSample hi,
+                                         double end, double rate, double noise)
+    {
+        const double width = std::max(hi.s - lo.s, noise / 4);
+        for (int i = 0; i < 8 && hi.s < end; ++i) {
+            if (probe.has_left(probe.value(hi.s))) break;
+            hi.s = std::min(hi.s + width, end);
+        }
         return {.lo = lo.s,
                 .hi = hi.s,
-                .root = root.value,
-                .root_remainder = root.remainder,
-                .slope = hi.rate,
-                .error = rounding > hi.s - lo.s ? rounding : hi.s - lo.s};
+                .root = hi.s,
+                .slope = rate,
+                .error = std::max(noise, hi.s - lo.s)};
+    }
+
+    /// |g| in the bracket, as far as its ends and their rates tell.
+    [[nodiscard]] static double size_of(const GuardSample& lo, const GuardSample& hi) noexcept
+    {
+        const double width = hi.s - lo.s;
+        double size = 0;
+        for (const double g : {lo.value, hi.value, lo.rate * width, hi.rate * width}) {
+            if (std::fabs(g) > size) size = std::fabs(g);
+        }
+        return size;
     }
 
     /// Change of the rate from one sample to another, per second.
@@ -133,12 +215,29 @@ private:
         return lo.s + u * width;
     }
 
+    /// Halves a bracket that had to be widened far from where the slope at `sample`, which a
+    /// kink may have spoilt, predicted the root.
+    template <class Probe>
+    static void halve_along(Probe& probe, const GuardSample& sample, double tolerance,
+                            GuardSample& lo, GuardSample& hi)
+    {
+        const double narrow = std::max(tolerance, 2 * probe.finest(hi.s));
+        while (hi.s - lo.s > narrow) {
+            const double s = lo.s + (hi.s - lo.s) / 2;
+            if (!(s > lo.s && s < hi.s)) return;
+            const GuardSample at = probe.along_the_flow(sample, s);
+            (probe.has_left(at) ? hi : lo) = at;
+        }
+    }
+
     /// Brackets the root predicted from `sample` as narrowly as rounding in the
     /// guard allows: from the predicted root outwards until the side changes. False
-    /// if it does not change within the bracket: the prediction was wrong.
+    /// if it does not change within the bracket: the prediction was wrong, or the guard is
+    /// noise, which hides its root for as long as `noise` [s].
     template <class Probe>
     [[nodiscard]] static bool close_in(Probe& probe, const GuardSample& sample, double correction,
-                                       double tolerance, GuardSample& lo, GuardSample& hi)
+                                       double tolerance, const detail::NoiseScale& scale,
+                                       GuardSample& lo, GuardSample& hi, double& noise)
     {
         double s = sample.s + correction;
         // Three quarters of the relative epsilon always reach the next double, and
@@ -146,6 +245,8 @@ private:
         double margin = std::max(tolerance / 2, 0.75 * probe.finest(s));
         const double widest = 0x1p20 * margin;
         int direction = 0;
+        GuardSample first;
+        bool tried = false;
         if (s <= lo.s) {
             direction = 1;
             s = lo.s + margin;
@@ -153,11 +254,25 @@ private:
             direction = -1;
             s = hi.s - margin;
         }
-        while (s > lo.s && s < hi.s) {
+        for (int count = 0; s > lo.s && s < hi.s; ++count) {
             const GuardSample at = probe.along_the_flow(sample, s);
             const int toward = probe.has_left(at) ? -1 : 1;
+            if (count == 0) first = at;
+            const bool repeats =
+                at.value == first.value && scale.resolves(sample.rate * (at.s - first.s));
+            if (count == 0 ? scale.may_be(at.value) : repeats && !tried) {
+                tried = true;
+                const double residue = scale.may_be(at.value)
+                                           ? at.value
+                                           : detail::tread_height(probe, sample, at, scale);
+                noise = detail::close_in_noise(probe, sample, s, residue, scale, lo, hi);
+                if (noise > 0) return false;
+            }
             (toward < 0 ? hi : lo) = at;
-            if (toward == -direction) return true;
+            if (toward == -direction) {
+                if (margin > widest / 256) halve_along(probe, sample, tolerance, lo, hi);
+                return true;
+            }
             direction = toward;
             s += toward * margin;
             margin *= 2;

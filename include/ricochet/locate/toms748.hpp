@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "ricochet/detect/step_probe.hpp"
+#include "ricochet/locate/jump.hpp"
 
 namespace ricochet {
 
@@ -21,8 +22,11 @@ struct Toms748 {
             const double middle = a + (b - a) / 2;
             return b - a <= std::max(tolerance, probe.finest(b)) || middle <= a || middle >= b;
         };
+        const double end = hi.s;
+        double size = detail::larger(detail::larger(0, lo.value), hi.value);
         const auto sample_at = [&](double s) {
             const GuardSample sample = probe.value(s);
+            size = detail::larger(size, sample.value);
             if (probe.has_left(sample)) {
                 if (s < hi.s) hi = sample;
             } else if (s > lo.s) {
@@ -42,6 +46,7 @@ struct Toms748 {
         // An exact zero ends the search from one side: close the other.
         if (!narrow_enough(lo.s, hi.s)) (void)sample_at(hi.s - probe.finest(hi.s));
         while (!narrow_enough(lo.s, hi.s)) halve();
+        if (detail::jumps(probe, lo, hi, size)) return detail::jump_at(probe, lo, hi, end);
         return {.lo = lo.s, .hi = hi.s, .root = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
     }
 };

@@ -74,6 +74,7 @@ public:
     using Reaction = ReactionOf<System>;
     using Branches = Eigen::Matrix<Branch, M, 1>;
     using Slacks = std::array<double, 2>;  ///< above the lower bound, below the upper one
+    using Rooms = std::array<double, 2 * static_cast<std::size_t>(M)>;  ///< of all reactions
 
     static constexpr bool forward_only = true;
     static constexpr std::size_t guard_count = 5 * static_cast<std::size_t>(M);
@@ -125,6 +126,12 @@ public:
         return mode < branch_modes && holds_[mask_of(mode)].determined;
     }
 
+    /// Whether a mode of branches holds any reaction.
+    [[nodiscard]] static constexpr bool holds(Mode mode) noexcept
+    {
+        return mode < branch_modes && mask_of(mode) != 0;
+    }
+
     [[nodiscard]] static GuardInfo guard_info(std::size_t which) noexcept
     {
         constexpr std::array<std::string_view, 4> names{"y falls to zero", "y rises to zero",
@@ -172,6 +179,46 @@ public:
         Reaction r;
         reactions(mode, t, w, free, r);
         return r;
+    }
+
+    /// How far every held reaction is from its bounds; infinite where there is no bound, and for
+    /// reactions that are not held. Writes the rate of the motion and the reactions, too.
+    void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const
+    {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        reactions(mode, t, w, rate, r);
+        rate += lever_.lazyProduct(r);
+        const auto set = [&] {
+            if constexpr (detail::ContinuesBounds<System>) {
+                return 0;
+            } else {
+                return matrices_.system().reaction_set(t, w);
+            }
+        }();
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
+            const auto k = static_cast<std::size_t>(i);
+            rooms[2 * k] = rooms[2 * k + 1] = infinity;
+            if (rest % 3 != 1) continue;
+            double lower, upper;
+            if constexpr (detail::ContinuesBounds<System>) {
+                lower = bound(t, w, i, Branch::lower);
+                upper = bound(t, w, i, Branch::upper);
+            } else {
+                lower = set.lower(k);
+                upper = set.upper(k);
+            }
+            if (!std::isinf(lower)) rooms[2 * k] = r[i] - lower;
+            if (!std::isinf(upper)) rooms[2 * k + 1] = upper - r[i];
+        }
+    }
+
+    /// What rounding of the terms may make of the held reactions.
+    [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
+    {
+        const double free = (rate - lever_.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
+        return negligible *
+               (holds_[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
     }
 
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
@@ -247,10 +294,19 @@ public:
         int arrived = 0;
         Branches held = branches;
         Vector w = vector(x);
+        // Reactions at a bound whose y is zero as well, as of contacts that depend on one another.
+        const Branches zero = zero_branches(t, w);
+        int undecided = 0;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (zero[i] != Branch::inside || branches[i] == Branch::inside) continue;
+            held[i] = Branch::inside;
+            ++undecided;
+        }
         for (const std::size_t which : fired) {
             if (which >= first_set_guard) return empty;
             const auto i = static_cast<Eigen::Index>(which / 4);
             if (which % 4 < 2) {
+                if (held[i] == Branch::inside) --undecided;
                 held[i] = Branch::inside;
                 ++arrived;
             } else {
@@ -261,7 +317,7 @@ public:
         hold(held, t, w);
         Eigen::Map<Vector>(x.data()) = w;
         if (faulty(t, w) >= 0) return empty;
-        if (left + arrived > 1 && left > 0) return several;
+        if (left + arrived + undecided > 1 && left > 0) return several;
         if (left == 1) return checked(mode_of(branches));
         return settle(held, t, w);
     }
@@ -274,16 +330,23 @@ public:
     [[nodiscard]] Mode mode_at(double t, Vector& w) const
     {
         (void)minimal_selection(matrices_, t, w);
+        const Branches held = zero_branches(t, w);
+        hold(held, t, w);
+        return settle(held, t, w);
+    }
+
+    /// The branches that the signs of y ask for; inside where y is zero up to rounding.
+    [[nodiscard]] Branches zero_branches(double t, const Vector& w) const
+    {
         const Reaction y = observed(t, w);
         const Reaction size = matrices_.observe().cwiseAbs() * w.cwiseAbs() + offset(t).cwiseAbs();
-        Branches held;
+        Branches out;
         for (Eigen::Index i = 0; i < M; ++i) {
             const double rounding = 16 * std::numeric_limits<double>::epsilon() * size[i];
             const bool zero = std::abs(y[i]) <= rounding;
-            held[i] = zero ? Branch::inside : y[i] > 0 ? Branch::lower : Branch::upper;
+            out[i] = zero ? Branch::inside : y[i] > 0 ? Branch::lower : Branch::upper;
         }
-        hold(held, t, w);
-        return settle(held, t, w);
+        return out;
     }
 
     /// Puts every held y at zero, along the reactions that hold it.
@@ -331,6 +394,7 @@ private:
     /// The inverse of the block of D = E A^-1 G of the held reactions, zero elsewhere.
     struct Hold {
         typename Matrices::Delassus inverse;
+        double largest = 0;
         bool determined = true;
     };
 
@@ -353,6 +417,7 @@ private:
         hold.determined = lu.isInvertible();
         if (!hold.determined) return;
         block = lu.inverse();
+        hold.largest = block.cwiseAbs().maxCoeff();
         for (Eigen::Index i = 0; i < count; ++i) {
             for (Eigen::Index j = 0; j < count; ++j) hold.inverse(at(i), at(j)) = block(i, j);
         }
@@ -519,7 +584,7 @@ private:
             if (at[i] == Branch::lower) inequality.upper[i] = inequality.lower[i];
             if (at[i] == Branch::upper) inequality.lower[i] = inequality.upper[i];
             // A reaction without influence on y' is all or nothing.
-            if (delassus_(i, i) == 0) inequality.w(i, i) = std::numeric_limits<double>::min();
+            if (delassus_(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
         }
         Branches next = at;
         Reaction r = inequality.lower;
@@ -527,6 +592,7 @@ private:
         if (!inequality.solve(r, rate, next)) return several;
         int doubtful = 0;
         Eigen::Index which = 0;
+        double size = 0;
         for (Eigen::Index i = 0; i < M; ++i) {
             if (at[i] != Branch::inside) {
                 next[i] = at[i];
@@ -541,16 +607,19 @@ private:
             if (clear) continue;
             ++doubtful;
             which = i;
+            size = terms;
         }
         if (doubtful == 0) return checked(mode_of(next));
         if (doubtful > 1) return several;
         const bool up =
             r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
-        return bend(next, which, up, t, w);
+        return bend(next, which, up, size, t, w);
     }
 
-    /// Reaction i is at its upper or lower bound and y_i does not move. Does it leave?
-    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double t, const Vector& w) const
+    /// Reaction i is at its upper or lower bound and y_i does not move. It leaves if the motion
+    /// bends away from y_i = 0 by more than the rounding of its `terms`.
+    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double terms, double t,
+                            const Vector& w) const
     {
         next[i] = up ? Branch::upper : Branch::lower;
         const Mode leaving = mode_of(next);
@@ -570,7 +639,8 @@ private:
             return y;
         };
         const double bending = rate_of_y(step) - rate_of_y(-step);
-        if (up ? bending < 0 : bending > 0) return checked(leaving);
+        const double noise = 4 * negligible * terms;
+        if (up ? bending < -noise : bending > noise) return checked(leaving);
         next[i] = Branch::inside;
         return checked(mode_of(next));
     }

@@ -49,6 +49,19 @@ struct SchemeOptions {
 /// @throws std::invalid_argument naming the option.
 void validate(const SchemeOptions& options);
 
+namespace detail {
+
+/// Whether E A^-1 G of at most 64 reactions is singular to working precision.
+template <class System>
+[[nodiscard]] bool has_dependent_reactions(const InclusionMatrices<System>& m)
+{
+    if (m.reactions() > 64) return false;
+    const Eigen::MatrixXd w = m.observe() * (m.inverse_mass() * m.act());
+    return !Eigen::FullPivLU<Eigen::MatrixXd>(w).isInvertible();
+}
+
+}  // namespace detail
+
 /// Steps from any state to the next. Nothing is carried from one step to another but
 /// factors of constant matrices, so that the same state and step give the same bits.
 template <Inclusion System>
@@ -69,10 +82,13 @@ public:
         validate(options);
         method_ = options.stage.method;
         const bool few = box && matrices_.reactions() <= most_cases;
+        falls_back_ = method_ == StageMethod::automatic;
         if (method_ == StageMethod::automatic) {
-            method_ = few ? StageMethod::cases : StageMethod::newton;
-        }
-        if (method_ == StageMethod::cases && !few) {
+            // Where reactions depend on one another Newton's equations are singular.
+            const bool by_cases = few || (box && detail::has_dependent_reactions(matrices_));
+            method_ = by_cases ? StageMethod::cases : StageMethod::newton;
+            falls_back_ = !by_cases;
+        } else if (method_ == StageMethod::cases && !few) {
             detail::refuse_inclusion("cases need a box of at most four reactions, not",
                                      static_cast<double>(matrices_.reactions()));
         }
@@ -243,12 +259,37 @@ private:
         if (method_ == StageMethod::fixed_point) {
             return detail::solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
         }
-        return newton_.solve(scratch_, stage_, options_.stage, to.w, to.reaction);
+        const Vector start = to.w;
+        const Reaction reaction = to.reaction;
+        const StageReport report =
+            newton_.solve(scratch_, stage_, options_.stage, to.w, to.reaction);
+        if (report.converged || !falls_back_) return report;
+        to.w = start;
+        to.reaction = reaction;
+        return solve_again(to, report);
+    }
+
+    /// Where Newton's method fails: pivots for a box, else the projected fixed point.
+    [[nodiscard]] StageReport solve_again(State& to, const StageReport& before)
+    {
+        StageReport report;
+        if constexpr (box) {
+            branches_.setConstant(Branch::inside);
+            report =
+                detail::solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_);
+        } else {
+            report = detail::solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
+        }
+        const int spent = report.iterations + before.iterations;
+        if (!report.converged && before.residual < report.residual) report = before;
+        report.iterations = spent;
+        return report;
     }
 
     Matrices matrices_;
     SchemeOptions options_;
     StageMethod method_ = StageMethod::cases;
+    bool falls_back_ = false;  // from Newton's method, where it was not asked for
     StageScratch<System> scratch_;
     detail::StageNewton<System> newton_;
     detail::Stage<System> stage_;

@@ -20,6 +20,8 @@
 
 #include "ricochet/integrate/simulation.hpp"
 #include "ricochet/nonsmooth/branch_modes.hpp"
+#include "ricochet/nonsmooth/held_reactions.hpp"
+#include "ricochet/nonsmooth/law.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {
@@ -33,6 +35,7 @@ enum class HandOverOutcome {
     cancelled,        ///< `HandOverOptions::cancelled` was set
     not_handed_over,  ///< a set-valued phase was due, and `HandOverOptions::events_only`
     released,         ///< no reaction is held any more, and `HandOverOptions::until_released`
+    law_violated,     ///< a set-valued step ended with a reaction that contradicts its y
 };
 
 [[nodiscard]] std::string_view name(HandOverOutcome outcome) noexcept;
@@ -42,13 +45,14 @@ enum class HandOverOutcome {
 /// Why a phase began.
 enum class PhaseCause {
     start,
-    no_modes,      ///< the set is no box, or has more than four reactions
-    no_flow,       ///< y' = 0 does not determine the held reactions
-    several,       ///< changes coincide, and rates do not tell what follows
-    accumulation,  ///< infinitely many switchings in finite time
-    chattering,    ///< more switchings in a short time than can be worth locating
-    stuck,         ///< the event-driven loop could not go on
-    released,      ///< event-driven again: every branch is plain
+    no_modes,       ///< the set is no box, or has more than four reactions
+    no_flow,        ///< y' = 0 does not determine the held reactions
+    several,        ///< changes coincide, and rates do not tell what follows
+    accumulation,   ///< infinitely many switchings in finite time
+    chattering,     ///< more switchings in a short time than can be worth locating
+    stuck,          ///< the event-driven loop could not go on
+    contradiction,  ///< an event-driven step contradicted the law of a reaction
+    released,       ///< event-driven again: every branch is plain
 };
 
 [[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
@@ -142,6 +146,32 @@ private:
     std::uint64_t mark_ = 0;
 };
 
+/// Whether a y that switches stays within the error of the steps: more than 400 events in a row
+/// between which it goes no farther from zero. Their times are then accidents of rounding, and the
+/// events of an accumulation need not become denser.
+class FlutterWatch {
+public:
+    /// After so many events, the last of them at t; `speed()` is then that of the y concerned, and
+    /// `resolved` what a step resolves of it.
+    template <class Speed>
+    [[nodiscard]] bool operator()(std::uint64_t events, double t, double resolved,
+                                  const Speed& speed)
+    {
+        if (events == seen_) return false;
+        // A parabola between two zeros.
+        const bool flutters = events == seen_ + 1 && speed() * (t - t_) / 4 <= resolved;
+        in_a_row_ = flutters ? in_a_row_ + 1 : 0;
+        seen_ = events;
+        t_ = t;
+        return in_a_row_ > 400;
+    }
+
+private:
+    std::uint64_t seen_ = 0;
+    int in_a_row_ = 0;
+    double t_ = 0;
+};
+
 /// The options as they will be used.
 /// @throws std::invalid_argument naming the option.
 [[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
@@ -165,6 +195,15 @@ struct ModesOf {
 template <Branching System>
 struct ModesOf<System> {
     using type = BranchModes<System>;
+};
+
+template <class System>
+struct HeldOf {
+    struct type {};
+};
+template <Branching System>
+struct HeldOf<System> {
+    using type = HeldReactions<System>;
 };
 
 }  // namespace detail
@@ -279,17 +318,142 @@ private:
             return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
         }
         detail::ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
+        detail::FlutterWatch unresolved;
         bool chatters = false;
+        bool flutters = false;
         bool released = false;
-        while (!chatters && !released && simulation->step() &&
-               simulation->mode() < Modes::branch_modes) {
+        Place before;
+        held_.forget();
+        while (!chatters && !flutters && !released) {
+            note_place(*simulation, before);
+            const bool going = simulation->step();
+            if (Modes::holds(before.mode) && !follows_held(before, *simulation)) {
+                go_back(simulation->finish(), before);
+                if (held_.starts_beyond()) go_by_steps(PhaseCause::contradiction);
+                return;
+            }
+            if (contradicts(simulation->mode(), simulation->t(), simulation->x())) {
+                go_back(simulation->finish(), before);
+                return go_by_steps(PhaseCause::contradiction);
+            }
+            if (!going || simulation->mode() >= Modes::branch_modes) break;
             released = options_.until_released &&
                        is_released(Modes::branches_of(simulation->mode()), simulation->t(),
                                    Modes::vector(simulation->x()));
             chatters = watch(simulation->t(), simulation->run().statistics.events);
+            const auto& events = simulation->run().events;
+            if (!events.empty()) {
+                flutters = unresolved(events.size(), events.back().t, resolution(simulation->x()),
+                                      [&] { return speed_after(events.back()); });
+            }
+            if (!chatters && !flutters && !released && may_lengthen()) {
+                note_place(*simulation, before);
+                return go_back(simulation->finish(), before);
+            }
         }
-        finish_events(simulation->finish(), chatters);
+        finish_events(simulation->finish(), chatters, flutters);
         if (released && !set_valued_) end_with(HandOverOutcome::released);
+    }
+
+    /// Where an event-driven step begins, and what had been recorded until then.
+    struct Place {
+        double t = 0;
+        Vector w;
+        Mode mode = 0;
+        std::size_t events = 0;
+        std::size_t samples = 0;
+    };
+
+    template <class Loop>
+    static void note_place(const Loop& simulation, Place& place)
+    {
+        place.t = simulation.t();
+        place.w = Modes::vector(simulation.x());
+        place.mode = simulation.mode();
+        place.events = simulation.run().events.size();
+        place.samples = simulation.run().trajectory.t.size();
+    }
+
+    /// Whether a step was short enough for the reactions that hold; if not, steps are as short
+    /// as that takes from now on.
+    template <class Loop>
+    [[nodiscard]] bool follows_held(const Place& before, const Loop& simulation)
+    {
+        const double fraction =
+            held_.fraction(modes_, before.mode, before.t, before.w, simulation.t(),
+                           Modes::vector(simulation.x()), options_.event_tolerance);
+        if (held_.starts_beyond()) return false;
+        if (fraction == 1) return true;
+        const double shorter = fraction * (simulation.t() - before.t);
+        // Below that the motion has no smoothness that steps could follow.
+        if (shorter <= 1e-9 * (options_.t_end - options_.t_start)) return true;
+        longest_step_ = shorter;
+        easy_steps_ = 0;
+        return false;
+    }
+
+    /// Of the y whose zero was an event; infinite where the event was another.
+    template <class X>
+    [[nodiscard]] double speed_after(const Event<X>& event) const
+    {
+        if (event.guard % 4 >= 2 || event.mode_after >= Modes::branch_modes) {
+            return std::numeric_limits<double>::infinity();
+        }
+        X rate;
+        modes_.flow(event.mode_after, event.t, event.after, rate);
+        const auto i = static_cast<Eigen::Index>(event.guard / 4);
+        return std::abs(modes_.matrices().observe().row(i).dot(Modes::vector(rate)));
+    }
+
+    /// What a step resolves of y.
+    template <class X>
+    [[nodiscard]] double resolution(const X& x) const
+    {
+        return options_.atol + options_.rtol * Modes::vector(x).template lpNorm<Eigen::Infinity>();
+    }
+
+    /// Whether a y is on the wrong side of its reaction, which is at a bound, by more than the
+    /// error of a step.
+    template <class X>
+    [[nodiscard]] bool contradicts(Mode mode, double t, const X& x) const
+    {
+        if (mode >= Modes::branch_modes) return false;
+        const Vector w = Modes::vector(x);
+        const Reaction y = modes_.observed(t, w);
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < y.size(); ++i, rest /= 3) {
+            if (rest % 3 == 0 ? !(y[i] < 0) : rest % 3 == 1 || !(y[i] > 0)) continue;
+            if (std::abs(y[i]) > 10 * resolution(x)) return true;
+        }
+        return false;
+    }
+
+    /// Whether so many steps in a row were shorter than need be that longer ones are tried.
+    [[nodiscard]] bool may_lengthen() noexcept
+    {
+        if (std::isinf(longest_step_)) return false;
+        easy_steps_ = held_.is_easy() ? easy_steps_ + 1 : 0;
+        if (easy_steps_ < 8) return false;
+        easy_steps_ = 0;
+        longest_step_ *= 2;
+        if (longest_step_ > options_.t_end - run_.state.t) {
+            longest_step_ = std::numeric_limits<double>::infinity();
+        }
+        return true;
+    }
+
+    /// Goes on from `before` with steps of another length; what was recorded later is dropped.
+    template <class X>
+    void go_back(Run<X>&& done, const Place& before)
+    {
+        done.statistics.events -= done.events.size() - before.events;
+        done.events.resize(before.events);
+        done.trajectory.t.resize(before.samples);
+        done.trajectory.x.resize(before.samples);
+        collect(done);
+        run_.state.t = before.t;
+        run_.state.w = before.w;
+        run_.mode = before.mode;
     }
 
     [[nodiscard]] Options event_options() const
@@ -298,13 +462,49 @@ private:
                                                 steps_taken());
         options.mode = run_.mode;
         if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
-            options.step = options_.set_valued.step;
+            options.step = std::min(options_.set_valued.step, longest_step_);
+        } else if (longest_step_ < options_.h_max) {
+            options.step = options.h_max = longest_step_;
         }
         return options;
     }
 
     template <class X>
-    void finish_events(Run<X>&& done, bool chatters)
+    void finish_events(Run<X>&& done, bool chatters, bool flutters)
+    {
+        const std::size_t fluttering = flutters ? done.events.back().guard : no_guard;
+        collect(done);
+        Vector& w = run_.state.w;
+        run_.state.t = done.t;
+        w = Modes::vector(done.x);
+        if (done.mode == Modes::empty) return end_with_empty_set();
+        if (done.mode >= Modes::branch_modes) {
+            return go_by_steps(cause_of(done.mode));
+        }
+        if (chatters) return go_by_steps(PhaseCause::chattering);
+        const auto accumulate = [&](std::size_t guard) {
+            auto branches = Modes::branches_of(done.mode);
+            branches[static_cast<Eigen::Index>(guard / 4)] = Branch::inside;
+            modes_.hold(branches, done.t, w);
+        };
+        if (flutters) {
+            accumulate(fluttering);
+            return go_by_steps(PhaseCause::accumulation);
+        }
+        if (const auto cause = detail::cause_after(done.outcome)) {
+            if (*cause == PhaseCause::accumulation && done.guard != no_guard) {
+                accumulate(done.guard);
+            }
+            return go_by_steps(*cause);
+        }
+        run_.mode = done.mode;
+        if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
+        end_with(detail::in_hand_over(done.outcome));
+    }
+
+    /// What an event-driven phase recorded.
+    template <class X>
+    void collect(const Run<X>& done)
     {
         if (run_.events.empty()) run_.events.reserve(done.events.size());
         for (const Event<X>& event : done.events) {
@@ -315,25 +515,6 @@ private:
             run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
         }
         detail::add(run_.statistics.event_driven, done.statistics);
-        Vector& w = run_.state.w;
-        run_.state.t = done.t;
-        w = Modes::vector(done.x);
-        if (done.mode == Modes::empty) return end_with_empty_set();
-        if (done.mode >= Modes::branch_modes) {
-            return go_by_steps(cause_of(done.mode));
-        }
-        if (chatters) return go_by_steps(PhaseCause::chattering);
-        if (const auto cause = detail::cause_after(done.outcome)) {
-            if (*cause == PhaseCause::accumulation && done.guard != no_guard) {
-                auto branches = Modes::branches_of(done.mode);
-                branches[static_cast<Eigen::Index>(done.guard / 4)] = Branch::inside;
-                modes_.hold(branches, done.t, w);
-            }
-            return go_by_steps(*cause);
-        }
-        run_.mode = done.mode;
-        if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
-        end_with(detail::in_hand_over(done.outcome));
     }
 
     void end_with_empty_set()
@@ -409,7 +590,9 @@ private:
             const bool switched = motion_.statistics().switches != switches;
             emit_samples(false);
             if (switched) record_switch();
-            if (outcome != SetValuedOutcome::running) {
+            if (outcome != SetValuedOutcome::not_converged && breaks_law()) {
+                end_with(HandOverOutcome::law_violated);
+            } else if (outcome != SetValuedOutcome::running) {
                 if (outcome == SetValuedOutcome::not_converged) run_.failure = motion_.failure();
                 end_with(detail::in_hand_over(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
@@ -429,24 +612,32 @@ private:
                     run_.mode = Modes::mode_of(motion_.branches());
                     end_with(HandOverOutcome::released);
                 }
-                if (!ended_ && steps >= patience_ && is_plain(switched)) {
-                    release();
-                    break;
-                }
+                if (!ended_ && steps >= patience_ && is_plain(switched) && release()) break;
             }
         }
         run_.statistics.set_valued_time += motion_.state().t - from;
         if (set_valued_) run_.state = motion_.state();
     }
 
+    /// Solvers leave a millionth of a millionth.
+    [[nodiscard]] bool breaks_law() const
+    {
+        const State& now = motion_.state();
+        return law_violation(motion_.matrices(), now.t, now.w, now.reaction,
+                             options_.set_valued.step) > 1e-6;
+    }
+
     /// Whether the branches are those of a mode that flows, and no y so near to zero that its
     /// sign is an accident.
     [[nodiscard]] bool is_plain(bool switched) requires branching
     {
-        const auto& branches = motion_.branches();
-        const State& now = motion_.state();
-        return modes_.flows(Modes::mode_of(branches)) &&
-               (switched || are_clear(branches, now.t, now.w));
+        auto branches = motion_.branches();
+        if (!modes_.flows(Modes::mode_of(branches))) return false;
+        // Of the y that has just been left the branch says which way it goes.
+        if (switched) {
+            branches[static_cast<Eigen::Index>(motion_.last_switch().reaction)] = Branch::inside;
+        }
+        return are_clear(branches, motion_.state().t, motion_.state().w);
     }
 
     /// Whether every y of a reaction at a bound is farther from zero than errors reach.
@@ -470,19 +661,29 @@ private:
         return !(branches.array() == Branch::inside).any() && are_clear(branches, t, w);
     }
 
-    void release() requires branching
+    /// Hands back to events, unless rates and reactions do not tell how the motion goes on.
+    [[nodiscard]] bool release() requires branching
     {
-        run_.state = motion_.state();
         auto branches = motion_.branches();
-        const Mode mode = Modes::mode_of(branches);
-        const Reaction y = modes_.observed(run_.state.t, run_.state.w);
+        double t = motion_.state().t;
+        Vector w = motion_.state().w;
+        const Reaction y = modes_.observed(t, w);
         // A y that has just been left is zero; which way it goes, its branch says.
         for (Eigen::Index i = 0; i < y.size(); ++i) {
             const bool wrong = branches[i] == Branch::lower ? y[i] < 0 : y[i] > 0;
             if (wrong) branches[i] = Branch::inside;
         }
-        modes_.hold(branches, run_.state.t, run_.state.w);
+        modes_.hold(branches, t, w);
+        Mode mode = Modes::several;
+        try {
+            mode = modes_.mode_at(t, w);
+        } catch (const std::invalid_argument&) {
+        }
+        if (mode >= Modes::branch_modes) return false;
+        run_.state = motion_.state();
+        run_.state.w = w;
         go_by_events(mode, PhaseCause::released);
+        return true;
     }
 
     void record_switch()
@@ -528,6 +729,10 @@ private:
     State sample_;
     HandOverRun<System> run_;
     static constexpr std::uint64_t most_patience = std::uint64_t{1} << 20;
+    using Held = typename detail::HeldOf<System>::type;
+    [[no_unique_address]] Held held_;
+    double longest_step_ = std::numeric_limits<double>::infinity();  // of the event-driven kind
+    int easy_steps_ = 0;
     std::uint64_t patience_ = 1;
     std::uint64_t chatter_patience_ = 10;  // by trial; 1 hands back amid the chattering
     bool chatters_ = false;

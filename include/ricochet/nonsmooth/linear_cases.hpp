@@ -4,7 +4,8 @@
 //
 // Each graph has three branches: lower bound, inside, upper bound. On a given choice of
 // branches the problem is a linear system, whose solution is that of the inequality if
-// it lies on those branches. One unknown is a formula.
+// it lies on those branches. One unknown is a formula. More unknowns than can be tried case by
+// case are solved by principal pivots.
 #pragma once
 
 #include <Eigen/Dense>
@@ -30,13 +31,17 @@ struct LinearInequality {
     using Matrix = Eigen::Matrix<double, M, M>;
     using Branches = Eigen::Matrix<Branch, M, 1>;
 
+    /// Stands for W_ii where a reaction has no influence on its y, so that one that is asked for
+    /// is all or nothing; the smallest double would overflow in y / W_ii.
+    static constexpr double no_influence = 1e-100;
+
     Confines confines = Confines::reaction;
     Matrix w;               ///< W
     Vector y0;
     Vector lower, upper;    ///< of K
 
     /// The solution on the branch where the search meets it first, `branches` before any
-    /// other; these are overwritten. False if no choice of branches has one.
+    /// other; these are overwritten. False if none was found.
     [[nodiscard]] bool solve(Vector& reaction, Vector& y, Branches& branches) const
     {
         if constexpr (M == 1) {
@@ -44,6 +49,7 @@ struct LinearInequality {
         }
         if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
         const int m = static_cast<int>(y0.size());
+        if (m > most_cases) return solve_by_pivots(reaction, y, branches);
         int count = 1;
         for (int i = 0; i < m; ++i) count *= 3;
         for (int code = 0; code < count; ++code) {
@@ -53,6 +59,42 @@ struct LinearInequality {
             if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
         }
         return false;
+    }
+
+    /// For any number of unknowns and a positive semidefinite W, reactions that depend on one
+    /// another included: proximal steps from reaction = 0,
+    ///
+    ///     y = W reaction + y0 + eps (reaction - reaction before),
+    ///
+    /// each solved by principal pivots (J. J. Judice and F. M. Pires, A block principal pivoting
+    /// algorithm for large-scale strictly monotone linear complementarity problems, Computers and
+    /// Operations Research 21, 1994). False where pivots or proximal steps do not end, as they
+    /// need not where W is indefinite.
+    [[nodiscard]] bool solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const
+    {
+        LinearInequality strict = *this;
+        const double largest = w.diagonal().cwiseAbs().maxCoeff();
+        const Vector eps = (w.diagonal().cwiseAbs() * 1e-7).cwiseMax(1e-12 * largest);
+        strict.w.diagonal() += eps;
+        Vector before = y0;
+        before.setZero();
+        for (int step = 0; step < 100; ++step) {
+            strict.y0 = y0 - eps.cwiseProduct(before);
+            if (!strict.pivot(reaction, y, branches)) return false;
+            bool moves = false;
+            for (Eigen::Index i = 0; i < y0.size(); ++i) {
+                const double off = eps[i] * std::abs(reaction[i] - before[i]);
+                moves = moves || !(off <= 1e-14 * terms(i, reaction));
+            }
+            before = reaction;
+            if (!moves) break;
+        }
+        y.noalias() = w * reaction;
+        y += y0;
+        for (Eigen::Index i = 0; i < y0.size(); ++i) {
+            if (held(branches[i])) y[i] = target(i, branches[i]);
+        }
+        return y.allFinite();
     }
 
     /// The solution of the equations of the given branches, whether it lies on them or
@@ -140,15 +182,65 @@ private:
         return branch == Branch::lower ? lower[i] : upper[i];
     }
 
+    /// The terms of y_i.
+    [[nodiscard]] double terms(Eigen::Index i, const Vector& reaction) const
+    {
+        return std::abs(y0[i]) + w.row(i).cwiseAbs().dot(reaction.cwiseAbs());
+    }
+
+    /// Whether pair i is off its branch by more than the rounding of the products.
+    [[nodiscard]] bool leaves(Eigen::Index i, Branch branch, const Vector& reaction,
+                              const Vector& y) const
+    {
+        const bool about_y = (confines == Confines::reaction) != (branch == Branch::inside);
+        const double of_y = terms(i, reaction);
+        const double size = about_y ? of_y : std::max(std::abs(reaction[i]), of_y / w(i, i));
+        return slack(i, branch, reaction[i], y[i]) < -1e-13 * size;
+    }
+
+    /// For a W whose principal minors are positive. Whatever is off its branch changes it, all at
+    /// once while their number falls, and one at a time, the last, where it does not.
+    [[nodiscard]] bool pivot(Vector& reaction, Vector& y, Branches& branches) const
+    {
+        const Eigen::Index m = y0.size();
+        Eigen::Index fewest = m + 1;
+        int patience = 10;
+        for (Eigen::Index pivots = 0; pivots < 100 * (m + 1); ++pivots) {
+            for (Eigen::Index i = 0; i < m; ++i) {
+                if (!held(branches[i]) && !std::isfinite(fixed_reaction(i, branches[i]))) {
+                    branches[i] = Branch::inside;
+                }
+            }
+            if (!solve_on(branches, reaction, y)) return false;
+            Eigen::Index off = 0;
+            Eigen::Index last = 0;
+            for (Eigen::Index i = 0; i < m; ++i) {
+                if (leaves(i, branches[i], reaction, y)) ++off, last = i;
+            }
+            if (off == 0) return true;
+            if (off < fewest) {
+                fewest = off;
+                patience = 10;
+            } else {
+                --patience;
+            }
+            for (Eigen::Index i = patience >= 0 ? 0 : last; i <= last; ++i) {
+                if (!leaves(i, branches[i], reaction, y)) continue;
+                const double confined = confines == Confines::reaction ? reaction[i] : y[i];
+                branches[i] = branches[i] != Branch::inside ? Branch::inside
+                              : confined < lower[i]         ? Branch::lower
+                                                            : Branch::upper;
+            }
+        }
+        return false;
+    }
+
     /// On their branches up to the rounding of the products.
     [[nodiscard]] bool fits(const Branches& branches, const Vector& reaction,
                             const Vector& y) const
     {
         for (Eigen::Index i = 0; i < y.size(); ++i) {
-            const bool about_y = (confines == Confines::reaction) != (branches[i] == Branch::inside);
-            const double of_y = std::abs(y0[i]) + w.row(i).cwiseAbs().dot(reaction.cwiseAbs());
-            const double size = about_y ? of_y : std::max(std::abs(reaction[i]), of_y / w(i, i));
-            if (slack(i, branches[i], reaction[i], y[i]) < -1e-13 * size) return false;
+            if (leaves(i, branches[i], reaction, y)) return false;
         }
         return true;
     }

@@ -102,7 +102,7 @@ template <Inclusion System>
     Reaction reaction;
     reaction.setZero(m.reactions());
     if constexpr (BoxSet<SetOf<System>>) {
-        if (m.reactions() <= most_cases) {
+        if (m.reactions() <= most_cases || detail::has_dependent_reactions(m)) {
             LinearInequality<reaction_size<System>> inequality;
             inequality.w = delassus;
             inequality.y0 = rate;
@@ -135,7 +135,7 @@ template <Inclusion System>
                 inequality.lower[i] = lower;
                 inequality.upper[i] = upper;
                 // Without influence on y' a reaction that is asked for is all or nothing.
-                if (delassus(i, i) == 0) inequality.w(i, i) = std::numeric_limits<double>::min();
+                if (delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
             }
             typename LinearInequality<reaction_size<System>>::Branches branches;
             branches.setConstant(m.reactions(), Branch::inside);

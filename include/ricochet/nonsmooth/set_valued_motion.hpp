@@ -180,6 +180,10 @@ public:
     /// With the counts of a `LearnedStep`.
     [[nodiscard]] const StepController& controller() const noexcept { return options_.controller; }
     [[nodiscard]] CompositeStep<System>& stepper() noexcept { return step_; }
+    [[nodiscard]] const InclusionMatrices<System>& matrices() const noexcept
+    {
+        return step_.matrices();
+    }
     /// The branches of the state, kept where switches are located.
     [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
     /// Whether changes are located from now on, where the options ask for it.
@@ -203,6 +207,11 @@ public:
                 return end_with(SetValuedOutcome::step_limit);
             }
             const double left = options_.t_end - now_.t;
+            if (left <= 4 * std::numeric_limits<double>::epsilon() * std::abs(options_.t_end)) {
+                // A change was located at the end up to rounding.
+                now_.t = options_.t_end;
+                return end_with(SetValuedOutcome::reached_end);
+            }
             double h = std::min(h_, options_.h_max);
             // No sliver is left for the last step: a step within a part in 1e9 takes it all.
             const bool last = left <= h * (1 + 1e-9);
@@ -322,7 +331,8 @@ private:
         }
         if (!std::isfinite(scaled_error_)) report.converged = false;
         if constexpr (CompositeStep<System>::box) {
-            if (options_.switches == Switches::located && locates_) {
+            if (options_.switches == Switches::located && locates_ &&
+                short_switches_ <= 4 + 2 * now_.reaction.size()) {
                 return end_at_switch(h, report);
             }
         }
@@ -470,7 +480,15 @@ private:
         }
         ++statistics_.accepted;
         if constexpr (CompositeStep<System>::box) {
-            if (options_.switches == Switches::located) enter_next_branches();
+            if (options_.switches == Switches::located) {
+                // Reactions that depend on one another can change places without end.
+                if (!switched_) {
+                    short_switches_ = 0;
+                } else if (now_.t - t < 0.1 * options_.step) {
+                    ++short_switches_;
+                }
+                enter_next_branches();
+            }
         }
     }
 
@@ -501,17 +519,27 @@ private:
         }
         // Sliding has come to a stop: it sticks, or goes on across.
         zero_observed(which);
-        now_.reaction = minimal_selection(step_.matrices(), now_.t, now_.w);
+        try {
+            now_.reaction = minimal_selection(step_.matrices(), now_.t, now_.w);
+        } catch (const std::invalid_argument&) {
+            // Nothing but the solver's reaction, then.
+        }
         step_.branches_of(now_, start_branches_);
         last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
     }
 
+    /// Of reaction `which`, and of those whose y is zero up to rounding.
     void zero_observed(Eigen::Index which)
     {
         if constexpr (detail::confines<System>() == Confines::reaction) {
-            Reaction s;
-            step_.matrices().offset(now_.t, s);
-            step_.matrices().hold(which, 0, s[which], now_.w);
+            const auto& m = step_.matrices();
+            Reaction s, y;
+            m.offset(now_.t, s);
+            m.observed(now_.t, now_.w, y);
+            const double rounding = 1e-14 * now_.w.template lpNorm<Eigen::Infinity>();
+            for (Eigen::Index i = 0; i < y.size(); ++i) {
+                if (i == which || std::abs(y[i]) <= rounding) m.hold(i, 0, s[i], now_.w);
+            }
         }
     }
 
@@ -532,6 +560,7 @@ private:
     bool holds_length_ = true;
     bool locates_ = true;
     bool switched_ = false;
+    Eigen::Index short_switches_ = 0;  // in a row
 };
 
 }  // namespace ricochet

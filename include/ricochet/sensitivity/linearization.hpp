@@ -152,7 +152,7 @@ struct ResetSet {
             if (fired.time_event()) {
                 X after = x;
                 const Mode next = call_time_reset(system, mode, t, after);
-                merging.add(no_guard - 1, next, after);
+                merging.add(time_event_reset, next, after);
             }
             conflict = merging.conflict;
             x = merging.after;

@@ -122,7 +122,7 @@ private:
             for (const Event<Flat>& event : flat_.events) {
                 if (event.t != last.t || event.before != last.before) continue;
                 if (event.kind == EventKind::time) on_time = true;
-                if (event.kind == EventKind::crossing) guards.push_back(event.guard);
+                if (changes_sign(event.kind)) guards.push_back(event.guard);
             }
             const Conflict conflict = variational_.conflict(FiredGuards(guards, on_time),
                                                             last.mode_before, last.t, last.before);
@@ -190,7 +190,7 @@ private:
         EventTime time;
         if (event.kind == EventKind::time) {
             time = variational_.time_event(event.t);
-        } else if (event.kind == EventKind::crossing) {
+        } else if (changes_sign(event.kind)) {
             time = variational_.crossing(event.guard, event.mode_before, event.t, event.before);
         } else if (!result_.undefined_at) {
             time.dt = variational_.last_event_derivatives(event.after);

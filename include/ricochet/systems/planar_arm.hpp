@@ -86,9 +86,9 @@ public:
         return joints_[joint].middle;
     }
 
-    /// Of every joint, drive sin(f t + p) [rad/s²]. Valid until this thread asks for another
-    /// time: the stages of a step share two.
-    [[nodiscard]] const double* torques(double t) const noexcept;
+    /// Of every joint, drive sin(f t + p) [rad/s²]. The last are remembered: the stages of a step
+    /// share two.
+    [[nodiscard]] std::array<double, most_joints> torques(double t) const noexcept;
 
     /// `torque`: that of the joint at this time.
     [[nodiscard]] double acceleration(std::size_t joint, double torque, double q,
@@ -193,7 +193,7 @@ public:
     template <class X>
     void flow(double t, const X& x, X& dxdt) const noexcept
     {
-        const double* torques = scene_.torques(t);
+        const auto torques = scene_.torques(t);
         for (std::size_t i = 0; i < N; ++i) {
             dxdt[i] = x[N + i];
             dxdt[N + i] = scene_.acceleration(i, torques[i], x[i], x[N + i]);

@@ -1,0 +1,107 @@
+// Impacts that accumulate: no reset is dropped, and nothing flutters for ever.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "accumulating_systems.hpp"
+#include "ricochet/integrate/integrate.hpp"
+
+namespace ricochet {
+namespace {
+
+using test::BallOnFloor;
+using test::fault_of;
+using test::LiftedBall;
+using test::RestingBall;
+using X = BallOnFloor::State;
+
+TEST(Accumulation, OfThreeThousandRandomBallsNoneFallsThroughItsFloorOrFlutters)
+{
+    std::map<std::string, int> faults;
+    for (std::uint32_t seed = 1; seed <= 3000; ++seed) {
+        const std::string fault = fault_of(seed);
+        if (!fault.empty()) ++faults[fault + ", seed " + std::to_string(seed)];
+    }
+    for (const auto& [fault, count] : faults) ADD_FAILURE() << fault;
+}
+
+TEST(Accumulation, ABallThatDeclaresNothingEndsInsteadOfFalling)
+{
+    // A guard that is not unilateral used to have its repeat suppressed with its reset.
+    for (const double tolerance : {0.0, 1e-9, 1e-6, 1e-3}) {
+        const BallOnFloor ball{};
+        const auto run = integrate(ball, X{1, 0}, {.t_end = 20, .event_tolerance = tolerance});
+        EXPECT_EQ(run.outcome, Outcome::zeno) << tolerance;
+        EXPECT_GE(run.x[0], -20 * tolerance - 1e-12) << tolerance;
+        EXPECT_EQ(run.statistics.suppressed, 0u) << tolerance;
+    }
+}
+
+/// The clock's reset sets it back by a rounding, after which it runs on across the surface.
+struct Nudged {
+    void flow(double, const std::array<double, 1>&, std::array<double, 1>& dxdt) const
+    {
+        dxdt = {1};
+    }
+    [[nodiscard]] double guard(double, const std::array<double, 1>& x) const { return 1 - x[0]; }
+    void reset(double, std::array<double, 1>& x) const { x[0] -= 3e-16; }
+};
+
+TEST(Accumulation, TheSameCrossingSeenAgainIsStillOneEvent)
+{
+    const auto run = integrate(Nudged{}, std::array<double, 1>{0}, {.t_end = 2});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.events.size(), 1u);
+}
+
+TEST(Accumulation, RestHoldsOnlyOnAFloorThatStaysWhereItIs)
+{
+    // Without a mode of rest the state stands still, which on a moving floor it must not.
+    const RestingBall moving{{.floor = {.velocity = 0.5, .restitution = 0.5}}};
+    EXPECT_EQ(integrate(moving, X{1, 0}, {.t_end = 20}).outcome, Outcome::zeno);
+    const RestingBall fixed{{.floor = {.height = 1000, .restitution = 0.5}}};
+    const auto run = integrate(fixed, X{1001, 0}, {.t_end = 20});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.x, (X{1000, 0}));
+}
+
+TEST(Accumulation, ABallAtRestIsLiftedOffByAVibratingFloor)
+{
+    // The floor's acceleration exceeds that of gravity in a part of every period: the ball
+    // rests and is thrown once in each, with a few dozen impacts.
+    const LiftedBall ball{.floor = {.amplitude = 0.011, .frequency = 33.8, .restitution = 0.2}};
+    const double period = 2 * 3.141592653589793 / 33.8;
+    const auto run = integrate(ball, X{1, 0}, {.t_end = 1 + 20 * period});
+    std::size_t rests = 0;
+    for (const auto& event : run.events) rests += event.kind == EventKind::accumulation;
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_GE(rests, 15u);
+    EXPECT_LE(run.statistics.events, 40 * rests);
+}
+
+/// Sticks and slips in turn, at intervals that are equal but for rounding.
+struct Relay {
+    static constexpr std::size_t guard_count = 2;
+    static constexpr std::size_t mode_count = 2;
+    [[nodiscard]] bool enabled(std::size_t which, Mode mode) const { return which == mode; }
+    void flow(Mode mode, double, const X&, X& dxdt) const { dxdt = {mode == 0 ? 1.0 : -1.0, 1}; }
+    [[nodiscard]] double guard(std::size_t which, Mode, double, const X& x) const
+    {
+        return which == 0 ? 1 - x[0] : x[0];
+    }
+    Mode reset(std::size_t, Mode mode, double, X&) const { return 1 - mode; }
+};
+
+TEST(Accumulation, IntervalsThatShrinkByRoundingDoNotAccumulate)
+{
+    const auto run = integrate(Relay{}, X{0.3, 0}, {.t_end = 100});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.events.size(), 100u);
+}
+
+}  // namespace
+}  // namespace ricochet
