@@ -466,7 +466,6 @@ private:
     void examine(const CurrentStep& step, Bank& bank, std::size_t i, const Detector& detector,
                  std::uint64_t& calls)
     {
-        GuardRecord& record = bank[i];
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {

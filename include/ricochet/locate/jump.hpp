@@ -34,15 +34,15 @@ inline constexpr double jump_part = 1e-3;
 template <class Probe>
 [[nodiscard, gnu::noinline]] bool jumps(Probe& probe, GuardSample lo, GuardSample hi, double size)
 {
-    // By one way of following the motion: two of them may differ by the error of the step.
-    lo = probe.value(lo.s);
-    hi = probe.value(hi.s);
-    if (probe.has_left(lo) == probe.has_left(hi)) return false;
     while (may_jump(lo, hi, size)) {
         const double middle = lo.s + (hi.s - lo.s) / 2;
         if (hi.s - lo.s <= probe.finest(hi.s) || middle <= lo.s || middle >= hi.s) {
+            // By one way of following the motion: two differ by the error of the step.
+            lo = probe.value(lo.s);
+            hi = probe.value(hi.s);
             const double change = std::fabs(hi.value - lo.value);
-            return !std::isfinite(change) || change > probe.rounding(hi.s);
+            return probe.has_left(lo) != probe.has_left(hi) &&
+                   (!std::isfinite(change) || change > probe.rounding(hi.s));
         }
         const GuardSample sample = probe.value(middle);
         const double change = std::fabs(hi.value - lo.value);
