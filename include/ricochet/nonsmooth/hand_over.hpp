@@ -84,7 +84,7 @@ struct HandOverOptions {
     /// thousandth of the run. Changes are located where the set is a box.
     SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
 
-    std::vector<double> sample_times{};  ///< ascending
+    std::vector<double> sample_times{};     ///< ascending
     std::uint64_t max_steps = 100'000'000;  ///< of both kinds, attempts included
     const std::atomic<bool>* cancelled = nullptr;
 };
@@ -458,8 +458,8 @@ private:
 
     [[nodiscard]] Options event_options() const
     {
-        Options options = detail::event_options(options_, run_.state.t, run_.trajectory.t.size(),
-                                                steps_taken());
+        Options options =
+            detail::event_options(options_, run_.state.t, run_.trajectory.t.size(), steps_taken());
         options.mode = run_.mode;
         if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
             options.step = std::min(options_.set_valued.step, longest_step_);
@@ -507,14 +507,23 @@ private:
     void collect(const Run<X>& done)
     {
         if (run_.events.empty()) run_.events.reserve(done.events.size());
+        std::uint64_t idle = 0;
         for (const Event<X>& event : done.events) {
-            if (event.mode_after != Modes::empty) run_.events.push_back(converted(event));
+            // A load that hardly passes the bound lets y rest on zero by rounding, and its guard
+            // find it there again and again: the reaction stays at its bound.
+            const bool stays = event.mode_after == event.mode_before &&
+                               detail::same_state(event.after, event.before);
+            idle += stays;
+            if (!stays && event.mode_after != Modes::empty) {
+                run_.events.push_back(converted(event));
+            }
         }
         for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
             run_.trajectory.t.push_back(done.trajectory.t[i]);
             run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
         }
         detail::add(run_.statistics.event_driven, done.statistics);
+        run_.statistics.event_driven.events -= idle;
     }
 
     void end_with_empty_set()
