@@ -10,6 +10,7 @@
 
 #include "measure.hpp"
 #include "random_inclusions.hpp"
+#include "random_mechanisms.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet::bench {
@@ -129,6 +130,31 @@ Measured meet()
     return out;
 }
 
+/// Blocks and woodpeckers by time stepping, each step checked; balls by hand-over.
+Measured follow_mechanisms()
+{
+    constexpr std::uint64_t seeds = 1000;
+    test::MechanismTally tally;
+    std::uint64_t balls_wrong = 0;
+    std::string first;
+    for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+        test::MechanismMaker(seed).block(tally);
+        test::MechanismMaker(seed).woodpecker(tally);
+        const std::string fault = test::follow_ball(seed, 50'000, tally.reported);
+        balls_wrong += !fault.empty();
+        if (first.empty()) first = fault;
+    }
+    Measured out{.pass = tally.fault.empty() && balls_wrong == 0 && tally.reported <= 5,
+                 .text = fmt::format("{} steps of {} runs, {} impacts, energy off by {:.1e} of its "
+                                     "terms; {} of {} balls wrong; {} reported",
+                                     tally.steps, tally.runs, tally.impacts, tally.largest,
+                                     balls_wrong, 3 * seeds, tally.reported)};
+    for (const std::string& fault : {tally.fault, first}) {
+        if (!fault.empty()) out.details.push_back(fault);
+    }
+    return out;
+}
+
 }  // namespace
 
 std::vector<Check> checks_of_part_8_hand_over()
@@ -140,6 +166,12 @@ std::vector<Check> checks_of_part_8_hand_over()
          .target = "0 wrong beyond the order of the step (was 68 of 496), 0 hang, < 1 in 1000 "
                    "reported, 0 break the law",
          .run = meet},
+        {.part = 8,
+         .id = "mechanisms",
+         .sentence = "1000 tipping blocks, woodpeckers and balls on moving plates: the contact "
+                     "laws and the balance of energy in every step, balls against backward Euler",
+         .target = "0 break the law, energy to 1e-11 of its terms, 0 wrong, < 1 in 1000 reported",
+         .run = follow_mechanisms},
     };
 }
 
