@@ -37,7 +37,7 @@ Measured accumulate()
         if (fault.empty()) continue;
         if (faults[fault]++ == 0) first[fault] = seed;
     }
-    Measured measured{.pass = faults.empty()};
+    Measured measured{.pass = faults.empty(), .text = {}};
     int wrong = 0;
     for (const auto& [fault, count] : faults) {
         wrong += count;

@@ -121,7 +121,9 @@ struct RandomBall {
         const auto uniform = [&](double a, double b) {
             return std::uniform_real_distribution<double>(a, b)(random);
         };
-        const auto one_of = [&](std::uint32_t n) { return random() % n; };
+        const auto one_of = [&](std::uint32_t n) {
+            return static_cast<std::uint32_t>(random() % n);
+        };
         floor.height = std::array{0.0, 1.0, -3.7, 1000.0}[one_of(4)];
         const std::uint32_t moves = one_of(4);
         vibrates = moves == 3;
