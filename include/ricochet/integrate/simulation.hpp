@@ -1468,6 +1468,13 @@ private:
         if constexpr (!RatedGuard<System, X>) {
             if (bank_[i].fired && bank_[i].turned && bank_[i].intervals.is_low()) {
                 rate = bank_[i].departure;
+                if (rate == 0) {
+                    // Too slow to be told: its reset has sent it back, and it has its next event
+                    // on the way down again.
+                    const Side back = bank_[i].last_side;
+                    bank_.set_rate0(i, detail::sign_of(back) * std::numeric_limits<double>::min());
+                    return back;
+                }
                 bank_.set_rate0(i, rate);
             }
         }
