@@ -43,9 +43,7 @@ void run_one(const RandomInclusion<M>& system, const ReferenceMotion& reference,
 {
     using Clock = std::chrono::steady_clock;
     HandOverOptions options{.t_end = system.t_end, .max_steps = 1'000'000};
-    for (int i = 1; i <= samples; ++i) {
-        options.sample_times.push_back(i == samples ? system.t_end : system.t_end * i / samples);
-    }
+    options.sample_times = equal_times(system.t_end, samples);
     options.set_valued.step = system.t_end / division;
     ++tally.runs;
     const Clock::time_point start = Clock::now();

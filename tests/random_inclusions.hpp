@@ -97,16 +97,39 @@ struct RandomInclusion {
     }
 };
 
+/// The same numbers from the same seed with any standard library.
+class Draw {
+    std::mt19937_64 engine_;
+
+public:
+    explicit Draw(std::uint64_t seed) : engine_(seed) {}
+
+    double uniform(double a, double b)
+    {
+        return a + (b - a) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
+    }
+    bool coin() { return uniform(0, 1) < 0.5; }
+};
+
+/// t_end k / samples, k = 1 ... samples.
+[[nodiscard]] inline std::vector<double> equal_times(double t_end, int samples)
+{
+    std::vector<double> times;
+    for (int i = 1; i <= samples; ++i) {
+        times.push_back(i == samples ? t_end : t_end * i / samples);
+    }
+    return times;
+}
+
 template <int M>
-class InclusionMaker {
+class InclusionMaker : Draw {
     using System = RandomInclusion<M>;
     System s_;
-    std::mt19937_64 engine_;
     int next_ = 0;
 
 public:
     InclusionMaker(InclusionFamily family, std::uint64_t seed)
-        : engine_(seed * 1000003 + static_cast<std::uint64_t>(family) * 7919 + 17)
+        : Draw(seed * 1000003 + static_cast<std::uint64_t>(family) * 7919 + 17)
     {
     }
 
@@ -136,11 +159,6 @@ public:
     }
 
 private:
-    double uniform(double a, double b)
-    {
-        return a + (b - a) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
-    }
-    bool coin() { return uniform(0, 1) < 0.5; }
     void loads(int first, int end, double amplitude, double fastest = 12)
     {
         for (int i = first; i < end; ++i) {

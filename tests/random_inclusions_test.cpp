@@ -22,9 +22,7 @@ template <int M>
                                                          double divisions)
 {
     HandOverOptions options{.t_end = system.t_end, .max_steps = 100'000};
-    for (int i = 1; i <= samples; ++i) {
-        options.sample_times.push_back(i == samples ? system.t_end : system.t_end * i / samples);
-    }
+    options.sample_times = test::equal_times(system.t_end, samples);
     options.set_valued.step = system.t_end / divisions;
     return hand_over(system, system.start, options);
 }

@@ -107,17 +107,9 @@ void follow_mechanism(const System& system, const typename TimeStepping<System>:
     ++tally.reported;
 }
 
-class MechanismMaker {
-    std::mt19937_64 engine_;
-
+class MechanismMaker : public Draw {
 public:
-    explicit MechanismMaker(std::uint64_t seed) : engine_(seed * 2654435761u + 5) {}
-
-    double uniform(double a, double b)
-    {
-        return a + (b - a) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
-    }
-    bool coin() { return uniform(0, 1) < 0.5; }
+    explicit MechanismMaker(std::uint64_t seed) : Draw(seed * 2654435761u + 5) {}
 
     void block(MechanismTally& tally)
     {
@@ -203,9 +195,7 @@ struct RandomRollingBall {
     const RollingBall system(ball.parameters);
     for (const double divisions : {200, 1000, 5000}) {
         HandOverOptions options{.t_end = ball.t_end, .max_steps = 100'000};
-        for (int i = 1; i <= samples; ++i) {
-            options.sample_times.push_back(i == samples ? ball.t_end : ball.t_end * i / samples);
-        }
+        options.sample_times = equal_times(ball.t_end, samples);
         options.set_valued.step = ball.t_end / divisions;
         const auto run = hand_over(system, ball.start, options);
         if (run.outcome != HandOverOutcome::reached_end) {

@@ -10,22 +10,23 @@ namespace {
 using test::MechanismMaker;
 using test::MechanismTally;
 
-TEST(RandomMechanisms, EveryStepOfATippingBlockObeysItsLawsAndBalancesEnergy)
+void expect_lawful(std::uint64_t seeds, void (MechanismMaker::*follow)(MechanismTally&))
 {
     MechanismTally tally;
-    for (std::uint64_t seed = 0; seed < 100; ++seed) MechanismMaker(seed).block(tally);
+    for (std::uint64_t seed = 0; seed < seeds; ++seed) (MechanismMaker(seed).*follow)(tally);
     EXPECT_EQ(tally.fault, "");
     EXPECT_EQ(tally.reported, 0u);
     EXPECT_GT(tally.impacts, 1000u);
 }
 
+TEST(RandomMechanisms, EveryStepOfATippingBlockObeysItsLawsAndBalancesEnergy)
+{
+    expect_lawful(100, &MechanismMaker::block);
+}
+
 TEST(RandomMechanisms, EveryStepOfAWoodpeckerObeysItsLawsAndBalancesEnergy)
 {
-    MechanismTally tally;
-    for (std::uint64_t seed = 0; seed < 30; ++seed) MechanismMaker(seed).woodpecker(tally);
-    EXPECT_EQ(tally.fault, "");
-    EXPECT_EQ(tally.reported, 0u);
-    EXPECT_GT(tally.impacts, 1000u);
+    expect_lawful(30, &MechanismMaker::woodpecker);
 }
 
 TEST(RandomMechanisms, BallsSlideRollAndRestOnMovingPlates)

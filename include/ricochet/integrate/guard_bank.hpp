@@ -62,8 +62,8 @@ struct GuardRecord {
     bool fired = false;
     bool turned = false;   ///< its last reset has sent it back from the surface
     double departure = 0;  ///< [1/s] its rate after the last reset
-    double rated_over =
-        std::numeric_limits<double>::quiet_NaN();  ///< [s] scale of that rate; NaN: stale
+    /// [s] scale of that rate; NaN where it is not that of the state in hand.
+    double rated_over = std::numeric_limits<double>::quiet_NaN();
     bool again = false;            ///< it is back inside the window of its last event
     Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
     bool acting = false;           ///< resets, or may end the run; else a notification
@@ -98,9 +98,12 @@ public:
     static constexpr bool remembers =
         Detector::uses_rates && !LooksInside<Detector> && !Bounded<System, X>;
 
-    /// Guards with declared bounds, which may be dear, remember the sizes that smooth phases
-    /// started with: their brackets are not narrowed below the rounding of those.
+    /// Whether brackets are not narrowed below the rounding of the sizes that smooth phases
+    /// started with: those of guards with declared bounds, which may be expensive.
     static constexpr bool coarse = Detector::uses_rates && Bounded<System, X>;
+
+    /// Whether sizes are kept from step to step.
+    static constexpr bool keeps_sizes = remembers || coarse;
 
     /// Whether guards can be looked at inside a step.
     static constexpr bool looks = LooksInside<Detector> && !Bounded<System, X>;
@@ -111,7 +114,7 @@ public:
         if constexpr (fixed == counted_at_run_time) {
             if constexpr (looks) inside_.resize(count_);
             if constexpr (looks) further_.resize(count_);
-            if constexpr (remembers || coarse) sizes_.resize(count_);
+            if constexpr (keeps_sizes) sizes_.resize(count_);
             for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_})
                 numbers->resize(count_);
             records_.resize(count_);
@@ -153,7 +156,7 @@ public:
         } else {
             sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
         }
-        if constexpr (remembers || coarse) {
+        if constexpr (keeps_sizes) {
             for (std::size_t i = 0; i < size(); ++i) {
                 // Beside a pole that it has just passed, a guard has no size of its own.
                 if (records_[i].fired && records_[i].jumped) continue;
@@ -358,8 +361,7 @@ public:
     }
 
     /// The width [s] below which a bracket in a step of length h is a matter of the guard's
-    /// rounding: that of a guard with declared bounds, which may be dear, is not narrowed
-    /// further. 0 for any other.
+    /// rounding, where it is not narrowed further; else 0.
     [[nodiscard]] double unresolved(std::size_t i, double h) const noexcept
     {
         if constexpr (coarse) {
@@ -478,7 +480,7 @@ public:
         for (std::size_t i = 0; i < size(); ++i) {
             GuardRecord& record = records_[i];
             visit(sign_[i]);
-            if constexpr (remembers || coarse) visit(sizes_[i]);
+            if constexpr (keeps_sizes) visit(sizes_[i]);
             visit(g0_[i]);
             visit(rate0_[i]);
             visit(record.enabled);
@@ -627,7 +629,7 @@ private:
     struct None {};
     bool looked_further_ = false;
     [[no_unique_address]] std::conditional_t<looks, Doubles, None> inside_{}, further_{};
-    [[no_unique_address]] std::conditional_t<remembers || coarse, Doubles, None> sizes_{};
+    [[no_unique_address]] std::conditional_t<keeps_sizes, Doubles, None> sizes_{};
     X there_{};
     PerGuard<GuardRecord, fixed> records_{};
 };
