@@ -57,8 +57,8 @@ TEST(Snapshot, BelongsToOneKindOfRun)
               ours + "system = Ball, and this one has system = marble");
     EXPECT_EQ(refused_by(saved, Ball{}, options, ErrorControlled<Fehlberg78>{}),
               ours +
-                  "stepping = ErrorControlled<Odeint<runge_kutta_dopri5>>, and this one has "
-                  "stepping = ErrorControlled<Odeint<runge_kutta_fehlberg78>>");
+                  "stepping = ErrorControlled<Dopri5>, and this one has "
+                  "stepping = ErrorControlled<Fehlberg78>");
     EXPECT_EQ(refused_by(saved, Ball{}, options, ErrorControlled<Dopri5>{}, Ends{}),
               ours + "detector = Extremum, and this one has detector = Ends");
     EXPECT_EQ(refused_by(saved, Ball{}, options, ErrorControlled<Dopri5>{}, Extremum{}, Toms748{}),

@@ -1,6 +1,6 @@
 // One step of an explicit one-step method, taken as a departure from the tangent.
 //
-// With f0 = f(t0, x0), odeint integrates
+// With f0 = f(t0, x0), the method integrates
 //
 //     w' = f(t0 + s, x0 + s f0 + w) - f0,    w(0) = 0,    x(t0 + s) = x0 + s f0 + w(s)
 //
@@ -113,7 +113,7 @@ public:
     [[gnu::noinline]] void interpolate(double s, X& x) const
     {
         if constexpr (has_dense_output) {
-            advancing_.calc_state(s, x, zero_, zero_, 0.0, w_, w_rate1_, h_);
+            departure(s, x);
             add_tangent(s, x);
         } else {
             const DenseView<X, false> view(dense(), s);
@@ -126,7 +126,7 @@ public:
     [[gnu::noinline]] void peek(double s, X& x) const
     {
         if constexpr (has_dense_output) {
-            advancing_.calc_state(s, x, zero_, zero_, 0.0, w_, w_rate1_, h_);
+            departure(s, x);
             add_tangent(s, x);
         } else {
             const double u = s / h_;
@@ -208,7 +208,7 @@ public:
     [[nodiscard]] double attempt(double h, double rtol, double atol)
     {
         static_assert(has_error_estimate<Stepper>,
-                      "ricochet: error control needs one of odeint's error steppers");
+                      "ricochet: error control needs a method with an error estimate, such as Dopri5");
         h_ = h;
         advance<true>(advancing_, h, w_, w_rate1_, error_);
         finish_attempt();
@@ -290,10 +290,7 @@ public:
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
 
 private:
-    static constexpr bool has_dense_output = requires(const Stepper& stepper, X& x)
-    {
-        stepper.calc_state(0.0, x, x, x, 0.0, x, x, 0.0);
-    };
+    static constexpr bool has_dense_output = has_interpolant<Stepper, X>;
 
     static constexpr DenseNodes dense_nodes = has_dense_output           ? DenseNodes::middle_end
                                               : order_of<Stepper>() <= 4 ? DenseNodes::end
@@ -333,11 +330,21 @@ private:
         dense_ready_ = false;
     }
 
+    /// w(s) on the method's own interpolant.
+    void departure(double s, X& w) const requires has_dense_output
+    {
+        if constexpr (Departing<Stepper>) {
+            advancing_.dense(s, h_, w_rate1_, w);
+        } else {
+            advancing_.calc_state(s, w, zero_, zero_, 0.0, w_, w_rate1_, h_);
+        }
+    }
+
     [[gnu::noinline]] void prepare_dense() const
     {
         for_components([&](auto i) { w_slope1_[i] = rate1_[i] - rate0_[i]; });
         if constexpr (has_dense_output) {
-            advancing_.calc_state(h_ / 2, inner_w_[0], zero_, zero_, 0.0, w_, w_rate1_, h_);
+            departure(h_ / 2, inner_w_[0]);
         } else {
             for (std::size_t k = 0; k < inner_nodes; ++k) {
                 prepare_node(h_ * static_cast<double>(k + 1) / static_cast<double>(inner_nodes + 1),
@@ -393,7 +400,9 @@ private:
                 for_each_component(from.x, [&](auto i) { departure_rate[i] -= from.rate[i]; });
             }
         };
-        if constexpr (is_fsal<Stepper> && with_error) {
+        if constexpr (Departing<Stepper>) {
+            stepper.template depart<with_error>(flow, from.zero, s, w, rate, error);
+        } else if constexpr (is_fsal<Stepper> && with_error) {
             stepper.do_step(flow, from.zero, from.zero, 0.0, w, rate, s, error);
         } else if constexpr (is_fsal<Stepper>) {
             stepper.do_step(flow, from.zero, from.zero, 0.0, w, rate, s);

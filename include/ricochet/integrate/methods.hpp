@@ -1,34 +1,20 @@
-// The one-step methods: Boost.Odeint's steppers, named as types.
-//
-// Only the headers of these steppers are included, since odeint's collective
-// header costs seconds of compile time in every file.
+// The one-step methods, named as types.
 #pragma once
 
-#include <boost/numeric/odeint/algebra/default_operations.hpp>
-#include <boost/numeric/odeint/stepper/euler.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta4_classic.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54_classic.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
-#include <boost/numeric/odeint/stepper/stepper_categories.hpp>
-#include <boost/numeric/odeint/util/resizer.hpp>
 #include <type_traits>
 
-#include "ricochet/integrate/odeint_support.hpp"
+#include "ricochet/integrate/runge_kutta.hpp"
+
+namespace boost::numeric::odeint {
+struct error_stepper_tag;
+struct explicit_error_stepper_tag;
+struct explicit_error_stepper_fsal_tag;
+}  // namespace boost::numeric::odeint
 
 namespace ricochet {
 
-/// Any odeint one-step method given by its class template, for example
-/// `Odeint<boost::numeric::odeint::runge_kutta_cash_karp54>`.
-template <template <class...> class Template>
-struct Odeint {
-    template <class State>
-    using Stepper = Template<State, double, State, double, Elementwise,
-                             boost::numeric::odeint::default_operations,
-                             boost::numeric::odeint::initially_resizer>;
-};
-
-/// A complete stepper type, odeint's or the user's own, for its one state type.
+/// A complete stepper type, odeint's (see `ricochet/odeint.hpp`) or the user's own, for its
+/// one state type, with odeint's `do_step`.
 /// It must be a one-step method: a multistep method has a memory that an event
 /// makes stale.
 template <class GivenStepper>
@@ -37,15 +23,40 @@ struct ThisStepper {
     using Stepper = GivenStepper;
 };
 
-using Euler = Odeint<boost::numeric::odeint::euler>;
-using Rk4 = Odeint<boost::numeric::odeint::runge_kutta4_classic>;
-using CashKarp54 = Odeint<boost::numeric::odeint::runge_kutta_cash_karp54_classic>;
-using Dopri5 = Odeint<boost::numeric::odeint::runge_kutta_dopri5>;
+// Explicit Runge-Kutta methods with the bits of Boost.Odeint's steppers.
+
+struct Euler {
+    template <class State>
+    using Stepper = detail::RungeKutta<detail::EulerTableau, State>;
+};
+
+/// The classical method of order 4.
+struct Rk4 {
+    template <class State>
+    using Stepper = detail::RungeKutta<detail::Rk4Tableau, State>;
+};
+
+/// Of order 5, with an error estimate.
+struct CashKarp54 {
+    template <class State>
+    using Stepper = detail::RungeKutta<detail::CashKarp54Tableau, State>;
+};
+
+/// Of order 5, with an error estimate, an interpolant of order 4 and the rate at the end of
+/// the step for nothing.
+struct Dopri5 {
+    template <class State>
+    using Stepper = detail::RungeKutta<detail::Dopri5Tableau, State>;
+};
+
 /// Of order 8, the cheapest for small errors. Its error estimate, a multiple of
 /// k1 + k11 - k12 - k13, is blind to components whose rate depends on time alone: k1 and
 /// k12 are taken at the start of the step, k11 and k13 at its end. Where such quadratures
 /// stand alone, use Dopri5, or bound the step by `Options::h_max`.
-using Fehlberg78 = Odeint<boost::numeric::odeint::runge_kutta_fehlberg78>;
+struct Fehlberg78 {
+    template <class State>
+    using Stepper = detail::RungeKutta<detail::Fehlberg78Tableau, State>;
+};
 
 /// Steps of the size `Options::step`; the last one is cut to end at `t_end`, and
 /// the grid starts anew at every event.
@@ -55,7 +66,7 @@ struct FixedStep {
 };
 
 /// Steps chosen so that the estimated error meets `Options::rtol` and `atol`.
-/// The method needs an error estimate: odeint's error steppers.
+/// The method needs an error estimate.
 template <class Method = Dopri5>
 struct ErrorControlled {
     using method = Method;
@@ -65,17 +76,35 @@ namespace detail {
 
 namespace odeint = boost::numeric::odeint;
 
-template <class Stepper, class Tag>
-inline constexpr bool has_category = std::is_same_v<typename Stepper::stepper_category, Tag>;
+/// One of our own, which departs from the tangent by itself.
+template <class Stepper>
+concept Departing = requires { Stepper::estimates_error; };
+
+template <class Stepper, class... Tags>
+inline constexpr bool has_category = (std::is_same_v<typename Stepper::stepper_category, Tags> ||
+                                      ...);
 
 /// Error estimate, and the rate at the end for free (first same as last).
 template <class Stepper>
 inline constexpr bool is_fsal = has_category<Stepper, odeint::explicit_error_stepper_fsal_tag>;
+template <Departing Stepper>
+inline constexpr bool is_fsal<Stepper> = Stepper::fsal;
 
 template <class Stepper>
 inline constexpr bool has_error_estimate =
-    is_fsal<Stepper> || has_category<Stepper, odeint::explicit_error_stepper_tag> ||
-    has_category<Stepper, odeint::error_stepper_tag>;
+    is_fsal<Stepper> ||
+    has_category<Stepper, odeint::explicit_error_stepper_tag, odeint::error_stepper_tag>;
+template <Departing Stepper>
+inline constexpr bool has_error_estimate<Stepper> = Stepper::estimates_error;
+
+/// Whether the method comes with an interpolant of its own.
+template <class Stepper, class X>
+inline constexpr bool has_interpolant = requires(const Stepper& stepper, X& x)
+{
+    stepper.calc_state(0.0, x, x, x, 0.0, x, x, 0.0);
+};
+template <Departing Stepper, class X>
+inline constexpr bool has_interpolant<Stepper, X> = Stepper::has_dense_output;
 
 template <class Stepper>
 concept Multistep = requires

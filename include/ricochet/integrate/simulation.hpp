@@ -1,6 +1,6 @@
 // A run in progress: smooth steps, events, resets, until the end or a reason to stop.
 //
-//     step from (t, x)              odeint, as a departure from the tangent
+//     step from (t, x)              the method, as a departure from the tangent
 //     guards at its end             screened, all at once
 //     search                        the first set of events in the step
 //     resets                        x⁻ becomes x⁺, the mode may change
@@ -111,7 +111,7 @@ class Simulation {
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
     static_assert(!error_controlled || detail::has_error_estimate<typename CurrentStep::Stepper>,
-                  "ricochet: error control needs one of odeint's error steppers, such as Dopri5");
+                  "ricochet: error control needs a method with an error estimate, such as Dopri5");
     static_assert(!predicts || fixed == 1, "ricochet: a network predicts the events of one guard");
 
 public:

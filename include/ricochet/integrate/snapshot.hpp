@@ -18,7 +18,7 @@
 namespace ricochet {
 
 /// What two runs have to have in common if one is to go on where the other was saved, as text:
-/// {"method", "FixedStep<Odeint<euler>>"}, {"rtol", "1e-08"}.
+/// {"method", "FixedStep<Euler>"}, {"rtol", "1e-08"}.
 struct RunProperty {
     std::string name;
     std::string value;

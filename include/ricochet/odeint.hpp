@@ -1,19 +1,21 @@
-// How Boost.Odeint sees our states: one algebra for all of them.
+// Any one-step method of Boost.Odeint, and steppers that fulfil its concepts, as methods.
 //
-// Odeint's own choices differ with the state type, and the one for Eigen vectors
-// reloads as a vector what the flow has just written as scalars, which stalls (7x
-// slower than std::array on a two-component state). A loop over x[i] is right for
-// every state type, and compilers unroll it where the size is fixed.
+// Euler, Rk4, CashKarp54, Dopri5 and Fehlberg78 of `methods.hpp` have the bits of odeint's
+// steppers and compile without it.
 #pragma once
 
+#include <boost/numeric/odeint/algebra/default_operations.hpp>
+#include <boost/numeric/odeint/stepper/stepper_categories.hpp>
 #include <boost/numeric/odeint/util/is_resizeable.hpp>
 #include <boost/numeric/odeint/util/resize.hpp>
+#include <boost/numeric/odeint/util/resizer.hpp>
 #include <boost/numeric/odeint/util/same_size.hpp>
 #include <cstddef>
 #include <tuple>
 #include <utility>
 
 #include "ricochet/hybrid/components.hpp"
+#include "ricochet/integrate/methods.hpp"
 
 namespace Eigen {
 template <typename Scalar, int Rows, int Cols, int Options, int MaxRows, int MaxCols>
@@ -50,7 +52,9 @@ struct same_size_impl<Eigen::Matrix<double, Rows, 1, Options, MaxRows, 1>,
 
 namespace ricochet {
 
-/// Odeint's Algebra concept for anything with `size()` and `operator[]`.
+/// Odeint's Algebra concept for anything with `size()` and `operator[]`. Odeint's own choices
+/// differ with the state type, and the one for Eigen vectors reloads as a vector what the flow
+/// has just written as scalars, which stalls; a loop over x[i] is right for every state type.
 struct Elementwise {
     template <class X, class... Rest>
     static void for_each(X& x, Rest&&... rest)
@@ -87,6 +91,16 @@ private:
             x, [&](auto i)
                    __attribute__((always_inline)) { operation(x[i], std::get<I>(rest)[i]...); });
     }
+};
+
+/// Any odeint one-step method given by its class template, for example
+/// `Odeint<boost::numeric::odeint::runge_kutta_cash_karp54>`; its header is yours to include.
+template <template <class...> class Template>
+struct Odeint {
+    template <class State>
+    using Stepper = Template<State, double, State, double, Elementwise,
+                             boost::numeric::odeint::default_operations,
+                             boost::numeric::odeint::initially_resizer>;
 };
 
 }  // namespace ricochet
