@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "ricochet/ricochet.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
 
 int main()
 {

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "ricochet/ricochet.hpp"
+#include "ricochet/systems/cavern.hpp"
 
 int main()
 {

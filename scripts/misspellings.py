@@ -49,8 +49,10 @@ def rows(kind, names, seen):
                 seen.add(wrong)
                 found.append(wrong)
         yield f"// {name}"
-        for wrong in found:
-            yield f"RICOCHET_{kind}({wrong}, {name})"
+        calls = [f"RICOCHET_{kind}({wrong}, {name})" for wrong in found]
+        per_row = max(1, 100 // (1 + max(map(len, calls))))
+        for i in range(0, len(calls), per_row):
+            yield " ".join(calls[i : i + per_row])
 
 
 def main():

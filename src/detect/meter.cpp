@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -28,6 +29,12 @@ constexpr std::uint64_t longest_wait = 64;
 constexpr double first_answers = 16;
 
 }  // namespace
+
+double Meter::seconds() noexcept
+{
+    using Clock = std::chrono::steady_clock;
+    return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
 
 void validate(const MeterOptions& options)
 {
@@ -73,7 +80,7 @@ Meter::Meter(const MeterOptions& options, std::size_t planned_guards)
         checked_step_.set(options.step);
         planned_step_.set(options.step);
     }
-    if (decides_ && samples_) began_ = Clock::now();
+    if (decides_ && samples_) began_ = seconds();
 }
 
 Meter::Way Meter::first_way() const noexcept
@@ -156,8 +163,8 @@ void Meter::consider(const Statistics& counts)
 /// What is left of the time of a piece, over its steps.
 void Meter::sample_step(const Counts& piece)
 {
-    const Clock::time_point now = Clock::now();
-    const double spent = std::chrono::duration<double>(now - began_).count();
+    const double now = seconds();
+    const double spent = now - began_;
     began_ = now;
     const double rest = spent - piece.looks * guard_.value() - piece.asked * network_.value();
     const double enough = 0.25 * static_cast<double>(options_.piece);

@@ -767,11 +767,11 @@ Model parse_model(std::span<const std::byte> bytes, std::string_view name,
     return model;
 }
 
-Model load_model(const std::filesystem::path& path, const LoadOptions& options)
+Model load_model(const std::string& path, const LoadOptions& options)
 {
-    const Refusal refuse(path.string());
+    const Refusal refuse(path);
     const std::string text = detail::read_file(path, refuse, max_file);
-    return parse_model(std::as_bytes(std::span(text)), path.string(), options);
+    return parse_model(std::as_bytes(std::span(text)), path, options);
 }
 
 std::vector<std::byte> to_safetensors(const Model& model, const LoadOptions& options)
@@ -816,13 +816,12 @@ std::vector<std::byte> to_safetensors(const Model& model, const LoadOptions& opt
     return bytes;
 }
 
-void save_model(const Model& model, const std::filesystem::path& path, const LoadOptions& options)
+void save_model(const Model& model, const std::string& path, const LoadOptions& options)
 {
-    const Refusal refuse(path.string());
+    const Refusal refuse(path);
     const std::vector<std::byte> bytes = to_safetensors(model, options);
 
-    std::filesystem::path beside = path;
-    beside += "." + std::to_string(std::random_device{}()) + ".tmp";
+    const std::string beside = path + "." + std::to_string(std::random_device{}()) + ".tmp";
     TemporaryFile temporary(beside);
     {
         std::ofstream file(temporary.path(), std::ios::binary);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ricochet/ricochet.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
 
 namespace {
 

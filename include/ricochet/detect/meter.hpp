@@ -18,7 +18,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -154,7 +153,6 @@ public:
     [[nodiscard]] MeterReading reading() const noexcept;
 
 private:
-    using Clock = std::chrono::steady_clock;
     static constexpr std::uint64_t every = 32;  ///< of which one is timed, later of 512
 
     enum Way : std::uint8_t { check, plan, ask };
@@ -185,13 +183,13 @@ private:
     {
         const std::uint64_t gap = count > 32 * every ? 16 * every : every;
         const bool sampled = samples_ && (count <= 8 || count % gap == 0);
-        Clock::time_point start;
-        if (sampled) start = Clock::now();
+        const double start = sampled ? seconds() : 0;
         const auto answer = call();  // in one place, so that it is compiled as without a meter
-        if (sampled) cost.add(std::chrono::duration<double>(Clock::now() - start).count());
+        if (sampled) cost.add(seconds() - start);
         return answer;
     }
 
+    [[nodiscard]] static double seconds() noexcept;  ///< [s] of a steady clock
     void consider(const Statistics& counts);
     void sample_step(const Counts& piece);
     void close_piece(const Counts& piece, double cost);
@@ -225,7 +223,7 @@ private:
     std::uint64_t next_steps_;
     std::uint64_t next_check_ = 0;
     Counts then_;  ///< when the piece began
-    Clock::time_point began_;
+    double began_ = 0;  ///< [s] when the piece began
     double spent_ = 0;  ///< [s] on trials in vain
     double total_ = 0;  ///< [s] of the run
 };

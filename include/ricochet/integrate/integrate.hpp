@@ -6,6 +6,17 @@
 
 namespace ricochet {
 
+namespace detail {
+
+/// Whether a system is to be handed over to an inclusion, by an `integrate` of its own.
+template <class System>
+concept WantsHandOver = requires(const System& system)
+{
+    system.set_valued();
+};
+
+}  // namespace detail
+
 /// Integrates `system` from x0 at `options.t_start` to `options.t_end`.
 ///
 /// @param system   declares what it has (see hybrid/system.hpp); not copied, not
@@ -25,6 +36,9 @@ requires Flowing<System, X> && StateVector<X>
                                const Stepping& stepping = {}, const Detector& detector = {},
                                const Locator& locator = {})
 {
+    static_assert(!detail::WantsHandOver<System>,
+                  "ricochet: found a system with set_valued(); expected that "
+                  "ricochet/nonsmooth/event_hand_over.hpp is included, which hands it over");
     return Simulation<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
                                                               detector, locator)
         .take();

@@ -20,7 +20,6 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "ricochet/detect/extremum.hpp"
@@ -88,9 +87,10 @@ class Simulation {
     static constexpr bool resets = Resetting<System, X>;
     static constexpr bool timed = Timed<System>;
     static constexpr bool puts_off = puts_off_checks<Detector, System, X>();
+    struct NoPlanner {};
     template <bool wanted, class D>
     struct PlannerOf {
-        using type = std::monostate;
+        using type = NoPlanner;
     };
     template <class D>
     struct PlannerOf<true, D> {

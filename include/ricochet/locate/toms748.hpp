@@ -2,14 +2,27 @@
 #pragma once
 
 #include <algorithm>
-#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
-#include <cstdint>
+#include <utility>
 
 #include "ricochet/detect/step_probe.hpp"
 #include "ricochet/locate/jump.hpp"
 
 namespace ricochet {
+
+namespace detail {
+
+/// A search by values alone: what it asks of its caller.
+struct ValueSearch {
+    void* caller;
+    double (*value)(void* caller, double s);
+    bool (*narrow_enough)(void* caller, double a, double b);
+};
+
+/// Narrows [a, b], with values of opposite signs at its ends, by Boost.Math's TOMS 748.
+void toms748(const ValueSearch& search, double a, double b, double value_a, double value_b);
+
+}  // namespace detail
 
 /// Inverse cubic interpolation on the values alone (Alefeld, Potra and Shi, ACM
 /// Transactions on Mathematical Software 21, 1995).
@@ -39,9 +52,17 @@ struct Toms748 {
         while (probe.has_left(lo) && !narrow_enough(lo.s, hi.s)) halve();
         if (lo.value * hi.value < 0 && std::isfinite(lo.value * hi.value) &&
             !narrow_enough(lo.s, hi.s)) {
-            std::uintmax_t iterations = 200;
-            boost::math::tools::toms748_solve(sample_at, lo.s, hi.s, lo.value, hi.value,
-                                              narrow_enough, iterations);
+            auto calls = std::pair(sample_at, narrow_enough);
+            using Calls = decltype(calls);
+            detail::toms748(
+                {.caller = &calls,
+                 .value = [](void* caller,
+                             double s) { return static_cast<Calls*>(caller)->first(s); },
+                 .narrow_enough =
+                     [](void* caller, double a, double b) {
+                         return static_cast<Calls*>(caller)->second(a, b);
+                     }},
+                lo.s, hi.s, lo.value, hi.value);
         }
         // An exact zero ends the search from one side: close the other.
         if (!narrow_enough(lo.s, hi.s)) (void)sample_at(hi.s - probe.finest(hi.s));

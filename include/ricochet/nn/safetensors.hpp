@@ -29,9 +29,9 @@
 #include "ricochet/nn/model.hpp"
 
 #include <cstddef>
-#include <filesystem>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -49,7 +49,7 @@ struct LoadOptions {
 };
 
 /// @throws ModelError if the file cannot be read or does not fit.
-[[nodiscard]] Model load_model(const std::filesystem::path& path, const LoadOptions& options = {});
+[[nodiscard]] Model load_model(const std::string& path, const LoadOptions& options = {});
 
 /// The model in the bytes of a file; `name` stands for the file in messages.
 /// @throws ModelError if they do not fit.
@@ -66,7 +66,6 @@ struct LoadOptions {
 /// Writes beside `path` and renames, so that a file of that name is complete or as
 /// it was, and nothing else is left behind.
 /// @throws ModelError if the file cannot be written, or as `to_safetensors`.
-void save_model(const Model& model, const std::filesystem::path& path,
-                const LoadOptions& options = {});
+void save_model(const Model& model, const std::string& path, const LoadOptions& options = {});
 
 }  // namespace ricochet
