@@ -16,7 +16,10 @@ OTHERS = {"rest", "gard", "resets", "enable", "enables", "crossings", "crossin",
 
 
 def one_slip(name):
-    """What one slip of the fingers, or another vowel, makes of a name."""
+    """What one slip of the fingers, another vowel or a plural makes of a name."""
+    yield name + "s"
+    if name == "unilateral":
+        yield "is_unilateral"
     for i in range(len(name)):
         if len(name) > 4:
             yield name[:i] + name[i + 1:]

@@ -36,6 +36,67 @@ TEST(Accumulation, AReboundTooSlowToBeToldIsARebound)
     EXPECT_EQ(fault_of(70164), "");
 }
 
+/// A drop falls from rest; where it lands the next one starts from rest, at the height h.
+struct DrippingTap {
+    double height = 1;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -10}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
+    void reset(double, X& x) const { x = {height, 0}; }
+    void rest(double, X& x) const { x = {-1, 0}; }
+};
+
+/// A timer whose guard is flat, or saturated, where its reset puts it.
+struct SaturatedTimer {
+    double largest = 1;
+    void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(double, const X& x) const
+    {
+        return std::min(0.0625 - x[0] * x[0], largest);
+    }
+    void reset(double, X& x) const { x[0] = 0; }
+};
+
+TEST(Accumulation, AResetThatLiftsAGuardOffItsSurfaceIsNoReboundHoweverItStarts)
+{
+    // One drop every sqrt(0.2) s, all with a rate of zero at their start.
+    const auto drops = integrate(DrippingTap{}, X{1, 0}, {.t_end = 10});
+    EXPECT_EQ(drops.outcome, Outcome::reached_end);
+    EXPECT_EQ(drops.events.size(), 22u);
+    for (const double largest : {1.0, 0.05, 0.001}) {
+        const auto ticks = integrate(SaturatedTimer{largest}, X{0, 0}, {.t_end = 5.1});
+        EXPECT_EQ(ticks.outcome, Outcome::reached_end) << largest;
+        EXPECT_EQ(ticks.events.size(), 20u) << largest;
+    }
+}
+
+/// A ball whose reset puts it back on a high floor.
+struct BallOnHighFloor {
+    double floor = 0;
+    double restitution = 0.9;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0] - floor; }
+    void reset(double, X& x) const { x = {floor, -restitution * x[1]}; }
+};
+
+TEST(Accumulation, ImpactsThatAreLocatedLateDoNotFlutter)
+{
+    // Each impact is late by up to the tolerance and put back on the floor: the intervals stop
+    // shrinking where that feeds them.
+    for (const double floor : {1e4, 1e5, -1e6}) {
+        for (const double tolerance : {1e-5, 1e-4, 1e-3}) {
+            for (const double e : {0.5, 0.8, 0.95}) {
+                const auto run = integrate(BallOnHighFloor{floor, e}, X{floor + 2, 0},
+                                           {.t_end = 60, .event_tolerance = tolerance});
+                const double fall = std::sqrt(2 * 2 / 9.81);
+                const double limit = fall * (1 + e) / (1 - e);
+                EXPECT_EQ(run.outcome, Outcome::zeno) << floor << ' ' << tolerance << ' ' << e;
+                EXPECT_LT(run.events.size(), 300u);
+                EXPECT_NEAR(run.t, limit, 0.02 * limit + 20 * tolerance);
+            }
+        }
+    }
+}
+
 TEST(Accumulation, ABallThatDeclaresNothingEndsInsteadOfFalling)
 {
     // A guard that is not unilateral used to have its repeat suppressed with its reset.

@@ -929,6 +929,11 @@ TEST(Events, ASimulationIsDrivenFromEventToEvent)
     EXPECT_EQ(run.events.size(), 3u);
     EXPECT_EQ(run.trajectory.t, (std::vector<double>{2, 3}));
     EXPECT_GE(stops.size(), 3u);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+
+    Simulation<BouncingBall, X> left(ball, X{10, 0}, {.t_end = 8});
+    EXPECT_TRUE(left.advance());
+    EXPECT_EQ(left.finish().outcome, Outcome::cancelled);
 }
 
 TEST(Events, AnObserverSeesEveryEventAndStep)

@@ -44,6 +44,102 @@ TEST(ResolvedGuards, WithoutTheLookInsideMostAreLost)
     EXPECT_GT(2 * missed, roots);
 }
 
+/// A state that stands still, and a guard of the time alone.
+template <double (*value)(double t, double parameter)>
+struct StillState {
+    double parameter = 0;
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {0}; }
+    [[nodiscard]] double guard(double t, const X1&) const { return value(t, parameter); }
+    [[nodiscard]] GuardInfo guard_info() const
+    {
+        return {.crossing = Crossing::either, .resets = false};
+    }
+};
+
+/// Below the surface for 11.2 s around `centre`, and flat away from it.
+double smooth_dip(double t, double centre)
+{
+    const double u = (t - centre) / 5.6;
+    return 0.5 - std::exp(-u * u * std::log(2.0));
+}
+double box_dip(double t, double centre)
+{
+    return 0.5 - 1 / (1 + std::exp(20 * (std::fabs(t - centre) / 5.6 - 1)));
+}
+
+TEST(ResolvedGuards, NoDipOfAnEighthOfAStepIsMissedWhereTheStateStandsStill)
+{
+    // The last step is 88.9 s long: nothing but the end of the run limits it.
+    for (int centre = 20; centre <= 90; ++centre) {
+        const StillState<smooth_dip> smooth{static_cast<double>(centre)};
+        EXPECT_EQ(integrate(smooth, X1{1}, {.t_end = 100}).events.size(), 2u) << centre;
+        const StillState<box_dip> box{static_cast<double>(centre)};
+        EXPECT_EQ(integrate(box, X1{1}, {.t_end = 100}).events.size(), 2u) << centre;
+    }
+}
+
+double decaying_wave(double t, double decay) { return std::exp(-decay * t) * std::sin(3 * t + 1); }
+
+TEST(ResolvedGuards, AGuardThatDecaysWithinAStepKeepsItsCrossings)
+{
+    // By e^-600 within a few steps; 3 t + 1 passes floor((3 t_end + 1) / pi) multiples of pi.
+    for (const double decay : {0.01, 0.1, 0.3, 1.0}) {
+        const StillState<decaying_wave> wave{decay};
+        EXPECT_EQ(integrate(wave, X1{1}, {.t_end = 100}).events.size(), 95u) << decay;
+        EXPECT_EQ(integrate(wave, X1{1}, {.t_end = 600}).events.size(), 573u) << decay;
+    }
+}
+
+/// x' = rate, with a guard that is a number only within its domain.
+struct LogarithmicGuard {
+    static constexpr bool resets = false;
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+    [[nodiscard]] double guard(double, const X1& x) const { return std::log(2.5 - x[0]); }
+    [[nodiscard]] GuardInfo guard_info() const { return {.resets = false}; }
+};
+
+TEST(ResolvedGuards, AGuardWhoseDomainEndsBeyondItsSurfaceHasItsEvent)
+{
+    const auto within = integrate(LogarithmicGuard{}, X1{0}, {.t_end = 2.4});
+    for (const double t_end : {2.6, 3.0, 30.0}) {
+        const auto run = integrate(LogarithmicGuard{}, X1{0}, {.t_end = t_end});
+        EXPECT_EQ(run.outcome, Outcome::non_finite);
+        EXPECT_NEAR(run.t, 2.5, 1e-12);
+        ASSERT_EQ(run.events.size(), 1u) << t_end;
+        EXPECT_NEAR(run.events[0].t, 1.5, 1e-15);
+        EXPECT_EQ(within.events.size(), 1u);
+    }
+}
+
+/// Flows that end at surfaces elsewhere than at zero.
+template <double (*rate)(double t, double x), double (*surface)(double t)>
+struct EndsAt {
+    double sign = 1;
+    void flow(double t, const X1& x, X1& dxdt) const { dxdt = {rate(t, x[0])}; }
+    [[nodiscard]] double guard(double t, const X1& x) const { return sign * (x[0] - surface(t)); }
+    [[nodiscard]] GuardInfo guard_info() const { return {.resets = false}; }
+};
+double towards_one(double, double x) { return 1 + std::acos(x); }
+double one(double) { return 1; }
+double below(double, double x) { return -1 - std::sqrt(x + 3.7); }
+double minus(double) { return -3.7; }
+double drifting(double t, double x) { return -1 - std::sqrt(x - 0.1 * t); }
+double drift(double t) { return 0.1 * t; }
+
+TEST(ResolvedGuards, AFlowThatEndsAtASurfaceAwayFromZeroHasItsEvent)
+{
+    const Options fine{.t_end = 5, .rtol = 1e-13, .atol = 1e-15};
+    for (const Options& options : {Options{.t_end = 5}, fine}) {
+        EXPECT_EQ(integrate(EndsAt<towards_one, one>{-1}, X1{0}, options).events.size(), 1u);
+        EXPECT_EQ(integrate(EndsAt<below, minus>{}, X1{-2.7}, options).events.size(), 1u);
+        EXPECT_EQ(integrate(EndsAt<drifting, drift>{}, X1{1}, options).events.size(), 1u);
+    }
+    // x + 3.7 = y: t = 2 (sqrt y - log(1 + sqrt y)), from y = 1.
+    const auto run = integrate(EndsAt<below, minus>{}, X1{-2.7}, fine);
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_NEAR(run.events[0].t, 2 - 2 * std::log(2.0), 1e-12);
+}
+
 /// Four crossings within one step, of which the ends show none.
 struct FourCrossings {
     static constexpr bool resets = false;

@@ -71,6 +71,8 @@ TEST(Snapshot, BelongsToOneKindOfRun)
               ours + "rtol = 1e-08, and this one has rtol = 1e-06");
     EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .event_tolerance = 1e-6}),
               ours + "event_tolerance = 0, and this one has event_tolerance = 1e-06");
+    EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .look_inside = false}),
+              ours + "look_inside = true, and this one has look_inside = false");
     EXPECT_NE(refused_by(saved, Ball{}, {.t_end = 1e-3}).find("the time"), std::string::npos);
 
     Snapshot nameless = saved;

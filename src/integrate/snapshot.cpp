@@ -196,6 +196,7 @@ std::vector<RunProperty> properties_of_run(const RunParts& parts, const Options&
     out.push_back({"event_rtol", text(o.event_rtol)});
     out.push_back({"event_window", text(o.event_window)});
     out.push_back({"stop_at_event", text(o.stop_at_event)});
+    out.push_back({"look_inside", o.look_inside ? "true" : "false"});
     return out;
 }
 

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "ricochet/hybrid/guard_view.hpp"
@@ -20,6 +21,10 @@ struct CubicLook {
     /// a simple ratio to the step hides behind, and a second place for cases of doubt.
     static constexpr double inside = 0.381966;
     static constexpr double further = 0.723607;
+    /// Where a step is looked at besides `inside` if the state stands still in it, so that
+    /// nothing has limited its length: no more than an eighth of it goes unseen.
+    static constexpr std::array<double, 8> places = {0.0902, 0.2016,  0.3069, 0.4934,
+                                                     0.6123, further, 0.8278, 0.9271};
 
     /// A deviation of e inside stands for one of 64 e at most anywhere: that of a quartic
     /// term is 1.1 e, that of a quintic one 1.4 e, and higher terms cancel at `inside` only

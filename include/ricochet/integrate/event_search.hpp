@@ -340,14 +340,14 @@ private:
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
         if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
         if (!bank.looked()) return heed(bank, i, watch, detector.examine(probe, watch));
-        return heed(bank, i, watch, next_in_parts(probe, watch, i, detector));
+        return heed(bank, i, watch, next_in_parts(probe, watch, bank, i, detector));
     }
 
     /// The detector's answers on the parts of a stretch, up to the first that is not clear.
-    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, std::size_t i,
-                                        const Detector& detector)
+    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank,
+                                        std::size_t i, const Detector& detector)
     {
-        parts_.resolve(probe, i, watch);
+        parts_.resolve(probe, i, watch, bank[i].info.touch, bank.looked_everywhere());
         refined_ = refined_ || parts_.divided();
         unresolved_ = unresolved_ || parts_.unresolved();
         const Watch whole = watch;
@@ -356,6 +356,7 @@ private:
             finest_ && parts_.nearly_cubic() && whole.start.s == parts_.whole().start.s;
         while (const GuardSample* node = parts_.next(watch.start.s, end.s)) {
             watch.end = *node;
+            judge_by_its_own_size(watch, bank, i);
             Finding finding = detector.examine(probe, watch);
             if (plain && finding.hit && finding.hi.s == node->s && stays_beyond(whole, *node)) {
                 finding.lo = whole.start;
@@ -366,7 +367,19 @@ private:
             watch.start = *node;
         }
         watch.end = end;
+        if (parts_.divided()) judge_by_its_own_size(watch, bank, i);
         return detector.examine(probe, watch);
+    }
+
+    /// What rounding leaves of a guard that decays within the step is that of the part.
+    static void judge_by_its_own_size(Watch& watch, const Bank& bank, std::size_t i) noexcept
+    {
+        const double width = watch.end.s - watch.start.s;
+        const CubicLook look(watch.start.value, watch.start.rate, watch.end.value, watch.end.rate,
+                             width);
+        if (!std::isfinite(look.size())) return;
+        watch.scale = look.size();
+        watch.touch = bank.touch_of(i, look.size());
     }
 
     /// Nothing more can be said of the stretch: what is left after an event at the end

@@ -114,6 +114,7 @@ public:
         if constexpr (fixed == counted_at_run_time) {
             if constexpr (looks) inside_.resize(count_);
             if constexpr (looks) further_.resize(count_);
+            if constexpr (looks) worst_.resize(count_);
             if constexpr (keeps_sizes) sizes_.resize(count_);
             for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_})
                 numbers->resize(count_);
@@ -192,20 +193,28 @@ public:
         if constexpr (looks) {
             sample_values(step.mode(), step.time(CubicLook::inside * step.h()), x, calls, inside_);
             looked_ = true;
-            looked_further_ = false;
+            looked_further_ = looked_everywhere_ = false;
         }
     }
 
-    /// And once more, where one evaluation leaves doubts.
+    /// And once more, at the part u of the step where the state is `x`.
     template <class Step>
-    void sample_further(const Step& step, const X& x, std::uint64_t& calls)
+    void sample_further(const Step& step, double u, const X& x, std::uint64_t& calls)
     {
         if constexpr (looks) {
-            sample_values(step.mode(), step.time(CubicLook::further * step.h()), x, calls,
-                          further_);
+            sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
+            for (std::size_t i = 0; i < size(); ++i) {
+                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], step.h());
+                const double e = look.deviation(u, further_[i]);
+                worst_[i] = looked_further_ && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
+            }
             looked_further_ = true;
         }
     }
+
+    /// Guards have been evaluated at all places of `CubicLook::places`.
+    void has_looked_everywhere() noexcept { looked_everywhere_ = true; }
+    [[nodiscard]] bool looked_everywhere() const noexcept { return looked_everywhere_; }
 
     /// Whether any guard deserves a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) const noexcept
@@ -539,8 +548,7 @@ private:
     {
         const double e = look.deviation(CubicLook::inside, inside_[i]);
         if (!looked_further_) return e;
-        const double other = look.deviation(CubicLook::further, further_[i]);
-        return other <= e ? e : other;  // NaN stays
+        return worst_[i] <= e ? e : worst_[i];  // NaN stays
     }
 
     [[gnu::noinline]] bool any_suspicious(double h) const noexcept
@@ -628,7 +636,9 @@ private:
     bool looked_ = false;  ///< inside the step in hand
     struct None {};
     bool looked_further_ = false;
+    bool looked_everywhere_ = false;
     [[no_unique_address]] std::conditional_t<looks, Doubles, None> inside_{}, further_{};
+    [[no_unique_address]] std::conditional_t<looks, Doubles, None> worst_{};  ///< of further looks
     [[no_unique_address]] std::conditional_t<keeps_sizes, Doubles, None> sizes_{};
     X there_{};
     PerGuard<GuardRecord, fixed> records_{};

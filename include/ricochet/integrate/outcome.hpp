@@ -17,7 +17,7 @@ enum class Outcome {
     step_underflow,        ///< no step above h_min met the tolerance
     step_limit,            ///< `Options::max_steps` steps were taken
     non_finite,            ///< the flow, a guard or a reset returned NaN or infinity
-    cancelled,             ///< `Options::cancelled` was set
+    cancelled,             ///< by `Options::cancelled`, or by `finish()` before the end
     wrong_bound,           ///< a guard broke a bound that the system declares for it
     not_converged,         ///< a set-valued stage could not be solved however short the step
     time_event_not_ahead,  ///< `next_time_event(t)` returned a time that is not after t

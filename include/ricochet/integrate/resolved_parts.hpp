@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "ricochet/detect/cubic_look.hpp"
@@ -20,8 +21,10 @@ public:
     void clear() noexcept { guard_ = nobody; }
 
     /// Divides the stretch that guard i is watched in, unless it is divided already.
+    /// `everywhere`: at all places of `CubicLook::places` to begin with.
     template <class Probe>
-    void resolve(Probe& probe, std::size_t i, const Watch& watch)
+    void resolve(Probe& probe, std::size_t i, const Watch& watch, double declared_touch,
+                 bool everywhere)
     {
         const GuardSample& start = watch.start;
         const GuardSample& end = watch.end;
@@ -33,7 +36,19 @@ public:
         divided_ = unresolved_ = nearly_cubic_ = false;
         if (!std::isfinite(start.rate) || !std::isfinite(end.rate)) return;
         noise_ = -1;
-        divide(probe, start, end, smallest_part * probe.step().h(), 0);
+        declared_touch_ = declared_touch;
+        const double smallest = smallest_part * probe.step().h();
+        if (!everywhere) return divide(probe, start, end, smallest, 0);
+        GuardSample from = start;
+        const double width = end.s - start.s;
+        for (const double u : CubicLook::places) {
+            const GuardSample node = probe.dense_value_and_rate(start.s + u * width);
+            divide(probe, from, node, smallest, 1);
+            if (node.value != 0) keep(node);
+            from = node;
+        }
+        divided_ = true;
+        divide(probe, from, end, smallest, 1);
     }
 
     /// The first node beyond offset s and before `end`, else null.
@@ -74,20 +89,23 @@ private:
             nearly_cubic_ = CubicLook::most * deviation <= look.size();
         }
         if (look.stays_clear(deviation) || look.keeps_shape(deviation)) return;
-        if (look.size() + deviation <= whole_.touch) return;
+        if (look.size() + deviation <= declared_touch_) return;
         if (width <= smallest) {
             // A kink keeps its shape however short the part.
             unresolved_ = unresolved_ || !(deviation <= 0x1p-24 * look.size());
             return;
         }
-        // Rounding has none.
+        // Rounding has none; that of a guard that decays is less here than where it was asked for.
         if (depth >= shallow && !(noise_ >= 0)) noise_ = probe.blur(end.s);
+        if (deviation <= noise_) noise_ = probe.blur(end.s);
         if (deviation <= noise_) return;
         const GuardSample middle = probe.dense_value_and_rate(start.s + cut * width);
         divided_ = true;
         divide(probe, start, middle, smallest, depth + 1);
         // A node that cannot be told from the surface is no end of a part.
-        if (std::fabs(middle.value) > std::max(noise_, whole_.touch)) keep(middle);
+        constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
+        const double touch = std::max(declared_touch_, ulps * look.size());
+        if (std::fabs(middle.value) > std::max(noise_, touch)) keep(middle);
         divide(probe, middle, end, smallest, depth + 1);
     }
 
@@ -106,6 +124,7 @@ private:
     std::size_t count_ = 0;            ///< of nodes
     std::array<GuardSample, 32> few_;  ///< the first of them: seldom more, and no allocation
     std::vector<GuardSample> many_;    ///< the others
+    double declared_touch_ = 0;
     double noise_ = -1;  ///< of the guard by rounding of the state; below 0: not asked for
     bool divided_ = false;
     bool nearly_cubic_ = false;

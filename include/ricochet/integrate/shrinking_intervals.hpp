@@ -87,9 +87,33 @@ public:
     /// Whether what is left after the event just noted is below `tolerance` [s] or
     /// the resolution of its time. An interval that is far shorter than the ones before
     /// made expect is the gap between two events, not the end of a series.
-    [[nodiscard]] bool accumulate(double tolerance) const noexcept
+    ///
+    /// An event that is located late by up to the tolerance, and whose reset puts the motion
+    /// back on the surface, gains speed: intervals with the ratio q then stay at
+    /// 2 q tolerance / (1 - q), and shrink less than half as fast from twice that on.
+    [[nodiscard]] bool accumulate(double tolerance) noexcept
     {
-        return shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution());
+        if (shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution())) {
+            return true;
+        }
+        if (interval_ * (1 - ratio_) > 16 * tolerance * ratio_) usual_ratio_ = ratio_;
+        const double decay = 1 - usual_ratio_;
+        const bool lingers = interval_ * decay <= 5 * tolerance * usual_ratio_ &&
+                             1 - ratio_ < decay / 2 && interval_ <= longest_ / 4;
+        lingering_ = lingers ? lingering_ + 1 : 0;
+        return lingering_ >= 3;
+    }
+
+    /// The event just noted is known to `error` [s].
+    void blame(double error) noexcept { blamed_ += error; }
+
+    /// By how much [s] the limit may be off: an event that is late by d delays all later ones by
+    /// d (1 + q) / (1 - q) in the end.
+    [[nodiscard]] double error() const noexcept
+    {
+        const double q = std::min(usual_ratio_, ratio_);
+        return remainder() + (q < 1 ? blamed_ * (1 + q) / (1 - q) : blamed_) +
+               (lingering_ > 0 ? interval_ / (1 - q) : 0);
     }
 
     /// Extrapolated time [s] from the last event to the limit of all; 0 where the intervals
@@ -118,6 +142,9 @@ public:
         visit(longest_);
         visit(decay_);
         visit(usual_decay_);
+        visit(usual_ratio_);
+        visit(blamed_);
+        visit(lingering_);
         visit(sunk_);
         visit(low_);
     }
@@ -149,6 +176,9 @@ private:
     double longest_ = 0;      ///< [s] interval
     double decay_ = 0;        ///< part that the last excursion has lost of the one before
     double usual_decay_ = 0;  ///< as it was before rounding mattered
+    double usual_ratio_ = 1;  ///< of intervals, before lateness mattered
+    double blamed_ = 0;       ///< [s] sum of the errors of events
+    std::uint32_t lingering_ = 0;
     std::uint32_t sunk_ = 0;
     bool low_ = false;
 };

@@ -250,9 +250,11 @@ public:
         return finish();
     }
 
-    /// Hands over what has been computed so far. The simulation is over.
+    /// Hands over what has been computed so far; before the end its outcome is `cancelled`. The
+    /// simulation is over.
     [[nodiscard]] Run<X> finish()
     {
+        if (!ended_) run_.outcome = Outcome::cancelled;
         run_.t = step_.start().value;
         run_.x = step_.x0();
         run_.mode = step_.mode();
@@ -826,12 +828,23 @@ private:
                 if (!record.enabled || record.info.boolean) continue;
                 if (!counts(record.side, record.info.crossing)) continue;
                 const double g = bank_.g0(i);
-                const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+                const double rate = approach_rate(i);
                 const double ahead = g * rate < 0 ? -g / rate : infinity;
                 if (ahead < first.ahead) first = {i, ahead};
             }
         }
         return first;
+    }
+
+    [[nodiscard]] double approach_rate(std::size_t i)
+    {
+        double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+        if constexpr (!RatedGuard<System, X>) {
+            // Over a short step the rounding of the state may swallow the difference.
+            double scale = h_next_;
+            for (int k = 0; rate == 0 && k < 12; ++k) rate = departure(i, scale *= 16);
+        }
+        return rate;
     }
 
     /// The next length to try after one of h that left the domain of the flow or a guard: nine
@@ -969,13 +982,33 @@ private:
             X& x = search_.space(step_.x0());
             step_.peek(detail::CubicLook::inside * step_.h(), x);
             bank_.sample_inside(step_, x, calls());
-            if (!bank_.doubtful(step_.h())) return false;
-            if (bank_.needs_second_look(step_.h())) {
-                step_.peek(detail::CubicLook::further * step_.h(), x);
-                bank_.sample_further(step_, x, calls());
+            if (hardly_moves()) {
+                for (const double u : detail::CubicLook::places) look_again(u, x);
+                bank_.has_looked_everywhere();
+                return bank_.suspicious(step_.h());
             }
+            if (!bank_.doubtful(step_.h())) return false;
+            if (bank_.needs_second_look(step_.h())) look_again(detail::CubicLook::further, x);
         }
         return bank_.suspicious(step_.h());
+    }
+
+    void look_again(double u, X& x)
+    {
+        step_.peek(u * step_.h(), x);
+        bank_.sample_further(step_, u, x, calls());
+    }
+
+    /// Whether the state hardly changes in the step, which error control then does not limit.
+    [[nodiscard]] bool hardly_moves() const noexcept
+    {
+        const X& x0 = step_.x0();
+        const X& x1 = step_.x1();
+        bool still = true;
+        detail::for_each_component(x0, [&](auto i) {
+            still &= std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]);
+        });
+        return still;
     }
 
     /// Whether the network predicts that the step is free of events.
@@ -989,10 +1022,13 @@ private:
     /// The step may hold events: finds out, and deals with them.
     [[gnu::noinline]] bool search(bool cleared)
     {
-        const std::size_t broken = bank_.first_not_finite();
-        if (broken != no_guard) {
-            end(Outcome::non_finite, broken);
-            return true;
+        if (bank_.first_not_finite() != no_guard) {
+            if (!return_to_domain()) return true;
+            if (!any_suspicious()) {
+                run_.statistics.evidence.add(Detector::evidence);
+                bank_.pass_on();
+                return false;
+            }
         }
         search_.begin(step_.x0());
         bank_.begin_search();
@@ -1022,6 +1058,39 @@ private:
         count_refined();
         bank_.pass_on_after_events();
         return ended_;
+    }
+
+    /// A guard is no number at the end of the step: takes it again, shorter, until all are.
+    /// False: there is no such step, and the run has ended.
+    [[nodiscard]] bool return_to_domain()
+    {
+        bool beyond = true;
+        for (;;) {
+            const std::size_t broken = bank_.first_not_finite();
+            if (broken == no_guard) return true;
+            const double h = shorten_into_domain(std::exchange(beyond, false));
+            if (is_tentative() || h < smallest_step()) {
+                if (!is_tentative() && happen_where_flow_ends(h)) return false;
+                end(Outcome::non_finite, broken);
+                return false;
+            }
+            ++run_.statistics.rejected;
+            is_last_ = time_event_due_ = false;
+            h_next_ = error_controlled ? h : h_next_;
+            step_.attempt(h);
+            bank_.sample_end(step_, calls());
+        }
+    }
+
+    /// A length at whose end a guard may be a number again: `beyond` a surface that lies within
+    /// the step by a little, where it can be seen to be crossed, else before it.
+    [[nodiscard]] double shorten_into_domain(bool beyond)
+    {
+        const double h = step_.h();
+        const double ahead = time_to_surface().ahead;
+        if (ahead > h) return 0.5 * h;
+        const double across = ahead + std::min(0.1 * ahead, 0.5 * (h - ahead));
+        return beyond && across < h ? across : 0.9 * ahead;
     }
 
     void count_refined() noexcept
@@ -1206,7 +1275,7 @@ private:
         if (how.on_time) step_.hold(t);
         if (stops_) return end(Outcome::stopped_by_event, first_member());
         if constexpr (guarded) {
-            if (resting_ || accumulates()) return;
+            if (resting_ || accumulates(how.located)) return;
             arm_all();
         }
     }
@@ -1241,7 +1310,7 @@ private:
 
     /// Whether the events of a member accumulate here. It comes to rest, or the run
     /// ends.
-    [[nodiscard]] bool accumulates()
+    [[nodiscard]] bool accumulates(bool located)
     {
         bool rested = false;
         for (const std::size_t i : search_.members()) {
@@ -1250,8 +1319,9 @@ private:
             const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
             const double tolerance = resolution_.tolerance(step_.start().value);
             const bool resetting = resets && bank_[i].info.resets;
+            if (resetting && located) intervals.blame(search_.where(i).error);
             if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
-                come_to_rest(i, stalls ? 0 : intervals.remainder());
+                come_to_rest(i, stalls ? 0 : intervals.remainder(), intervals.error());
                 rested = true;
             }
         }
@@ -1273,6 +1343,7 @@ private:
         double rate = departure(i, h_next_);
         const bool low = record.intervals.is_low_at(rate);
         const double rounding = low ? rounding_of(i) : 0;
+        if (low && is_away(i, rounding)) return false;
         bool lost = false;
         if constexpr (!RatedGuard<System, X>) {
             if (low) {
@@ -1293,6 +1364,18 @@ private:
         return low && record.intervals.fades(rounding);
     }
 
+    /// Whether the reset has put guard i so far from its surface, on the side it came from, that
+    /// it need not rise: not a residue of the location.
+    [[nodiscard]] bool is_away(std::size_t i, double rounding)
+    {
+        detail::GuardRecord& record = bank_[i];
+        const double g =
+            bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
+        if (!(detail::sign_of(record.last_side) * g > 1024 * rounding)) return false;
+        record.turned = true;
+        return true;
+    }
+
     /// The rate [1/s] of guard i at the start of the step; where it is a difference quotient,
     /// over 1e-5 of `scale` [s].
     [[nodiscard]] double departure(std::size_t i, double scale)
@@ -1301,14 +1384,13 @@ private:
             .rate(step_.time(0), step_.x0(), step_.rate0(), scale);
     }
 
-    /// The limit of the events of guard i is `ahead` [s] from here.
-    void come_to_rest(std::size_t i, double ahead)
+    /// The limit of the events of guard i is `ahead` [s] from here, give or take `error`.
+    void come_to_rest(std::size_t i, double ahead, double error)
     {
         if constexpr (Resting<System, X>) {
             if (resting_ || ended_) return;
             const X before = step_.x0();
             const Mode mode = step_.mode();
-            const double error = ahead;
             ahead = std::min(ahead, step_.until(options_.t_end));
             if constexpr (timed) ahead = std::min(ahead, step_.until(time_event_));
             const double t = step_.time(ahead);
@@ -1519,7 +1601,7 @@ private:
                 return end(Outcome::outside_mode, stuck);
             }
             if (stuck != no_guard) {
-                come_to_rest(stuck, 0);
+                come_to_rest(stuck, 0, 0);
                 if (!ended_ && !resting_) {
                     search_.members().clear();
                     search_.members().push_back(stuck);
