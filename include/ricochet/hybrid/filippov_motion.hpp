@@ -353,7 +353,10 @@ private:
         fields_.field(region_of(put(at, which, Place::above)), t, x, f[0]);
         const double rate_below = surface_rate(which, t, x, dxdt);
         const double normal = surface_rate(which, t, x, f[0]) - rate_below;
-        const double excess = rate_below + restoring(which, t, x);
+        // A share of 0 to 1 keeps the excess within the jump. Beyond the exit of a step that is
+        // going to be cut there, and where both fields become tangent, nothing else would.
+        const double most = 2 * std::fabs(normal);
+        const double excess = std::clamp(rate_below + restoring(which, t, x), -most, most);
         for_each_component(x, [&](auto i) {
             const double jump = f[0][i] - dxdt[i];
             // Fields that agree on the surface's rate leave the share open.

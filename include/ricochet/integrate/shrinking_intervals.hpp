@@ -88,9 +88,9 @@ public:
     /// the resolution of its time. An interval that is far shorter than the ones before
     /// made expect is the gap between two events, not the end of a series.
     ///
-    /// An event that is located late by up to the tolerance, and whose reset puts the motion
-    /// back on the surface, gains speed: intervals with the ratio q then stay at
-    /// 2 q tolerance / (1 - q), and shrink less than half as fast from twice that on.
+    /// An event that is located late by d, and whose reset puts the motion back on the surface,
+    /// gains speed: intervals with the ratio q then stay at 2 q d / (1 - q), and shrink less than
+    /// half as fast from twice that on.
     [[nodiscard]] bool accumulate(double tolerance) noexcept
     {
         if (shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution())) {
@@ -98,14 +98,18 @@ public:
         }
         if (interval_ * (1 - ratio_) > 16 * tolerance * ratio_) usual_ratio_ = ratio_;
         const double decay = 1 - usual_ratio_;
-        const bool lingers = interval_ * decay <= 5 * tolerance * usual_ratio_ &&
+        const bool lingers = interval_ * decay <= 5 * late_ * usual_ratio_ &&
                              1 - ratio_ < decay / 2 && interval_ <= longest_ / 4;
         lingering_ = lingers ? lingering_ + 1 : 0;
         return lingering_ >= 3;
     }
 
     /// The event just noted is known to `error` [s].
-    void blame(double error) noexcept { blamed_ += error; }
+    void blame(double error) noexcept
+    {
+        late_ = error;
+        blamed_ += error;
+    }
 
     /// By how much [s] the limit may be off: an event that is late by d delays all later ones by
     /// d (1 + q) / (1 - q) in the end.
@@ -117,10 +121,10 @@ public:
     }
 
     /// Extrapolated time [s] from the last event to the limit of all; 0 where the intervals
-    /// do not shrink.
+    /// do not shrink, or only because events are late.
     [[nodiscard]] double remainder() const noexcept
     {
-        return ratio_ < 1 ? interval_ * ratio_ / (1 - ratio_) : 0;
+        return ratio_ < 1 && lingering_ < 3 ? interval_ * ratio_ / (1 - ratio_) : 0;
     }
 
     /// Calls `visit` with every number that makes up the state.
@@ -143,6 +147,7 @@ public:
         visit(decay_);
         visit(usual_decay_);
         visit(usual_ratio_);
+        visit(late_);
         visit(blamed_);
         visit(lingering_);
         visit(sunk_);
@@ -177,7 +182,8 @@ private:
     double decay_ = 0;        ///< part that the last excursion has lost of the one before
     double usual_decay_ = 0;  ///< as it was before rounding mattered
     double usual_ratio_ = 1;  ///< of intervals, before lateness mattered
-    double blamed_ = 0;       ///< [s] sum of the errors of events
+    double late_ = 0;         ///< [s] the error of the last event
+    double blamed_ = 0;       ///< [s] the sum of all
     std::uint32_t lingering_ = 0;
     std::uint32_t sunk_ = 0;
     bool low_ = false;

@@ -982,7 +982,7 @@ private:
             X& x = search_.space(step_.x0());
             step_.peek(detail::CubicLook::inside * step_.h(), x);
             bank_.sample_inside(step_, x, calls());
-            if (hardly_moves()) {
+            if (error_controlled && hardly_moves()) {
                 for (const double u : detail::CubicLook::places) look_again(u, x);
                 bank_.has_looked_everywhere();
                 return bank_.suspicious(step_.h());
