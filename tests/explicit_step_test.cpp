@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <boost/numeric/odeint/algebra/array_algebra.hpp>
 #include <cmath>
 
 #include "ricochet/hybrid/step.hpp"
@@ -69,21 +68,6 @@ TYPED_TEST(ExplicitStepTest, DenseOutputMeetsBothEnds)
     EXPECT_NEAR(x[1], step.x1()[1], 1e-15);
 }
 
-TEST(ExplicitStep, ItIsOdeintsStep)
-{
-    // The same step by odeint on the state itself; the two differ by rounding.
-    const WalledOscillator oscillator;
-    StepOf<Dopri5> ours(oscillator, 0, {1.0, 0.5});
-    ours.attempt(0.3);
-    namespace odeint = boost::numeric::odeint;
-    odeint::runge_kutta_dopri5<X, double, X, double, odeint::array_algebra> theirs;
-    X x = {1.0, 0.5};
-    theirs.do_step([&](const X& at, X& dxdt, double t) { oscillator.flow(t, at, dxdt); }, x, 0.0,
-                   0.3);
-    EXPECT_NEAR(ours.x1()[0], x[0], 4e-16);
-    EXPECT_NEAR(ours.x1()[1], x[1], 4e-16);
-}
-
 TEST(ExplicitStep, DenseOutputOfDopri5IsOfFourthOrder)
 {
     const auto error = [](double h) {
@@ -113,31 +97,6 @@ TEST(ExplicitStep, RoundingDoesNotGrowWithTheNumberOfSteps)
     }
     EXPECT_NEAR(step.x0()[0], 1e4, 2e-12);    // one ulp
     EXPECT_NEAR(step.time(0), 1e5, 1.5e-11);  // one ulp
-}
-
-/// The explicit midpoint rule, as little as odeint's Stepper concept asks for.
-struct Midpoint {
-    using stepper_category = boost::numeric::odeint::stepper_tag;
-    static constexpr unsigned short order() { return 2; }
-    template <class System>
-    void do_step(System system, X& x, double t, double dt)
-    {
-        X k;
-        system(x, k, t);
-        X middle = {x[0] + dt / 2 * k[0], x[1] + dt / 2 * k[1]};
-        system(middle, k, t + dt / 2);
-        x = {x[0] + dt * k[0], x[1] + dt * k[1]};
-    }
-};
-
-TEST(ExplicitStep, AUsersOwnStepperNeedsOnlyTheStepInPlace)
-{
-    const WalledOscillator oscillator;
-    StepOf<ThisStepper<Midpoint>> step(oscillator, 0, {1.0, 0.0});
-    step.attempt(0.01);
-    EXPECT_EQ(step.order(), 2);
-    EXPECT_NEAR(step.x1()[0], 1 - 0.01 * 0.01 / 2, 1e-16);
-    EXPECT_NEAR(step.x1()[1], -0.01, 1e-18);
 }
 
 }  // namespace

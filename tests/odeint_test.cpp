@@ -1,0 +1,154 @@
+#include "ricochet/odeint.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <boost/numeric/odeint/algebra/array_algebra.hpp>
+#include <boost/numeric/odeint/stepper/euler.hpp>
+#include <boost/numeric/odeint/stepper/modified_midpoint.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta4_classic.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54_classic.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "ricochet/integrate/explicit_step.hpp"
+#include "walled_oscillator.hpp"
+
+namespace ricochet {
+namespace {
+
+namespace odeint = boost::numeric::odeint;
+using X = std::array<double, 2>;
+using test::WalledOscillator;
+
+template <class Method>
+using StepOf = detail::ExplicitStep<Method, WalledOscillator, X>;
+
+/// Three components that depend on one another and on the time.
+struct Tangle {
+    template <class State>
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        dxdt[0] = x[1] * std::cos(t) + 0.1 * x[2];
+        dxdt[1] = -std::sin(x[0]) + 0.3 * x[1] * x[2];
+        dxdt[2] = std::exp(-x[2] * x[2]) - t * x[0];
+    }
+};
+
+template <class State>
+void expect_same_bits(const State& ours, const State& theirs)
+{
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_TRUE(ours[i] == theirs[i] || (std::isnan(ours[i]) && std::isnan(theirs[i])))
+            << ours[i] << " and " << theirs[i];
+    }
+}
+
+/// Steps of random lengths from random states, forward and backward, with all that they give.
+template <class Ours, template <class...> class Theirs, class State>
+void expect_bits_of_odeint(State x)
+{
+    const Tangle system;
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (int k = 0; k < 500 && !testing::Test::HasFailure(); ++k) {
+        for (std::size_t i = 0; i < 3; ++i) x[i] = 10 * uniform(random);
+        const double t = 5 * uniform(random);
+        const double h = std::exp(5 * uniform(random) - 4);
+        detail::ExplicitStep<Ours, Tangle, State> ours(system, t, x, 0, k % 2 == 1);
+        detail::ExplicitStep<Odeint<Theirs>, Tangle, State> theirs(system, t, x, 0, k % 2 == 1);
+        if constexpr (detail::has_error_estimate<typename Ours::template Stepper<State>>) {
+            const double error = ours.attempt(h, 1e-8, 1e-8);
+            const double their_error = theirs.attempt(h, 1e-8, 1e-8);
+            EXPECT_TRUE(error == their_error || std::isnan(error));
+        } else {
+            ours.attempt(h);
+            theirs.attempt(h);
+        }
+        expect_same_bits(ours.x1(), theirs.x1());
+        expect_same_bits(ours.rate1(), theirs.rate1());
+        State at = x;
+        State there = x;
+        State rate = x;
+        State their_rate = x;
+        for (const double s : {0.3 * h, 0.77 * h}) {
+            ours.interpolate(s, at);
+            theirs.interpolate(s, there);
+            expect_same_bits(at, there);
+            ours.restep(s, at, rate);
+            theirs.restep(s, there, their_rate);
+            expect_same_bits(at, there);
+            expect_same_bits(rate, their_rate);
+        }
+        EXPECT_EQ(ours.flow_calls(), theirs.flow_calls());
+    }
+}
+
+template <class State>
+void expect_all_bits_of_odeint(const State& x)
+{
+    expect_bits_of_odeint<Euler, odeint::euler>(x);
+    expect_bits_of_odeint<Rk4, odeint::runge_kutta4_classic>(x);
+    expect_bits_of_odeint<CashKarp54, odeint::runge_kutta_cash_karp54_classic>(x);
+    expect_bits_of_odeint<Dopri5, odeint::runge_kutta_dopri5>(x);
+    expect_bits_of_odeint<Fehlberg78, odeint::runge_kutta_fehlberg78>(x);
+}
+
+TEST(Odeint, OurMethodsHaveTheBitsOfItsSteppers)
+{
+    expect_all_bits_of_odeint(std::array<double, 3>{});
+    expect_all_bits_of_odeint(std::vector<double>(3));
+}
+
+TEST(Odeint, ItsOtherOneStepMethodsWork)
+{
+    const WalledOscillator oscillator;
+    StepOf<Odeint<odeint::modified_midpoint>> step(oscillator, 0, {1.0, 0.0});
+    step.attempt(0.01);
+    EXPECT_NEAR(step.x1()[0], std::cos(0.01), 1e-8);
+}
+
+TEST(Odeint, ADepartureFromTheTangentIsTheSameStep)
+{
+    // The same step by odeint on the state itself; the two differ by rounding.
+    const WalledOscillator oscillator;
+    StepOf<Dopri5> ours(oscillator, 0, {1.0, 0.5});
+    ours.attempt(0.3);
+    odeint::runge_kutta_dopri5<X, double, X, double, odeint::array_algebra> theirs;
+    X x = {1.0, 0.5};
+    theirs.do_step([&](const X& at, X& dxdt, double t) { oscillator.flow(t, at, dxdt); }, x, 0.0,
+                   0.3);
+    EXPECT_NEAR(ours.x1()[0], x[0], 4e-16);
+    EXPECT_NEAR(ours.x1()[1], x[1], 4e-16);
+}
+
+/// The explicit midpoint rule, as little as odeint's Stepper concept asks for.
+struct Midpoint {
+    using stepper_category = odeint::stepper_tag;
+    static constexpr unsigned short order() { return 2; }
+    template <class System>
+    void do_step(System system, X& x, double t, double dt)
+    {
+        X k;
+        system(x, k, t);
+        X middle = {x[0] + dt / 2 * k[0], x[1] + dt / 2 * k[1]};
+        system(middle, k, t + dt / 2);
+        x = {x[0] + dt * k[0], x[1] + dt * k[1]};
+    }
+};
+
+TEST(Odeint, AUsersOwnStepperNeedsOnlyTheStepInPlace)
+{
+    const WalledOscillator oscillator;
+    StepOf<ThisStepper<Midpoint>> step(oscillator, 0, {1.0, 0.0});
+    step.attempt(0.01);
+    EXPECT_EQ(step.order(), 2);
+    EXPECT_NEAR(step.x1()[0], 1 - 0.01 * 0.01 / 2, 1e-16);
+    EXPECT_NEAR(step.x1()[1], -0.01, 1e-18);
+}
+
+}  // namespace
+}  // namespace ricochet
