@@ -12,7 +12,8 @@ FUNCTIONS = """flow guard guards guard_rate guard_rates guard_curvature guard_in
 VALUES = "guard_count mode_count crossing unilateral changes_dimension forward_only".split()
 KNOWN = set(FUNCTIONS + VALUES)
 # Words of their own, and names of C++.
-OTHERS = {"rest", "gard", "resets", "enable", "enables", "crossings", "crossin", "lower", "upper"}
+OTHERS = {"rest", "gard", "resets", "enable", "enables", "crossings", "crossin", "lower", "upper",
+          "flows"}
 
 
 def one_slip(name):
