@@ -19,14 +19,14 @@
 #include <vector>
 
 #include "certificates.hpp"
-#include "ricochet/learn/adam.hpp"
+#include "ricochet/detail/adam.hpp"
 #include "ricochet/learn/certify.hpp"
-#include "ricochet/learn/random.hpp"
-#include "ricochet/learn/trainable_mlp.hpp"
+#include "ricochet/detail/random.hpp"
+#include "ricochet/detail/trainable_mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "ricochet/systems/cavern.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/cavern.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
 
 namespace ricochet::bench {
 namespace {

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include "crossover.hpp"
-#include "ricochet/systems/cavern.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/cavern.hpp"
+#include "problems/planar_arm.hpp"
 
 namespace ricochet::bench {
 

@@ -2,9 +2,9 @@
 
 #include "crossover.hpp"
 #include "ricochet/learn/train_gate.hpp"
-#include "ricochet/systems/cavern.hpp"
-#include "ricochet/systems/opaque.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/cavern.hpp"
+#include "problems/opaque.hpp"
+#include "problems/planar_arm.hpp"
 
 namespace ricochet::bench {
 

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "problems.hpp"
-#include "ricochet/detect/ballistic_line.hpp"
+#include "ricochet/detail/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
@@ -25,9 +25,9 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "ricochet/systems/cavern.hpp"
-#include "ricochet/systems/planar_arm.hpp"
-#include "ricochet/systems/zones.hpp"
+#include "problems/cavern.hpp"
+#include "problems/planar_arm.hpp"
+#include "problems/zones.hpp"
 #include "score.hpp"
 #include "timing.hpp"
 

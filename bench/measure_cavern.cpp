@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "measure.hpp"
-#include "ricochet/systems/cavern.hpp"
+#include "problems/cavern.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

@@ -11,7 +11,7 @@
 
 #include "measure.hpp"
 #include "problems.hpp"
-#include "ricochet/detect/ballistic_line.hpp"
+#include "ricochet/detail/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/verified.hpp"

@@ -10,7 +10,7 @@
 #include "ricochet/detect/certified.hpp"
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
+#include "problems/least_eigenvalue.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 
 namespace ricochet::bench {
 

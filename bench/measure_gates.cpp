@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "ricochet/learn/train_gate.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/opaque.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/opaque.hpp"
+#include "problems/planar_arm.hpp"
 
 namespace ricochet::bench {
 

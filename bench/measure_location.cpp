@@ -9,10 +9,10 @@
 
 #include "measure.hpp"
 #include "ricochet/locate/newton.hpp"
-#include "ricochet/systems/cave_body.hpp"
-#include "ricochet/systems/cavern.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/cave_body.hpp"
+#include "problems/cavern.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

@@ -11,7 +11,7 @@
 #include "measure.hpp"
 #include "piecewise_linear.hpp"
 #include "random_contacts.hpp"
-#include "ricochet/nonsmooth/contact_problem.hpp"
+#include "ricochet/detail/contact_problem.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
 #include "ricochet/systems/sliding_mode.hpp"

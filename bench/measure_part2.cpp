@@ -18,7 +18,7 @@
 #include "ricochet/detect/network.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/learn/assessment.hpp"
+#include "ricochet/detail/assessment.hpp"
 #include "ricochet/learn/bouncing_ball.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "score.hpp"

@@ -16,7 +16,7 @@
 #include "measure.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "ricochet/systems/fault_rate_state.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet::bench {
 

@@ -11,7 +11,7 @@
 
 #include "measure.hpp"
 #include "ricochet/detect/ends.hpp"
-#include "ricochet/friction/additive_pair.hpp"
+#include "ricochet/faults/additive_pair.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/locate/toms748.hpp"

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <string>
 
-#include "ricochet/learn/step_environment.hpp"
+#include "ricochet/detail/step_environment.hpp"
 #include "ricochet/learn/tqc.hpp"
-#include "ricochet/systems/strike_slip_fault.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::bench {
 

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "measure.hpp"
-#include "ricochet/systems/cave_body.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/planar_arm.hpp"
-#include "ricochet/systems/zones.hpp"
+#include "problems/cave_body.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
+#include "problems/zones.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

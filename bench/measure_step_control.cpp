@@ -16,7 +16,7 @@
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet::bench {

@@ -17,8 +17,8 @@
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/learn/random.hpp"
-#include "ricochet/systems/near_tangent.hpp"
+#include "ricochet/detail/random.hpp"
+#include "problems/near_tangent.hpp"
 
 namespace ricochet::bench {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/learn/td3.hpp"
 #include "ricochet/learn/tqc.hpp"
 #include "ricochet/nn/mlp.hpp"

@@ -18,7 +18,7 @@
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/systems/cave_body.hpp"
+#include "problems/cave_body.hpp"
 #include "timing.hpp"
 #ifdef RICOCHET_BENCH_FCL
 #include "peers/fcl.hpp"

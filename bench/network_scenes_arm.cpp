@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "measure_networks.hpp"
-#include "ricochet/systems/opaque.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/opaque.hpp"
+#include "problems/planar_arm.hpp"
 
 namespace ricochet::bench {
 

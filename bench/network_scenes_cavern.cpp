@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "measure_networks.hpp"
-#include "ricochet/systems/cave_body.hpp"
-#include "ricochet/systems/cavern.hpp"
+#include "problems/cave_body.hpp"
+#include "problems/cavern.hpp"
 
 namespace ricochet::bench {
 

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "measure_networks.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/zones.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/zones.hpp"
 
 namespace ricochet::bench {
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "ricochet/ricochet.hpp"
-#include "ricochet/systems/cavern.hpp"
+#include "problems/cavern.hpp"
 
 int main()
 {

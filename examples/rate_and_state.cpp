@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ricochet/friction/spring_slider.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 
 int main()
 {

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Writes include/ricochet/hybrid/misspellings.inc: the likely misspellings of the names
+"""Writes include/ricochet/detail/misspellings.inc: the likely misspellings of the names
 that a system may declare.
 
-usage: misspellings.py > include/ricochet/hybrid/misspellings.inc
+usage: misspellings.py > include/ricochet/detail/misspellings.inc
 """
 
 # Functions first, then values; of the latter a data member is meant, too.

@@ -14,11 +14,11 @@
 #include "ricochet/locate/toms748.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "ricochet/systems/cave_body.hpp"
-#include "ricochet/systems/cavern.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/planar_arm.hpp"
-#include "ricochet/systems/zones.hpp"
+#include "problems/cave_body.hpp"
+#include "problems/cavern.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
+#include "problems/zones.hpp"
 
 namespace ricochet {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "app.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/systems/detest_f1.hpp"
-#include "ricochet/systems/detest_f4.hpp"
+#include "problems/detest_f1.hpp"
+#include "problems/detest_f4.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
 

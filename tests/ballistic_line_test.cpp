@@ -1,4 +1,4 @@
-#include "ricochet/detect/ballistic_line.hpp"
+#include "ricochet/detail/ballistic_line.hpp"
 
 #include <gtest/gtest.h>
 

@@ -16,9 +16,9 @@
 #include "host_step.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "ricochet/systems/hidden_pair.hpp"
+#include "problems/hidden_pair.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
-#include "ricochet/systems/near_tangent.hpp"
+#include "problems/near_tangent.hpp"
 
 namespace ricochet {
 namespace {

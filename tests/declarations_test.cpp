@@ -1,7 +1,7 @@
 // Every declaration that a system can get wrong is told from the right one. What
 // `check_declarations` refuses is what is not `absent` or `fits` here.
 
-#include "ricochet/hybrid/declarations.hpp"
+#include "ricochet/detail/declarations.hpp"
 
 #include <gtest/gtest.h>
 

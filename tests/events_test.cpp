@@ -16,7 +16,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "ricochet/systems/near_tangent.hpp"
+#include "problems/near_tangent.hpp"
 
 namespace ricochet {
 namespace {

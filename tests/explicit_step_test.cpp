@@ -1,4 +1,4 @@
-#include "ricochet/integrate/explicit_step.hpp"
+#include "ricochet/detail/explicit_step.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "ricochet/friction/spring_slider.hpp"
-#include "ricochet/systems/fault_rate_state.hpp"
+#include "ricochet/faults/spring_slider.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet::test {
 

@@ -19,12 +19,12 @@
 #include <cstddef>
 #include <vector>
 
-#include "ricochet/friction/laws.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
-#include "ricochet/systems/fault_rate_state.hpp"
-#include "ricochet/systems/fault_rupture.hpp"
-#include "ricochet/systems/stiffness_series.hpp"
-#include "ricochet/systems/strike_slip_fault.hpp"
+#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
+#include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/detail/stiffness_series.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::test {
 

@@ -9,9 +9,9 @@
 
 #include "fault_as_slider.hpp"
 #include "refusal.hpp"
-#include "ricochet/friction/spring_slider.hpp"
-#include "ricochet/systems/fault_friction_stage.hpp"
-#include "ricochet/systems/fault_rate_state.hpp"
+#include "ricochet/faults/spring_slider.hpp"
+#include "ricochet/detail/fault_friction_stage.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet {
 namespace {

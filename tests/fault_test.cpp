@@ -10,11 +10,11 @@
 #include <string>
 
 #include "refusal.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
-#include "ricochet/systems/fault_kernel.hpp"
-#include "ricochet/systems/fault_rupture.hpp"
-#include "ricochet/systems/stiffness_series.hpp"
-#include "ricochet/systems/strike_slip_fault.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/detail/fault_kernel.hpp"
+#include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/detail/stiffness_series.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet {
 namespace {

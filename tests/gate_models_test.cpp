@@ -16,8 +16,8 @@
 #include "ricochet/detect/calibrated.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
 
 namespace ricochet {
 namespace {

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/geometry/concave_table.hpp"
-#include "ricochet/geometry/distance_grid.hpp"
-#include "ricochet/geometry/outline.hpp"
-#include "ricochet/geometry/segments.hpp"
-#include "ricochet/learn/random.hpp"
+#include "geometry/concave_table.hpp"
+#include "geometry/distance_grid.hpp"
+#include "geometry/outline.hpp"
+#include "geometry/segments.hpp"
+#include "ricochet/detail/random.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet::geometry {

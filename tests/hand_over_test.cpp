@@ -10,11 +10,11 @@
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
-#include "ricochet/systems/incline_block.hpp"
-#include "ricochet/systems/rolling_ball.hpp"
+#include "problems/incline_block.hpp"
+#include "problems/rolling_ball.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 #include "ricochet/systems/stick_slip.hpp"
-#include "ricochet/systems/super_twisting.hpp"
+#include "problems/super_twisting.hpp"
 
 namespace ricochet {
 namespace {

@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/guard_view.hpp"
+#include "ricochet/detail/guard_view.hpp"
 #include "ricochet/hybrid/step.hpp"
 
 namespace ricochet::test {

@@ -1,4 +1,4 @@
-#include "ricochet/hybrid/instant.hpp"
+#include "ricochet/detail/instant.hpp"
 
 #include <gtest/gtest.h>
 

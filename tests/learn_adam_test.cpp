@@ -1,4 +1,4 @@
-#include "ricochet/learn/adam.hpp"
+#include "ricochet/detail/adam.hpp"
 
 #include <cmath>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "ricochet/learn/assessment.hpp"
+#include "ricochet/detail/assessment.hpp"
 
 #include <cmath>
 #include <limits>

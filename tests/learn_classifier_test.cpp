@@ -13,9 +13,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "ricochet/learn/checkpoint.hpp"
-#include "ricochet/learn/random.hpp"
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/checkpoint.hpp"
+#include "ricochet/detail/random.hpp"
+#include "ricochet/detail/classifier.hpp"
 
 namespace ricochet::learn {
 namespace {

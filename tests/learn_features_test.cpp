@@ -1,4 +1,4 @@
-#include "ricochet/detect/features.hpp"
+#include "ricochet/detail/features.hpp"
 
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet {

@@ -1,4 +1,4 @@
-#include "ricochet/learn/surface.hpp"
+#include "ricochet/detail/surface.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ricochet/learn/trainable_mlp.hpp"
+#include "ricochet/detail/trainable_mlp.hpp"
 
 #include <cmath>
 #include <stdexcept>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/classifier.hpp"
 
 namespace ricochet::learn {
 namespace {

@@ -7,10 +7,10 @@
 #include <limits>
 #include <string>
 
-#include "ricochet/geometry/mesh.hpp"
-#include "ricochet/geometry/triangles.hpp"
-#include "ricochet/learn/random.hpp"
-#include "ricochet/systems/cave_body.hpp"
+#include "geometry/mesh.hpp"
+#include "geometry/triangles.hpp"
+#include "ricochet/detail/random.hpp"
+#include "problems/cave_body.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet::geometry {

@@ -6,7 +6,7 @@
 #include "allocations.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/systems/incline_block.hpp"
+#include "problems/incline_block.hpp"
 
 namespace ricochet {
 namespace {

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "random_contacts.hpp"
-#include "ricochet/nonsmooth/contact_problem.hpp"
-#include "ricochet/nonsmooth/linear_cases.hpp"
+#include "ricochet/detail/contact_problem.hpp"
+#include "ricochet/detail/linear_cases.hpp"
 
 namespace ricochet {
 namespace {

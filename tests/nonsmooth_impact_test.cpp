@@ -8,7 +8,7 @@
 
 #include "refusal.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
-#include "ricochet/systems/incline_block.hpp"
+#include "problems/incline_block.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
 #include "ricochet/systems/woodpecker.hpp"
 

@@ -7,10 +7,10 @@
 #include <random>
 
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
-#include "ricochet/nonsmooth/sparse_direction.hpp"
+#include "ricochet/detail/sparse_direction.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
-#include "ricochet/systems/super_twisting.hpp"
+#include "problems/super_twisting.hpp"
 
 namespace ricochet {
 namespace {

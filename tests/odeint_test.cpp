@@ -14,7 +14,7 @@
 #include <random>
 #include <vector>
 
-#include "ricochet/integrate/explicit_step.hpp"
+#include "ricochet/detail/explicit_step.hpp"
 #include "walled_oscillator.hpp"
 
 namespace ricochet {

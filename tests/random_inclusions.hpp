@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "ricochet/nonsmooth/inclusion.hpp"
-#include "ricochet/nonsmooth/linear_cases.hpp"
+#include "ricochet/detail/linear_cases.hpp"
 
 namespace ricochet::test {
 

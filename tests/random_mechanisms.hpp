@@ -12,7 +12,7 @@
 #include "random_inclusions.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
-#include "ricochet/systems/rolling_ball.hpp"
+#include "problems/rolling_ball.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
 #include "ricochet/systems/woodpecker.hpp"
 

@@ -13,7 +13,7 @@
 
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::test {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "ricochet/friction/incremental.hpp"
+#include "ricochet/detail/incremental.hpp"
 
 namespace ricochet::test {
 

@@ -8,8 +8,8 @@
 
 #include "rate_state_identities.hpp"
 #include "refusal.hpp"
-#include "ricochet/friction/affine_law.hpp"
-#include "ricochet/friction/wright_omega.hpp"
+#include "ricochet/detail/affine_law.hpp"
+#include "ricochet/detail/wright_omega.hpp"
 
 namespace ricochet {
 namespace {

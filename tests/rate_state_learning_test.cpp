@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "../src/learn/friction_models.hpp"
-#include "ricochet/friction/along_history.hpp"
-#include "ricochet/learn/friction_study.hpp"
+#include "ricochet/detail/along_history.hpp"
+#include "ricochet/detail/friction_study.hpp"
 #include "ricochet/learn/train_friction.hpp"
 
 namespace ricochet {

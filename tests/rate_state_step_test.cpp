@@ -7,9 +7,9 @@
 #include <type_traits>
 #include <vector>
 
-#include "ricochet/friction/baselines.hpp"
-#include "ricochet/friction/incremental.hpp"
-#include "ricochet/friction/spring_slider.hpp"
+#include "ricochet/detail/baselines.hpp"
+#include "ricochet/detail/incremental.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 
 namespace ricochet {
 namespace {

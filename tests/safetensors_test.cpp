@@ -4,7 +4,7 @@
 #include "ricochet/nn/safetensors.hpp"
 
 #include "nn_models.hpp"
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/classifier.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/systems/cavern.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
-#include "ricochet/systems/opaque.hpp"
-#include "ricochet/systems/planar_arm.hpp"
-#include "ricochet/systems/zones.hpp"
+#include "problems/cavern.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/opaque.hpp"
+#include "problems/planar_arm.hpp"
+#include "problems/zones.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet {

@@ -1,5 +1,5 @@
 // Runs as environments: their steps, rewards and ends.
-#include "ricochet/learn/step_environment.hpp"
+#include "ricochet/detail/step_environment.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet::learn {

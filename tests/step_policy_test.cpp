@@ -11,7 +11,7 @@
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "ricochet/friction/histories.hpp"
+#include "ricochet/faults/histories.hpp"
 
 namespace ricochet::test {
 

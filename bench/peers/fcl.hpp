@@ -4,8 +4,8 @@
 #include <memory>
 #include <string_view>
 
-#include "ricochet/geometry/mesh.hpp"
-#include "ricochet/geometry/triangles.hpp"
+#include "geometry/mesh.hpp"
+#include "geometry/triangles.hpp"
 
 namespace ricochet::bench {
 

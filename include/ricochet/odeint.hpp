@@ -14,7 +14,7 @@
 #include <tuple>
 #include <utility>
 
-#include "ricochet/hybrid/components.hpp"
+#include "ricochet/detail/components.hpp"
 #include "ricochet/integrate/methods.hpp"
 
 namespace Eigen {

@@ -1,7 +1,7 @@
 // The core: hybrid systems, their events, their integration, networks that spare checks.
 //
 // Ready systems are in `ricochet/systems/`, set-valued motion in `ricochet/nonsmooth/`,
-// derivatives in `ricochet/sensitivity/`, friction in `ricochet/friction/`, training in
+// derivatives in `ricochet/sensitivity/`, friction in `ricochet/faults/`, training in
 // `ricochet/learn/`; each is included by name.
 #pragma once
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "input.hpp"
-#include "ricochet/detect/features.hpp"
+#include "ricochet/detail/features.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
 namespace ricochet::app {

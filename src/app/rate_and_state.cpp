@@ -16,9 +16,9 @@
 #include "json_text.hpp"
 #include "plot.hpp"
 #include "report.hpp"
-#include "ricochet/friction/spring_slider.hpp"
-#include "ricochet/learn/friction_study.hpp"
-#include "ricochet/learn/identify_friction.hpp"
+#include "ricochet/faults/spring_slider.hpp"
+#include "ricochet/detail/friction_study.hpp"
+#include "ricochet/detail/identify_friction.hpp"
 #include "run_watch.hpp"
 
 namespace ricochet::app {

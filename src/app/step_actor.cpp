@@ -20,7 +20,7 @@
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
-#include "ricochet/systems/strike_slip_fault.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "timing.hpp"
 #include "train.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "ricochet/learn/step_environment.hpp"
+#include "ricochet/detail/step_environment.hpp"
 #include "ricochet/nn/model.hpp"
 #include "step_policy.hpp"
 

@@ -18,7 +18,7 @@
 #include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 #include "run_watch.hpp"
 #include "settings.hpp"

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <utility>
 
-#include "ricochet/systems/fault_rupture.hpp"
+#include "ricochet/faults/fault_rupture.hpp"
 
 namespace ricochet::app {
 

@@ -16,7 +16,7 @@
 #include "keep_model.hpp"
 #include "progress_bar.hpp"
 #include "report.hpp"
-#include "ricochet/learn/checkpoint.hpp"
+#include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "timing.hpp"
 

@@ -1,4 +1,4 @@
-#include "ricochet/detect/gate.hpp"
+#include "ricochet/detail/gate.hpp"
 
 #include <fmt/format.h>
 

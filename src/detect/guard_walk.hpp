@@ -9,7 +9,7 @@
 
 #include <cmath>
 
-#include "ricochet/detect/finding.hpp"
+#include "ricochet/detail/finding.hpp"
 
 namespace ricochet::detail {
 

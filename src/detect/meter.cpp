@@ -1,4 +1,4 @@
-#include "ricochet/detect/meter.hpp"
+#include "ricochet/detail/meter.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/geometry/mesh.hpp"
+#include "geometry/mesh.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/geometry/outline.hpp"
+#include "geometry/outline.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/geometry/segments.hpp"
+#include "geometry/segments.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/geometry/triangles.hpp"
+#include "geometry/triangles.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "ricochet/hybrid/debug_checks.hpp"
+#include "ricochet/detail/debug_checks.hpp"
 
 namespace ricochet::detail {
 

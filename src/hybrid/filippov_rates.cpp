@@ -1,4 +1,4 @@
-#include "ricochet/hybrid/filippov_rates.hpp"
+#include "ricochet/detail/filippov_rates.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ricochet/learn/assessment.hpp"
+#include "ricochet/detail/assessment.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <boost/math/special_functions/beta.hpp>
 
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/classifier.hpp"
 
 namespace ricochet::learn {
 

@@ -12,7 +12,7 @@
 
 #include "aligned.hpp"
 #include "dense.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::learn {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "ricochet/detect/features.hpp"
+#include "ricochet/detail/features.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::learn {

@@ -10,7 +10,7 @@
 #include <deque>
 #include <span>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "ricochet/learn/certify.hpp"
-#include "ricochet/nn/bounds.hpp"
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/bounds.hpp"
+#include "ricochet/detail/classifier.hpp"
 
 namespace ricochet::learn {
 

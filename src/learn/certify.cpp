@@ -11,7 +11,7 @@
 #include "certify_checkpoint.hpp"
 #include "checkpoint_file.hpp"
 #include "proof.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 

@@ -1,4 +1,4 @@
-#include "ricochet/learn/checkpoint.hpp"
+#include "ricochet/detail/checkpoint.hpp"
 
 #include <string>
 #include <string_view>

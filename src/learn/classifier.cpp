@@ -14,8 +14,8 @@
 #include <nlohmann/json.hpp>
 
 #include "checkpoint_file.hpp"
-#include "ricochet/learn/checkpoint.hpp"
-#include "ricochet/learn/trainable_mlp.hpp"
+#include "ricochet/detail/checkpoint.hpp"
+#include "ricochet/detail/trainable_mlp.hpp"
 
 namespace ricochet::learn {
 

@@ -1,10 +1,10 @@
-#include "ricochet/learn/data_set.hpp"
+#include "ricochet/detail/data_set.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "checkpoint_file.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "workers.hpp"
 
 namespace ricochet::learn {

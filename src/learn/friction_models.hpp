@@ -9,10 +9,10 @@
 #include <optional>
 #include <vector>
 
-#include "../friction/fast_tanh.hpp"
-#include "ricochet/friction/additive_pair.hpp"
-#include "ricochet/friction/histories.hpp"
-#include "ricochet/learn/random.hpp"
+#include "../faults/fast_tanh.hpp"
+#include "ricochet/faults/additive_pair.hpp"
+#include "ricochet/faults/histories.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn::detail {
 

@@ -1,10 +1,10 @@
-#include "ricochet/learn/friction_study.hpp"
+#include "ricochet/detail/friction_study.hpp"
 
 #include <cmath>
 #include <stdexcept>
 
-#include "ricochet/friction/variational_step.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/variational_step.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 

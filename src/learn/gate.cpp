@@ -15,11 +15,11 @@
 #include <utility>
 
 #include "checkpoint_file.hpp"
-#include "ricochet/learn/assessment.hpp"
-#include "ricochet/learn/checkpoint.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/assessment.hpp"
+#include "ricochet/detail/checkpoint.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/learn/train_gate.hpp"
-#include "ricochet/learn/trainable_mlp.hpp"
+#include "ricochet/detail/trainable_mlp.hpp"
 
 namespace ricochet::learn {
 

@@ -1,4 +1,4 @@
-#include "ricochet/learn/identify_friction.hpp"
+#include "ricochet/detail/identify_friction.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "ricochet/learn/levenberg_marquardt.hpp"
+#include "ricochet/detail/levenberg_marquardt.hpp"
 
 namespace ricochet::learn {
 

@@ -12,7 +12,7 @@
 #include "checkpoint_file.hpp"
 #include "ricochet/learn/environment.hpp"
 #include "ricochet/learn/policy_training.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "transitions.hpp"
 
 namespace ricochet::learn {

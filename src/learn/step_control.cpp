@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "workers.hpp"
 
 namespace ricochet::learn {

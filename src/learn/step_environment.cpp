@@ -1,4 +1,4 @@
-#include "ricochet/learn/step_environment.hpp"
+#include "ricochet/detail/step_environment.hpp"
 
 #include <fmt/format.h>
 

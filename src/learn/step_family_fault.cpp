@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/learn/step_control.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "step_reference.hpp"
 
 namespace ricochet::learn {

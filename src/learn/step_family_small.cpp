@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"

@@ -10,8 +10,8 @@
 #include <stdexcept>
 
 #include "friction_models.hpp"
-#include "ricochet/friction/variational_step.hpp"
-#include "ricochet/learn/adam.hpp"
+#include "ricochet/detail/variational_step.hpp"
+#include "ricochet/detail/adam.hpp"
 
 namespace ricochet::learn {
 

@@ -1,4 +1,4 @@
-#include "ricochet/learn/trainable_mlp.hpp"
+#include "ricochet/detail/trainable_mlp.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "ricochet/nn/bounds.hpp"
+#include "ricochet/detail/bounds.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "ricochet/nn/pack.hpp"
+#include "ricochet/detail/pack.hpp"
 
 namespace ricochet {
 namespace {

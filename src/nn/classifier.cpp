@@ -1,4 +1,4 @@
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/classifier.hpp"
 
 #include <array>
 #include <stdexcept>

@@ -2,11 +2,11 @@
 //
 // Included by one file per instruction set, which is compiled with its flags and
 // has defined RICOCHET_KERNEL_NAMESPACE. Only what lives in that namespace may be
-// called here: see nn/kernel.hpp.
+// called here: see detail/kernel.hpp.
 #pragma once
 
 #include "kernel_table.hpp"
-#include "ricochet/nn/kernel.hpp"
+#include "ricochet/detail/kernel.hpp"
 #include "ricochet/nn/mlp.hpp"
 
 #include <cstddef>

@@ -1,7 +1,7 @@
 #include "ricochet/nn/mlp.hpp"
 
 #include "kernel_table.hpp"
-#include "ricochet/nn/pack.hpp"
+#include "ricochet/detail/pack.hpp"
 
 #include <array>
 #include <new>

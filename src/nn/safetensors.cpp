@@ -2,8 +2,8 @@
 
 #include "../files/read_file.hpp"
 #include "../files/strict_json.hpp"
-#include "ricochet/nn/classifier.hpp"
-#include "ricochet/nn/pack.hpp"
+#include "ricochet/detail/classifier.hpp"
+#include "ricochet/detail/pack.hpp"
 
 #include <nlohmann/json.hpp>
 

@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/composite_step.hpp"
+#include "ricochet/detail/composite_step.hpp"
 
 #include <fmt/format.h>
 

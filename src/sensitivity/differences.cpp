@@ -1,4 +1,4 @@
-#include "ricochet/sensitivity/differences.hpp"
+#include "ricochet/detail/differences.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/sensitivity/directions.hpp"
+#include "ricochet/detail/directions.hpp"
 
 #include <fmt/format.h>
 

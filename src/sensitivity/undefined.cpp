@@ -1,4 +1,4 @@
-#include "ricochet/sensitivity/undefined.hpp"
+#include "ricochet/detail/undefined.hpp"
 
 namespace ricochet {
 

@@ -19,8 +19,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "ricochet/detect/finding.hpp"
-#include "ricochet/hybrid/dense_polynomial.hpp"
+#include "ricochet/detail/finding.hpp"
+#include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/hybrid/step.hpp"
 #include "ricochet/hybrid/system.hpp"
 

@@ -25,7 +25,7 @@
 #include <utility>
 
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/gate.hpp"
+#include "ricochet/detail/gate.hpp"
 #include "ricochet/detect/planned.hpp"
 
 namespace ricochet {

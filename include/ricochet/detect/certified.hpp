@@ -16,7 +16,7 @@
 #include <string_view>
 #include <utility>
 
-#include "ricochet/detect/gate.hpp"
+#include "ricochet/detail/gate.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/nn/certificate.hpp"
 

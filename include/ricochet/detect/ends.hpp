@@ -4,7 +4,7 @@
 // so "no event" is only assumed.
 #pragma once
 
-#include "ricochet/detect/finding.hpp"
+#include "ricochet/detail/finding.hpp"
 
 namespace ricochet {
 

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ricochet/detect/finding.hpp"
+#include "ricochet/detail/finding.hpp"
 
 namespace ricochet {
 

@@ -10,7 +10,7 @@
 #include <concepts>
 #include <utility>
 
-#include "ricochet/detect/meter.hpp"
+#include "ricochet/detail/meter.hpp"
 
 namespace ricochet {
 

@@ -19,8 +19,8 @@
 #include <string_view>
 
 #include "ricochet/detect/ends.hpp"
-#include "ricochet/detect/features.hpp"
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/features.hpp"
+#include "ricochet/detail/classifier.hpp"
 
 namespace ricochet {
 

@@ -23,11 +23,11 @@
 #include <limits>
 #include <utility>
 
-#include "ricochet/detect/around.hpp"
+#include "ricochet/detail/around.hpp"
 #include "ricochet/detect/cover.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/bounds.hpp"
-#include "ricochet/hybrid/debug_checks.hpp"
+#include "ricochet/detail/debug_checks.hpp"
 
 namespace ricochet {
 

@@ -10,9 +10,9 @@
 #include <cmath>
 #include <limits>
 
-#include "ricochet/detect/finding.hpp"
-#include "ricochet/hybrid/components.hpp"
-#include "ricochet/hybrid/instant.hpp"
+#include "ricochet/detail/finding.hpp"
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/instant.hpp"
 #include "ricochet/hybrid/step.hpp"
 
 namespace ricochet {

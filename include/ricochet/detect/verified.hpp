@@ -11,7 +11,7 @@
 
 #include <utility>
 
-#include "ricochet/detect/around.hpp"
+#include "ricochet/detail/around.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/network.hpp"
 

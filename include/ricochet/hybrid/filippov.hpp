@@ -42,12 +42,12 @@
 #include <string_view>
 #include <utility>
 
-#include "ricochet/hybrid/components.hpp"
-#include "ricochet/hybrid/filippov_decision.hpp"
-#include "ricochet/hybrid/filippov_motion.hpp"
-#include "ricochet/hybrid/filippov_rates.hpp"
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/filippov_decision.hpp"
+#include "ricochet/detail/filippov_motion.hpp"
+#include "ricochet/detail/filippov_rates.hpp"
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/scratch.hpp"
+#include "ricochet/detail/scratch.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {

@@ -14,7 +14,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "ricochet/hybrid/arithmetic.hpp"
+#include "ricochet/detail/arithmetic.hpp"
 
 namespace ricochet {
 

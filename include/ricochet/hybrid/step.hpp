@@ -9,7 +9,7 @@
 
 #include <concepts>
 
-#include "ricochet/hybrid/dense_polynomial.hpp"
+#include "ricochet/detail/dense_polynomial.hpp"
 
 namespace ricochet {
 

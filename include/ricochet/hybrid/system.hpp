@@ -46,7 +46,7 @@
 //
 // All functions are const and free of side effects; t is in seconds. A function of one
 // of these names that fits none of the forms, and one of a name that is nearly one of
-// these, is refused by the compiler, see hybrid/declarations.hpp. Guards written
+// these, is refused by the compiler, see detail/declarations.hpp. Guards written
 // for any x that has `x[i]` are located without the rest of the state. A system
 // without a guard is integrated as a plain ordinary differential equation: none of
 // the machinery of events is compiled in.
@@ -59,7 +59,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "ricochet/hybrid/components.hpp"
+#include "ricochet/detail/components.hpp"
 #include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet {

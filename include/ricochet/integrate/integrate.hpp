@@ -1,7 +1,7 @@
 // A whole run in one call.
 #pragma once
 
-#include "ricochet/integrate/refused_calls.hpp"
+#include "ricochet/detail/refused_calls.hpp"
 #include "ricochet/integrate/simulation.hpp"
 
 namespace ricochet {

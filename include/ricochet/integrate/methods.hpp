@@ -3,7 +3,7 @@
 
 #include <type_traits>
 
-#include "ricochet/integrate/runge_kutta.hpp"
+#include "ricochet/detail/runge_kutta.hpp"
 
 namespace boost::numeric::odeint {
 struct error_stepper_tag;

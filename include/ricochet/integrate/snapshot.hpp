@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "ricochet/hybrid/components.hpp"
+#include "ricochet/detail/components.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/outcome.hpp"

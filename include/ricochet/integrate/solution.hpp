@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
-#include "ricochet/hybrid/components.hpp"
-#include "ricochet/hybrid/dense_polynomial.hpp"
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet {

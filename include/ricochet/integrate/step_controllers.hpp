@@ -17,7 +17,7 @@
 #include <variant>
 #include <vector>
 
-#include "ricochet/integrate/step_control.hpp"
+#include "ricochet/detail/step_control.hpp"
 
 namespace ricochet {
 

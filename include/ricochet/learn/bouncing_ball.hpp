@@ -13,7 +13,7 @@
 #include <string_view>
 
 #include "ricochet/learn/classifier.hpp"
-#include "ricochet/learn/surface.hpp"
+#include "ricochet/detail/surface.hpp"
 
 namespace ricochet::learn {
 

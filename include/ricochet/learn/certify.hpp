@@ -41,7 +41,7 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detect/features.hpp"
+#include "ricochet/detail/features.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/model.hpp"

@@ -15,9 +15,9 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/learn/adam.hpp"
-#include "ricochet/learn/assessment.hpp"
-#include "ricochet/learn/data_set.hpp"
+#include "ricochet/detail/adam.hpp"
+#include "ricochet/detail/assessment.hpp"
+#include "ricochet/detail/data_set.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::learn {

@@ -24,8 +24,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detect/gate.hpp"
-#include "ricochet/learn/adam.hpp"
+#include "ricochet/detail/gate.hpp"
+#include "ricochet/detail/adam.hpp"
 #include "ricochet/learn/classifier.hpp"
 #include "ricochet/nn/model.hpp"
 

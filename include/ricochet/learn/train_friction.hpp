@@ -15,9 +15,9 @@
 #include <optional>
 #include <vector>
 
-#include "ricochet/friction/additive_pair.hpp"
-#include "ricochet/friction/histories.hpp"
-#include "ricochet/learn/levenberg_marquardt.hpp"
+#include "ricochet/faults/additive_pair.hpp"
+#include "ricochet/faults/histories.hpp"
+#include "ricochet/detail/levenberg_marquardt.hpp"
 
 namespace ricochet::learn {
 

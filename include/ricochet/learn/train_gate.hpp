@@ -34,7 +34,7 @@
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/simulation.hpp"
 #include "ricochet/learn/gate.hpp"
-#include "ricochet/learn/random.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 

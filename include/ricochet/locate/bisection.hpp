@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/locate/jump.hpp"
+#include "ricochet/detail/jump.hpp"
 
 namespace ricochet {
 

@@ -14,9 +14,9 @@
 #include <limits>
 
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/locate/flat.hpp"
-#include "ricochet/locate/jump.hpp"
-#include "ricochet/locate/noise.hpp"
+#include "ricochet/detail/flat.hpp"
+#include "ricochet/detail/jump.hpp"
+#include "ricochet/detail/noise.hpp"
 
 namespace ricochet {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/locate/jump.hpp"
+#include "ricochet/detail/jump.hpp"
 
 namespace ricochet {
 

@@ -17,7 +17,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/nn/classifier.hpp"
+#include "ricochet/detail/classifier.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet {

@@ -5,7 +5,7 @@
 // give up IEEE arithmetic (-ffast-math).
 #pragma once
 
-#include "ricochet/nn/pack.hpp"
+#include "ricochet/detail/pack.hpp"
 
 #include <array>
 #include <cstddef>

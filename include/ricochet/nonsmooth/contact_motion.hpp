@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/nonsmooth/free_flight.hpp"
+#include "ricochet/detail/free_flight.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
 

@@ -19,9 +19,9 @@
 #include <vector>
 
 #include "ricochet/integrate/simulation.hpp"
-#include "ricochet/nonsmooth/branch_modes.hpp"
-#include "ricochet/nonsmooth/held_reactions.hpp"
-#include "ricochet/nonsmooth/law.hpp"
+#include "ricochet/detail/branch_modes.hpp"
+#include "ricochet/detail/held_reactions.hpp"
+#include "ricochet/detail/law.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {

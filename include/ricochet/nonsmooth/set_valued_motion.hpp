@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/hybrid/debug_checks.hpp"
+#include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/integrate/step_controllers.hpp"
-#include "ricochet/nonsmooth/minimal_selection.hpp"
-#include "ricochet/nonsmooth/step_layout.hpp"
+#include "ricochet/detail/minimal_selection.hpp"
+#include "ricochet/detail/step_layout.hpp"
 
 namespace ricochet {
 

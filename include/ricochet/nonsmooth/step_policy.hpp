@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "ricochet/nn/mlp.hpp"
-#include "ricochet/nonsmooth/step_layout.hpp"
+#include "ricochet/detail/step_layout.hpp"
 
 namespace ricochet {
 

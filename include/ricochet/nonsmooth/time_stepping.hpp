@@ -29,7 +29,7 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/nonsmooth/contact_problem.hpp"
+#include "ricochet/detail/contact_problem.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/sensitivity/directions.hpp"
-#include "ricochet/sensitivity/undefined.hpp"
-#include "ricochet/sensitivity/variational.hpp"
+#include "ricochet/detail/directions.hpp"
+#include "ricochet/detail/undefined.hpp"
+#include "ricochet/detail/variational.hpp"
 
 namespace ricochet {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "ricochet/nonsmooth/inclusion.hpp"
-#include "ricochet/nonsmooth/step_layout.hpp"
+#include "ricochet/detail/step_layout.hpp"
 
 namespace ricochet {
 

@@ -1,7 +1,7 @@
 #include "../any_system.hpp"
 #include "../model_lookup.hpp"
 #include "entries.hpp"
-#include "ricochet/systems/planar_arm.hpp"
+#include "problems/planar_arm.hpp"
 
 namespace ricochet::app {
 

@@ -1,4 +1,4 @@
-#include "ricochet/systems/cavern.hpp"
+#include "problems/cavern.hpp"
 
 #include "../any_system.hpp"
 #include "../model_lookup.hpp"

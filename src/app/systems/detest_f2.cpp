@@ -1,4 +1,4 @@
-#include "ricochet/systems/detest_f2.hpp"
+#include "problems/detest_f2.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

@@ -1,4 +1,4 @@
-#include "ricochet/systems/detest_f4.hpp"
+#include "problems/detest_f4.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

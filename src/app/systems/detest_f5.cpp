@@ -1,4 +1,4 @@
-#include "ricochet/systems/detest_f5.hpp"
+#include "problems/detest_f5.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

@@ -3,7 +3,7 @@
 #include "../any_system.hpp"
 #include "../model_lookup.hpp"
 #include "entries.hpp"
-#include "ricochet/systems/least_eigenvalue.hpp"
+#include "problems/least_eigenvalue.hpp"
 
 namespace ricochet::app {
 

@@ -19,7 +19,7 @@
 #include "../step_progress.hpp"
 #include "entries.hpp"
 #include "fault.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 
 namespace ricochet::app {
 

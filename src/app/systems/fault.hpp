@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/systems/fault_rupture.hpp"
+#include "ricochet/faults/fault_rupture.hpp"
 
 namespace ricochet::app {
 

@@ -18,7 +18,7 @@
 #include "../step_progress.hpp"
 #include "../timing.hpp"
 #include "fault.hpp"
-#include "ricochet/systems/fault_bathe.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 
 namespace ricochet::app {
 

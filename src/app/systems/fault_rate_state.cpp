@@ -20,7 +20,7 @@
 #include "../step_progress.hpp"
 #include "entries.hpp"
 #include "fault.hpp"
-#include "ricochet/systems/fault_rate_state.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet::app {
 

@@ -1,4 +1,4 @@
-#include "ricochet/systems/grow_decay.hpp"
+#include "problems/grow_decay.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

@@ -1,4 +1,4 @@
-#include "ricochet/systems/henon_heiles.hpp"
+#include "problems/henon_heiles.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

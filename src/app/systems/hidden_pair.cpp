@@ -1,4 +1,4 @@
-#include "ricochet/systems/hidden_pair.hpp"
+#include "problems/hidden_pair.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

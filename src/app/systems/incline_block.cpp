@@ -1,4 +1,4 @@
-#include "ricochet/systems/incline_block.hpp"
+#include "problems/incline_block.hpp"
 
 #include "entries.hpp"
 #include "run_inclusion.hpp"

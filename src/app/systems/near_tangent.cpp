@@ -1,4 +1,4 @@
-#include "ricochet/systems/near_tangent.hpp"
+#include "problems/near_tangent.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

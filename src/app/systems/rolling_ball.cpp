@@ -1,4 +1,4 @@
-#include "ricochet/systems/rolling_ball.hpp"
+#include "problems/rolling_ball.hpp"
 
 #include "entries.hpp"
 #include "run_inclusion.hpp"

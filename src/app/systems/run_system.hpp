@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "../registry.hpp"
-#include "ricochet/detect/ballistic_line.hpp"
+#include "ricochet/detail/ballistic_line.hpp"
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/features.hpp"
+#include "ricochet/detail/features.hpp"
 #include "ricochet/detect/verified.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"

@@ -1,4 +1,4 @@
-#include "ricochet/systems/super_twisting.hpp"
+#include "problems/super_twisting.hpp"
 
 #include "entries.hpp"
 #include "run_inclusion.hpp"

@@ -1,4 +1,4 @@
-#include "ricochet/systems/three_body.hpp"
+#include "problems/three_body.hpp"
 
 #include "../any_system.hpp"
 #include "entries.hpp"

@@ -1,4 +1,4 @@
-#include "ricochet/systems/zones.hpp"
+#include "problems/zones.hpp"
 
 #include <array>
 #include <string>

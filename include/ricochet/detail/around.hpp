@@ -1,0 +1,42 @@
+// Internal: what it declares may change without notice.
+//
+// What every gate leaves to the exact detector inside it.
+#pragma once
+
+#include "ricochet/detail/finding.hpp"
+
+namespace ricochet::detail {
+
+/// Answers as `Exact` does.
+template <class Exact>
+class Around {
+public:
+    static constexpr bool uses_rates = Exact::uses_rates;
+    static constexpr bool looks_inside = LooksInside<Exact>;
+    static constexpr Evidence evidence = Exact::evidence;  ///< of a step it has looked at
+
+    explicit Around(const Exact& exact) : exact_(exact) {}
+
+    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
+                                                 double rate1, double h) noexcept
+    {
+        return Exact::suspects(sign, g0, rate0, g1, rate1, h);
+    }
+
+    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,
+                                             const GuardSample& end, double touch) noexcept
+    {
+        return Exact::leaves_plainly(sign, start, end, touch);
+    }
+
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        return exact_.examine(probe, watch);
+    }
+
+private:
+    Exact exact_;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,62 @@
+// Internal: what it declares may change without notice.
+//
+// The exact rival of a network: where the guard is a parabola in time, whether a
+// step meets the event surface is one inequality.
+#pragma once
+
+#include "ricochet/detail/features.hpp"
+#include "ricochet/detect/network.hpp"
+
+namespace ricochet {
+
+/// Predicts as `Network` does, with the same answers to its mistakes, from
+///
+///     g + g' h + g'' h^2 / 2 <= 0   iff the guard is on or below its surface after h,
+///
+/// which for a ball in free fall is u / (g h^2) + v / (g h) <= 1/2. Exact up to
+/// rounding for a falling guard of constant negative curvature.
+struct BallisticLine {
+    static constexpr bool uses_rates = false;
+    static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
+    static constexpr bool checks_every_step = false;
+
+    /// Nothing has been trained, so nothing can be unsuitable.
+    template <class System, class X>
+    requires CurvedGuard<System, X>
+    void check(const System& /*system*/, const X& /*x*/, double /*smallest*/,
+               double /*largest*/) const noexcept
+    {
+    }
+
+    template <class Guard, class Step>
+    [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
+    {
+        const double t = step.time(0);
+        const double h = step.h();
+        const double value = guard.value(t, step.x0());
+        const double rate = guard.rate(t, step.x0(), step.rate0(), h);
+        const double curvature = guard.system().guard_curvature(t, step.x0());
+        return value + h * (rate + 0.5 * h * curvature) > 0;
+    }
+
+    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
+                                                 double rate1, double h) noexcept
+    {
+        return Ends::suspects(sign, g0, rate0, g1, rate1, h);
+    }
+
+    /// A prediction may have been late, so that every event is looked at with care.
+    [[nodiscard]] static bool leaves_plainly(double, const GuardSample&, const GuardSample&,
+                                             double) noexcept
+    {
+        return false;
+    }
+
+    template <class Probe>
+    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    {
+        return detail::examine_prediction(probe, watch);
+    }
+};
+
+}  // namespace ricochet

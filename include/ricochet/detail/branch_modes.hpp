@@ -1,0 +1,661 @@
+// Internal: what it declares may change without notice.
+//
+// The branches of an inclusion as the modes of a hybrid system.
+//
+// Where every reaction is at one of its bounds, or held, the inclusion
+//
+//     A w' = f(t, w) + G reaction,    -y in the normal cone of K at the reaction
+//
+// is an ordinary differential equation: a reaction at a bound is known, and those that
+// hold their y at zero follow from y' = 0, a linear system whose matrix is constant. A mode
+// says for every reaction which of the three it is. Between changes of mode the motion is
+// as smooth as f, for any stepper; a change is a guard's event, located like any other.
+//
+//     y > 0     reaction at its lower bound    until y falls to zero
+//     y < 0     reaction at its upper bound    until -y does
+//     y = 0     reaction in between            until it meets a bound
+//
+// Boxes of at most four reactions, in systems of fixed size, have such modes.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "ricochet/detail/filippov_motion.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/minimal_selection.hpp"
+
+namespace ricochet {
+
+namespace detail {
+
+template <class System>
+constexpr bool has_branch_modes() noexcept
+{
+    constexpr int n = state_size<System>;
+    constexpr int m = reaction_size<System>;
+    return BoxSet<SetOf<System>> && confines<System>() == Confines::reaction &&
+           n != Eigen::Dynamic && m != Eigen::Dynamic && m <= most_cases;
+}
+
+/// A bound that is smooth beyond y = 0 on its branch, where the system gives one.
+template <class System>
+concept ContinuesBounds = requires(const System& system, double t, const StateOf<System>& w, int i) {
+    { system.branch_bound(t, w, i, Branch::upper) } -> std::convertible_to<double>;
+};
+
+}  // namespace detail
+
+/// Inclusions whose branches are modes.
+template <class System>
+concept Branching = Inclusion<System> && detail::has_branch_modes<System>();
+
+/// The hybrid system. Digit i to base 3 of a mode is the branch of reaction i: 0 lower (y > 0),
+/// 1 inside (held), 2 upper. Three more modes say that the motion cannot go on by itself:
+/// `several`, where changes coincide and rates do not tell what follows, `no_flow`, where
+/// the held reactions are not determined by y' = 0, and `empty`, where a lower bound lies above
+/// the upper one. There nothing moves.
+///
+/// There are four guards per reaction, 4 i + kind: y, -y, reaction - lower, upper - reaction, an
+/// infinite bound being far away always; and 4 M + i, 1 where the bounds of reaction i make an
+/// interval and -1 where they do not.
+///
+/// A bound that depends on y must be smooth a little beyond y = 0 on its side. Where
+/// that of `reaction_set` is not, as with F(|y|), the system declares
+///
+///     double branch_bound(t, w, i, branch) const
+template <Branching System>
+class BranchModes {
+public:
+    static constexpr int N = state_size<System>;
+    static constexpr int M = reaction_size<System>;
+    using State = std::array<double, static_cast<std::size_t>(N)>;
+    using Matrices = InclusionMatrices<System>;
+    using Vector = StateOf<System>;
+    using Reaction = ReactionOf<System>;
+    using Branches = Eigen::Matrix<Branch, M, 1>;
+    using Slacks = std::array<double, 2>;  ///< above the lower bound, below the upper one
+    using Rooms = std::array<double, 2 * static_cast<std::size_t>(M)>;  ///< of all reactions
+
+    static constexpr bool forward_only = true;
+    static constexpr std::size_t guard_count = 5 * static_cast<std::size_t>(M);
+    static constexpr std::size_t first_set_guard = 4 * static_cast<std::size_t>(M);
+    static constexpr std::size_t branch_modes = M == 1 ? 3 : M == 2 ? 9 : M == 3 ? 27 : 81;
+    static constexpr std::size_t mode_count = branch_modes + 3;
+    static constexpr Mode several = branch_modes;
+    static constexpr Mode no_flow = branch_modes + 1;
+    static constexpr Mode empty = branch_modes + 2;
+
+    /// @throws std::invalid_argument for matrices that `InclusionMatrices` refuses.
+    explicit BranchModes(const System& system) : matrices_(system)
+    {
+        lever_ = matrices_.inverse_mass() * matrices_.act();
+        delassus_ = matrices_.observe() * lever_;
+        inverse_diagonal_ = matrices_.inverse_mass().diagonal();
+        diagonal_ = matrices_.inverse_mass().isDiagonal(0);
+        for (std::size_t mask = 0; mask < masks; ++mask) prepare(mask);
+    }
+
+    [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
+
+    // --- modes and guards by name ---
+
+    [[nodiscard]] static constexpr Branch branch(std::size_t i, Mode mode) noexcept
+    {
+        for (; i > 0; --i) mode /= 3;
+        return static_cast<Branch>(static_cast<int>(mode % 3) - 1);
+    }
+    [[nodiscard]] static constexpr Mode mode_of(const Branches& branches) noexcept
+    {
+        Mode mode = 0;
+        for (Eigen::Index i = M; i-- > 0;) {
+            mode = 3 * mode + static_cast<Mode>(static_cast<int>(branches[i]) + 1);
+        }
+        return mode;
+    }
+    [[nodiscard]] static Branches branches_of(Mode mode) noexcept
+    {
+        Branches branches;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            branches[i] = branch(static_cast<std::size_t>(i), mode);
+        }
+        return branches;
+    }
+    /// Whether the reactions that a mode holds are determined.
+    [[nodiscard]] bool flows(Mode mode) const noexcept
+    {
+        return mode < branch_modes && holds_[mask_of(mode)].determined;
+    }
+
+    /// Whether a mode of branches holds any reaction.
+    [[nodiscard]] static constexpr bool holds(Mode mode) noexcept
+    {
+        return mode < branch_modes && mask_of(mode) != 0;
+    }
+
+    [[nodiscard]] static GuardInfo guard_info(std::size_t which) noexcept
+    {
+        constexpr std::array<std::string_view, 4> names{"y falls to zero", "y rises to zero",
+                                                        "lower bound", "upper bound"};
+        GuardInfo info;
+        info.name = which < first_set_guard ? names[which % 4] : "the set is not empty";
+        info.unilateral = which < first_set_guard && which % 4 < 2;
+        return info;
+    }
+    [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
+    {
+        if (mode >= branch_modes) return false;
+        if (which >= first_set_guard) return true;
+        const Branch at = branch(which / 4, mode);
+        if (which % 4 == 0) return at == Branch::lower;
+        if (which % 4 == 1) return at == Branch::upper;
+        return at == Branch::inside;
+    }
+
+    // --- the contract of a system ---
+
+    void flow(Mode mode, double t, const State& x, State& dxdt) const
+    {
+        Eigen::Map<Vector> rate(dxdt.data());
+        if (mode >= branch_modes) {
+            rate.setZero();
+            return;
+        }
+        const Vector w = vector(x);
+        Vector free;
+        Reaction reaction;
+        reactions(mode, t, w, free, reaction);
+        rate = free + lever_.lazyProduct(reaction);
+        // To the last bit where y is a component.
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (!is_held(i, mode)) continue;
+            if (const Eigen::Index k = matrices_.selected(i); k >= 0) rate[k] = offset_rate(t)[i];
+        }
+    }
+
+    /// What acts in a mode at (t, w).
+    [[nodiscard]] Reaction reaction(Mode mode, double t, const Vector& w) const
+    {
+        Vector free;
+        Reaction r;
+        reactions(mode, t, w, free, r);
+        return r;
+    }
+
+    /// How far every held reaction is from its bounds; infinite where there is no bound, and for
+    /// reactions that are not held. Writes the rate of the motion and the reactions, too.
+    void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const
+    {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        reactions(mode, t, w, rate, r);
+        rate += lever_.lazyProduct(r);
+        const auto set = [&] {
+            if constexpr (detail::ContinuesBounds<System>) {
+                return 0;
+            } else {
+                return matrices_.system().reaction_set(t, w);
+            }
+        }();
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
+            const auto k = static_cast<std::size_t>(i);
+            rooms[2 * k] = rooms[2 * k + 1] = infinity;
+            if (rest % 3 != 1) continue;
+            double lower, upper;
+            if constexpr (detail::ContinuesBounds<System>) {
+                lower = bound(t, w, i, Branch::lower);
+                upper = bound(t, w, i, Branch::upper);
+            } else {
+                lower = set.lower(k);
+                upper = set.upper(k);
+            }
+            if (!std::isinf(lower)) rooms[2 * k] = r[i] - lower;
+            if (!std::isinf(upper)) rooms[2 * k + 1] = upper - r[i];
+        }
+    }
+
+    /// What rounding of the terms may make of the held reactions.
+    [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
+    {
+        const double free = (rate - lever_.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
+        return negligible *
+               (holds_[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
+    }
+
+    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
+    {
+        const auto i = static_cast<Eigen::Index>(which / 4);
+        const Vector w = vector(x);
+        if (which >= first_set_guard) {
+            return is_set(which - first_set_guard, mode, t, w, observed(t, w));
+        }
+        if (which % 4 < 2) {
+            const double y = observed(t, w)[i];
+            return which % 4 == 0 ? y : -y;
+        }
+        return slacks(i, t, w, reaction(mode, t, w)[i])[which % 4 - 2];
+    }
+
+    /// All of them, from one evaluation of the reactions.
+    void guards(Mode mode, double t, const State& x, std::span<double> g) const
+    {
+        const Vector w = vector(x);
+        const Reaction y = observed(t, w);
+        const Reaction r = reaction(mode < branch_modes ? mode : 0, t, w);
+        for (Eigen::Index i = 0; i < M; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            const auto slack = slacks(i, t, w, r[i]);
+            g[4 * k] = y[i];
+            g[4 * k + 1] = -y[i];
+            g[4 * k + 2] = slack[0];
+            g[4 * k + 3] = slack[1];
+            g[first_set_guard + k] = is_set(k, mode, t, w, y);
+        }
+    }
+
+    [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const State& x,
+                                    const State& dxdt) const
+    {
+        if (which >= first_set_guard) return 0;
+        const auto i = static_cast<Eigen::Index>(which / 4);
+        const Vector w = vector(x);
+        const Vector dwdt = vector(dxdt);
+        if (which % 4 >= 2) return slack_rates(i, mode, t, w, dwdt)[which % 4 - 2];
+        const double rate = observed_rate(i, mode, t, w, dwdt);
+        return which % 4 == 0 ? rate : -rate;
+    }
+
+    /// Those that the mode enables; the others are 0.
+    void guard_rates(Mode mode, double t, const State& x, const State& dxdt,
+                     std::span<double> rates) const
+    {
+        std::fill(rates.begin(), rates.end(), 0.0);
+        if (mode >= branch_modes) return;
+        const Vector w = vector(x);
+        const Vector dwdt = vector(dxdt);
+        for (Eigen::Index i = 0; i < M; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            if (is_held(i, mode)) {
+                const Slacks of = slack_rates(i, mode, t, w, dwdt);
+                rates[4 * k + 2] = of[0];
+                rates[4 * k + 3] = of[1];
+            } else {
+                const double rate = observed_rate(i, mode, t, w, dwdt);
+                (branch(k, mode) == Branch::lower ? rates[4 * k] : rates[4 * k + 1]) =
+                    branch(k, mode) == Branch::lower ? rate : -rate;
+            }
+        }
+    }
+
+    /// All that happened at one instant, together.
+    [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, State& x) const
+    {
+        Branches branches = branches_of(mode);
+        int left = 0;
+        int arrived = 0;
+        Branches held = branches;
+        Vector w = vector(x);
+        // Reactions at a bound whose y is zero as well, as of contacts that depend on one another.
+        const Branches zero = zero_branches(t, w);
+        int undecided = 0;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (zero[i] != Branch::inside || branches[i] == Branch::inside) continue;
+            held[i] = Branch::inside;
+            ++undecided;
+        }
+        for (const std::size_t which : fired) {
+            if (which >= first_set_guard) return empty;
+            const auto i = static_cast<Eigen::Index>(which / 4);
+            if (which % 4 < 2) {
+                if (held[i] == Branch::inside) --undecided;
+                held[i] = Branch::inside;
+                ++arrived;
+            } else {
+                branches[i] = which % 4 == 2 ? Branch::lower : Branch::upper;
+                ++left;
+            }
+        }
+        hold(held, t, w);
+        Eigen::Map<Vector>(x.data()) = w;
+        if (faulty(t, w) >= 0) return empty;
+        if (left + arrived + undecided > 1 && left > 0) return several;
+        if (left == 1) return checked(mode_of(branches));
+        return settle(held, t, w);
+    }
+
+    // --- entering ---
+
+    /// The mode of the motion from (t, w), whose observed components that are zero up to
+    /// rounding are made so; `several` where rates do not tell.
+    /// @throws std::invalid_argument for what `minimal_selection` refuses.
+    [[nodiscard]] Mode mode_at(double t, Vector& w) const
+    {
+        (void)minimal_selection(matrices_, t, w);
+        const Branches held = zero_branches(t, w);
+        hold(held, t, w);
+        return settle(held, t, w);
+    }
+
+    /// The branches that the signs of y ask for; inside where y is zero up to rounding.
+    [[nodiscard]] Branches zero_branches(double t, const Vector& w) const
+    {
+        const Reaction y = observed(t, w);
+        const Reaction size = matrices_.observe().cwiseAbs() * w.cwiseAbs() + offset(t).cwiseAbs();
+        Branches out;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            const double rounding = 16 * std::numeric_limits<double>::epsilon() * size[i];
+            const bool zero = std::abs(y[i]) <= rounding;
+            out[i] = zero ? Branch::inside : y[i] > 0 ? Branch::lower : Branch::upper;
+        }
+        return out;
+    }
+
+    /// Puts every held y at zero, along the reactions that hold it.
+    void hold(const Branches& branches, double t, Vector& w) const
+    {
+        const Hold& mine = holds_[mask_of(mode_of(branches))];
+        Reaction y = observed(t, w);
+        bool any = false;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (branches[i] != Branch::inside) y[i] = 0;
+            any = any || (branches[i] == Branch::inside && matrices_.selected(i) < 0);
+        }
+        if (any && mine.determined) w -= lever_ * (mine.inverse * y);
+        const Reaction s = offset(t);
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (branches[i] == Branch::inside) matrices_.hold(i, 0, s[i], w);
+        }
+    }
+
+    /// y = E w - s(t).
+    [[nodiscard]] Reaction observed(double t, const Vector& w) const
+    {
+        Reaction y;
+        y = matrices_.observe().lazyProduct(w);
+        if constexpr (moves) y -= offset(t);
+        return y;
+    }
+
+    /// The first reaction whose bounds make no interval; -1 if all do.
+    [[nodiscard]] int faulty(double t, const Vector& w) const
+    {
+        return detail::faulty_interval(matrices_.system().reaction_set(t, w));
+    }
+
+    [[nodiscard]] static Vector vector(const State& x)
+    {
+        return Eigen::Map<const Vector>(x.data());
+    }
+
+private:
+    static constexpr std::size_t masks = std::size_t{1} << M;
+    static constexpr bool moves =
+        requires(const System& system, Reaction& s) { system.offset(0.0, s); };
+
+    /// The inverse of the block of D = E A^-1 G of the held reactions, zero elsewhere.
+    struct Hold {
+        typename Matrices::Delassus inverse;
+        double largest = 0;
+        bool determined = true;
+    };
+
+    void prepare(std::size_t mask)
+    {
+        Hold& hold = holds_[mask];
+        hold.inverse.setZero();
+        std::array<Eigen::Index, static_cast<std::size_t>(M)> held{};
+        Eigen::Index count = 0;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (mask >> i & 1) held[static_cast<std::size_t>(count++)] = i;
+        }
+        if (count == 0) return;
+        Eigen::MatrixXd block(count, count);
+        const auto at = [&](Eigen::Index k) { return held[static_cast<std::size_t>(k)]; };
+        for (Eigen::Index i = 0; i < count; ++i) {
+            for (Eigen::Index j = 0; j < count; ++j) block(i, j) = delassus_(at(i), at(j));
+        }
+        const Eigen::FullPivLU<Eigen::MatrixXd> lu(block);
+        hold.determined = lu.isInvertible();
+        if (!hold.determined) return;
+        block = lu.inverse();
+        hold.largest = block.cwiseAbs().maxCoeff();
+        for (Eigen::Index i = 0; i < count; ++i) {
+            for (Eigen::Index j = 0; j < count; ++j) hold.inverse(at(i), at(j)) = block(i, j);
+        }
+    }
+
+    [[nodiscard]] static constexpr bool is_held(Eigen::Index i, Mode mode) noexcept
+    {
+        return branch(static_cast<std::size_t>(i), mode) == Branch::inside;
+    }
+    [[nodiscard]] static constexpr std::size_t mask_of(Mode mode) noexcept
+    {
+        std::size_t mask = 0;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(M); ++i, mode /= 3) {
+            if (mode % 3 == 1) mask |= std::size_t{1} << i;
+        }
+        return mask;
+    }
+
+    [[nodiscard]] Reaction offset(double t) const
+    {
+        Reaction s;
+        matrices_.offset(t, s);
+        return s;
+    }
+    [[nodiscard]] Reaction offset_rate([[maybe_unused]] double t) const
+    {
+        Reaction rate;
+        if constexpr (requires { matrices_.system().offset_rate(t, rate); }) {
+            matrices_.system().offset_rate(t, rate);
+        } else if constexpr (moves) {
+            const double step = 1e-5 * std::max(1.0, std::abs(t));
+            rate = (offset(t + step) - offset(t - step)) / (2 * step);
+        } else {
+            rate.setZero();
+        }
+        return rate;
+    }
+
+    [[nodiscard]] double bound(double t, const Vector& w, Eigen::Index i, Branch side) const
+    {
+        if constexpr (detail::ContinuesBounds<System>) {
+            return matrices_.system().branch_bound(t, w, static_cast<int>(i), side);
+        } else {
+            const auto set = matrices_.system().reaction_set(t, w);
+            const auto k = static_cast<std::size_t>(i);
+            return side == Branch::lower ? set.lower(k) : set.upper(k);
+        }
+    }
+
+    /// The reactions of a mode, and A^-1 f.
+    void reactions(Mode mode, double t, const Vector& w, Vector& free, Reaction& r) const
+    {
+        Vector f;
+        matrices_.smooth(t, w, f);
+        if (diagonal_) {
+            free = inverse_diagonal_.cwiseProduct(f);
+        } else {
+            free = matrices_.inverse_mass().lazyProduct(f);
+        }
+        if constexpr (M == 1) {
+            const Branch at = branch(0, mode);
+            if (at != Branch::inside) {
+                r[0] = bound(t, w, 0, at);
+                return;
+            }
+            const Eigen::Index k = matrices_.selected(0);
+            double rate = k >= 0 ? free[k] : matrices_.observe().row(0).dot(free);
+            if constexpr (moves) rate -= offset_rate(t)[0];
+            r[0] = -holds_[1].inverse(0, 0) * rate;
+            return;
+        }
+        bool any_held = false;
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
+            const Branch at = static_cast<Branch>(static_cast<int>(rest % 3) - 1);
+            any_held = any_held || at == Branch::inside;
+            r[i] = at == Branch::inside ? 0 : bound(t, w, i, at);
+        }
+        if (!any_held) return;
+        Reaction rate = matrices_.observe().lazyProduct(free);
+        rate += delassus_.lazyProduct(r);
+        if constexpr (moves) rate -= offset_rate(t);
+        r -= holds_[mask_of(mode)].inverse.lazyProduct(rate);
+    }
+
+    /// How far a reaction is above its lower bound and below its upper one; 1 or -1 where
+    /// there is none.
+    [[nodiscard]] Slacks slacks(Eigen::Index i, double t, const Vector& w, double r) const
+    {
+        const double lower = bound(t, w, i, Branch::lower);
+        const double upper = bound(t, w, i, Branch::upper);
+        return {std::isinf(lower) ? std::copysign(1.0, -lower) : r - lower,
+                std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
+    }
+
+    /// 1 where the bounds of reaction k make an interval, else -1. Beyond y = 0, where the
+    /// branch ends, bounds that depend on y need not make one.
+    [[nodiscard]] double is_set(std::size_t k, Mode mode, double t, const Vector& w,
+                                const Reaction& y) const
+    {
+        const auto set = matrices_.system().reaction_set(t, w);
+        if (set.lower(k) <= set.upper(k)) return 1;
+        const double at = y[static_cast<Eigen::Index>(k)];
+        const Branch side = branch(k, mode);
+        return (side == Branch::lower && at < 0) || (side == Branch::upper && at > 0) ? 1 : -1;
+    }
+
+    /// y', and zero where rounding decides its sign: the bending of a motion that is tangent
+    /// to y = 0 then tells where it goes.
+    [[nodiscard]] double observed_rate(Eigen::Index i, Mode mode, double t, const Vector& w,
+                                       const Vector& dwdt) const
+    {
+        double rate = matrices_.observe().row(i) * dwdt;
+        if constexpr (moves) rate -= offset_rate(t)[i];
+        double size = 0;
+        Mode rest = mode;
+        for (Eigen::Index j = 0; j < M; ++j, rest /= 3) {
+            if (delassus_(i, j) == 0 || rest % 3 == 1) continue;
+            const Branch at = static_cast<Branch>(static_cast<int>(rest % 3) - 1);
+            size += std::abs(delassus_(i, j) * bound(t, w, j, at));
+        }
+        return std::abs(rate) <= 64 * std::numeric_limits<double>::epsilon() * size ? 0 : rate;
+    }
+
+    [[nodiscard]] Slacks slack_rates(Eigen::Index i, Mode mode, double t, const Vector& w,
+                                     const Vector& dwdt) const
+    {
+        const double lower = bound(t, w, i, Branch::lower);
+        const double upper = bound(t, w, i, Branch::upper);
+        if (std::isinf(lower) && std::isinf(upper)) return {0, 0};
+        const double width = upper - lower;
+        const auto at = [&](double s, const Vector& there) {
+            const Slacks slack = slacks(i, t + s, there, reaction(mode, t + s, there)[i]);
+            return detail::Exits{slack[0], slack[1], 0, 0};
+        };
+        const detail::Exits here = at(0, w);
+        const double size =
+            std::isfinite(width) ? width : std::max({std::abs(here[0]), std::abs(here[1]), 1.0});
+        if (!(size > 0)) return {0, 0};
+        const detail::TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
+                                       dwdt.template lpNorm<Eigen::Infinity>());
+        const auto later = [&](double s) { return at(s, w + s * dwdt); };
+        const detail::Exits rates = detail::fitted_rates(later, here, size, times);
+        return {rates[0], rates[1]};
+    }
+
+    [[nodiscard]] Mode checked(Mode mode) const noexcept { return flows(mode) ? mode : no_flow; }
+
+    /// The branches that follow where those marked inside are at y = 0: the rates decide, as a
+    /// linear inequality; where the reaction is at a bound and y does not move, the bending.
+    [[nodiscard]] Mode settle(const Branches& at, double t, const Vector& w) const
+    {
+        const Mode mode = mode_of(at);
+        if (mask_of(mode) == 0) return mode;
+        Vector f;
+        matrices_.smooth(t, w, f);
+        LinearInequality<M> inequality;
+        inequality.w = delassus_;
+        inequality.y0.noalias() = matrices_.observe() * (matrices_.inverse_mass() * f);
+        if constexpr (moves) inequality.y0 -= offset_rate(t);
+        for (Eigen::Index i = 0; i < M; ++i) {
+            inequality.lower[i] = bound(t, w, i, Branch::lower);
+            inequality.upper[i] = bound(t, w, i, Branch::upper);
+            if (at[i] == Branch::lower) inequality.upper[i] = inequality.lower[i];
+            if (at[i] == Branch::upper) inequality.lower[i] = inequality.upper[i];
+            // A reaction without influence on y' is all or nothing.
+            if (delassus_(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
+        }
+        Branches next = at;
+        Reaction r = inequality.lower;
+        Reaction rate = r;
+        if (!inequality.solve(r, rate, next)) return several;
+        int doubtful = 0;
+        Eigen::Index which = 0;
+        double size = 0;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (at[i] != Branch::inside) {
+                next[i] = at[i];
+                continue;
+            }
+            if (delassus_(i, i) == 0 && rate[i] == 0) return no_flow;
+            const double terms =
+                std::abs(inequality.y0[i]) + delassus_.row(i).cwiseAbs().dot(r.cwiseAbs());
+            const double room = std::min(r[i] - inequality.lower[i], inequality.upper[i] - r[i]);
+            const bool clear = next[i] == Branch::inside ? room > negligible * std::abs(r[i])
+                                                         : std::abs(rate[i]) > negligible * terms;
+            if (clear) continue;
+            ++doubtful;
+            which = i;
+            size = terms;
+        }
+        if (doubtful == 0) return checked(mode_of(next));
+        if (doubtful > 1) return several;
+        const bool up =
+            r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
+        return bend(next, which, up, size, t, w);
+    }
+
+    /// Reaction i is at its upper or lower bound and y_i does not move. It leaves if the motion
+    /// bends away from y_i = 0 by more than the rounding of its `terms`.
+    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double terms, double t,
+                            const Vector& w) const
+    {
+        next[i] = up ? Branch::upper : Branch::lower;
+        const Mode leaving = mode_of(next);
+        State x;
+        State dxdt;
+        Eigen::Map<Vector>(x.data()) = w;
+        flow(leaving, t, x, dxdt);
+        const Vector rate = vector(dxdt);
+        const detail::TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
+                                       rate.template lpNorm<Eigen::Infinity>());
+        const double step = 1e-5 * times.shortest;
+        const auto rate_of_y = [&](double s) {
+            Eigen::Map<Vector>(x.data()) = w + s * rate;
+            flow(leaving, t + s, x, dxdt);
+            double y = matrices_.observe().row(i) * vector(dxdt);
+            if constexpr (moves) y -= offset_rate(t + s)[i];
+            return y;
+        };
+        const double bending = rate_of_y(step) - rate_of_y(-step);
+        const double noise = 4 * negligible * terms;
+        if (up ? bending < -noise : bending > noise) return checked(leaving);
+        next[i] = Branch::inside;
+        return checked(mode_of(next));
+    }
+
+    /// Of the terms of a rate or a reaction: 64 units in the last place.
+    static constexpr double negligible = 64 * std::numeric_limits<double>::epsilon();
+
+    Matrices matrices_;
+    typename Matrices::Action lever_;       // A^-1 G
+    typename Matrices::Delassus delassus_;  // E A^-1 G
+    Vector inverse_diagonal_;               // of A^-1, most often all there is
+    bool diagonal_ = false;
+    std::array<Hold, masks> holds_;
+};
+
+}  // namespace ricochet

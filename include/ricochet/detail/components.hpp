@@ -1,0 +1,80 @@
+// Internal: what it declares may change without notice.
+//
+// Loops over the components of a state.
+//
+// States of a fixed, small size are unrolled by hand. Left to itself the compiler
+// turns a loop of two iterations into one 16-byte access, and such a load right
+// after the 8-byte stores of a flow waits until they have reached the cache: on the
+// bouncing ball that is a third of the time of a step.
+#pragma once
+
+#include <cstddef>
+#include <tuple>
+#include <utility>
+
+#include "ricochet/detail/arithmetic.hpp"
+
+namespace ricochet::detail {
+
+/// Number of components where the type fixes it, else 0.
+template <class X>
+[[nodiscard]] constexpr std::size_t fixed_size() noexcept
+{
+    if constexpr (requires { std::tuple_size<X>::value; }) {
+        return std::tuple_size<X>::value;
+    } else if constexpr (requires { X::SizeAtCompileTime; }) {
+        return X::SizeAtCompileTime > 0 ? static_cast<std::size_t>(X::SizeAtCompileTime) : 0;
+    } else {
+        return 0;
+    }
+}
+
+template <class X>
+inline constexpr bool is_small = fixed_size<X>() > 0 && fixed_size<X>() <= 8;
+
+/// Calls `function(i)` for every component of x, with i of the state's own index
+/// type.
+template <class X, class Function>
+[[gnu::always_inline]] inline void for_each_component(const X& x, const Function& function)
+{
+    using Index = decltype(x.size());
+    if constexpr (is_small<X>) {
+        [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+            (function(static_cast<Index>(I)), ...);
+        }(std::make_index_sequence<fixed_size<X>()>{});
+    } else {
+        const Index n = x.size();
+        for (Index i = 0; i < n; ++i) {
+            function(i);
+        }
+    }
+}
+
+/// to = from.
+template <class X>
+[[gnu::always_inline]] inline void assign(X& to, const X& from)
+{
+    if constexpr (is_small<X>) {
+        for_each_component(from, [&](auto i) { to[i] = from[i]; });
+    } else {
+        to = from;
+    }
+}
+
+/// to = from + factor * direction.
+template <class X>
+[[gnu::always_inline]] inline void move(X& to, const X& from, double factor, const X& direction)
+{
+    for_each_component(from, [&](auto i) { to[i] = from[i] + factor * direction[i]; });
+}
+
+/// Whether every component is finite.
+template <class X>
+[[nodiscard]] bool all_finite(const X& x) noexcept
+{
+    double sum = 0;  // 0 * x is NaN where x is not finite
+    for_each_component(x, [&](auto i) { sum += 0 * x[i]; });
+    return sum == 0;
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,304 @@
+// Internal: what it declares may change without notice.
+//
+// Implicit steps of an inclusion: Bathe's composite step, backward Euler, theta.
+#pragma once
+
+#include <optional>
+
+#include "ricochet/detail/stage_cases.hpp"
+#include "ricochet/detail/stage_fixed_point.hpp"
+#include "ricochet/detail/stage_newton.hpp"
+
+namespace ricochet {
+
+/// Where a set-valued motion is: the reaction belongs to the state.
+template <Inclusion System>
+struct SetValuedState {
+    double t = 0;
+    StateOf<System> w;
+    ReactionOf<System> reaction;
+};
+
+enum class Scheme {
+    /// Over half the step the trapezoidal rule, then backward differences of three points
+    /// over all of it: of order 2, and strongly damped at high frequencies (K.-J. Bathe and
+    /// G. Noh, Insight into an implicit time integration scheme for structural dynamics,
+    /// Computers and Structures 98-99, 2012):
+    ///
+    ///     A (w_g - w_n) / (h/2) = (f_n + f_g) / 2 + G reaction
+    ///     A (3 w_{n+1} - 4 w_g + w_n) / h = f_{n+1} + G reaction_{n+1}
+    bathe,
+    backward_euler,
+    theta,  ///< A (w_{n+1} - w_n) / h = theta f_{n+1} + (1 - theta) f_n + G reaction
+};
+
+/// What stands for the reaction in a stage that averages f over its ends.
+enum class FirstStage {
+    averaged,  ///< averaged like f: order 2 also where the reaction varies
+    at_end,    ///< that of the stage's end, as in the source's code: order 1 there
+    /// averaged, but where the branch at the stage's end is another than at the start,
+    /// whose reaction says nothing of the motion after a switch, solved again with at_end
+    switch_aware,
+};
+
+struct SchemeOptions {
+    Scheme scheme = Scheme::bathe;
+    FirstStage first_stage = FirstStage::averaged;
+    double theta = 0.5;  ///< in [0, 1]; above 0, since the reaction must be implicit
+    StageOptions stage{};
+};
+
+/// @throws std::invalid_argument naming the option.
+void validate(const SchemeOptions& options);
+
+namespace detail {
+
+/// Whether E A^-1 G of at most 64 reactions is singular to working precision.
+template <class System>
+[[nodiscard]] bool has_dependent_reactions(const InclusionMatrices<System>& m)
+{
+    if (m.reactions() > 64) return false;
+    const Eigen::MatrixXd w = m.observe() * (m.inverse_mass() * m.act());
+    return !Eigen::FullPivLU<Eigen::MatrixXd>(w).isInvertible();
+}
+
+}  // namespace detail
+
+/// Steps from any state to the next. Nothing is carried from one step to another but
+/// factors of constant matrices, so that the same state and step give the same bits.
+template <Inclusion System>
+class CompositeStep {
+public:
+    using Matrices = InclusionMatrices<System>;
+    using Vector = StateOf<System>;
+    using Reaction = ReactionOf<System>;
+    using State = SetValuedState<System>;
+    using Branches = detail::BranchesOf<System>;
+    static constexpr bool box = BoxSet<SetOf<System>>;
+
+    /// @throws std::invalid_argument for what `SchemeOptions` and `InclusionMatrices` refuse,
+    /// and for StageMethod::cases where the set is no box of at most four reactions.
+    explicit CompositeStep(const System& system, const SchemeOptions& options = {})
+        : matrices_(system), options_(options), scratch_(matrices_), newton_(matrices_)
+    {
+        validate(options);
+        method_ = options.stage.method;
+        const bool few = box && matrices_.reactions() <= most_cases;
+        falls_back_ = method_ == StageMethod::automatic;
+        if (method_ == StageMethod::automatic) {
+            // Where reactions depend on one another Newton's equations are singular.
+            const bool by_cases = few || (box && detail::has_dependent_reactions(matrices_));
+            method_ = by_cases ? StageMethod::cases : StageMethod::newton;
+            falls_back_ = !by_cases;
+        } else if (method_ == StageMethod::cases && !few) {
+            detail::refuse_inclusion("cases need a box of at most four reactions, not",
+                                     static_cast<double>(matrices_.reactions()));
+        }
+        const Eigen::Index n = matrices_.size();
+        for (Vector* v : {&f_, &stage_.q}) v->setZero(n);
+        middle_.w.setZero(n);
+        middle_.reaction.setZero(matrices_.reactions());
+        branches_.setConstant(matrices_.reactions(), Branch::inside);
+    }
+    CompositeStep(const CompositeStep& other) : CompositeStep(other.system(), other.options_) {}
+    CompositeStep& operator=(const CompositeStep&) = delete;
+
+    [[nodiscard]] const System& system() const noexcept { return matrices_.system(); }
+    [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
+    [[nodiscard]] const SchemeOptions& options() const noexcept { return options_; }
+
+    /// The state after a step of h from `from`. If it has not converged, `to` means nothing.
+    /// `frozen`: with these branches, whether the solution lies on them or not.
+    [[nodiscard]] StageReport take(const State& from, double h, State& to,
+                                   const Branches* frozen = nullptr)
+    {
+        frozen_ = frozen;
+        if (options_.scheme == Scheme::bathe) return composite(from, h, to);
+        const double theta = options_.scheme == Scheme::theta ? options_.theta : 1;
+        return one_stage(from, h, theta, 1 / h, to);
+    }
+
+    /// The state at the end of the first stage of the last step.
+    [[nodiscard]] const State& middle() const noexcept { return middle_; }
+
+    /// Simpson's rule over the three states of the last step minus the step: the local
+    /// error of Bathe's step with the averaged reaction, to leading order, for the price of
+    /// a sum,
+    ///
+    ///     (w_{n+1} - 4 w_g + 3 w_n + h A^-1 (f_n + G reaction_n)) / 2.
+    void embedded_error(const State& from, double h, const State& to, Vector& error) const
+    {
+        error.noalias() = matrices_.act() * from.reaction;
+        error += f_;
+        error = (0.5 * h) * (matrices_.inverse_mass() * error).eval();
+        error += 0.5 * (to.w - 4 * middle_.w + 3 * from.w);
+    }
+
+    /// Where the pair of reaction and y is on its graph: for a set of reactions the sign of
+    /// y tells, and where that is zero up to rounding the place of the reaction in the
+    /// set; for a set of states the place of y.
+    void branches_of(const State& state, Branches& branches)
+        requires box
+    {
+        const auto set = system().reaction_set(state.t, state.w);
+        constexpr bool of_reactions = detail::confines<System>() == Confines::reaction;
+        matrices_.observed(state.t, state.w, scratch_.y);
+        matrices_.offset(state.t, scratch_.s);
+        scratch_.argument = matrices_.observe().cwiseAbs() * state.w.cwiseAbs() + scratch_.s.cwiseAbs();
+        for (Eigen::Index i = 0; i < branches.size(); ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            const double y = scratch_.y[i];
+            if (of_reactions && std::abs(y) > 1e-14 * scratch_.argument[i]) {
+                branches[i] = y > 0 ? Branch::lower : Branch::upper;
+                continue;
+            }
+            const double lower = set.lower(k);
+            const double upper = set.upper(k);
+            const double at = of_reactions ? state.reaction[i] : y;
+            // Bounds that depend on the state are met within the solver's tolerance.
+            const double near = 1e-9 * (std::abs(at) + std::min(std::abs(lower), std::abs(upper)));
+            branches[i] = at <= lower + near   ? Branch::lower
+                          : at >= upper - near ? Branch::upper
+                                               : Branch::inside;
+        }
+    }
+
+    /// How far a state is inside its branches, as `LinearInequality::slack`.
+    [[nodiscard]] double slack(const State& state, const Branches& branches, Eigen::Index* which = nullptr)
+        requires box
+    {
+        auto& inequality = scratch_.inequality;
+        inequality.confines = detail::confines<System>();
+        const auto set = system().reaction_set(state.t, state.w);
+        matrices_.observed(state.t, state.w, scratch_.y);
+        double least = std::numeric_limits<double>::infinity();
+        for (Eigen::Index i = 0; i < branches.size(); ++i) {
+            inequality.lower[i] = set.lower(static_cast<std::size_t>(i));
+            inequality.upper[i] = set.upper(static_cast<std::size_t>(i));
+            const double here =
+                inequality.slack(i, branches[i], state.reaction[i], scratch_.y[i]);
+            if (here < least) {
+                least = here;
+                if (which) *which = i;
+            }
+        }
+        return least;
+    }
+
+private:
+    [[nodiscard]] StageReport composite(const State& from, double h, State& to)
+    {
+        StageReport first = one_stage(from, h / 2, 0.5, 2 / h, middle_);
+        if (!first.converged) return first;
+        stage_.t = from.t + h;
+        stage_.c = 3 / h;
+        stage_.kappa = stage_.sigma = 1;
+        stage_.q.noalias() = matrices_.mass() * (4 * middle_.w - from.w);
+        stage_.q /= h;
+        to.t = stage_.t;
+        to.w = middle_.w;
+        to.reaction = middle_.reaction;
+        StageReport second = solve(to);
+        second.iterations += first.iterations;
+        second.residual = std::max(second.residual, first.residual);
+        return second;
+    }
+
+    /// One stage of `span` with the weights theta and 1 - theta.
+    [[nodiscard]] StageReport one_stage(const State& from, double span, double theta, double c,
+                                        State& to)
+    {
+        matrices_.smooth(from.t, from.w, f_);
+        const bool averages = options_.first_stage != FirstStage::at_end && theta < 1;
+        StageReport report = attempt(from, span, theta, c, averages, to);
+        if constexpr (box) {
+            if (averages && report.converged && !frozen_ &&
+                options_.first_stage == FirstStage::switch_aware) {
+                Branches before = branches_;
+                Branches after = branches_;
+                branches_of(from, before);
+                branches_of(to, after);
+                if (before != after) {
+                    const int spent = report.iterations;
+                    report = attempt(from, span, theta, c, false, to);
+                    report.iterations += spent;
+                }
+            }
+        }
+        return report;
+    }
+
+    [[nodiscard]] StageReport attempt(const State& from, double span, double theta, double c,
+                                      bool averages, State& to)
+    {
+        stage_.t = from.t + span;
+        stage_.c = c;
+        stage_.kappa = theta;
+        stage_.sigma = averages ? theta : 1;
+        stage_.q.noalias() = c * (matrices_.mass() * from.w);
+        stage_.q += (1 - theta) * f_;
+        if (averages) stage_.q.noalias() += (1 - theta) * (matrices_.act() * from.reaction);
+        to.t = stage_.t;
+        to.w = from.w;
+        to.reaction = from.reaction;
+        return solve(to);
+    }
+
+    [[nodiscard]] StageReport solve(State& to)
+    {
+        if constexpr (box) {
+            if (frozen_) {
+                branches_ = *frozen_;
+                return detail::solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction,
+                                           branches_, true);
+            }
+            if (method_ == StageMethod::cases) {
+                branches_.setConstant(Branch::inside);
+                return detail::solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction,
+                                           branches_);
+            }
+        }
+        if (method_ == StageMethod::fixed_point) {
+            return detail::solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
+        }
+        const Vector start = to.w;
+        const Reaction reaction = to.reaction;
+        const StageReport report =
+            newton_.solve(scratch_, stage_, options_.stage, to.w, to.reaction);
+        if (report.converged || !falls_back_) return report;
+        to.w = start;
+        to.reaction = reaction;
+        return solve_again(to, report);
+    }
+
+    /// Where Newton's method fails: pivots for a box, else the projected fixed point.
+    [[nodiscard]] StageReport solve_again(State& to, const StageReport& before)
+    {
+        StageReport report;
+        if constexpr (box) {
+            branches_.setConstant(Branch::inside);
+            report =
+                detail::solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_);
+        } else {
+            report = detail::solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
+        }
+        const int spent = report.iterations + before.iterations;
+        if (!report.converged && before.residual < report.residual) report = before;
+        report.iterations = spent;
+        return report;
+    }
+
+    Matrices matrices_;
+    SchemeOptions options_;
+    StageMethod method_ = StageMethod::cases;
+    bool falls_back_ = false;  // from Newton's method, where it was not asked for
+    StageScratch<System> scratch_;
+    detail::StageNewton<System> newton_;
+    detail::Stage<System> stage_;
+    Vector f_;  // f_n
+    State middle_;
+    Branches branches_;
+    const Branches* frozen_ = nullptr;
+};
+
+}  // namespace ricochet

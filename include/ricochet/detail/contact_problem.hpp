@@ -1,0 +1,93 @@
+// Internal: what it declares may change without notice.
+//
+// Several contacts with friction at once, at one instant or over one step.
+//
+//     u = W p + q,     for every contact c:
+//     0 <= p_n,  u_n >= 0,  p_n u_n = 0,      |p_t| <= friction p_n,
+//     p_t = -friction p_n u_t / |u_t| where u_t is not zero
+//
+// with u the relative velocities and p the impulses (or accelerations and forces) of the
+// contacts, normal component first; W = H M^-1 H' is positive semidefinite. With one
+// tangent a contact has two components, with two tangents three.
+//
+// Such a problem may have many solutions (where W is singular the impulses of redundant
+// contacts are not determined; with much friction not even the velocities), or none.
+#pragma once
+
+#include <Eigen/Dense>
+
+#include <span>
+#include <string_view>
+
+namespace ricochet {
+
+struct ContactReport {
+    bool converged = false;
+    /// The largest defect over the contacts, of velocity or impulse, in units in which W has a
+    /// unit diagonal in each contact, as a fraction of the largest component of q in these
+    /// units. Not of p: where there is no solution p grows without bound, and every defect
+    /// would be small beside it.
+    double residual = 0;
+    int iterations = 0;  ///< of Newton's method, in all its attempts
+    int sweeps = 0;      ///< over the contacts, one by one
+    int contact = -1;    ///< the contact of the largest defect
+};
+
+struct ContactOptions {
+    double tolerance = 1e-10;  ///< of the residual
+    int max_iterations = 40;   ///< of one attempt of Newton's method
+    int max_sweeps = 4000;
+};
+
+/// Solves contact problems of up to a number of components without allocating, once its
+/// memory has grown to their size.
+///
+/// A single contact in closed form, where its solution is unique and needs no iteration. Else
+/// first by a semismooth Newton method on the projections
+///
+///     p_n = max(0, p_n - rho u_n),   p_t = P(|.| <= friction p_n)(p_t - rho u_t)
+///
+/// with a line search (P. Alart and A. Curnier, A mixed formulation for frictional contact
+/// problems prone to Newton like solution methods, Computer Methods in Applied Mechanics
+/// and Engineering 92, 1991); where that stalls by sweeps that solve one contact after
+/// another (nonsmooth Gauss-Seidel), from which Newton's method starts again every so
+/// often. The work is bounded; what is not solved then is reported as such.
+class ContactSolver {
+public:
+    explicit ContactSolver(const ContactOptions& options = {});
+
+    /// Improves `p`, the start of the iteration: the impulses of the step before, or zero.
+    ///
+    /// @throws std::invalid_argument where the sizes do not fit, `components` is neither 2 nor
+    /// 3, a coefficient of friction is negative or infinite, or something is not finite.
+    ContactReport solve(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,
+                        std::span<const double> friction, int components, Eigen::VectorXd& p);
+
+    /// The residual of `p`, as in the report.
+    [[nodiscard]] ContactReport residual(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,
+                                         std::span<const double> friction, int components,
+                                         const Eigen::VectorXd& p);
+
+private:
+    void scale(const Eigen::MatrixXd& w, const Eigen::VectorXd& q, std::span<const double> friction,
+               int components);
+    void defects(const Eigen::VectorXd& p, Eigen::VectorXd& f);
+    [[nodiscard]] double measure(const Eigen::VectorXd& p, const Eigen::VectorXd& f) const;
+    [[nodiscard]] bool newton(ContactReport& report);
+    void polish();
+    void iterate(Eigen::VectorXd& p, ContactReport& report);
+    void jacobian(const Eigen::VectorXd& p);
+    void sweep(double relaxation);
+    void solve_contact(Eigen::Index c, double relaxation);
+
+    ContactOptions options_;
+    int components_ = 2;
+    std::span<const double> friction_;
+    Eigen::VectorXd units_;  // 1 / sqrt of the mean diagonal of W in each contact
+    Eigen::MatrixXd w_;      // in these units, as are the following
+    Eigen::VectorXd q_, p_, u_, f_, direction_, trial_, f_trial_, u_trial_, best_;
+    Eigen::MatrixXd v_;
+    Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+};
+
+}  // namespace ricochet

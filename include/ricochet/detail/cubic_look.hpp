@@ -1,0 +1,79 @@
+// Internal: what it declares may change without notice.
+//
+// Does a cubic through the ends of a stretch tell what a guard does inside?
+//
+// Error control resolves the state, not the guard: where the state stands still or moves
+// slowly, steps grow without regard to a guard that depends on time. One evaluation at an
+// offset that is no simple fraction of the stretch is compared with the cubic through the
+// values and rates at its ends. A stretch where they disagree is divided until they agree
+// (detail/resolved_parts.hpp).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "ricochet/detail/guard_view.hpp"
+
+namespace ricochet::detail {
+
+/// The guard at the ends of a stretch, as a cubic over u in [0, 1].
+struct CubicLook {
+    /// Where a stretch is looked at: the golden section, which no period of a guard with
+    /// a simple ratio to the step hides behind, and a second place for cases of doubt.
+    static constexpr double inside = 0.381966;
+    static constexpr double further = 0.723607;
+    /// Where a step is looked at besides `inside` if the state stands still in it, so that
+    /// nothing has limited its length: no more than an eighth of it goes unseen.
+    static constexpr std::array<double, 8> places = {0.0902, 0.2016,  0.3069, 0.4934,
+                                                     0.6123, further, 0.8278, 0.9271};
+
+    /// A deviation of e inside stands for one of 64 e at most anywhere: that of a quartic
+    /// term is 1.1 e, that of a quintic one 1.4 e, and higher terms cancel at `inside` only
+    /// by coincidence.
+    static constexpr double most = 64;
+
+    /// Where one evaluation deviates by so little that the guard stays clear by this factor,
+    /// a second is not needed: one time in a thousand a guard that does not follow its cubic
+    /// crosses it at `inside`.
+    static constexpr double doubt = 1024;
+
+    double v0, b1, b2, v1;  ///< control points
+
+    CubicLook(double g0, double rate0, double g1, double rate1, double width) noexcept
+        : v0(g0), b1(g0 + rate0 * (width / 3)), b2(g1 - rate1 * (width / 3)), v1(g1)
+    {
+    }
+
+    /// How far a value at `u` is from the cubic.
+    [[nodiscard]] double deviation(double u, double value) const noexcept
+    {
+        const double w = 1 - u;
+        return std::fabs(value - (w * w * (w * v0 + 3 * u * b1) + u * u * (3 * w * b2 + u * v1)));
+    }
+
+    /// The lowest control point of the cubic times `sign`, but for the start, which may be
+    /// on the surface.
+    [[nodiscard]] double lowest(double sign) const noexcept
+    {
+        return std::min(std::min(sign * b1, sign * b2), sign * v1);
+    }
+
+    /// Whether a guard that deviates by `e` inside keeps the sign of its end all along, as
+    /// its start decides on its own.
+    [[nodiscard]] bool stays_clear(double e) const noexcept
+    {
+        return lowest(v1 < 0 ? -1 : 1) > most * e;
+    }
+
+    /// Whether its shape is that of the cubic, for a detector to go by.
+    [[nodiscard]] bool keeps_shape(double e) const noexcept { return most * most * e <= size(); }
+
+    /// The largest control point.
+    [[nodiscard]] double size() const noexcept
+    {
+        return std::max({std::fabs(v0), std::fabs(b1), std::fabs(b2), std::fabs(v1)});
+    }
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,488 @@
+// Internal: what it declares may change without notice.
+//
+// Declarations that are there but do not fit.
+//
+// A system is asked what it can do by concepts, and a member that answers to none of
+// them would be passed over in silence: a guard that is not const, a reset that returns
+// no mode, a function that counts its guards but is not told which. Here every such
+// member is looked at once per system, templates and overloads too, and is refused with
+// a sentence. So is a member that cannot be called at all, because it is private or its own
+// requires-clause does not hold, and one whose name is a slip away from a known one. A
+// system that means all its names as they are says so:
+//
+//     static constexpr bool unchecked_names = true
+//
+// A class that is final cannot be asked for names.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/system.hpp"
+
+namespace ricochet::detail {
+
+/// What became of a function that a system may declare.
+enum class Declaration : std::uint8_t {
+    absent,
+    fits,
+    not_const,            ///< fits no call on a const system, perhaps one on another
+    does_not_fit,         ///< parameters or result are others
+    mode_for_which,       ///< counts its guards, has modes, and takes a Mode where `which` belongs
+    which_without_count,  ///< takes `which`, but there is no guard_count
+    by_value,             ///< changes a copy
+};
+
+// --- arguments to try with ---
+
+/// Becomes whatever is asked for.
+struct Anything {
+    template <class T>
+    operator T() const;
+};
+
+/// Becomes a T and nothing that a T converts to.
+template <class T>
+struct Only {
+    template <class U> requires std::same_as<U, T>
+    operator U() const;
+};
+
+/// Every name that is looked for. Together with these a class that has the name itself
+/// has it twice, and a pointer to it is ambiguous.
+struct Names {
+    int flow, guard, guards, guard_rate, guard_rates, guard_info, guard_count, reset, rest, enabled;
+    int next_time_event, previous_time_event, time_reset, mode_count, crossing, unilateral;
+};
+
+template <class System, bool final = std::is_final_v<System>>
+struct NamesTwice : System, Names {};
+
+template <class System>
+struct NamesTwice<System, true> : Names {};
+
+/// The same of names that are likely misspellings.
+struct NearNames {
+#define RICOCHET_FUNCTION(wrong, right) int wrong;
+#define RICOCHET_VALUE(wrong, right) int wrong;
+#include "ricochet/detail/misspellings.inc"
+#undef RICOCHET_FUNCTION
+#undef RICOCHET_VALUE
+};
+
+template <class System, bool final = std::is_final_v<System>>
+struct NearNamesTwice : System, NearNames {};
+
+template <class System>
+struct NearNamesTwice<System, true> : NearNames {};
+
+/// None of those names is in use.
+template <class System>
+concept SpeltWell = requires
+{
+#define RICOCHET_FUNCTION(wrong, right) &NearNamesTwice<System>::wrong;
+#define RICOCHET_VALUE(wrong, right) &NearNamesTwice<System>::wrong;
+#include "ricochet/detail/misspellings.inc"
+#undef RICOCHET_FUNCTION
+#undef RICOCHET_VALUE
+};
+
+// What can be asked of one name: whether a class has a member of it, how it can be
+// called, whether it has an address, whether it is a number or another value.
+#define RICOCHET_NAME(name)                                                                   \
+    struct Name_##name {                                                                      \
+        template <class System>                                                               \
+        static constexpr bool named = std::is_final_v<System> ||                              \
+                                      !requires { &NamesTwice<System>::name; };               \
+        template <class System, class... Arguments>                                           \
+        static constexpr bool takes = requires(System& system, Arguments... arguments) {      \
+            system.name(static_cast<Arguments>(arguments)...);                                \
+        };                                                                                    \
+        template <class System>                                                               \
+        static constexpr bool addressable = requires { &System::name; };                      \
+        template <class System>                                                               \
+        static constexpr bool type = requires { typename System::name; };                     \
+        template <class System>                                                               \
+        static constexpr bool number = requires(const System& system) {                       \
+            requires std::is_arithmetic_v<std::remove_cvref_t<decltype(system.name)>>;        \
+        };                                                                                    \
+        template <class System>                                                               \
+        static constexpr bool value = requires(const System& system) {                        \
+            requires !std::is_function_v<std::remove_reference_t<decltype((system.name))>>;   \
+        };                                                                                    \
+    };
+RICOCHET_NAME(flow)
+RICOCHET_NAME(guard)
+RICOCHET_NAME(guards)
+RICOCHET_NAME(guard_rate)
+RICOCHET_NAME(guard_rates)
+RICOCHET_NAME(guard_info)
+RICOCHET_NAME(guard_count)
+RICOCHET_NAME(reset)
+RICOCHET_NAME(rest)
+RICOCHET_NAME(enabled)
+RICOCHET_NAME(next_time_event)
+RICOCHET_NAME(previous_time_event)
+RICOCHET_NAME(time_reset)
+RICOCHET_NAME(mode_count)
+RICOCHET_NAME(crossing)
+RICOCHET_NAME(unilateral)
+#undef RICOCHET_NAME
+
+/// Callable with these, after up to four and before up to one of whatever it likes.
+template <class Name, class System, class... Middle>
+concept CallableAround =
+    Name::template takes<System, Middle...> ||
+    Name::template takes<System, Anything, Middle...> ||
+    Name::template takes<System, Anything, Anything, Middle...> ||
+    Name::template takes<System, Anything, Anything, Anything, Middle...> ||
+    Name::template takes<System, Anything, Anything, Anything, Anything, Middle...> ||
+    Name::template takes<System, Middle..., Anything> ||
+    Name::template takes<System, Anything, Middle..., Anything> ||
+    Name::template takes<System, Anything, Anything, Middle..., Anything> ||
+    Name::template takes<System, Anything, Anything, Anything, Middle..., Anything>;
+
+/// Callable somehow. States are given as such, and last nothing but arguments of any
+/// type, so that templates of a state are not tried with something that is none.
+template <class Name, class System, class X>
+concept CallableSomehow =
+    CallableAround<Name, System, X&, X&> || CallableAround<Name, System, X&> || CallableAround<Name, System>;
+
+/// Of a function that fits no form, why.
+template <class Name, class System, class X>
+[[nodiscard]] constexpr Declaration unfit() noexcept
+{
+    if constexpr (!Name::template named<System>) {
+        return Declaration::absent;
+    } else if constexpr (Name::template number<System>) {
+        return Declaration::absent;  // a length that is called `rest`
+    } else if constexpr (CallableSomehow<Name, const System, X>) {
+        return Declaration::does_not_fit;
+    } else if constexpr (CallableSomehow<Name, System, X>) {
+        return Declaration::not_const;
+    } else {
+        return Name::template addressable<System> ? Declaration::does_not_fit : Declaration::absent;
+    }
+}
+
+/// A member of this name is there, but nothing outside can use it.
+template <class Name, class System, class X>
+[[nodiscard]] constexpr bool is_hidden() noexcept
+{
+    if constexpr (std::is_final_v<System> || !Name::template named<System> || Name::template type<System>) {
+        return false;
+    } else {
+        return !CallableSomehow<Name, System, X> && !Name::template addressable<System> &&
+               !Name::template value<System>;
+    }
+}
+
+/// Takes a Mode, and only that, in the place of a number of a guard.
+template <class Name, class System, class... Rest>
+concept TakesOnlyMode = Name::template takes<const System, Only<Mode>, Rest...> &&
+    !Name::template takes<const System, Only<std::size_t>, Rest...>;
+
+/// The other way round.
+template <class Name, class System, class... Rest>
+concept TakesOnlyWhich = !Name::template takes<const System, Only<Mode>, Rest...> &&
+    Name::template takes<const System, Only<std::size_t>, Rest...>;
+
+/// A mode and the number of a guard convert into each other, so that one of them can be
+/// taken for the other. `counted` and `moded` say in which form the function is used.
+template <class Name, class System, class X, bool counted, bool moded, class... Rest>
+[[nodiscard]] constexpr Declaration told_apart() noexcept
+{
+    if constexpr (counted) {
+        if constexpr (Moded<System, X> && TakesOnlyMode<Name, System, Rest...>) {
+            return Declaration::mode_for_which;
+        }
+    } else if constexpr (moded) {
+        if constexpr (!Moded<System, X> && TakesOnlyWhich<Name, System, Rest...>) {
+            return Declaration::which_without_count;
+        }
+    }
+    return Declaration::fits;
+}
+
+// --- one function after the other ---
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration flow_declaration() noexcept
+{
+    if constexpr (!Flowing<System, X>) {
+        return unfit<Name_flow, System, X>();
+    } else if constexpr (Name_flow::addressable<System> &&
+                         (Name_flow::takes<const System, double, const X&, X> || Name_flow::takes<const System, Mode, double, const X&, X>)) {
+        return Declaration::by_value;
+    } else {
+        return Declaration::fits;
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration guard_declaration() noexcept
+{
+    if constexpr (!GuardAlone<System, X>) {
+        return unfit<Name_guard, System, X>();
+    } else {
+        return told_apart<Name_guard, System, X, PlainGuardOf<System, X> && !ModedGuardOf<System, X>,
+                          ModedSingleGuard<System, X>, double, const X&>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration guards_declaration() noexcept
+{
+    if constexpr (GuardsTogether<System, X>) {
+        return Declaration::fits;
+    } else {
+        return unfit<Name_guards, System, X>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration guard_rate_declaration() noexcept
+{
+    if constexpr (!RateAlone<System, X>) {
+        return unfit<Name_guard_rate, System, X>();
+    } else {
+        return told_apart<Name_guard_rate, System, X, PlainRateOf<System, X, X> && !ModedRateOf<System, X, X>,
+                          ModedSingleRate<System, X, X>, double, const X&, const X&>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration guard_rates_declaration() noexcept
+{
+    if constexpr (RatesTogether<System, X>) {
+        return Declaration::fits;
+    } else {
+        return unfit<Name_guard_rates, System, X>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration guard_info_declaration() noexcept
+{
+    if constexpr (InfoOf<System> || SingleInfo<System>) {
+        return Declaration::fits;
+    } else {
+        return unfit<Name_guard_info, System, X>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration reset_declaration() noexcept
+{
+    if constexpr (!Resetting<System, X>) {
+        return unfit<Name_reset, System, X>();
+    } else if constexpr ((PlainSingleReset<System, X> && Name_reset::takes<const System, double, X>) ||
+                         (PlainResetOf<System, X> && Name_reset::takes<const System, std::size_t, double, X>) ||
+                         (ModedSingleReset<System, X> && Name_reset::takes<const System, Mode, double, X>) ||
+                         (ModedResetOf<System, X> && Name_reset::takes<const System, std::size_t, Mode, double, X>) ||
+                         (PlainSetReset<System, X> && Name_reset::takes<const System, const FiredGuards&, double, X>) ||
+                         (ModedSetReset<System, X> && Name_reset::takes<const System, const FiredGuards&, Mode, double, X>)) {
+        return Declaration::by_value;
+    } else if constexpr (ResetsTogether<System, X>) {
+        return Declaration::fits;
+    } else {
+        return told_apart<Name_reset, System, X, PlainResetOf<System, X> && !ModedResetOf<System, X>,
+                          ModedSingleReset<System, X>, double, X&>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration rest_declaration() noexcept
+{
+    if constexpr (!Resting<System, X>) {
+        return unfit<Name_rest, System, X>();
+    } else if constexpr ((PlainSingleRest<System, X> && Name_rest::takes<const System, double, X>) ||
+                         (PlainRestOf<System, X> && Name_rest::takes<const System, std::size_t, double, X>) ||
+                         (ModedSingleRest<System, X> && Name_rest::takes<const System, Mode, double, X>) ||
+                         (ModedRestOf<System, X> && Name_rest::takes<const System, std::size_t, Mode, double, X>)) {
+        return Declaration::by_value;
+    } else {
+        return told_apart<Name_rest, System, X, PlainRestOf<System, X> && !ModedRestOf<System, X>,
+                          ModedSingleRest<System, X>, double, X&>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration enabled_declaration() noexcept
+{
+    if constexpr (!Guarded<System, X>) {
+        return Declaration::absent;  // of nothing
+    } else if constexpr (!EnabledIn<System> && !EnabledAt<System, X>) {
+        if constexpr (Name_enabled::number<System>) return Declaration::does_not_fit;
+        return unfit<Name_enabled, System, X>();
+    } else if constexpr (CountsGuards<System> && EnabledAt<System, X>) {
+        return told_apart<Name_enabled, System, X, !requires(const System& system, std::size_t which, Mode mode, double t, const X& x) { system.enabled(which, mode, t, x); },
+                          false, double, const X&>();
+    } else {
+        return Declaration::fits;
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration next_time_event_declaration() noexcept
+{
+    if constexpr (Timed<System>) {
+        return Declaration::fits;
+    } else {
+        return unfit<Name_next_time_event, System, X>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration previous_time_event_declaration() noexcept
+{
+    if constexpr (TimedBackward<System>) {
+        return Declaration::fits;
+    } else {
+        return unfit<Name_previous_time_event, System, X>();
+    }
+}
+
+/// Without next_time_event it would never be called, and does not fit.
+template <class System, class X>
+[[nodiscard]] constexpr Declaration time_reset_declaration() noexcept
+{
+    if constexpr (!TimeResetting<System, X>) {
+        return unfit<Name_time_reset, System, X>();
+    } else if constexpr (!Timed<System>) {
+        return Declaration::does_not_fit;
+    } else if constexpr (Name_time_reset::takes<const System, double, X> || Name_time_reset::takes<const System, Mode, double, X>) {
+        return Declaration::by_value;
+    } else {
+        return Declaration::fits;
+    }
+}
+
+/// A value, or a function without parameters; a function with parameters of the same name
+/// is of another purpose.
+template <class Name, class System, bool fits>
+[[nodiscard]] constexpr Declaration value_declaration() noexcept
+{
+    if constexpr (fits) {
+        return Declaration::fits;
+    } else if constexpr (!Name::template named<System>) {
+        return Declaration::absent;
+    } else if constexpr (Name::template takes<const System> || Name::template value<System>) {
+        return Declaration::does_not_fit;
+    } else {
+        return Name::template takes<System> ? Declaration::not_const : Declaration::absent;
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration guard_count_declaration() noexcept
+{
+    return value_declaration<Name_guard_count, System, CountsGuards<System>>();
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration mode_count_declaration() noexcept
+{
+    constexpr bool fits = requires(const System& system) { { system.mode_count } -> std::convertible_to<std::size_t>; } ||
+        requires(const System& system) { { system.mode_count() } -> std::convertible_to<std::size_t>; };
+    return value_declaration<Name_mode_count, System, fits>();
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration crossing_declaration() noexcept
+{
+    constexpr bool fits = requires(const System& system) { { system.crossing } -> std::convertible_to<Crossing>; };
+    return value_declaration<Name_crossing, System, fits>();
+}
+
+/// A function would convert to true by its address.
+template <class System, class X>
+[[nodiscard]] constexpr Declaration unilateral_declaration() noexcept
+{
+    constexpr bool fits = requires(const System& system) {
+        { system.unilateral } -> std::convertible_to<bool>;
+        requires !std::is_function_v<std::remove_reference_t<decltype((system.unilateral))>>;
+    };
+    return value_declaration<Name_unilateral, System, fits>();
+}
+
+/// Refuses names that are likely misspellings, with a sentence for each. A data member with a
+/// name near to that of a function has its own purpose, as a nested type has.
+template <class System>
+struct NearNamesOf {
+#define RICOCHET_FUNCTION(wrong, right)                                                              \
+    static_assert(requires { &NearNamesTwice<System>::wrong; } || requires { typename System::wrong; } || \
+                      requires(const System& system) { requires !std::is_function_v<std::remove_reference_t<decltype((system.wrong))>>; }, \
+                  "ricochet: found a member `" #wrong "`, which nothing calls; rename it to `" #right "`, or declare " \
+                  "static constexpr bool unchecked_names = true if it is meant");
+#define RICOCHET_VALUE(wrong, right)                                                                 \
+    static_assert(requires { &NearNamesTwice<System>::wrong; } || requires { typename System::wrong; }, \
+                  "ricochet: found a member `" #wrong "`, which nothing reads; rename it to `" #right "`, or declare " \
+                  "static constexpr bool unchecked_names = true if it is meant");
+#include "ricochet/detail/misspellings.inc"
+#undef RICOCHET_FUNCTION
+#undef RICOCHET_VALUE
+    static constexpr bool checked = true;
+};
+
+/// Refuses what does not fit, with a sentence for each. True, so that a static_assert makes
+/// the compiler look here before it looks elsewhere.
+template <class System, class X>
+constexpr bool check_declarations()
+{
+    constexpr bool checks_names = !requires { requires System::unchecked_names; };
+    if constexpr (checks_names && !SpeltWell<System>) static_assert(NearNamesOf<System>::checked);
+#define RICOCHET_CHECK(name, expected)                                                        \
+    {                                                                                         \
+        constexpr Declaration found = name##_declaration<System, X>();                        \
+        static_assert(!checks_names || !is_hidden<Name_##name, System, X>(),                  \
+                      "ricochet: found a " #name " that cannot be used: it is private, or its " \
+                      "requires-clause does not hold; expected " expected "; or declare "      \
+                      "static constexpr bool unchecked_names = true if that is meant");        \
+        static_assert(found != Declaration::not_const,                                        \
+                      "ricochet: found a " #name " that is not const; expected " expected);   \
+        static_assert(found != Declaration::does_not_fit,                                     \
+                      "ricochet: found a " #name " whose parameters or result do not fit; "   \
+                      "expected " expected);                                                  \
+        static_assert(found != Declaration::mode_for_which,                                   \
+                      "ricochet: found a " #name " that takes a Mode where the number of the " \
+                      "guard belongs, in a system with modes and guard_count; expected "      \
+                      expected);                                                              \
+        static_assert(found != Declaration::which_without_count,                              \
+                      "ricochet: found a " #name " that takes std::size_t first, in a "       \
+                      "system without guard_count; expected guard_count, or " expected);      \
+        static_assert(found != Declaration::by_value,                                         \
+                      "ricochet: found a " #name " that changes a copy; expected " expected); \
+    }
+    RICOCHET_CHECK(guard_count, "a number of guards: guard_count, or guard_count() const, convertible to std::size_t")
+    RICOCHET_CHECK(mode_count, "a number of modes: mode_count, or mode_count() const, convertible to std::size_t")
+    RICOCHET_CHECK(crossing, "a data member of type ricochet::Crossing")
+    RICOCHET_CHECK(unilateral, "a data member of type bool")
+    RICOCHET_CHECK(flow, "void flow([Mode,] double t, const State& x, State& dxdt) const")
+    RICOCHET_CHECK(guard, "double guard([std::size_t which,] [Mode,] double t, const State& x) const, "
+                          "with `which` if and only if there is a guard_count; modes are a Mode, not an enum")
+    RICOCHET_CHECK(guards, "void guards([Mode,] double t, const State& x, std::span<double> g) const, with a guard_count")
+    RICOCHET_CHECK(guard_rate, "double guard_rate([std::size_t which,] [Mode,] double t, const State& x, const State& dxdt) const, "
+                               "with `which` if and only if there is a guard_count; modes are a Mode, not an enum")
+    RICOCHET_CHECK(guard_rates, "void guard_rates([Mode,] double t, const State& x, const State& dxdt, std::span<double> rates) const, with a guard_count")
+    RICOCHET_CHECK(guard_info, "GuardInfo guard_info(std::size_t which) const, or without `which` where there is no guard_count")
+    RICOCHET_CHECK(reset, "void reset([std::size_t which,] double t, State& x) const, or Mode reset([std::size_t which,] Mode, double t, State& x) const, "
+                          "or with const FiredGuards& for `which`; `which` if and only if there is a guard_count; and a guard")
+    RICOCHET_CHECK(rest, "void rest([std::size_t which,] double t, State& x) const, or Mode rest([std::size_t which,] Mode, double t, State& x) const, "
+                         "with `which` if and only if there is a guard_count; and a guard")
+    RICOCHET_CHECK(enabled, "bool enabled([std::size_t which,] Mode) const, or bool enabled([std::size_t which,] [Mode,] double t, const State& x) const, "
+                            "with `which` if and only if there is a guard_count")
+    RICOCHET_CHECK(next_time_event, "double next_time_event(double t) const")
+    RICOCHET_CHECK(previous_time_event, "double previous_time_event(double t) const")
+    RICOCHET_CHECK(time_reset, "void time_reset(double t, State& x) const, or Mode time_reset(Mode, double t, State& x) const, with a next_time_event")
+#undef RICOCHET_CHECK
+    if constexpr (CountsGuards<System>) {
+        static_assert(Guarded<System, X>, "ricochet: found guard_count, but neither guard(which, [mode,] t, x) nor guards([mode,] t, x, g) that fits the state");
+    }
+    return true;
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,79 @@
+// Internal: what it declares may change without notice.
+//
+// What to differentiate with respect to.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "ricochet/detail/differences.hpp"
+
+namespace ricochet {
+
+/// A parameter of a system, given as the way to a system with another value of it:
+///
+///     {.with = [](double r) { return BouncingBall({.restitution = r}); }, .nominal = 0.9}
+template <class System>
+struct Parameter {
+    std::function<System(double)> with{};                       ///< the system with that value
+    double nominal = std::numeric_limits<double>::quiet_NaN();  ///< its value in the system at hand
+    double scale = 0;  ///< over which the system bends with it; 0: |nominal|, or 1 where that is 0
+    std::vector<double> start{};  ///< derivative of the initial state by it; empty: zero
+};
+
+/// The columns of derivatives, in this order: one for each component of the initial
+/// state, where wanted, then one for each parameter.
+template <class System>
+struct Directions {
+    bool initial_state = true;
+    std::vector<Parameter<System>> parameters{};
+    Differences differences{};  ///< for what the system gives no derivative of
+};
+
+namespace detail {
+
+/// @throws std::invalid_argument naming what is wrong with parameter `index`.
+void validate_parameter(std::size_t index, bool callable, double nominal, double scale,
+                        const std::vector<double>& start, std::size_t components);
+
+/// The systems around a parameter's value, from which differences are taken.
+template <class System>
+struct Neighbours {
+    Stencil stencil;
+    double h;
+    std::vector<System> systems;
+};
+
+/// Central differences, or one-sided ones at the edge of the parameter's range, where
+/// some system is refused with std::invalid_argument.
+template <class System>
+[[nodiscard]] Neighbours<System> neighbours_of(const Parameter<System>& parameter, double step)
+{
+    const double size = std::fabs(parameter.nominal);
+    const double h = step * (parameter.scale > 0 ? parameter.scale : size > 0 ? size : 1.0);
+    const auto build = [&](const Stencil& stencil) {
+        Neighbours<System> neighbours{stencil, h, {}};
+        neighbours.systems.reserve(stencil.points);
+        for (std::size_t k = 0; k < stencil.points; ++k) {
+            neighbours.systems.push_back(parameter.with(parameter.nominal + stencil.offset[k] * h));
+        }
+        return neighbours;
+    };
+    try {
+        return build(central_stencil);
+    } catch (const std::invalid_argument&) {
+    }
+    try {
+        return build(one_sided_stencil(-1));
+    } catch (const std::invalid_argument&) {
+    }
+    return build(one_sided_stencil(1));
+}
+
+}  // namespace detail
+
+}  // namespace ricochet

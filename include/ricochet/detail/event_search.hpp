@@ -1,0 +1,700 @@
+// Internal: what it declares may change without notice.
+//
+// Which events does a step hold, and which of them comes first?
+//
+// Guards that act, by a reset or by ending the run, cut the step short at the first
+// set of events. Its members are found without regard to the order in which the
+// guards were written: every candidate is located by itself, the earliest first, and
+// whichever else has left its side by the end of the window is located too. Guards
+// that only notify are located on the step's polynomial, one at a time, up to there.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/detail/guard_bank.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/detail/resolved_parts.hpp"
+#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/newton.hpp"
+
+namespace ricochet::detail {
+
+/// How finely events are told apart, at a time.
+class EventResolution {
+public:
+    explicit EventResolution(const Options& options) noexcept
+        : absolute_(options.event_tolerance),
+          relative_(options.event_rtol),
+          window_(options.event_window)
+    {
+    }
+
+    /// Width [s] of a bracket that is narrow enough.
+    [[nodiscard]] double tolerance(double t) const noexcept
+    {
+        return absolute_ + relative_ * std::fabs(t);
+    }
+
+    /// Whether events are located to neighbouring doubles, wherever they are.
+    [[nodiscard]] bool is_finest() const noexcept { return absolute_ == 0 && relative_ == 0; }
+
+    /// Events no further apart [s] cannot be told apart.
+    [[nodiscard]] double blur(double t) const noexcept
+    {
+        return std::max(tolerance(t), 4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
+    }
+
+    /// Events no further apart [s] happen together.
+    [[nodiscard]] double window(double t) const noexcept { return std::max(blur(t), window_); }
+
+private:
+    double absolute_, relative_, window_;
+};
+
+/// An event that changes nothing, found inside a step.
+struct Note {
+    std::size_t guard;
+    EventKind kind;
+    Side side;  ///< that the guard left
+    Location where;
+};
+
+/// How a guard changes its sign at a place that a locator found.
+[[nodiscard]] inline EventKind kind_of(const Location& where) noexcept
+{
+    return where.jump ? EventKind::jump : EventKind::crossing;
+}
+
+/// A guard that acts, found to leave its side inside a step.
+struct Hit {
+    std::size_t guard = 0;
+    Side side = Side::plateau;  ///< that it leaves
+    Finding finding;
+    double guess = 0;  ///< [s] offset
+    bool located = false;
+    Location where;
+};
+
+template <class System, class X, class CurrentStep, class Detector, class Locator>
+class EventSearch {
+    static constexpr std::size_t fixed = fixed_guard_count<System, X>();
+    using Bank = GuardBank<System, X, Detector>;
+    using Probe = StepProbe<GuardView<System, X>, CurrentStep>;
+
+public:
+    EventSearch(const X& like, std::size_t guards, const EventResolution& resolution)
+        : space_(like),
+          before_(like),
+          hits_(guards),
+          members_(guards),
+          finest_(resolution.is_finest())
+    {
+    }
+
+    /// Starts on another step; the state may have changed its dimension.
+    void begin(const X& like)
+    {
+        fit(like);
+        notes_.clear();
+        parts_.clear();
+        refined_ = unresolved_ = false;
+    }
+
+    /// A state of the dimension of `like` to work with, when no search is going on.
+    [[nodiscard]] X& space(const X& like)
+    {
+        fit(like);
+        return space_.x;
+    }
+
+    [[nodiscard]] GuardList<std::size_t, fixed>& members() noexcept { return members_; }
+    [[nodiscard]] std::vector<Note>& notes() noexcept { return notes_; }
+    /// Crossings of guard i that are noted, but not yet recorded.
+    [[nodiscard]] std::uint64_t noted(std::size_t i) const noexcept
+    {
+        return static_cast<std::uint64_t>(std::count_if(
+            notes_.begin(), notes_.end(),
+            [i](const Note& note) { return note.guard == i && note.kind != EventKind::touch; }));
+    }
+    [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
+
+    /// Whether a guard was resolved by dividing the step; and whether that was not enough.
+    [[nodiscard]] bool refined() const noexcept { return refined_; }
+    [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
+
+    /// Whether the set was only found at a step after the one that held it.
+    [[nodiscard]] bool late() const noexcept { return late_; }
+
+    /// Where the set happens [s], as offset + remainder, and the state there.
+    [[nodiscard]] double at() const noexcept { return at_; }
+    [[nodiscard]] double at_remainder() const noexcept { return at_remainder_; }
+    [[nodiscard]] X& before() noexcept { return before_; }
+
+    /// The set that fires next is at the start of the step.
+    void stay_at_start() noexcept { at_ = at_remainder_ = 0; }
+    [[nodiscard]] const Location& where(std::size_t guard) noexcept
+    {
+        for (Hit& hit : hits_) {
+            if (hit.guard == guard) return hit.where;
+        }
+        return hits_[0].where;
+    }
+
+    /// Finds the first set of acting guards in the step; a time event that is due at
+    /// its end belongs to it if it lies in the window. False: none.
+    [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank, const Detector& detector,
+                                const Locator& locator, const EventResolution& resolution,
+                                bool time_event_due, std::uint64_t& calls)
+    {
+        hits_.clear();
+        members_.clear();
+        evidence_ = Detector::evidence;
+        late_ = false;
+        std::size_t suspects = 0;
+        std::size_t last = 0;
+        for (std::size_t i = 0; i < bank.size(); ++i) {
+            if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
+            ++suspects;
+            last = i;
+        }
+        if (suspects == 0) return false;
+        if (suspects == 1) {
+            if (!find_only(step, bank, last, detector, locator, resolution, calls)) return false;
+        } else if (!find_among(step, bank, detector, locator, resolution, calls)) {
+            return false;
+        }
+        settle_place(step, resolution, time_event_due);
+        return true;
+    }
+
+    /// Adds the crossings and touches of a notifying guard, up to the sample `end`.
+    void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
+                        const Detector& detector, const Locator& locator,
+                        const EventResolution& resolution, std::uint64_t& calls)
+    {
+        GuardRecord& record = bank[i];
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_, record.info.boolean ? Path::restep : Path::dense);
+        int stalled = 0;
+        for (int round = 0; round < most_rounds; ++round) {
+            Watch watch = bank.watch(i, step, end);
+            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            if (finding.touch) continue;
+            if (!finding.hit) return;
+            probe.watch(finding.side);
+            const Location where = find(probe, finding, bank, i, locator, resolution);
+            const Side side = opposite(finding.side);
+            bool counted = true;
+            if constexpr (has_predicate) {
+                counted = call_enabled_at(guard.system(), i, step.mode(), step.time(where.root),
+                                          probe.state_at(where));
+                if (!counted) ++disabled;
+            }
+            if (counted) {
+                notes_.push_back(
+                    {.guard = i, .kind = kind_of(where), .side = finding.side, .where = where});
+            }
+            const bool stays = record.from > 0 && !(where.root > record.from);
+            pass(bank, i, side, where, probe);
+            if (stays && ++stalled > 8) {  // noise around a flat root
+                record.next = side_of(end.value);
+                return;
+            }
+        }
+    }
+
+    /// Notes a located crossing of a guard that acts, but did not change anything.
+    void note(std::size_t i, Side side)
+    {
+        notes_.push_back({.guard = i, .kind = kind_of(where(i)), .side = side, .where = where(i)});
+    }
+
+    /// A guard that has crossed without consequence goes on from there.
+    void pass(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        for (const Hit& hit : hits_) {
+            if (hit.guard == i) pass(bank, i, opposite(hit.side), hit.where, probe);
+        }
+    }
+
+    /// A guard that leaves its plateau in the step, away from the side on which it is
+    /// awaited, is armed on that side from there on.
+    void end_plateau(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
+    {
+        const Side awaited = bank[i].awaited;
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        double on = 0;
+        double off = step.h();
+        while (off - on > finest_bracket(off, step.h())) {
+            const double middle = on + (off - on) / 2;
+            if (!(middle > on && middle < off)) break;
+            (side_of(probe.value(middle).value) == opposite(awaited) ? off : on) = middle;
+        }
+        bank.go_on_from(i, awaited, away(awaited, on));
+    }
+
+    /// The value and rate of a guard where the set happens.
+    [[nodiscard]] GuardSample sample_at_set(const CurrentStep& step, Bank& bank, std::size_t i,
+                                            std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        const double t = step.time(at_);
+        GuardSample sample{.s = at_, .value = guard.value(t, before_)};
+        if (!bank[i].info.boolean) {
+            step.flow(at_, before_, space_.dxdt);
+            sample.rate = guard.rate(t, before_, space_.dxdt, step.h());
+        }
+        return sample;
+    }
+
+    /// Whether a guard crosses its surface with the set: it is within rounding of it
+    /// there. `sample` has its rate.
+    [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Bank& bank, std::size_t i,
+                                        const GuardSample& sample,
+                                        const EventResolution& resolution) const
+    {
+        // The rounding of a step of length s moves an event by a few ulp(s).
+        const double rounding = 64 * std::numeric_limits<double>::epsilon() * sample.s;
+        const double reach = std::max(resolution.blur(step.time(sample.s)), rounding);
+        // A guard that acts must be located in the set; one that only notifies may be as far
+        // from its surface as the rounding of its largest values.
+        const double band = bank[i].acting ? 0 : bank.touch(i, step.h());
+        return std::fabs(sample.value) <= std::max(std::fabs(sample.rate) * reach, band);
+    }
+
+    /// Notes a crossing that happens with the set.
+    void note_at_set(Bank& bank, std::size_t i, Side side, double slope)
+    {
+        notes_.push_back({.guard = i,
+                          .kind = EventKind::crossing,
+                          .side = side,
+                          .where = {.lo = at_, .hi = at_, .root = at_, .slope = slope}});
+        bank.arm(i, opposite(side));
+    }
+
+    /// Drops what was noted beyond the offset s, and sorts the rest by time.
+    void keep_notes_until(double s)
+    {
+        std::erase_if(notes_, [&](const Note& note) { return note.where.root > s; });
+        // std::stable_sort would allocate.
+        std::sort(notes_.begin(), notes_.end(), [](const Note& a, const Note& b) {
+            return a.where.root != b.where.root ? a.where.root < b.where.root : a.guard < b.guard;
+        });
+    }
+
+    /// The state at a note on the step's polynomial.
+    [[nodiscard]] const X& state_at(const CurrentStep& step, const Note& note)
+    {
+        step.interpolate(note.where.root, space_.x);
+        return space_.x;
+    }
+
+    std::uint64_t disabled = 0;
+
+private:
+    static constexpr int most_rounds = 1'000'000;
+    static constexpr bool has_predicate =
+        requires(const System& system, std::size_t i, double t, const X& x)
+    {
+        system.enabled(i, t, x);
+    }
+    || requires(const System& system, std::size_t i, Mode mode, double t, const X& x)
+    {
+        system.enabled(i, mode, t, x);
+    }
+    || requires(const System& system, double t, const X& x) { system.enabled(t, x); };
+
+    void fit(const X& like)
+    {
+        if (space_.x.size() != like.size()) {
+            space_ = ProbeSpace<X>(like);
+            before_ = like;
+        }
+    }
+
+    /// Both ends of the stretch are on the surface: so is all of a plateau between, of
+    /// which the middle and a place that no symmetry singles out are looked at.
+    [[nodiscard]] static bool is_plateau(Probe& probe, const Watch& watch)
+    {
+        const double width = watch.end.s - watch.start.s;
+        return watch.end.value == 0 &&
+               std::fabs(watch.start.value) <= std::numeric_limits<double>::min() &&
+               probe.value(watch.start.s + 0.5 * width).value == 0 &&
+               probe.value(watch.start.s + 0.381966 * width).value == 0;
+    }
+
+    /// What the guard does next in the stretch. A touch is noted, and a clear stretch
+    /// decides on which side the guard is at its end.
+    [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i,
+                                       const Detector& detector)
+    {
+        if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
+        if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
+        if (!bank.looked()) return heed(bank, i, watch, detector.examine(probe, watch));
+        return heed(bank, i, watch, next_in_parts(probe, watch, bank, i, detector));
+    }
+
+    /// The detector's answers on the parts of a stretch, up to the first that is not clear.
+    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank,
+                                        std::size_t i, const Detector& detector)
+    {
+        parts_.resolve(probe, i, watch, bank[i].info.touch, bank.looked_everywhere());
+        refined_ = refined_ || parts_.divided();
+        unresolved_ = unresolved_ || parts_.unresolved();
+        const Watch whole = watch;
+        const GuardSample end = watch.end;
+        const bool plain =
+            finest_ && parts_.nearly_cubic() && whole.start.s == parts_.whole().start.s;
+        while (const GuardSample* node = parts_.next(watch.start.s, end.s)) {
+            watch.end = *node;
+            judge_by_its_own_size(watch, bank, i);
+            Finding finding = detector.examine(probe, watch);
+            if (plain && finding.hit && finding.hi.s == node->s && stays_beyond(whole, *node)) {
+                finding.lo = whole.start;
+                finding.hi = whole.end;
+            }
+            if (finding.hit || finding.touch) return finding;
+            watch.side = watch.side_after;
+            watch.start = *node;
+        }
+        watch.end = end;
+        if (parts_.divided()) judge_by_its_own_size(watch, bank, i);
+        return detector.examine(probe, watch);
+    }
+
+    /// What rounding leaves of a guard that decays within the step is that of the part.
+    static void judge_by_its_own_size(Watch& watch, const Bank& bank, std::size_t i) noexcept
+    {
+        const double width = watch.end.s - watch.start.s;
+        const CubicLook look(watch.start.value, watch.start.rate, watch.end.value, watch.end.rate,
+                             width);
+        if (!std::isfinite(look.size())) return;
+        watch.scale = look.size();
+        watch.touch = bank.touch_of(i, look.size());
+    }
+
+    /// Nothing more can be said of the stretch: what is left after an event at the end
+    /// of a step is that event's residue, and a plateau waits.
+    [[nodiscard]] static bool is_over(Probe& probe, const Watch& watch, GuardRecord& record)
+    {
+        const double h = probe.step().h();
+        if (record.from > 0 && watch.end.s - record.from <= 8 * finest_bracket(watch.end.s, h)) {
+            record.next = record.side;
+            return true;
+        }
+        if (is_plateau(probe, watch)) {
+            record.next = record.awaited = Side::plateau;
+            return true;
+        }
+        return false;
+    }
+
+    /// Whether a guard that has left its side by `node` does nothing else in what is left of
+    /// the stretch, which then is a bracket as good as any part of it.
+    [[nodiscard]] bool stays_beyond(const Watch& whole, GuardSample node) const noexcept
+    {
+        if constexpr (!LooksInside<Detector>) {
+            return false;
+        } else {
+            const double sign = sign_of(whole.side);
+            if (std::fabs(whole.start.value) <= whole.touch) return false;
+            if (!Detector::leaves_plainly(sign, whole.start, whole.end, whole.touch)) return false;
+            for (;;) {
+                const GuardSample* next = parts_.next(node.s, whole.end.s);
+                const GuardSample to = next ? *next : whole.end;
+                if (Detector::suspects(-sign, node.value, node.rate, to.value, to.rate,
+                                       to.s - node.s)) {
+                    return false;
+                }
+                if (!next) return true;
+                node = *next;
+            }
+        }
+    }
+
+    [[nodiscard]] Finding heed(Bank& bank, std::size_t i, const Watch& watch,
+                               const Finding& finding)
+    {
+        if (finding.touch) {
+            touched(bank, i, finding.side, finding.hi.s);
+        } else if (!finding.hit) {
+            evidence_ = std::max(evidence_, finding.evidence);
+            bank[i].next = watch.side_after;
+        }
+        return finding;
+    }
+
+    [[nodiscard]] static Location find(Probe& probe, Finding finding, const Bank& bank,
+                                       std::size_t i, const Locator& locator,
+                                       const EventResolution& resolution)
+    {
+        if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
+        probe.agree_on(finding.lo, finding.hi, bank.start(i));
+        const double tolerance = std::max(resolution.tolerance(probe.step().time(finding.hi.s)),
+                                          bank.unresolved(i, probe.step().h()));
+        if (!bank[i].info.boolean) return locator.locate(probe, finding.lo, finding.hi, tolerance);
+        // A guard of which only the sign means anything jumps by its nature.
+        Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
+        where.jump = false;
+        return where;
+    }
+
+    [[gnu::noinline]] void touched(Bank& bank, std::size_t i, Side side, double s)
+    {
+        notes_.push_back({.guard = i,
+                          .kind = EventKind::touch,
+                          .side = side,
+                          .where = {.lo = s, .hi = s, .root = s, .slope = 0}});
+        bank.go_on_from(i, side, away(side, s));
+    }
+
+    /// On the surface and heading for `side`, by next to nothing.
+    [[nodiscard]] static GuardSample away(Side side, double s) noexcept
+    {
+        const double least = sign_of(side) * std::numeric_limits<double>::min();
+        return {.s = s, .value = least, .rate = least};
+    }
+
+    void pass(Bank& bank, std::size_t i, Side side, const Location& where, Probe& probe)
+    {
+        GuardSample start = away(side, where.root);
+        if (Detector::uses_rates && !bank[i].info.boolean) {
+            start.rate =
+                std::isfinite(where.slope) ? where.slope : probe.value_and_rate(where.root).rate;
+            if (start.rate == 0) start.rate = start.value;
+        }
+        bank.go_on_from(i, side, start);
+    }
+
+    /// Adds a hit of a guard that acts, and notes its touches before it.
+    void examine(const CurrentStep& step, Bank& bank, std::size_t i, const Detector& detector,
+                 std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        for (int round = 0; round < most_rounds; ++round) {
+            Watch watch = bank.watch(i, step, bank.end(i, step.h()));
+            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            if (finding.touch) continue;
+            if (!finding.hit) return;
+            late_ = late_ || finding.late;
+            Hit hit;
+            hit.guard = i;
+            hit.side = finding.side;
+            hit.finding = finding;
+            hits_.push_back(hit);
+            return;
+        }
+    }
+
+    /// Where a cubic through the ends of the stretch would have its root.
+    [[nodiscard]] static double guess(const Finding& finding) noexcept
+    {
+        if (!std::isfinite(finding.lo.rate) || !std::isfinite(finding.hi.rate)) {
+            return finding.hi.s;
+        }
+        const double width = finding.hi.s - finding.lo.s;
+        const double u = hermite_root(finding.lo.value, finding.lo.rate * width, finding.hi.value,
+                                      finding.hi.rate * width, sign_of(finding.side));
+        const double root = finding.lo.s + u * width;
+        return std::isfinite(root) ? root : finding.hi.s;
+    }
+
+    void locate(const CurrentStep& step, Bank& bank, Hit& hit, const Locator& locator,
+                const EventResolution& resolution, std::uint64_t& calls)
+    {
+        const auto guard = bank.view(hit.guard, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        probe.watch(hit.side);
+        hit.where = find(probe, hit.finding, bank, hit.guard, locator, resolution);
+        hit.located = true;
+    }
+
+    /// The first set where guard i is the only one that deserves a look. What nearly
+    /// every event needs is inlined here: handing samples from one function to another
+    /// through memory takes as long as the location itself.
+    [[gnu::flatten]] bool find_only(const CurrentStep& step, Bank& bank, std::size_t i,
+                                    const Detector& detector, const Locator& locator,
+                                    const EventResolution& resolution, std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        const Side side = bank[i].side;
+        if (bank[i].from == 0 && !bank[i].info.boolean && counts(side, guard.crossing()) &&
+            bank.is_plain(i, step.h()) &&
+            Detector::leaves_plainly(sign_of(side), bank.start(i), bank.end(i, step.h()),
+                                     bank.touch(i, step.h()))) {
+            probe.watch(side);
+            const double tolerance =
+                std::max(resolution.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
+            const Location where =
+                locator.locate(probe, bank.start(i), bank.end(i, step.h()), tolerance);
+            keep_only(i, side, where, probe.state_at(where));
+            return true;
+        }
+        return find_only_carefully(step, bank, i, detector, locator, resolution, calls);
+    }
+
+    [[gnu::noinline]] bool find_only_carefully(const CurrentStep& step, Bank& bank, std::size_t i,
+                                               const Detector& detector, const Locator& locator,
+                                               const EventResolution& resolution,
+                                               std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        for (int round = 0; round < most_rounds; ++round) {
+            Watch watch = bank.watch(i, step, bank.end(i, step.h()));
+            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            if (finding.touch) continue;
+            if (!finding.hit) return false;
+            late_ = finding.late;
+            probe.watch(finding.side);
+            const Location where = find(probe, finding, bank, i, locator, resolution);
+            keep_only(i, finding.side, where, finding.late ? step.x0() : probe.state_at(where));
+            return true;
+        }
+        return false;
+    }
+
+    void keep_only(std::size_t i, Side side, const Location& where, const X& before)
+    {
+        at_ = where.root;
+        at_remainder_ = where.root_remainder;
+        assign(before_, before);
+        Hit& hit = hits_.add();
+        hit.guard = i;
+        hit.side = side;
+        hit.where = where;
+        members_.push_back(i);
+    }
+
+    /// The first set among several candidates.
+    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, const Detector& detector,
+                                  const Locator& locator, const EventResolution& resolution,
+                                  std::uint64_t& calls)
+    {
+        for (std::size_t i = 0; i < bank.size(); ++i) {
+            if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
+            examine(step, bank, i, detector, calls);
+        }
+        if (hits_.empty()) return false;
+        close_set(step, bank, locator, resolution, calls);
+        if (members_.size() == 1) locate_alone(step, bank, locator, resolution, calls);
+        return true;
+    }
+
+    /// Locates the only member of the set, and keeps the state at its root.
+    void locate_alone(const CurrentStep& step, Bank& bank, const Locator& locator,
+                      const EventResolution& resolution, std::uint64_t& calls)
+    {
+        Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
+            return candidate.guard == members_[0];
+        });
+        const auto guard = bank.view(hit.guard, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        probe.watch(hit.side);
+        hit.where = find(probe, hit.finding, bank, hit.guard, locator, resolution);
+        at_ = hit.where.root;
+        at_remainder_ = hit.where.root_remainder;
+        assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
+    }
+
+    /// Locates candidates until every one that has left its side by the end of the
+    /// window is located; the set is whoever lies in the window.
+    void close_set(const CurrentStep& step, Bank& bank, const Locator& locator,
+                   const EventResolution& resolution, std::uint64_t& calls)
+    {
+        double first = std::numeric_limits<double>::infinity();
+        for (Hit& hit : hits_) {
+            hit.guess = guess(hit.finding);
+            first = std::min(first, hit.guess);
+        }
+        for (Hit& hit : hits_) {
+            if (hit.guess == first) locate(step, bank, hit, locator, resolution, calls);
+        }
+        double limit = window_end(step, resolution);
+        for (bool changed = true; changed;) {
+            changed = false;
+            const double at = std::min(limit, step.h());
+            bool placed = false;
+            for (Hit& hit : hits_) {
+                if (hit.located) continue;
+                if (hit.finding.hi.s > at) {
+                    if (!placed) step.restep(at, before_);
+                    placed = true;
+                    const auto guard = bank.view(hit.guard, step.mode(), calls);
+                    if (!has_left(hit.side, guard.value(step.time(at), before_))) continue;
+                }
+                locate(step, bank, hit, locator, resolution, calls);
+                changed = true;
+            }
+            limit = window_end(step, resolution);
+        }
+        for (Hit& hit : hits_) {
+            if (hit.located && hit.where.root <= limit) members_.push_back(hit.guard);
+        }
+    }
+
+    [[nodiscard]] double window_end(const CurrentStep& step,
+                                    const EventResolution& resolution) noexcept
+    {
+        double first = std::numeric_limits<double>::infinity();
+        for (const Hit& hit : hits_) {
+            if (hit.located) first = std::min(first, hit.where.root);
+        }
+        return first + resolution.window(step.time(first));
+    }
+
+    /// The set happens at its latest root, or at the time event that it belongs to.
+    void settle_place(const CurrentStep& step, const EventResolution& resolution,
+                      bool time_event_due)
+    {
+        if (members_.size() > 1) {
+            at_ = 0;
+            for (const Hit& hit : hits_) {
+                if (hit.located &&
+                    std::find(members_.begin(), members_.end(), hit.guard) != members_.end()) {
+                    at_ = std::max(at_, hit.where.root);
+                }
+            }
+            at_remainder_ = 0;
+            if (at_ == 0) {
+                assign(before_, step.x0());
+            } else {
+                step.restep(at_, before_);
+            }
+        }
+        if (time_event_due && at_ + resolution.window(step.time(at_)) >= step.h()) {
+            at_ = step.h();
+            at_remainder_ = 0;
+            assign(before_, step.x1());
+        }
+    }
+
+    ProbeSpace<X> space_;
+    X before_;
+    GuardList<Hit, fixed> hits_;
+    GuardList<std::size_t, fixed> members_;
+    std::vector<Note> notes_;
+    bool finest_;
+    ResolvedParts parts_;
+    bool refined_ = false;
+    bool unresolved_ = false;
+    Evidence evidence_ = Detector::evidence;
+    bool late_ = false;
+    double at_ = 0;
+    double at_remainder_ = 0;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,142 @@
+// Internal: what it declares may change without notice.
+//
+// What a network sees of a state: features computed from (t, x, h) by a recipe
+// that a model names.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "ricochet/hybrid/system.hpp"
+
+namespace ricochet {
+
+enum class Recipe {
+    state,      ///< the components of x, as they are
+    ballistic,  ///< the guard's height and rate in units of what its curvature does in one step
+};
+
+/// What a model file calls it.
+[[nodiscard]] constexpr std::string_view name(Recipe recipe) noexcept
+{
+    return recipe == Recipe::state ? "state" : "ballistic";
+}
+
+/// @throws std::invalid_argument naming what was given and what is known.
+[[nodiscard]] inline Recipe recipe_named(std::string_view given)
+{
+    for (const Recipe recipe : {Recipe::state, Recipe::ballistic}) {
+        if (given == name(recipe)) return recipe;
+    }
+    throw std::invalid_argument("unknown feature recipe '" + std::string(given) +
+                                "'; known are state, ballistic");
+}
+
+/// How many features a recipe makes of a state of `state_size` components.
+[[nodiscard]] constexpr std::size_t dimension(Recipe recipe, std::size_t state_size) noexcept
+{
+    return recipe == Recipe::state ? state_size : 2;
+}
+
+/// The curvature d2g/dt2 of a guard along the flow is known in closed form.
+template <class System, class X>
+concept CurvedGuard = RatedGuard<System, X> && requires(const System& system, double t, const X& x)
+{
+    {
+        system.guard_curvature(t, x)
+        } -> std::convertible_to<double>;
+};
+
+/// Whether `recipe` can be computed for states of type X of a system.
+template <class System, class X>
+[[nodiscard]] constexpr bool offers(Recipe recipe) noexcept
+{
+    return recipe == Recipe::state || CurvedGuard<System, X>;
+}
+
+namespace detail {
+
+/// 1 / x for x >= 0, the largest double instead of infinity; NaN stays NaN.
+[[nodiscard]] inline double saturated_reciprocal(double x) noexcept
+{
+    return std::min(1 / x, std::numeric_limits<double>::max());
+}
+
+}  // namespace detail
+
+/// A signed logarithm, sign(a) L(1 + |a| / a0) with a0 = 1/2, where L is log2 at
+/// the powers of two and linear between them:
+///
+///     L(2^e m) = e + m - 1  for m in [1, 2),  within 0.0861 of log2.
+///
+/// Linear for |a| <= a0 and a logarithm further out, so that equal ratios are
+/// nearly equal distances over all decades. A network learns from it as well as
+/// from the smooth one, and it is read off the bits of 1 + |a| / a0, in a tenth of
+/// the time and alike on every machine. Odd, continuous, never decreasing; at most
+/// 1024, also for infinite a; NaN stays NaN.
+///
+/// a0 is where the boundary of a ballistic step passes, see `features`.
+[[nodiscard]] inline double slog(double a) noexcept
+{
+    constexpr double a0 = 0.5;
+    constexpr auto one = std::bit_cast<std::int64_t>(1.0);
+    const double y = std::min(std::abs(a) * (1 / a0), std::numeric_limits<double>::max());
+    const std::int64_t above_one = std::bit_cast<std::int64_t>(1 + y) - one;
+    const double if_nan = y - y;
+    return std::copysign(static_cast<double>(above_one) * 0x1p-52 + if_nan, a);
+}
+
+/// Computes the features of the step of length h from state x, where the flow is
+/// dxdt.
+///
+///     state       x[0], x[1], ...
+///     ballistic   slog(g / (|g''| h^2)),  slog(g' / (|g''| h))
+///
+/// with guard g, rate g' and curvature g'' along the flow. Where g'' is constant
+/// and negative, as for a ball in free fall, the end of the step is on or below
+/// the surface iff g / (|g''| h^2) + g' / (|g''| h) <= 1/2: one boundary for
+/// every gravity and every step.
+///
+/// @param h    [s], positive
+/// @param out  `dimension(recipe, x.size())` numbers, written. Finite for finite
+///             arguments: quotients saturate, that by a curvature of zero too.
+///             NaN for a recipe that the system does not offer.
+template <class System, class X>
+void features(Recipe recipe, const System& system, double t, const X& x, const X& dxdt, double h,
+              double* out) noexcept
+{
+    if (recipe == Recipe::state) {
+        const auto n = static_cast<std::size_t>(x.size());
+        for (std::size_t i = 0; i < n; ++i) out[i] = x[i];
+        return;
+    }
+    if constexpr (CurvedGuard<System, X>) {
+        const double per_step = detail::saturated_reciprocal(h);
+        const double per_speed =
+            detail::saturated_reciprocal(std::abs(system.guard_curvature(t, x)) * h);
+        out[0] = slog(system.guard(t, x) * per_speed * per_step);
+        out[1] = slog(system.guard_rate(t, x, dxdt) * per_speed);
+    } else {
+        out[0] = out[1] = std::numeric_limits<double>::quiet_NaN();
+    }
+}
+
+/// As above, with the flow evaluated here, into a copy of the state.
+template <class System, class X>
+void features(Recipe recipe, const System& system, double t, const X& x, double h,
+              double* out) noexcept
+{
+    X dxdt = x;
+    if (recipe != Recipe::state) system.flow(t, x, dxdt);
+    features(recipe, system, t, x, dxdt, h, out);
+}
+
+}  // namespace ricochet

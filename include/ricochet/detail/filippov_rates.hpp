@@ -1,0 +1,159 @@
+// Internal: what it declares may change without notice.
+//
+// Where fields meet at switching surfaces: what the rates of the surfaces decide.
+//
+// Region r of four has h_i > 0 for every bit i of r. At a point on some surfaces the
+// motion may depart into a region, or along one surface away from another, or stay on
+// all of them. Only the rates dh_i/dt along the fields of the adjoining regions enter.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace ricochet {
+
+/// Where a motion is with respect to a switching surface h = 0.
+enum class Place : std::uint8_t {
+    below,    ///< h < 0
+    above,    ///< h > 0
+    sliding,  ///< held on h = 0 by the fields of both sides
+};
+
+/// What happens to a motion that is on a switching surface.
+enum class Meeting : std::uint8_t {
+    crossing_up,    ///< both fields lead up
+    crossing_down,  ///< both fields lead down
+    attractive,     ///< neither field leads away: the motion slides
+    repulsive,      ///< both fields lead away: the motion is not unique
+};
+
+namespace detail {
+
+/// A place for each surface.
+using Places = std::array<Place, 2>;
+
+/// The surfaces that a point lies on: bit i for surface i.
+using Surfaces = unsigned;
+
+/// rates[i][region]: dh_i/dt along the field of the region [1/s times the unit of
+/// h_i]; zero for regions that do not meet at the point.
+using RegionRates = std::array<std::array<double, 4>, 2>;
+
+/// The region of a motion that slides nowhere.
+[[nodiscard]] constexpr unsigned region_of(const Places& places) noexcept
+{
+    return (places[0] == Place::above ? 1u : 0u) | (places[1] == Place::above ? 2u : 0u);
+}
+
+/// The rates of each surface in units of the largest of them.
+[[nodiscard]] RegionRates normalised(const RegionRates& rates) noexcept;
+
+/// How much of the fields above takes part in sliding on both surfaces.
+struct Shares {
+    double first = 0.5;
+    double second = 0.5;
+
+    /// Weights of the four regions, bilinear in the shares.
+    [[nodiscard]] constexpr std::array<double, 4> weights() const noexcept
+    {
+        return {(1 - first) * (1 - second), first * (1 - second), (1 - first) * second,
+                first * second};
+    }
+};
+
+/// The shares of a motion beside a surface, and the middle of those along it.
+[[nodiscard]] constexpr Shares middle_of(const Places& at) noexcept
+{
+    const auto share = [](Place place) {
+        return place == Place::above ? 1.0 : place == Place::below ? 0.0 : 0.5;
+    };
+    return {share(at[0]), share(at[1])};
+}
+
+/// The sum over four regions, in an order that does not depend on which surface is
+/// called the first.
+[[nodiscard]] constexpr double blend(const std::array<double, 4>& weights, double f0, double f1,
+                                     double f2, double f3) noexcept
+{
+    return (weights[0] * f0 + weights[3] * f3) + (weights[1] * f1 + weights[2] * f2);
+}
+
+/// The shares for which both surfaces keep still.
+struct SlidingShares {
+    Shares shares;
+    /// What is left until they cease to exist, because they meet with another such pair:
+    /// the discriminant of the quadratic that they solve over the sum of its terms.
+    double apart = 1;
+};
+
+/// The zero of two bilinear functions of two unknowns that is in the unit square or
+/// nearest to it. If a pair of zeros has just vanished, the place where it did. Where
+/// the rates leave a share open (a rate that all fields have in common is zero), the
+/// zero nearest to (1/2, 1/2).
+[[nodiscard]] SlidingShares sliding_shares(const RegionRates& rates) noexcept;
+
+/// Where a motion goes from the intersection of two surfaces.
+struct Continuation {
+    Places to{Place::sliding, Place::sliding};
+    double margin = 0;  ///< least rate, of normalised rates, at which it leaves a surface
+};
+
+/// Follows steep but continuous switching: across an intersection the shares change
+/// fast, at the combined rates of their surfaces,
+///
+///     a' = rate of h_0,  b' = rate of h_1,   (a, b) in the unit square,
+///
+/// (Alexander and Seidman, Houston J. Math. 24, 1998, blend the fields so.) They come to
+/// a corner and the motion departs into a region; or to the middle of an edge, and it
+/// departs along one surface; or they stay inside and it slides on both. From a balance
+/// that is not stable both shares are pushed up a little.
+[[nodiscard]] Continuation follow_shares(const RegionRates& normalised, Shares from) noexcept;
+
+/// Two directions in which the state can be moved, and the rates of both surfaces
+/// along them: normal[k][m] for surface k and direction m. Moving the state
+///
+///     x -= residue_0 d_0 + residue_1 d_1,   with rates of d_m: 1 for surface m, else 0
+///
+/// takes residues away. The combination is formed by elimination with the largest
+/// rate as pivot, a component at a time. Where a surface is one component of the
+/// state, minus a constant, that component ends exactly on the surface: quotients that
+/// are 1 and differences that are 0 in real numbers are so in floating point too.
+class Elimination {
+public:
+    Elimination(const std::array<std::array<double, 2>, 2>& normal,
+                const std::array<double, 2>& residue) noexcept;
+
+    /// One component, given that component of both directions.
+    [[nodiscard]] double operator()(double x, double first, double second) const noexcept
+    {
+        const double main = first_is_pivot_ ? first : second;
+        const double other = first_is_pivot_ ? second : first;
+        const double unit = main / pivot_;
+        const double moved = x - residue_ * unit;
+        if (pivot_rest_ == 0) return moved;
+        return moved - residue_rest_ * ((other - other_on_pivot_ * unit) / pivot_rest_);
+    }
+
+    /// Whether there is a direction at all.
+    [[nodiscard]] bool possible() const noexcept { return pivot_ != 0; }
+
+private:
+    bool first_is_pivot_;
+    double pivot_;
+    double residue_;
+    double other_on_pivot_;
+    double pivot_rest_;  ///< 0: the directions are parallel, one residue stays
+    double residue_rest_;
+};
+
+/// Names of modes by their number, and of guards.
+[[nodiscard]] const char* filippov_mode_name(std::size_t surfaces, std::uint32_t mode) noexcept;
+[[nodiscard]] const char* filippov_guard_name(std::size_t which) noexcept;
+
+/// @throws std::invalid_argument: the rate is negative or not finite.
+void check_restoring_rate(double rate);
+
+}  // namespace detail
+
+}  // namespace ricochet

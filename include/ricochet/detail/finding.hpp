@@ -1,0 +1,72 @@
+// Internal: what it declares may change without notice.
+//
+// What a detector says of a step.
+#pragma once
+
+#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/detail/guard_view.hpp"
+#include "ricochet/hybrid/statistics.hpp"
+
+namespace ricochet {
+
+/// A detector that asks for one evaluation of every guard inside each step, so that a guard
+/// that the step does not resolve is found out.
+template <class Detector>
+concept LooksInside = requires
+{
+    requires Detector::looks_inside;
+};
+
+/// The guard over a step or the rest of one: the side on which it is armed, and its
+/// samples at both ends. A detector fills in `side_after`.
+struct Watch {
+    Side side = Side::plateau;
+    GuardSample start;
+    GuardSample end;
+    double touch = 0;      ///< |g| at an extremum that counts as being on the surface, at least
+    double scale = 0;      ///< the largest |g| that the ends of the step suggest
+    bool departs = false;  ///< an event of the guard, or what enabled it, is at the start
+    Side side_after = Side::plateau;  ///< at the end, if the stretch is clear
+};
+
+/// Either "clear", with its evidence; or a stretch in which the guard leaves `side`:
+/// still on it at `lo`, across or on the surface at `hi`; or a touch at `hi`.
+struct Finding {
+    bool hit = false;
+    bool touch = false;
+    Evidence evidence = Evidence::assumed;
+    Side side = Side::plateau;
+    GuardSample lo;
+    GuardSample hi;
+    bool late = false;  ///< the guard had left its side before the step began
+
+    [[nodiscard]] static constexpr Finding clear(Evidence evidence) noexcept
+    {
+        Finding finding;
+        finding.evidence = evidence;
+        return finding;
+    }
+
+    [[nodiscard]] static constexpr Finding leaving(Side side, const GuardSample& lo,
+                                                   const GuardSample& hi) noexcept
+    {
+        Finding finding;
+        finding.hit = true;
+        finding.side = side;
+        finding.lo = lo;
+        finding.hi = hi;
+        return finding;
+    }
+
+    [[nodiscard]] static constexpr Finding touching(Side side, const GuardSample& at) noexcept
+    {
+        Finding finding;
+        finding.touch = true;
+        finding.side = side;
+        finding.lo = at;
+        finding.hi = at;
+        return finding;
+    }
+};
+
+}  // namespace ricochet

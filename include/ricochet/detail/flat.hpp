@@ -1,0 +1,112 @@
+// Internal: what it declares may change without notice.
+//
+// Roots of any order by values alone, where Newton's method converges linearly.
+//
+// Near a root of order m a guard behaves as sign(u) |u|^m, and its signed power 1/m as u:
+// a secant of those powers meets the root as it meets that of a straight line. Which power
+// straightens three samples is found by trial. The reciprocal straightens a pole, which is
+// a sign change as well.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/detail/jump.hpp"
+
+namespace ricochet::detail {
+
+/// A place in a bracket, and the power of the guard that puts it there.
+struct PowerRoot {
+    double s = 0;
+    double power = 0;  ///< 0: the samples say nothing
+};
+
+/// Root of the line through two of three samples, in the signed power of their values that
+/// comes closest to a straight line through all three.
+[[nodiscard]] inline PowerRoot power_root(std::array<GuardSample, 3> samples) noexcept
+{
+    std::sort(samples.begin(), samples.end(),
+              [](const GuardSample& a, const GuardSample& b) { return a.s < b.s; });
+    const auto [a, b, c] = samples;
+    if (!(a.s < b.s && b.s < c.s)) return {};
+    for (const GuardSample& sample : samples) {
+        // A start on the surface has no value, but the least there is.
+        const double size = std::fabs(sample.value);
+        if (!(size > std::numeric_limits<double>::min() && std::isfinite(size))) return {};
+    }
+    PowerRoot best;
+    double straightest = 0.1;  // of the larger distance, else no power fits
+    for (const double power :
+         {1.0, 1.0 / 3, 1.0 / 5, 0.5, 1.0 / 7, 1.0 / 9, 0.25, 2.0, 3.0, -1.0}) {
+        const auto straight = [power](double g) {
+            return power == 1 ? g : std::copysign(std::pow(std::fabs(g), power), g);
+        };
+        const double va = straight(a.value);
+        const double vb = straight(b.value);
+        const double vc = straight(c.value);
+        const double on_line = va + (vc - va) * ((b.s - a.s) / (c.s - a.s));
+        const double bend = std::fabs(vb - on_line) / std::fabs(vc - va);
+        if (!(bend < straightest)) continue;
+        straightest = bend;
+        // The line through the middle and the nearer of the others.
+        const bool first = std::fabs(va) < std::fabs(vc);
+        const double s = first ? a.s : c.s;
+        const double v = first ? va : vc;
+        best = {.s = b.s - vb * ((s - b.s) / (v - vb)), .power = power};
+    }
+    return best;
+}
+
+/// Narrows the bracket by values alone, to `tolerance` or neighbouring doubles; to
+/// `handed_back` already if the guard turns out to be a straight line there. Interpolation
+/// that does not shrink the bracket is given up for bisection.
+template <class Probe>
+void narrow_by_values(Probe& probe, GuardSample& lo, GuardSample& hi, GuardSample recent,
+                      double tolerance, double handed_back, double& size)
+{
+    int patience = 8;
+    int zeros = 0;
+    double past = 0;
+    double last = recent.s;
+    double width_before = hi.s - lo.s;
+    for (int count = 1;; ++count) {
+        const double width = hi.s - lo.s;
+        const double finest = probe.finest(hi.s);
+        if (width <= std::max(tolerance, finest)) return;
+        const PowerRoot guess = patience > 0 ? power_root({lo, recent, hi}) : PowerRoot{};
+        if (guess.power == 1 && width <= handed_back) return;
+        double s = lo.s + width / 2;
+        if (hi.value == 0 && zeros < 2) {  // met exactly: is it the only zero?
+            s = hi.s - (++zeros == 1 ? 1 : 64) * finest;
+        } else if (guess.power != 0) {
+            // Converged from one side: reach for the other.
+            const double toward = last >= hi.s ? -1 : 1;
+            past = std::fabs(guess.s - last) > 2 * finest ? 0 : past > 0 ? 4 * past : finest;
+            const double place = guess.s + toward * past;
+            if (place > lo.s && place < hi.s) {
+                s = place;
+            } else if (guess.s >= hi.s || guess.s <= lo.s) {
+                const double beside = std::max(past, finest);
+                s = guess.s >= hi.s ? hi.s - beside : lo.s + beside;
+                past = beside;
+            }
+        }
+        if (s <= lo.s || s >= hi.s) s = lo.s + width / 2;
+        if (s <= lo.s || s >= hi.s) return;  // neighbouring doubles
+        const GuardSample sample = probe.value(s);
+        size = larger(size, sample.value);
+        GuardSample& end = probe.has_left(sample) ? hi : lo;
+        recent = end;
+        end = sample;
+        last = s;
+        if (count % 3 == 0) {
+            if (hi.s - lo.s > width_before / 8) --patience;
+            width_before = hi.s - lo.s;
+        }
+    }
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,133 @@
+// Internal: what it declares may change without notice.
+//
+// A mechanical system with contacts, between its impacts, as a hybrid system.
+//
+//     flow    q' = v,   M(q) v' = F(t, q, v)
+//     guards  the gaps, falling
+//     reset   v⁺ = v⁻ + M⁻¹ H' p  with the impulses p of Newton's law of impact and Coulomb's
+//             of friction, for all contacts that closed at that instant at once
+//
+// The system is a value as `TimeStepping` takes it. Nothing holds a contact that stays
+// closed: there the run ends (`Outcome::zeno`), and `contact_motion.hpp` goes on.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/contact_problem.hpp"
+
+namespace ricochet {
+
+/// State x = (q, v). An impact allocates memory; flight does not. That of one contact without
+/// friction, or with one tangent, is a closed form: at restitution 1 it keeps the energy to
+/// rounding.
+template <class System>
+class FreeFlight {
+public:
+    static constexpr int N = System::coordinates;
+    static constexpr int C = System::contacts;
+    static constexpr int D = 1 + System::tangents;
+    using State = std::array<double, 2 * static_cast<std::size_t>(N)>;
+    using Vector = Eigen::Matrix<double, N, 1>;
+    using Square = Eigen::Matrix<double, N, N>;
+    using Gaps = Eigen::Matrix<double, C, 1>;
+    using Directions = Eigen::Matrix<double, C * D, N>;
+
+    static constexpr bool forward_only = true;
+    static constexpr std::size_t guard_count = static_cast<std::size_t>(C);
+
+    explicit FreeFlight(const System& system, const ContactOptions& contacts = {})
+        : system_(system), contacts_(contacts)
+    {
+    }
+
+    [[nodiscard]] static State state(const Vector& q, const Vector& v)
+    {
+        State x;
+        Eigen::Map<Vector>(x.data()) = q;
+        Eigen::Map<Vector>(x.data() + N) = v;
+        return x;
+    }
+    [[nodiscard]] static Vector position(const State& x)
+    {
+        return Eigen::Map<const Vector>(x.data());
+    }
+    [[nodiscard]] static Vector velocity(const State& x)
+    {
+        return Eigen::Map<const Vector>(x.data() + N);
+    }
+
+    [[nodiscard]] static GuardInfo guard_info(std::size_t /*contact*/) noexcept
+    {
+        GuardInfo info;
+        info.name = "gap";
+        info.unilateral = true;
+        return info;
+    }
+
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        const Vector q = position(x);
+        const Vector v = velocity(x);
+        Square mass;
+        Vector force;
+        system_.mass(q, mass);
+        system_.force(t, q, v, force);
+        Eigen::Map<Vector>(dxdt.data()) = v;
+        Eigen::Map<Vector>(dxdt.data() + N) = mass.llt().solve(force);
+    }
+
+    [[nodiscard]] double guard(std::size_t contact, double /*t*/, const State& x) const
+    {
+        Gaps gaps;
+        system_.gaps(position(x), gaps);
+        return gaps[static_cast<Eigen::Index>(contact)];
+    }
+    [[nodiscard]] double guard_rate(std::size_t contact, double /*t*/, const State& x,
+                                    const State& /*dxdt*/) const
+    {
+        Directions directions;
+        system_.directions(position(x), directions);
+        return directions.row(static_cast<Eigen::Index>(contact) * D).dot(velocity(x));
+    }
+
+    /// The impact. Where its contact problem has no solution that the solver finds, the
+    /// velocity stays as it is, and the run ends for want of a way on.
+    void reset(const FiredGuards& fired, double /*t*/, State& x) const
+    {
+        const Vector q = position(x);
+        Vector v = velocity(x);
+        Directions all;
+        system_.directions(q, all);
+        const auto count = static_cast<Eigen::Index>(fired.size());
+        Eigen::Matrix<double, Eigen::Dynamic, N> h(count * D, N);
+        std::vector<double> friction;
+        for (Eigen::Index k = 0; k < count; ++k) {
+            const auto c = static_cast<int>(fired[static_cast<std::size_t>(k)]);
+            h.middleRows(k * D, D) = all.middleRows(c * D, D);
+            friction.push_back(system_.friction(c));
+        }
+        Square mass;
+        system_.mass(q, mass);
+        const Eigen::Matrix<double, N, Eigen::Dynamic> lever = mass.llt().solve(h.transpose());
+        Eigen::VectorXd u = h * v;
+        for (Eigen::Index k = 0; k < count; ++k) {
+            const auto c = static_cast<int>(fired[static_cast<std::size_t>(k)]);
+            u[k * D] *= 1 + system_.restitution(c);
+        }
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(count * D);
+        ContactSolver solver(contacts_);
+        const Eigen::MatrixXd w = h * lever;
+        if (!w.allFinite() || !u.allFinite()) return;
+        if (!solver.solve(w, u, friction, D, p).converged) return;
+        v += lever * p;
+        Eigen::Map<Vector>(x.data() + N) = v;
+    }
+
+private:
+    System system_;
+    ContactOptions contacts_;
+};
+
+}  // namespace ricochet

@@ -1,0 +1,115 @@
+// Internal: what it declares may change without notice.
+//
+// A trained gate: what a network says of the guards of a system, for more than one step.
+//
+//     horizon gate   one output for each horizon: no guard has its event within so many seconds
+//     level gate     one output, lower bounds of one guard in its own units
+//
+// Nothing is proved by it. How it is used, and how often it was wrong, see `Calibrated` and
+// `Calibration`.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "ricochet/detail/gate_features.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/classifier.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet {
+
+namespace detail {
+
+/// @throws std::invalid_argument: the model is for another system.
+void check_gate_system(const Model& model, std::string_view name);
+/// @throws std::invalid_argument: the model was trained for another value.
+void check_gate_parameter(const Model& model, std::string_view name, double trained,
+                          std::optional<double> value);
+/// @throws std::invalid_argument: the model takes other features, or tells other modes apart.
+void check_gate_layout(const Model& model, const GateRecipe& recipe, std::size_t features,
+                       std::size_t modes);
+/// @throws std::invalid_argument: the model has no box, or more features than a gate may.
+void check_certified(const Model& model);
+
+/// Name and parameters, where the system declares them.
+template <class System>
+void check_gate_model(const Model& model, const System& system)
+{
+    if constexpr (requires { std::string_view(system.name); }) {
+        check_gate_system(model, system.name);
+    }
+    if constexpr (requires { system.parameter(std::string_view()); }) {
+        for (const auto& [name, trained] : model.parameters) {
+            check_gate_parameter(model, name, trained, system.parameter(std::string_view(name)));
+        }
+    }
+}
+
+}  // namespace detail
+
+namespace gates {
+
+/// Immutable, shared by threads and copies; asking it allocates nothing.
+class Gate {
+public:
+    /// @throws std::invalid_argument if the model is no gate, its levels do not fit its outputs or
+    /// do not rise, it has no domain, or its recipe is unknown.
+    explicit Gate(Model model);
+
+    [[nodiscard]] const Model& model() const noexcept { return classifier_->model(); }
+    [[nodiscard]] const GateRecipe& recipe() const noexcept { return recipe_; }
+    [[nodiscard]] bool is_horizon() const noexcept { return horizon_; }
+
+    /// The largest value that is cleared: a horizon [s], all shorter ones being cleared as well,
+    /// or a level. 0: none. NaN is never cleared.
+    [[nodiscard]] double cleared(const double* features) const noexcept;
+
+    [[nodiscard]] bool in_domain(const double* features) const noexcept
+    {
+        return classifier_->in_domain(features);
+    }
+
+    /// What the gate says of a state.
+    struct Answer {
+        double cleared = 0;
+        bool outside = false;  ///< of the domain; nothing is cleared
+    };
+
+    template <class System, class X>
+    [[nodiscard]] Answer ask(const System& system, Mode mode, double t, const X& x) const
+    {
+        std::array<double, GateRecipe::most> features;
+        gate_features(recipe_, system, mode, t, x, features.data());
+        if (!in_domain(features.data())) return {.outside = true};
+        return {.cleared = cleared(features.data())};
+    }
+
+    /// Whether the gate can be asked about `system`, in steps between `smallest` and `largest`
+    /// [s], at least in some of them. A system without a name is taken as the right one;
+    /// parameters are compared where it declares them.
+    ///
+    /// @throws std::invalid_argument naming what the model is for and what it would have to be.
+    template <class System, class X>
+    void check(const System& system, const X& x, double smallest, double largest) const
+    {
+        detail::check_gate_model(model(), system);
+        detail::check_gate_layout(model(), recipe_, feature_count(recipe_, system, x),
+                                  mode_count_of(system));
+        check_step(smallest, largest);
+    }
+
+private:
+    void check_step(double smallest, double largest) const;
+
+    std::shared_ptr<const Classifier> classifier_;
+    GateRecipe recipe_;
+    bool horizon_;
+};
+
+}  // namespace gates
+
+}  // namespace ricochet

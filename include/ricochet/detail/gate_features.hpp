@@ -1,0 +1,131 @@
+// Internal: what it declares may change without notice.
+//
+// What a gate sees of a state, by a recipe that its model names.
+//
+//     state            x
+//     state-rate       x, x'
+//     state-phase(w)   x, sin(w t), cos(w t): for a force of the frequency w [rad/s]
+//     angles           sin and cos of the first half of x, then the other half
+//     chain            the same of the sums q_1 + ... + q_i of the first half: the directions
+//                      of the links of a chain whose joints turn relative to each other
+//     own              whatever the system computes: features(t, x, out), feature_count
+//
+// With " mode(n)" behind it, n further features say which of n modes it is: 1 for the mode, 0
+// for the others.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/hybrid/system.hpp"
+
+namespace ricochet {
+
+/// How features are computed from (mode, t, x).
+struct GateRecipe {
+    enum class Kind { state, state_rate, state_phase, angles, chain, own };
+
+    static constexpr std::size_t most = 64;  ///< features
+
+    Kind kind = Kind::state;
+    double frequency = 0;   ///< [rad/s] of `state_phase`
+    std::size_t modes = 0;  ///< 0: the mode is no feature
+
+    friend bool operator==(const GateRecipe&, const GateRecipe&) = default;
+};
+
+/// As a model spells it, e.g. "state-phase(0.7) mode(3)".
+[[nodiscard]] std::string to_string(const GateRecipe& recipe);
+
+/// @throws std::invalid_argument naming what was given and what is known.
+[[nodiscard]] GateRecipe gate_recipe(std::string_view spelled);
+
+/// A system with features of its own.
+template <class System, class X>
+concept FeaturesOwned = requires(const System& system, double t, const X& x, double* out) {
+    { system.feature_count } -> std::convertible_to<std::size_t>;
+    system.features(t, x, out);
+};
+
+/// How many features a recipe makes of a state; 0 where it cannot.
+template <class System, class X>
+[[nodiscard]] std::size_t feature_count(const GateRecipe& recipe,
+                                        [[maybe_unused]] const System& system, const X& x)
+{
+    const auto n = static_cast<std::size_t>(x.size());
+    switch (recipe.kind) {
+        case GateRecipe::Kind::state: return n + recipe.modes;
+        case GateRecipe::Kind::state_rate: return 2 * n + recipe.modes;
+        case GateRecipe::Kind::state_phase: return n + 2 + recipe.modes;
+        case GateRecipe::Kind::angles:
+        case GateRecipe::Kind::chain: return n % 2 == 0 ? n + n / 2 + recipe.modes : 0;
+        case GateRecipe::Kind::own:
+            if constexpr (FeaturesOwned<System, X>) {
+                return static_cast<std::size_t>(system.feature_count) + recipe.modes;
+            }
+            return 0;
+    }
+    return 0;
+}
+
+namespace detail {
+
+template <class System, class X>
+void flow_features(const System& system, Mode mode, double t, const X& x, double* out)
+{
+    X rate = x;
+    call_flow(system, mode, t, x, rate);
+    for_each_component(x, [&](auto i) { out[i] = rate[i]; });
+}
+
+template <class X>
+void angle_features(const X& x, bool chained, double* out) noexcept
+{
+    const auto n = static_cast<std::size_t>(x.size()) / 2;
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double angle = x[static_cast<decltype(x.size())>(i)];
+        sum = chained ? sum + angle : angle;
+        out[2 * i] = std::sin(sum);
+        out[2 * i + 1] = std::cos(sum);
+        out[2 * n + i] = x[static_cast<decltype(x.size())>(n + i)];
+    }
+}
+
+}  // namespace detail
+
+/// Writes `feature_count` numbers.
+template <class System, class X>
+void gate_features(const GateRecipe& recipe, const System& system, Mode mode, double t, const X& x,
+                   double* out)
+{
+    const auto n = static_cast<std::size_t>(x.size());
+    const auto copy = [&] { detail::for_each_component(x, [&](auto i) { out[i] = x[i]; }); };
+    switch (recipe.kind) {
+        case GateRecipe::Kind::state: copy(); break;
+        case GateRecipe::Kind::state_rate:
+            copy();
+            detail::flow_features(system, mode, t, x, out + n);
+            break;
+        case GateRecipe::Kind::state_phase:
+            copy();
+            out[n] = std::sin(recipe.frequency * t);
+            out[n + 1] = std::cos(recipe.frequency * t);
+            break;
+        case GateRecipe::Kind::angles: detail::angle_features(x, false, out); break;
+        case GateRecipe::Kind::chain: detail::angle_features(x, true, out); break;
+        case GateRecipe::Kind::own:
+            if constexpr (FeaturesOwned<System, X>) system.features(t, x, out);
+            break;
+    }
+    if (recipe.modes == 0) return;
+    double* const flags = out + feature_count(recipe, system, x) - recipe.modes;
+    for (std::size_t m = 0; m < recipe.modes; ++m) flags[m] = m == mode ? 1 : 0;
+}
+
+}  // namespace ricochet

@@ -1,0 +1,197 @@
+// Internal: what it declares may change without notice.
+//
+// One guard of a system as detectors and locators use it: evaluations are counted,
+// and the rate is there whether or not the system has one in closed form.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/hybrid/system.hpp"
+
+namespace ricochet {
+
+/// The guard at one time inside a step. The rate is NaN where nobody asked for it.
+struct GuardSample {
+    double s = 0;      ///< [s] offset from the start of the step
+    double value = 0;  ///< g
+    double rate = std::numeric_limits<double>::quiet_NaN();  ///< dg/ds along the flow
+};
+
+namespace detail {
+
+/// The index in the type that x counts with.
+template <class Index, class X>
+[[nodiscard]] constexpr auto own(Index i, const X& x) noexcept
+{
+    return static_cast<decltype(x.size())>(i);
+}
+
+/// x + factor * direction, a component at a time.
+template <class X, class D>
+class MovedView {
+public:
+    MovedView(const X& x, double factor, const D& direction) noexcept
+        : x_(&x), direction_(&direction), factor_(factor)
+    {
+    }
+    template <class Index>
+    [[nodiscard]] double operator[](Index i) const noexcept
+    {
+        return (*x_)[own(i, *x_)] + factor_ * (*direction_)[own(i, *direction_)];
+    }
+    [[nodiscard]] auto size() const noexcept { return x_->size(); }
+
+private:
+    const X* x_;
+    const D* direction_;
+    double factor_;
+};
+
+/// -x, a component at a time.
+template <class X>
+class NegatedView {
+public:
+    explicit NegatedView(const X& x) noexcept : x_(&x) {}
+    template <class Index>
+    [[nodiscard]] double operator[](Index i) const noexcept
+    {
+        return -(*x_)[own(i, *x_)];
+    }
+    [[nodiscard]] auto size() const noexcept { return x_->size(); }
+
+private:
+    const X* x_;
+};
+
+template <class X>
+[[nodiscard]] X negated(X x)
+{
+    for_each_component(x, [&](auto i) { x[i] = -x[i]; });
+    return x;
+}
+
+}  // namespace detail
+
+/// One guard in one mode. Rates are with respect to the offset inside a step, so in
+/// a run backward in time they are the negative of dg/dt.
+template <class System, class X>
+class GuardView {
+public:
+    using State = X;
+
+    /// Guard of a system that has one. Keeps references to both; `calls` is
+    /// incremented at every evaluation.
+    GuardView(const System& system, std::uint64_t& calls) noexcept
+        : GuardView(system, calls, 0, 0, guard_info_of<X>(system, 0).crossing, false)
+    {
+    }
+
+    GuardView(const System& system, std::uint64_t& calls, std::size_t which, Mode mode,
+              Crossing crossing, bool backward) noexcept
+        : system_(&system),
+          calls_(&calls),
+          which_(which),
+          mode_(mode),
+          crossing_(crossing),
+          backward_(backward)
+    {
+    }
+
+    /// Whether the guard can be had from a view of the state.
+    template <class V>
+    static constexpr bool sees = detail::GuardAlone<System, V>;
+
+    /// Whether its rate can be had from views of the state and of its rate.
+    template <class V, class D>
+    static constexpr bool sees_rate =
+        detail::RateAlone<System, V, D>&& detail::RateAlone<System, V, detail::NegatedView<D>>;
+
+    /// Whether the system gives its rate; else it is a difference quotient.
+    static constexpr bool is_rated = RatedGuard<System, X>;
+
+    [[nodiscard]] const System& system() const noexcept { return *system_; }
+    [[nodiscard]] std::size_t which() const noexcept { return which_; }
+    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] Crossing crossing() const noexcept { return crossing_; }
+
+    /// Counts an evaluation that somebody else makes.
+    void count() const noexcept { ++*calls_; }
+
+    /// g(t, x); x is a state, or a view of one where the guard `sees` it.
+    template <class V>
+    [[nodiscard]] double value(double t, const V& x) const
+    {
+        count();
+        if constexpr (sees<V>) {
+            return detail::call_guard(*system_, which_, mode_, t, x);
+        } else {
+            return one_of_all(t, x);
+        }
+    }
+
+    /// The rate at (t, x) with x' = dxdt: `guard_rate` of the system, else the central
+    /// difference along the flow over 1e-5 of the time `scale` [s] to either side:
+    /// its truncation error is 1e-10 scale^2 / 6 times the third derivative, and it
+    /// magnifies rounding in g by 1e5 / scale.
+    template <class V, class D>
+    [[nodiscard]] double rate(double t, const V& x, const D& dxdt, double scale) const
+    {
+        if constexpr (detail::RateAlone<System, V, D>) {
+            if (!backward_) return detail::call_rate(*system_, which_, mode_, t, x, dxdt);
+            if constexpr (sees_rate<V, D>) {
+                const detail::NegatedView<D> forward(dxdt);
+                return -detail::call_rate(*system_, which_, mode_, t, x, forward);
+            } else {
+                return -detail::call_rate(*system_, which_, mode_, t, x, detail::negated(dxdt));
+            }
+        } else {
+            const double delta = 1e-5 * scale;
+            return (moved(t, x, dxdt, delta) - moved(t, x, dxdt, -delta)) / (2 * delta);
+        }
+    }
+
+private:
+    /// The guard a time `s` later along a straight line.
+    template <class V, class D>
+    [[nodiscard]] double moved(double t, const V& x, const D& dxdt, double s) const
+    {
+        const double later = backward_ ? t - s : t + s;
+        using Moved = detail::MovedView<V, D>;
+        if constexpr (sees<Moved>) {
+            return value(later, Moved(x, s, dxdt));
+        } else {
+            V there = x;
+            detail::move(there, x, s, dxdt);
+            return value(later, there);
+        }
+    }
+
+    /// From a system whose guards come only all together.
+    template <class V>
+    [[nodiscard]] double one_of_all(double t, const V& x) const
+    {
+        constexpr std::size_t fixed = fixed_guard_count<System, X>();
+        constexpr std::size_t on_stack = fixed == counted_at_run_time ? 256 : fixed;
+        const std::size_t count = guard_count_of<X>(*system_);
+        std::array<double, on_stack> few;
+        std::vector<double> many(count > on_stack ? count : 0);
+        const std::span<double> all(count > on_stack ? many.data() : few.data(), count);
+        detail::call_guards(*system_, mode_, t, x, all);
+        return all[which_];
+    }
+
+    const System* system_;
+    std::uint64_t* calls_;
+    std::size_t which_;
+    Mode mode_;
+    Crossing crossing_;
+    bool backward_;
+};
+
+}  // namespace ricochet

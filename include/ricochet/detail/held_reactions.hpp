@@ -1,0 +1,170 @@
+// Internal: what it declares may change without notice.
+//
+// Whether a step followed the reactions that hold.
+//
+// While everything is held the state stands still, error control takes any step, and a reaction
+// that moves with its load may pass its bound and come back unseen. Hence after each step in
+// which a reaction is held its room to either bound is evaluated inside the step, and compared
+// with the cubic through the values and rates of the ends, on which the exit is searched for.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "ricochet/detail/branch_modes.hpp"
+
+namespace ricochet::detail {
+
+/// Remembers the end of the last step, which is the start of the next one.
+template <Branching System>
+class HeldReactions {
+    using Modes = BranchModes<System>;
+    using Vector = StateOf<System>;
+    using Rooms = typename Modes::Rooms;
+
+public:
+    /// The fraction of the step from (t0, w0) to (t1, w1) in `mode` that would follow the
+    /// reactions; 1 if the step does.
+    [[nodiscard]] double fraction(const Modes& modes, Mode mode, double t0, const Vector& w0,
+                                  double t1, const Vector& w1, double event_tolerance)
+    {
+        starts_beyond_ = false;
+        if (!(t1 > t0)) return 1;
+        const double h = t1 - t0;
+        const bool goes_on = end_.t == t0 && end_.mode == mode;
+        if (!goes_on) evaluate(modes, mode, t0, w0, h, end_);
+        start_ = end_;
+        evaluate(modes, mode, t1, w1, -h, end_);
+        // A step that is longer than the one before could agree by accident.
+        const double growth = goes_on ? h / length_ : std::numeric_limits<double>::infinity();
+        if (growth > 2) {
+            // The deviation grows with the fourth power of the step.
+            const double foreseen = goes_on ? worst_ * (growth * growth) * (growth * growth) : 0;
+            worst_ = foreseen > 8 ? foreseen : 0;
+            compare(modes, mode, t0, w0, h, w1, 0.13711, event_tolerance);
+            compare(modes, mode, t0, w0, h, w1, 0.78934, event_tolerance);
+        } else {
+            worst_ = 0;
+        }
+        compare(modes, mode, t0, w0, h, w1, 0.38196601125010515, event_tolerance);
+        length_ = h;
+        return worst_ <= 1 ? 1 : std::clamp(0.8 / std::sqrt(std::sqrt(worst_)), 0.1, 0.5);
+    }
+
+    /// Whether a step of twice the last one's length would have done.
+    [[nodiscard]] bool is_easy() const noexcept { return worst_ <= 1.0 / 32; }
+
+    /// Whether a reaction was beyond its bound at the start of the last step already.
+    [[nodiscard]] bool starts_beyond() const noexcept { return starts_beyond_; }
+
+    void forget() noexcept
+    {
+        end_.t = std::numeric_limits<double>::quiet_NaN();
+        worst_ = 0;
+    }
+
+private:
+    struct End {
+        double t = std::numeric_limits<double>::quiet_NaN();
+        Mode mode = 0;
+        Vector rate;
+        Rooms rooms{}, change{};
+    };
+
+    /// `ahead`: the step, with its sign as seen from there.
+    void evaluate(const Modes& modes, Mode mode, double t, const Vector& w, double ahead, End& end)
+    {
+        end.t = t;
+        end.mode = mode;
+        modes.rooms(mode, t, w, end.rate, reaction_, end.rooms);
+        const double step = nudge * ahead;
+        inside_ = w + step * end.rate;
+        modes.rooms(mode, t + step, inside_, rate_, reaction_, end.change);
+        for (std::size_t k = 0; k < end.rooms.size(); ++k) {
+            const double change = (end.change[k] - end.rooms[k]) / step;
+            end.change[k] = std::isfinite(change) ? change : 0;
+        }
+    }
+
+    /// The rooms at s within the step against their cubics.
+    void compare(const Modes& modes, Mode mode, double t0, const Vector& w0, double h,
+                 const Vector& w1, double s, double event_tolerance)
+    {
+        const auto [a, b, c, d] = hermite(s);
+        inside_ = a * w0 + b * w1 + h * (c * start_.rate + d * end_.rate);
+        modes.rooms(mode, t0 + s * h, inside_, rate_, reaction_, rooms_);
+        double rounding = -1;
+        for (std::size_t k = 0; k < rooms_.size(); ++k) {
+            if (std::isinf(rooms_[k])) continue;
+            const std::array<double, 4> ends{start_.rooms[k], end_.rooms[k], h * start_.change[k],
+                                             h * end_.change[k]};
+            const double size = std::max(std::abs(ends[0]), std::abs(ends[1]));
+            const double off = std::abs(rooms_[k] - value(ends, s));
+            const double least = std::min({ends[0], ends[1], rooms_[k]});
+            if (off <= 1e-9 * size && least > 0) continue;
+            if (rounding < 0) {
+                // A difference over `nudge` of the step magnifies rounding by so much.
+                rounding = modes.rounding_of_held(mode, rate_, reaction_) * (0.01 / nudge);
+            }
+            const double negligible = std::max(1e-9 * size, rounding);
+            // An exit that is an event is as far beyond the bound as the event's tolerance.
+            const double beyond = 1e-6 * size + rounding;
+            const double at_end = 2 * event_tolerance * std::abs(end_.change[k]) + beyond;
+            starts_beyond_ = starts_beyond_ || ends[0] < -beyond;
+            if (rooms_[k] < -negligible || ends[1] < -at_end) {
+                worst_ = std::max(worst_, missed);
+            } else if (off > negligible) {
+                worst_ = std::max(worst_, doubt(ends, off / bump(s), negligible));
+            }
+        }
+    }
+
+    [[nodiscard]] static constexpr double bump(double s) noexcept
+    {
+        return s * s * (1 - s) * (1 - s);
+    }
+
+    [[nodiscard]] static constexpr std::array<double, 4> hermite(double s) noexcept
+    {
+        const double u = 1 - s;
+        return {u * u * (1 + 2 * s), s * s * (3 - 2 * s), s * u * u, -s * s * u};
+    }
+    [[nodiscard]] static constexpr double value(const std::array<double, 4>& ends,
+                                                double s) noexcept
+    {
+        const auto [a, b, c, d] = hermite(s);
+        return a * ends[0] + b * ends[1] + c * ends[2] + d * ends[3];
+    }
+
+    /// The cubic's error is `off` s^2 (1 - s)^2; four times of it, as a fraction of the room that
+    /// the cubic leaves.
+    [[nodiscard]] static double doubt(const std::array<double, 4>& ends, double off,
+                                      double negligible) noexcept
+    {
+        // s (1 - s)^2 is at most 4/27.
+        const double least =
+            std::min(ends[0], ends[1]) - (std::abs(ends[2]) + std::abs(ends[3])) * (4.0 / 27);
+        if (off * 8 <= least) return 0.25 * off / least;
+        double worst = 0;
+        for (int i = 1; i < 8; ++i) {
+            const double s = i / 8.0;
+            worst = std::max(worst, 4 * off * bump(s) / std::max(value(ends, s), negligible));
+        }
+        return worst;
+    }
+
+    static constexpr double nudge = 1e-5;  // of a step, for rates
+    static constexpr double missed = 256;
+
+    End start_, end_;
+    Vector inside_, rate_;
+    typename Modes::Reaction reaction_;
+    Rooms rooms_{};
+    double worst_ = 0;
+    double length_ = 0;
+    bool starts_beyond_ = false;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,211 @@
+// Internal: what it declares may change without notice.
+//
+// One implicit stage with a reaction.
+//
+//     c A w = kappa f(t, w) + sigma G reaction + q,     law(E w - s(t), reaction)
+//
+// is what every implicit method asks for, in its stages. Its residual is a fraction of
+// the forces in play: the largest defect of the equation, and of the law
+//
+//     sigma G (reaction - P(reaction - rho y)),   rho_i = 1 / W_ii,  W = sigma E S^-1 G,
+//
+// over the largest term of the equation, with S = c A - kappa df/dw. It is free of units
+// and does not depend on anything that a solver carries along.
+#pragma once
+
+#include <limits>
+
+#include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/detail/linear_cases.hpp"
+
+namespace ricochet {
+
+namespace detail {
+
+template <class System>
+struct Stage {
+    double t = 0;
+    double c = 1;
+    double kappa = 1;
+    double sigma = 1;
+    StateOf<System> q;
+};
+
+}  // namespace detail
+
+/// What became of a stage.
+struct StageReport {
+    bool converged = false;
+    double residual = std::numeric_limits<double>::infinity();  ///< see above
+    int iterations = 0;
+    int set = -1;  ///< the component of the reaction whose law failed; -1: the equation
+};
+
+enum class StageMethod {
+    automatic,    ///< cases for boxes of up to four reactions, else Newton's method
+    cases,        ///< Newton's method on f alone, the inequality solved exactly by cases
+    newton,       ///< semismooth Newton on equation and law together
+    fixed_point,  ///< projected fixed point with an adapted step, as the source's
+};
+
+struct StageOptions {
+    StageMethod method = StageMethod::automatic;
+    double tolerance = 1e-12;  ///< of the residual
+    int max_iterations = 50;   ///< of the fixed point: a hundred times as many
+    bool line_search = true;   ///< of `newton`
+};
+
+/// S^-1 and what follows from it.
+template <class System>
+struct StageFactor {
+    static constexpr int N = state_size<System>;
+    static constexpr bool direct = N != Eigen::Dynamic && N <= 4;
+    using Matrices = InclusionMatrices<System>;
+    using Square = SquareOf<System>;
+
+    double c = 0, kappa = 0, sigma = 0;
+    bool valid = false;
+    Square jacobian;
+    Square inverse;                        // of S, if direct
+    Eigen::PartialPivLU<Square> lu;        // of S, if not
+    typename Matrices::Action influence;   // sigma S^-1 G
+    typename Matrices::Delassus delassus;  // E influence
+
+    void compute(const Matrices& m, const detail::Stage<System>& stage)
+    {
+        c = stage.c, kappa = stage.kappa, sigma = stage.sigma;
+        if constexpr (direct) {
+            inverse = (c * m.mass() - kappa * jacobian).inverse();
+            influence.noalias() = inverse * m.act();
+        } else {
+            lu.compute(c * m.mass() - kappa * jacobian);
+            influence = lu.solve(m.act());
+        }
+        influence *= sigma;
+        delassus.noalias() = m.observe() * influence;
+        valid = true;
+    }
+
+    void solve(const StateOf<System>& right, StateOf<System>& w) const
+    {
+        if constexpr (direct) {
+            w.noalias() = inverse * right;
+        } else {
+            w = lu.solve(right);
+        }
+    }
+};
+
+/// What the stage solvers need to know of one another's work, and their memory.
+template <class System>
+struct StageScratch {
+    using Matrices = InclusionMatrices<System>;
+    using State = StateOf<System>;
+    using Reaction = ReactionOf<System>;
+    static constexpr int N = state_size<System>;
+    static constexpr int M = reaction_size<System>;
+
+    explicit StageScratch(const Matrices& matrices) : m(matrices)
+    {
+        const Eigen::Index n = matrices.size();
+        const Eigen::Index k = matrices.reactions();
+        for (State* v : {&f, &f_trial, &w0, &trial, &defect, &base}) v->setZero(n);
+        for (Reaction* v : {&s, &y, &reaction, &argument, &image, &rho}) v->setZero(k);
+        for (auto& factor : factors) factor.jacobian.setZero(n, n);
+        inequality.w.setZero(k, k);
+        for (Reaction* v : {&inequality.y0, &inequality.lower, &inequality.upper}) v->setZero(k);
+    }
+
+    const Matrices& m;
+    State f, f_trial, w0, trial, defect, base;
+    Reaction s, y, reaction, argument, image, rho;
+    LinearInequality<M> inequality;
+    // Steps of constant length have two stages, and halved ones as many again.
+    std::array<StageFactor<System>, detail::is_affine<System>() ? 4 : 1> factors;
+    std::size_t next_factor = 0;
+
+    /// The factor of S at (t, w): an earlier one where f is affine and the weights are
+    /// the same.
+    StageFactor<System>& factor(const detail::Stage<System>& stage, const State& w)
+    {
+        if constexpr (detail::is_affine<System>()) {
+            for (auto& known : factors) {
+                if (known.valid && known.c == stage.c && known.kappa == stage.kappa &&
+                    known.sigma == stage.sigma) {
+                    return known;
+                }
+            }
+        }
+        auto& fresh = factors[next_factor];
+        next_factor = (next_factor + 1) % factors.size();
+        m.jacobian(stage.t, w, fresh.jacobian);
+        fresh.compute(m, stage);
+        return fresh;
+    }
+
+    /// rho, from the diagonal of W. Sets that are no boxes need one value for all.
+    void set_rho(const StageFactor<System>& by)
+    {
+        double sum = 0;
+        for (Eigen::Index i = 0; i < rho.size(); ++i) {
+            const double w = std::abs(by.delassus(i, i));
+            rho[i] = w > 0 ? 1 / w : 1;
+            sum += w;
+        }
+        if constexpr (!BoxSet<SetOf<System>>) {
+            rho.setConstant(sum > 0 ? static_cast<double>(rho.size()) / sum : 1);
+        }
+    }
+
+    /// image = reaction - P(reaction - rho y), or for a set of states
+    /// rho (P(y - reaction / rho) - y) with the sign of a reaction.
+    template <class Set>
+    void law_defect(const Set& set, const Reaction& r, const Reaction& y_at)
+    {
+        if constexpr (detail::confines<System>() == Confines::reaction) {
+            argument = r - rho.cwiseProduct(y_at);
+            set.project(detail::span_of(argument), detail::span_of(image));
+            image = r - image;
+        } else {
+            argument = y_at - r.cwiseQuotient(rho);
+            set.project(detail::span_of(argument), detail::span_of(image));
+            image = rho.cwiseProduct(image - y_at);
+        }
+    }
+
+    /// The residual of (w, r), with f = f(t, w) given; tells which law is worst.
+    template <class Set>
+    StageReport residual(const detail::Stage<System>& stage, const Set& set, const State& w,
+                         const State& f_at, const Reaction& r)
+    {
+        base.noalias() = stage.c * (m.mass() * w);
+        defect = base - stage.kappa * f_at - stage.q;
+        double scale = std::max({base.template lpNorm<Eigen::Infinity>(),
+                                 stage.kappa * f_at.template lpNorm<Eigen::Infinity>(),
+                                 stage.q.template lpNorm<Eigen::Infinity>()});
+        base.noalias() = stage.sigma * (m.act() * r);
+        defect -= base;
+        scale = std::max(scale, base.template lpNorm<Eigen::Infinity>());
+        StageReport report{.residual = defect.template lpNorm<Eigen::Infinity>()};
+
+        y.noalias() = m.observe() * w;
+        y -= s;
+        law_defect(set, r, y);
+        for (Eigen::Index i = 0; i < image.size(); ++i) {
+            const double force = stage.sigma * std::abs(image[i]) *
+                                 m.act().col(i).template lpNorm<Eigen::Infinity>();
+            if (force > report.residual) {
+                report.residual = force;
+                report.set = static_cast<int>(i);
+            }
+        }
+        if (!std::isfinite(report.residual) || !std::isfinite(scale)) {
+            report.residual = std::numeric_limits<double>::infinity();
+        } else if (scale > 0) {
+            report.residual /= scale;
+        }
+        return report;
+    }
+};
+
+}  // namespace ricochet

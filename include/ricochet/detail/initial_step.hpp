@@ -1,0 +1,48 @@
+// Internal: what it declares may change without notice.
+//
+// How long may the first step be?
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/integrate/options.hpp"
+
+namespace ricochet::detail {
+
+/// A first step [s] at which an Euler step and the change of the flow over it stay well
+/// inside the tolerance (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations
+/// I, section II.4). `step` stands at the start.
+template <class CurrentStep>
+[[nodiscard]] double initial_step(const CurrentStep& step, const Options& options)
+{
+    constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
+    const auto& x = step.x0();
+    const auto& dxdt = step.rate0();
+    const auto scale = [&](auto i) { return options.atol + options.rtol * std::fabs(x[i]); };
+    double size = 0;
+    double speed = 0;
+    for_each_component(x, [&](auto i) {
+        // A component that stands for "never" has no size.
+        if (std::fabs(x[i]) < 1e300) size = std::max(size, std::fabs(x[i]) / scale(i));
+        speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
+    });
+    // Where the state tells no time scale; how far the end lies tells none either.
+    const double least = 1e-6 * std::min(1.0, std::fabs(options.t_end - options.t_start));
+    const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : least;
+    auto moved = x;
+    auto rate = dxdt;
+    move(moved, x, euler, dxdt);
+    step.flow(euler, moved, rate);
+    double bend = 0;
+    for_each_component(
+        x, [&](auto i) { bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i)); });
+    const double fastest = std::max(speed, bend / euler);
+    const double h =
+        fastest <= 1e-15 ? std::max(least, euler * 1e-3) : std::pow(0.01 / fastest, 1.0 / order);
+    const double first = std::min(std::min(100 * euler, h), options.h_max);
+    return std::isfinite(first) && first > 0 ? first : least;
+}
+
+}  // namespace ricochet::detail

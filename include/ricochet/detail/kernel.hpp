@@ -1,0 +1,299 @@
+// Internal: what it declares may change without notice.
+//
+// The arithmetic of a small multilayer perceptron, written once.
+//
+// Whatever the shape, the compiler and the instruction set, an evaluation does the
+// same operations in the same order, so its result has the same bits everywhere:
+//
+//     hidden    y_j = activation((a_0 + a_1) + (a_2 + a_3)),
+//               a_c the sum of w_ji x_i over i = c, c + C, c + 2 C, ..., after b_j
+//               in a_0; there are C = `chains` of the number of outputs
+//     last      the same without activation; but if it has one output, lane l of
+//               chain c sums w_i x_i over every C-th block of 32 bytes, C = 4, 2 or 1
+//               for as many blocks; chains are added as above, lanes in halves, b last
+//
+// Products are rounded before they are added: `opaque` hides each from the
+// compiler, which would otherwise contract the two to one operation on some
+// machines (g++ does by default). A register holds 16 or 32 bytes as the target has
+// it, and neither the lane in which an output is computed nor how many are computed
+// together can show in it.
+#pragma once
+
+#include "ricochet/detail/activation.hpp"
+#include "ricochet/detail/simd.hpp"
+
+#include <cstddef>
+#include <cstdint>
+
+namespace ricochet::detail::RICOCHET_KERNEL_NAMESPACE {
+
+/// The widest layer that the buffers on the stack hold.
+inline constexpr std::size_t max_width = 256;
+
+/// `width` rounded up to whole blocks.
+template <class T>
+[[nodiscard]] constexpr std::size_t padded(std::size_t width) noexcept
+{
+    return (width + block<T> - 1) / block<T> * block<T>;
+}
+
+/// Partial sums per output: few outputs have too few independent additions to
+/// hide the latency of one.
+template <class T>
+[[nodiscard]] constexpr std::size_t chains(std::size_t outputs) noexcept
+{
+    const std::size_t blocks = padded<T>(outputs) / block<T>;
+    return blocks <= 2 ? 4 : blocks <= 4 ? 2 : 1;
+}
+
+/// Values stored for one layer: a padded row of biases, then for each input a
+/// padded row of weights. If the last layer has one output, its weights are one
+/// padded row, and the bias begins a block of its own after them.
+template <class T>
+[[nodiscard]] constexpr std::size_t layer_size(std::size_t inputs, std::size_t outputs,
+                                               bool last) noexcept
+{
+    return last && outputs == 1 ? padded<T>(inputs) + block<T> : padded<T>(outputs) * (1 + inputs);
+}
+
+/// Registers used for sums; half of those that a machine of any of our
+/// instruction sets has, the rest are for weights and inputs.
+inline constexpr std::size_t accumulators = 8;
+
+/// Sums of `Chains` partial sums in pairs.
+template <std::size_t Chains, class V>
+RICOCHET_INLINE V sum_of(const V (&a)[Chains]) noexcept
+{
+    if constexpr (Chains == 4) {
+        return (a[0] + a[1]) + (a[2] + a[3]);
+    } else if constexpr (Chains == 2) {
+        return a[0] + a[1];
+    } else {
+        static_assert(Chains == 1);
+        return a[0];
+    }
+}
+
+/// `Registers` registers of outputs of one layer. `parameters` and `y` begin at
+/// the first of them, `row` is the distance between rows of weights.
+template <class T, class Activation, std::size_t Registers, std::size_t Chains>
+RICOCHET_INLINE void outputs_together(const T* parameters, std::size_t row, const T* x,
+                                      std::size_t inputs, T* y) noexcept
+{
+    using V = Vector<T>;
+    V sums[Registers][Chains];
+    const T* weights = parameters + row;
+    const auto product = [&](std::size_t k, std::size_t i) RICOCHET_INLINE_LAMBDA {
+        return load(weights + i * row + k * lanes<T>) * x[i];
+    };
+    RICOCHET_UNROLL
+    for (std::size_t c = 0; c < Chains; ++c) {
+        RICOCHET_UNROLL
+        for (std::size_t k = 0; k < Registers; ++k) {
+            sums[k][c] = c == 0 ? load(parameters + k * lanes<T>) : V{};
+            if (c >= inputs) continue;
+            if (c == 0) {
+                accumulate(sums[k][c], product(k, c));
+            } else {
+                sums[k][c] = opaque(product(k, c));
+            }
+        }
+    }
+    std::size_t i = Chains;
+    RICOCHET_KEEP_LOOP
+    for (; i + Chains <= inputs; i += Chains) {
+        RICOCHET_UNROLL
+        for (std::size_t c = 0; c < Chains; ++c) {
+            RICOCHET_UNROLL
+            for (std::size_t k = 0; k < Registers; ++k) accumulate(sums[k][c], product(k, i + c));
+        }
+    }
+    RICOCHET_UNROLL
+    for (std::size_t c = 0; c + 1 < Chains; ++c) {
+        if (i + c >= inputs) continue;
+        RICOCHET_UNROLL
+        for (std::size_t k = 0; k < Registers; ++k) accumulate(sums[k][c], product(k, i + c));
+    }
+    RICOCHET_UNROLL
+    for (std::size_t k = 0; k < Registers; ++k) {
+        store(y + k * lanes<T>, Activation::template of<T>(sum_of<Chains>(sums[k])));
+    }
+}
+
+/// Outputs `first` ... `row` - 1, as many together as there are registers.
+template <class T, class Activation, std::size_t Registers, std::size_t Chains>
+RICOCHET_INLINE void outputs_from(std::size_t first, const T* parameters, std::size_t row,
+                                  const T* x, std::size_t inputs, T* y) noexcept
+{
+    constexpr std::size_t step = Registers * lanes<T>;
+    for (; first + step <= row; first += step) {
+        outputs_together<T, Activation, Registers, Chains>(parameters + first, row, x, inputs,
+                                                           y + first);
+    }
+    if constexpr (Registers > 1) {
+        outputs_from<T, Activation, Registers / 2, Chains>(first, parameters, row, x, inputs, y);
+    }
+}
+
+/// y = activation(W x + b), all padded outputs; the padding of y is activation(0)
+/// for finite x.
+template <class T, class Activation>
+RICOCHET_INLINE void dense(const T* parameters, const T* x, std::size_t inputs, std::size_t outputs,
+                           T* y) noexcept
+{
+    const std::size_t row = padded<T>(outputs);
+    switch (chains<T>(outputs)) {
+        case 4:
+            outputs_from<T, Activation, accumulators / 4, 4>(0, parameters, row, x, inputs, y);
+            break;
+        case 2:
+            outputs_from<T, Activation, accumulators / 2, 2>(0, parameters, row, x, inputs, y);
+            break;
+        default:
+            outputs_from<T, Activation, accumulators, 1>(0, parameters, row, x, inputs, y);
+            break;
+    }
+}
+
+/// Zeroes what a layer left in the padding of y: infinite inputs make NaN of it.
+template <class T>
+RICOCHET_INLINE void clear_padding(T* y, std::size_t outputs) noexcept
+{
+    for (std::size_t j = outputs; j < padded<T>(outputs); ++j) y[j] = 0;
+}
+
+/// w x + b for one output, with x padded by zeros; `Chains` blocks at a time.
+template <class T, std::size_t Chains>
+RICOCHET_INLINE T dot_by(const T* parameters, const T* x, std::size_t inputs) noexcept
+{
+    using V = Vector<T>;
+    constexpr std::size_t parts = block<T> / lanes<T>;
+    V sums[parts][Chains];
+    const auto product = [&](std::size_t k, std::size_t i) RICOCHET_INLINE_LAMBDA {
+        return load(parameters + i + k * lanes<T>) * load(x + i + k * lanes<T>);
+    };
+    RICOCHET_UNROLL
+    for (std::size_t k = 0; k < parts; ++k) {
+        RICOCHET_UNROLL
+        for (std::size_t c = 0; c < Chains; ++c) sums[k][c] = opaque(product(k, c * block<T>));
+    }
+    const std::size_t end = padded<T>(inputs);
+    std::size_t i = Chains * block<T>;
+    for (; i + Chains * block<T> <= end; i += Chains * block<T>) {
+        RICOCHET_UNROLL
+        for (std::size_t k = 0; k < parts; ++k) {
+            RICOCHET_UNROLL
+            for (std::size_t c = 0; c < Chains; ++c) {
+                accumulate(sums[k][c], product(k, i + c * block<T>));
+            }
+        }
+    }
+    RICOCHET_UNROLL
+    for (std::size_t c = 0; c + 1 < Chains; ++c) {
+        if (i + c * block<T> >= end) continue;
+        RICOCHET_UNROLL
+        for (std::size_t k = 0; k < parts; ++k) {
+            accumulate(sums[k][c], product(k, i + c * block<T>));
+        }
+    }
+    V total[parts];
+    RICOCHET_UNROLL
+    for (std::size_t k = 0; k < parts; ++k) total[k] = sum_of<Chains>(sums[k]);
+    return sum_of_lanes<T>(total) + parameters[end];
+}
+
+template <class T>
+RICOCHET_INLINE T dot(const T* parameters, const T* x, std::size_t inputs) noexcept
+{
+    const std::size_t blocks = padded<T>(inputs) / block<T>;
+    if (blocks >= 4) return dot_by<T, 4>(parameters, x, inputs);
+    if (blocks >= 2) return dot_by<T, 2>(parameters, x, inputs);
+    return dot_by<T, 1>(parameters, x, inputs);
+}
+
+/// The last layer: no activation, and `outputs` values, not a block more.
+template <class T>
+RICOCHET_INLINE void last(const T* parameters, const T* x, std::size_t inputs, std::size_t outputs,
+                          T* y) noexcept
+{
+    if (outputs == 1) {
+        *y = dot(parameters, x, inputs);
+        return;
+    }
+    alignas(block_bytes) T all[max_width];
+    dense<T, Linear>(parameters, x, inputs, outputs, all);
+    for (std::size_t j = 0; j < outputs; ++j) y[j] = all[j];
+}
+
+/// The layers after `x`, whose widths are known: `Width` outputs, then `Widths`.
+template <class T, class Activation, std::size_t Width, std::size_t... Widths>
+RICOCHET_INLINE void layers(const T* parameters, const T* x, std::size_t inputs, T* y) noexcept
+{
+    if constexpr (sizeof...(Widths) == 0) {
+        last(parameters, x, inputs, Width, y);
+    } else {
+        alignas(block_bytes) T hidden[padded<T>(Width)];
+        dense<T, Activation>(parameters, x, inputs, Width, hidden);
+        clear_padding(hidden, Width);
+        layers<T, Activation, Widths...>(parameters + layer_size<T>(inputs, Width, false), hidden,
+                                         Width, y);
+    }
+}
+
+/// A network of which only the input is read where it lies: a single layer with
+/// one output needs it padded.
+template <class T, class Activation, std::size_t... Widths>
+RICOCHET_INLINE void network(const T* parameters, const T* in, std::size_t inputs, T* out) noexcept
+{
+    if constexpr (sizeof...(Widths) == 1) {
+        alignas(block_bytes) T x[max_width];
+        for (std::size_t i = 0; i < inputs; ++i) x[i] = in[i];
+        clear_padding(x, inputs);
+        layers<T, Activation, Widths...>(parameters, x, inputs, out);
+    } else {
+        layers<T, Activation, Widths...>(parameters, in, inputs, out);
+    }
+}
+
+/// The same for widths known only now: `widths` has `layers + 1` of them.
+template <class T, class Activation>
+RICOCHET_INLINE void network(const T* parameters, const std::uint16_t* widths, std::size_t layers,
+                             const T* in, T* out) noexcept
+{
+    if (layers == 1) {
+        alignas(block_bytes) T x[max_width];
+        for (std::size_t i = 0; i < widths[0]; ++i) x[i] = in[i];
+        clear_padding(x, widths[0]);
+        last(parameters, x, widths[0], widths[1], out);
+        return;
+    }
+    alignas(block_bytes) T hidden[2][max_width];
+    const T* x = in;
+    for (std::size_t k = 0; k + 1 < layers; ++k) {
+        T* y = hidden[k % 2];
+        dense<T, Activation>(parameters, x, widths[k], widths[k + 1], y);
+        clear_padding(y, widths[k + 1]);
+        parameters += layer_size<T>(widths[k], widths[k + 1], false);
+        x = y;
+    }
+    last(parameters, x, widths[layers - 1], widths[layers], out);
+}
+
+template <bool>
+struct HiddenActivation {
+    using Type = Relu;
+};
+
+template <>
+struct HiddenActivation<false> {
+    using Type = Tanh;
+};
+
+/// All of a network whose shape is known: `Widths` are those after the input.
+template <class T, bool relu, std::size_t Inputs, std::size_t... Widths>
+inline void evaluate(const T* parameters, const T* in, T* out) noexcept
+{
+    network<T, typename HiddenActivation<relu>::Type, Widths...>(parameters, in, Inputs, out);
+}
+
+}  // namespace ricochet::detail::RICOCHET_KERNEL_NAMESPACE

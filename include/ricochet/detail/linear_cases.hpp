@@ -1,0 +1,276 @@
+// Internal: what it declares may change without notice.
+//
+// Linear variational inequalities of a few unknowns, solved case by case.
+//
+//     y = W reaction + y0,   each pair (reaction_i, y_i) on its own monotone graph
+//
+// Each graph has three branches: lower bound, inside, upper bound. On a given choice of
+// branches the problem is a linear system, whose solution is that of the inequality if
+// it lies on those branches. One unknown is a formula. More unknowns than can be tried case by
+// case are solved by principal pivots.
+#pragma once
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "ricochet/nonsmooth/inclusion.hpp"
+
+namespace ricochet {
+
+/// Where a pair lies on its graph. For a set of reactions `inside` is sticking and a bound
+/// is sliding; for a set of states `inside` is free and a bound is contact.
+enum class Branch : signed char { lower = -1, inside = 0, upper = 1 };
+
+/// The most unknowns that are solved by cases: 3^4 linear systems at worst.
+inline constexpr int most_cases = 4;
+
+template <int M>
+struct LinearInequality {
+    using Vector = Eigen::Matrix<double, M, 1>;
+    using Matrix = Eigen::Matrix<double, M, M>;
+    using Branches = Eigen::Matrix<Branch, M, 1>;
+
+    /// Stands for W_ii where a reaction has no influence on its y, so that one that is asked for
+    /// is all or nothing; the smallest double would overflow in y / W_ii.
+    static constexpr double no_influence = 1e-100;
+
+    Confines confines = Confines::reaction;
+    Matrix w;               ///< W
+    Vector y0;
+    Vector lower, upper;    ///< of K
+
+    /// The solution on the branch where the search meets it first, `branches` before any
+    /// other; these are overwritten. False if none was found.
+    [[nodiscard]] bool solve(Vector& reaction, Vector& y, Branches& branches) const
+    {
+        if constexpr (M == 1) {
+            if (w(0, 0) > 0) return solve_one(reaction, y, branches);
+        }
+        if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
+        const int m = static_cast<int>(y0.size());
+        if (m > most_cases) return solve_by_pivots(reaction, y, branches);
+        int count = 1;
+        for (int i = 0; i < m; ++i) count *= 3;
+        for (int code = 0; code < count; ++code) {
+            for (int i = 0, rest = code; i < m; ++i, rest /= 3) {
+                branches[i] = static_cast<Branch>(rest % 3 - 1);
+            }
+            if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
+        }
+        return false;
+    }
+
+    /// For any number of unknowns and a positive semidefinite W, reactions that depend on one
+    /// another included: proximal steps from reaction = 0,
+    ///
+    ///     y = W reaction + y0 + eps (reaction - reaction before),
+    ///
+    /// each solved by principal pivots (J. J. Judice and F. M. Pires, A block principal pivoting
+    /// algorithm for large-scale strictly monotone linear complementarity problems, Computers and
+    /// Operations Research 21, 1994). False where pivots or proximal steps do not end, as they
+    /// need not where W is indefinite.
+    [[nodiscard]] bool solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const
+    {
+        LinearInequality strict = *this;
+        const double largest = w.diagonal().cwiseAbs().maxCoeff();
+        const Vector eps = (w.diagonal().cwiseAbs() * 1e-7).cwiseMax(1e-12 * largest);
+        strict.w.diagonal() += eps;
+        Vector before = y0;
+        before.setZero();
+        for (int step = 0; step < 100; ++step) {
+            strict.y0 = y0 - eps.cwiseProduct(before);
+            if (!strict.pivot(reaction, y, branches)) return false;
+            bool moves = false;
+            for (Eigen::Index i = 0; i < y0.size(); ++i) {
+                const double off = eps[i] * std::abs(reaction[i] - before[i]);
+                moves = moves || !(off <= 1e-14 * terms(i, reaction));
+            }
+            before = reaction;
+            if (!moves) break;
+        }
+        y.noalias() = w * reaction;
+        y += y0;
+        for (Eigen::Index i = 0; i < y0.size(); ++i) {
+            if (held(branches[i])) y[i] = target(i, branches[i]);
+        }
+        return y.allFinite();
+    }
+
+    /// The solution of the equations of the given branches, whether it lies on them or
+    /// not. False if they have none.
+    [[nodiscard]] bool solve_on(const Branches& branches, Vector& reaction, Vector& y) const
+    {
+        const Eigen::Index m = y0.size();
+        y = y0;
+        for (Eigen::Index i = 0; i < m; ++i) {
+            reaction[i] = held(branches[i]) ? 0 : fixed_reaction(i, branches[i]);
+            if (!std::isfinite(reaction[i])) return false;
+        }
+        // Reactions that hold their y at its target; the others are known.
+        Matrix a = w;
+        Vector b = y0;
+        for (Eigen::Index i = 0; i < m; ++i) {
+            if (held(branches[i])) {
+                b[i] = target(i, branches[i]) - y0[i];
+                for (Eigen::Index j = 0; j < m; ++j) {
+                    if (held(branches[j])) continue;
+                    b[i] -= w(i, j) * reaction[j];
+                    a(i, j) = 0;
+                }
+            } else {
+                a.row(i).setZero();
+                a(i, i) = 1;
+                b[i] = reaction[i];
+            }
+        }
+        if constexpr (M == 1) {
+            reaction[0] = b[0] / a(0, 0);
+        } else {
+            reaction = a.partialPivLu().solve(b);
+        }
+        if (!reaction.allFinite()) return false;
+        y.noalias() += w * reaction;
+        for (Eigen::Index i = 0; i < m; ++i) {
+            if (held(branches[i])) y[i] = target(i, branches[i]);
+        }
+        return y.allFinite();
+    }
+
+    [[nodiscard]] bool held(Branch branch) const noexcept
+    {
+        return confines == Confines::reaction ? branch == Branch::inside
+                                              : branch != Branch::inside;
+    }
+
+    /// The smallest of the amounts by which the pairs stay on their branches, in units of
+    /// y or of the reaction; negative where one has left it.
+    [[nodiscard]] double slack(const Branches& branches, const Vector& reaction,
+                               const Vector& y) const
+    {
+        double least = std::numeric_limits<double>::infinity();
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            least = std::min(least, slack(i, branches[i], reaction[i], y[i]));
+        }
+        return least;
+    }
+
+    [[nodiscard]] double slack(Eigen::Index i, Branch branch, double reaction, double y) const
+    {
+        // The two kinds of set differ in which of the pair is confined.
+        const bool of_reactions = confines == Confines::reaction;
+        const double confined = of_reactions ? reaction : y;
+        const double conjugate = of_reactions ? y : reaction;
+        switch (branch) {
+            case Branch::lower: return conjugate;
+            case Branch::upper: return -conjugate;
+            case Branch::inside: break;
+        }
+        return std::min(confined - lower[i], upper[i] - confined);
+    }
+
+private:
+    [[nodiscard]] double fixed_reaction(Eigen::Index i, Branch branch) const
+    {
+        if (confines == Confines::state) return 0;
+        return branch == Branch::lower ? lower[i] : upper[i];
+    }
+
+    [[nodiscard]] double target(Eigen::Index i, Branch branch) const
+    {
+        if (confines == Confines::reaction) return 0;
+        return branch == Branch::lower ? lower[i] : upper[i];
+    }
+
+    /// The terms of y_i.
+    [[nodiscard]] double terms(Eigen::Index i, const Vector& reaction) const
+    {
+        return std::abs(y0[i]) + w.row(i).cwiseAbs().dot(reaction.cwiseAbs());
+    }
+
+    /// Whether pair i is off its branch by more than the rounding of the products.
+    [[nodiscard]] bool leaves(Eigen::Index i, Branch branch, const Vector& reaction,
+                              const Vector& y) const
+    {
+        const bool about_y = (confines == Confines::reaction) != (branch == Branch::inside);
+        const double of_y = terms(i, reaction);
+        const double size = about_y ? of_y : std::max(std::abs(reaction[i]), of_y / w(i, i));
+        return slack(i, branch, reaction[i], y[i]) < -1e-13 * size;
+    }
+
+    /// For a W whose principal minors are positive. Whatever is off its branch changes it, all at
+    /// once while their number falls, and one at a time, the last, where it does not.
+    [[nodiscard]] bool pivot(Vector& reaction, Vector& y, Branches& branches) const
+    {
+        const Eigen::Index m = y0.size();
+        Eigen::Index fewest = m + 1;
+        int patience = 10;
+        for (Eigen::Index pivots = 0; pivots < 100 * (m + 1); ++pivots) {
+            for (Eigen::Index i = 0; i < m; ++i) {
+                if (!held(branches[i]) && !std::isfinite(fixed_reaction(i, branches[i]))) {
+                    branches[i] = Branch::inside;
+                }
+            }
+            if (!solve_on(branches, reaction, y)) return false;
+            Eigen::Index off = 0;
+            Eigen::Index last = 0;
+            for (Eigen::Index i = 0; i < m; ++i) {
+                if (leaves(i, branches[i], reaction, y)) ++off, last = i;
+            }
+            if (off == 0) return true;
+            if (off < fewest) {
+                fewest = off;
+                patience = 10;
+            } else {
+                --patience;
+            }
+            for (Eigen::Index i = patience >= 0 ? 0 : last; i <= last; ++i) {
+                if (!leaves(i, branches[i], reaction, y)) continue;
+                const double confined = confines == Confines::reaction ? reaction[i] : y[i];
+                branches[i] = branches[i] != Branch::inside ? Branch::inside
+                              : confined < lower[i]         ? Branch::lower
+                                                            : Branch::upper;
+            }
+        }
+        return false;
+    }
+
+    /// On their branches up to the rounding of the products.
+    [[nodiscard]] bool fits(const Branches& branches, const Vector& reaction,
+                            const Vector& y) const
+    {
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            if (leaves(i, branches[i], reaction, y)) return false;
+        }
+        return true;
+    }
+
+    [[nodiscard]] bool solve_one(Vector& reaction, Vector& y, Branches& branches) const
+    {
+        const double w11 = w(0, 0);
+        if (confines == Confines::reaction) {
+            const double holding = -y0[0] / w11;
+            if (holding > lower[0] && holding < upper[0]) {
+                branches[0] = Branch::inside;
+                reaction[0] = holding;
+                y[0] = 0;
+            } else {
+                branches[0] = holding >= upper[0] ? Branch::upper : Branch::lower;
+                reaction[0] = holding >= upper[0] ? upper[0] : lower[0];
+                y[0] = y0[0] + w11 * reaction[0];
+                if (reaction[0] == holding) y[0] = 0;
+            }
+        } else {
+            y[0] = std::min(std::max(y0[0], lower[0]), upper[0]);
+            reaction[0] = y[0] == y0[0] ? 0 : (y[0] - y0[0]) / w11;
+            branches[0] = y0[0] < lower[0]   ? Branch::lower
+                          : y0[0] > upper[0] ? Branch::upper
+                                             : Branch::inside;
+        }
+        return std::isfinite(reaction[0]) && std::isfinite(y[0]);
+    }
+};
+
+}  // namespace ricochet

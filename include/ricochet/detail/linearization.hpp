@@ -1,0 +1,459 @@
+// Internal: what it declares may change without notice.
+//
+// A system and its derivatives: exact where it declares them, else by differences.
+//
+//     flow_derivative([mode,] t, x, s, ds)              ds = (df/dx) s
+//     guard_derivative([which,] [mode,] t, x, s)        (dg/dx) s
+//     reset_derivative([which,] [mode,] t, x, dt, s)    s becomes (dR/dx) s + (dR/dt) dt, with
+//                                                       x the state before the reset
+//
+// Each is optional, const, and takes the same leading arguments as the function that it
+// differentiates: `which` in a system that counts its guards, the fired set where the
+// reset takes one, the mode where the system has modes.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/detail/scratch.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/differences.hpp"
+#include "ricochet/detail/directions.hpp"
+
+namespace ricochet::detail {
+
+/// A state of n components, uninitialised or zero.
+template <class X>
+[[nodiscard]] X state_of_size(std::size_t n)
+{
+    if constexpr (fixed_size<X>() > 0) {
+        return X{};
+    } else {
+        return X(static_cast<decltype(std::declval<const X&>().size())>(n));
+    }
+}
+
+// --- exact members ---
+
+template <class System, class X>
+[[nodiscard]] bool exact_flow(const System& system, [[maybe_unused]] Mode mode, double t,
+                              const X& x, const X& s, X& ds)
+{
+    if constexpr (requires { system.flow_derivative(mode, t, x, s, ds); }) {
+        system.flow_derivative(mode, t, x, s, ds);
+        return true;
+    } else if constexpr (requires { system.flow_derivative(t, x, s, ds); }) {
+        system.flow_derivative(t, x, s, ds);
+        return true;
+    } else {
+        return false;
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] double exact_guard(const System& system, [[maybe_unused]] std::size_t which,
+                                 [[maybe_unused]] Mode mode, double t, const X& x, const X& s)
+{
+    if constexpr (requires { system.guard_derivative(which, mode, t, x, s); }) {
+        return system.guard_derivative(which, mode, t, x, s);
+    } else if constexpr (CountsGuards<System>) {
+        return system.guard_derivative(which, t, x, s);
+    } else if constexpr (requires { system.guard_derivative(mode, t, x, s); }) {
+        return system.guard_derivative(mode, t, x, s);
+    } else {
+        return system.guard_derivative(t, x, s);
+    }
+}
+
+template <class System, class X, class... Which>
+[[nodiscard]] bool exact_reset(const System& system, [[maybe_unused]] Mode mode, double t,
+                               const X& x, double dt, X& s, const Which&... which)
+{
+    if constexpr (requires { system.reset_derivative(which..., mode, t, x, dt, s); }) {
+        system.reset_derivative(which..., mode, t, x, dt, s);
+        return true;
+    } else if constexpr (requires { system.reset_derivative(which..., t, x, dt, s); }) {
+        system.reset_derivative(which..., t, x, dt, s);
+        return true;
+    } else {
+        return false;
+    }
+}
+
+// --- the kinds of reset, as one kind of function ---
+
+/// The reset of one guard, as the run applies it to a set of one.
+struct ResetOf {
+    std::size_t which;
+
+    template <class System, class X>
+    [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x) const
+    {
+        if constexpr (ResetsTogether<System, X>) {
+            return call_reset_set(system, FiredGuards(std::span(&which, 1)), mode, t, x);
+        } else {
+            return call_reset(system, which, mode, t, x);
+        }
+    }
+    template <class System, class X>
+    [[nodiscard]] bool derive(const System& system, Mode mode, double t, const X& x, double dt,
+                              X& s) const
+    {
+        if constexpr (ResetsTogether<System, X>) {
+            return exact_reset(system, mode, t, x, dt, s, FiredGuards(std::span(&which, 1)));
+        } else if constexpr (CountsGuards<System>) {
+            return exact_reset(system, mode, t, x, dt, s, which);
+        } else {
+            return exact_reset(system, mode, t, x, dt, s);
+        }
+    }
+};
+
+/// Two resets of one set that write one number differently; a time event counts as
+/// the guard before `no_guard`.
+struct Conflict {
+    std::size_t first = no_guard;
+    std::size_t second = no_guard;
+    [[nodiscard]] bool any() const noexcept { return first != no_guard; }
+};
+
+/// The resets of all that fired, at once, as a run applies them: by the system's own
+/// reset for sets, or else each reads the state before and writes what it changes.
+struct ResetSet {
+    FiredGuards fired;
+
+    template <class System, class X>
+    [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x) const
+    {
+        Conflict conflict;
+        return apply(system, mode, t, x, conflict);
+    }
+
+    template <class System, class X>
+    [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x,
+                             Conflict& conflict) const
+    {
+        if constexpr (ResetsTogether<System, X>) {
+            return call_reset_set(system, fired, mode, t, x);
+        } else {
+            Merging<X> merging(mode, x);
+            if constexpr (ResetsAlone<System, X>) {
+                for (const std::size_t which : fired) {
+                    if (!guard_info_of<X>(system, which).resets) continue;
+                    X after = x;
+                    const Mode next = call_reset(system, which, mode, t, after);
+                    merging.add(which, next, after);
+                }
+            }
+            if (fired.time_event()) {
+                X after = x;
+                const Mode next = call_time_reset(system, mode, t, after);
+                merging.add(time_event_reset, next, after);
+            }
+            conflict = merging.conflict;
+            x = merging.after;
+            return merging.mode_after;
+        }
+    }
+
+    template <class System, class X>
+    [[nodiscard]] bool derive(const System& system, Mode mode, double t, const X& x, double dt,
+                              X& s) const
+    {
+        if constexpr (ResetsTogether<System, X>) {
+            return exact_reset(system, mode, t, x, dt, s, fired);
+        } else {
+            if (fired.size() != 1 || fired.time_event()) return false;
+            return ResetOf{fired[0]}.derive(system, mode, t, x, dt, s);
+        }
+    }
+
+private:
+    template <class X>
+    struct Merging {
+        Merging(Mode mode, const X& x)
+            : mode_before(mode),
+              mode_after(mode),
+              before(x),
+              after(x),
+              writers(static_cast<std::size_t>(x.size()), no_guard)
+        {
+        }
+
+        void add(std::size_t writer, Mode next, const X& made)
+        {
+            if (next != mode_before) {
+                claim(mode_writer, writer, next == mode_after);
+                mode_after = next;
+            }
+            if (made.size() != before.size() || after.size() != before.size()) {
+                if (any) conflict = {last, writer};
+                after = made;
+            } else {
+                for_each_component(before, [&](auto i) {
+                    if (made[i] == before[i]) return;
+                    claim(writers[static_cast<std::size_t>(i)], writer, made[i] == after[i]);
+                    after[i] = made[i];
+                });
+            }
+            any = true;
+            last = writer;
+        }
+
+        void claim(std::size_t& owner, std::size_t writer, bool same)
+        {
+            if (owner != no_guard && !same) conflict = {owner, writer};
+            owner = writer;
+        }
+
+        Mode mode_before, mode_after;
+        X before, after;
+        std::vector<std::size_t> writers;
+        std::size_t mode_writer = no_guard;
+        bool any = false;
+        std::size_t last = no_guard;
+        Conflict conflict{};
+    };
+};
+
+/// Where accumulating events of a guard end.
+struct RestOf {
+    std::size_t which;
+
+    template <class System, class X>
+    [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x) const
+    {
+        return call_rest(system, which, mode, t, x);
+    }
+    template <class System, class X>
+    [[nodiscard]] static bool derive(const System&, Mode, double, const X&, double, X&)
+    {
+        return false;
+    }
+};
+
+struct TimeReset {
+    template <class System, class X>
+    [[nodiscard]] static Mode apply(const System& system, Mode mode, double t, X& x)
+    {
+        return call_time_reset(system, mode, t, x);
+    }
+    /// Exact where nothing is reset.
+    template <class System, class X>
+    [[nodiscard]] static bool derive(const System& system, [[maybe_unused]] Mode mode, double t,
+                                     const X&, double, X& s)
+    {
+        return !(
+            requires { system.time_reset(mode, t, s); } || requires { system.time_reset(t, s); });
+    }
+};
+
+/// Flow, guards and resets of a system, and their derivatives along directions (f_x s)
+/// and by its parameters (f_p). The fields on both sides of a surface are taken to be
+/// smooth across it, since differences look beyond it.
+template <class System, class X>
+class Linearization {
+public:
+    /// @throws std::invalid_argument for parameters or differences that make no sense, and
+    /// whatever `Parameter::with` throws.
+    Linearization(const System& system, const std::vector<Parameter<System>>& parameters,
+                  const Differences& differences, std::size_t components)
+        : system_(system), differences_(differences)
+    {
+        validate(differences, components);
+        parameters_.reserve(parameters.size());
+        for (std::size_t j = 0; j < parameters.size(); ++j) {
+            const Parameter<System>& p = parameters[j];
+            validate_parameter(j, static_cast<bool>(p.with), p.nominal, p.scale, p.start,
+                               components);
+            parameters_.push_back(neighbours_of(p, differences.step));
+        }
+    }
+
+    [[nodiscard]] const System& system() const noexcept { return system_; }
+    [[nodiscard]] std::size_t parameters() const noexcept { return parameters_.size(); }
+
+    // --- flow ---
+
+    [[nodiscard]] X flow(Mode mode, double t, const X& x) const
+    {
+        X f = x;
+        call_flow(system_, mode, t, x, f);
+        return f;
+    }
+
+    /// ds = (df/dx) s.
+    void flow_along(Mode mode, double t, const X& x, const X& s, X& ds) const
+    {
+        if (exact_flow(system_, mode, t, x, s, ds)) return;
+        const double h = step_along(differences_, x, s);
+        if (!std::isfinite(h)) {
+            for_each_component(ds, [&](auto i) { ds[i] = 0; });
+            return;
+        }
+        Scratch<X, 3> room(x);
+        const auto flow_at = [&](std::size_t k, X& f) {
+            move(room[0], x, central_stencil.offset[k] * h, s);
+            call_flow(system_, mode, t, room[0], f);
+        };
+        differentiate_into(ds, central_stencil, h, flow_at, room[1], room[2]);
+    }
+
+    /// df = df/dp of parameter j.
+    void flow_by(std::size_t j, Mode mode, double t, const X& x, X& df) const
+    {
+        Scratch<X, 2> room(x);
+        const Neighbours<System>& around = parameters_[j];
+        const auto flow_at = [&](std::size_t k, X& f) {
+            call_flow(around.systems[k], mode, t, x, f);
+        };
+        differentiate_into(df, around.stencil, around.h, flow_at, room[0], room[1]);
+    }
+
+    // --- guards ---
+
+    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const X& x) const
+    {
+        return guard_of(system_, which, mode, t, x);
+    }
+
+    /// (dg/dx) s.
+    [[nodiscard]] double guard_along(std::size_t which, Mode mode, double t, const X& x,
+                                     const X& s) const
+    {
+        if constexpr (has_exact_guard) {
+            return exact_guard(system_, which, mode, t, x, s);
+        } else {
+            const double h = step_along(differences_, x, s);
+            if (!std::isfinite(h)) return 0;
+            return differentiate(central_stencil, h, [&](std::size_t k) {
+                return guard(which, mode, t, moved_along(x, central_stencil.offset[k] * h, s));
+            });
+        }
+    }
+
+    /// dg/dp of parameter j.
+    [[nodiscard]] double guard_by(std::size_t j, std::size_t which, Mode mode, double t,
+                                  const X& x) const
+    {
+        return by_parameter(
+            j, [&](const System& system) { return guard_of(system, which, mode, t, x); });
+    }
+
+    /// dg/dt + (dg/dx) f along x' = f: `guard_rate`, else by differences.
+    [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const X& x,
+                                    const X& f) const
+    {
+        if constexpr (RateAlone<System, X>) {
+            return call_rate(system_, which, mode, t, x, f);
+        } else if constexpr (RatesTogether<System, X>) {
+            std::vector<double> rates(guard_count_of<X>(system_));
+            call_rates(system_, mode, t, x, f, std::span<double>(rates));
+            return rates[which];
+        } else {
+            const double h = step_in_time(x, f, 1);
+            return differentiate(central_stencil, h, [&](std::size_t k) {
+                const double later = central_stencil.offset[k] * h;
+                return guard(which, mode, t + later, moved_along(x, later, f));
+            });
+        }
+    }
+
+    // --- resets ---
+
+    /// (dR/dx) s + (dR/dt) dt at the state before the reset.
+    template <class Reset>
+    [[nodiscard]] X reset_along(const Reset& reset, Mode mode, double t, const X& x, double dt,
+                                const X& s) const
+    {
+        X after = s;
+        if (reset.derive(system_, mode, t, x, dt, after)) return after;
+        const double h = step_in_time(x, s, dt);
+        if (!std::isfinite(h)) return zeros_shaped_like(reset_of(system_, reset, mode, t, x));
+        return differentiate(central_stencil, h, [&](std::size_t k) {
+            const double factor = central_stencil.offset[k] * h;
+            return reset_of(system_, reset, mode, t + factor * dt, moved_along(x, factor, s));
+        });
+    }
+
+    /// dR/dp of parameter j.
+    template <class Reset>
+    [[nodiscard]] X reset_by(std::size_t j, const Reset& reset, Mode mode, double t,
+                             const X& x) const
+    {
+        return by_parameter(
+            j, [&](const System& system) { return reset_of(system, reset, mode, t, x); });
+    }
+
+    /// Derivative by parameter j of the value that `function` has for a system.
+    template <class Function>
+    [[nodiscard]] auto by_parameter(std::size_t j, const Function& function) const
+    {
+        const Neighbours<System>& around = parameters_[j];
+        return differentiate(around.stencil, around.h,
+                             [&](std::size_t k) { return function(around.systems[k]); });
+    }
+
+private:
+    static constexpr bool has_exact_guard = [] {
+        if constexpr (CountsGuards<System>) {
+            return requires(const System& system, std::size_t which, Mode mode, double t,
+                            const X& x)
+            {
+                system.guard_derivative(which, mode, t, x, x);
+            }
+            || requires(const System& system, std::size_t which, double t, const X& x)
+            {
+                system.guard_derivative(which, t, x, x);
+            };
+        } else {
+            return requires(const System& system, Mode mode, double t, const X& x)
+            {
+                system.guard_derivative(mode, t, x, x);
+            }
+            || requires(const System& system, double t, const X& x)
+            {
+                system.guard_derivative(t, x, x);
+            };
+        }
+    }();
+
+    [[nodiscard]] static double guard_of(const System& system, std::size_t which, Mode mode,
+                                         double t, const X& x)
+    {
+        if constexpr (GuardAlone<System, X>) {
+            return call_guard(system, which, mode, t, x);
+        } else {
+            std::vector<double> g(guard_count_of<X>(system));
+            call_guards(system, mode, t, x, std::span<double>(g));
+            return g[which];
+        }
+    }
+
+    template <class Reset>
+    [[nodiscard]] static X reset_of(const System& system, const Reset& reset, Mode mode, double t,
+                                    X x)
+    {
+        (void)reset.apply(system, mode, t, x);
+        return x;
+    }
+
+    /// As `step_along`, for a direction that also has a part in time.
+    [[nodiscard]] double step_in_time(const X& x, const X& s, double dt) const
+    {
+        const double in_time = differences_.step * differences_.time_scale / std::fabs(dt);
+        return std::min(step_along(differences_, x, s), in_time);
+    }
+
+    System system_;
+    Differences differences_;
+    std::vector<Neighbours<System>> parameters_;
+};
+
+}  // namespace ricochet::detail

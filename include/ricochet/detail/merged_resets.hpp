@@ -1,0 +1,135 @@
+// Internal: what it declares may change without notice.
+//
+// The resets of guards that fired together, applied to one state.
+//
+// A reset of a single guard changes the state in place. Of several, each reads the state
+// before, and what it changed is merged: two that give one component, or the mode, two
+// values are in conflict, unless the system takes the whole set.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/system.hpp"
+
+namespace ricochet::detail {
+
+/// Whether two states are equal, component by component.
+template <class X>
+[[nodiscard]] bool same_state(const X& a, const X& b)
+{
+    if (a.size() != b.size()) return false;
+    bool equal = true;
+    for_each_component(a, [&](auto c) { equal = equal && a[c] == b[c]; });
+    return equal;
+}
+
+template <class System, class X>
+class MergedResets {
+public:
+    explicit MergedResets(const X& like) : after_(like), single_(like) {}
+
+    /// Computes what the resets of `members`, all from the state `before`, make of it; with
+    /// that of a time event if the set happens on time. `bank` says which of them reset.
+    template <class Bank>
+    void apply(const System& system, const Bank& bank, std::span<const std::size_t> members,
+               bool on_time, Mode mode, double t, const X& before)
+    {
+        assign(after_, before);
+        mode_ = mode;
+        conflict_ = {no_guard, no_guard};
+        if (members.size() > 1 || on_time) {
+            mode_writer_ = resizer_ = no_guard;
+            writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
+        }
+        if constexpr (ResetsTogether<System, X>) {
+            std::size_t resetting = 0;
+            for (const std::size_t i : members) resetting += bank[i].info.resets;
+            if (resetting > 0) {
+                mode_ = call_reset_set(system, FiredGuards(members, on_time), mode, t, after_);
+                return;
+            }
+        } else if constexpr (Resetting<System, X>) {
+            if (members.size() == 1 && !on_time) {
+                const std::size_t i = members[0];
+                if (bank[i].info.resets) mode_ = call_reset(system, i, mode, t, after_);
+                return;
+            }
+            for (const std::size_t i : members) {
+                if (!bank[i].info.resets) continue;
+                assign(single_, before);
+                merge(i, call_reset(system, i, mode, t, single_), mode, before);
+            }
+        }
+        if constexpr (Timed<System>) {
+            if (!on_time) return;
+            if (members.empty()) {
+                mode_ = call_time_reset(system, mode, t, after_);
+            } else {
+                assign(single_, before);
+                merge(time_event_reset, call_time_reset(system, mode, t, single_), mode, before);
+            }
+        }
+    }
+
+    [[nodiscard]] X& after() noexcept { return after_; }
+    [[nodiscard]] const X& after() const noexcept { return after_; }
+    [[nodiscard]] X& scratch() noexcept { return single_; }
+    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+
+    /// Two guards that disagree, or a guard and `time_event_reset`; `no_guard` where there are
+    /// none.
+    [[nodiscard]] const std::pair<std::size_t, std::size_t>& conflict() const noexcept
+    {
+        return conflict_;
+    }
+
+private:
+    /// Adds to `after_` what one reset has made of the state before, in `single_`.
+    void merge(std::size_t writer, Mode mode_after, Mode mode, const X& before)
+    {
+        const auto claim = [&](std::size_t& owner, bool same) {
+            if (owner != no_guard && !same) conflict_ = {owner, writer};
+            owner = writer;
+        };
+        if (mode_after != mode) {
+            claim(mode_writer_, mode_after == mode_);
+            mode_ = mode_after;
+        }
+        if (resizer_ != no_guard || single_.size() != before.size()) {
+            return merge_resized(writer, before);
+        }
+        for_each_component(before, [&](auto c) {
+            if (single_[c] == before[c]) return;
+            claim(writers_[static_cast<std::size_t>(c)], single_[c] == after_[c]);
+            after_[c] = single_[c];
+        });
+    }
+
+    /// One reset that gives the state another dimension writes all of it: in conflict with
+    /// any other that writes, unless they agree.
+    void merge_resized(std::size_t writer, const X& before)
+    {
+        if (same_state(single_, before)) return;
+        for (const std::size_t owner : writers_) {
+            if (owner != no_guard) conflict_ = {owner, writer};
+        }
+        if (resizer_ != no_guard && !same_state(single_, after_)) conflict_ = {resizer_, writer};
+        resizer_ = writer;
+        assign(after_, single_);
+    }
+
+    X after_;
+    X single_;
+    Mode mode_ = 0;
+    std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
+    std::vector<std::size_t> writers_;
+    std::size_t mode_writer_ = no_guard;
+    std::size_t resizer_ = no_guard;
+};
+
+}  // namespace ricochet::detail

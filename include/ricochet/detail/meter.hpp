@@ -1,0 +1,250 @@
+// Internal: what it declares may change without notice.
+//
+// Whether asking a network pays, found out during a run.
+//
+// A run is cut into pieces of some hundred steps, and each is gone through in one of three ways:
+// every step is checked, checks are planned under bounds, or planned with the network. What a
+// step costs is compared:
+//
+//     cost = (guard calls x their cost + answers x their cost + steps x their cost) / steps
+//
+// Counts are exact; what one of each costs is sampled with a clock, ever more rarely, for the
+// steps with planning apart from those without: it has its price, too. The ways are tried in turn
+// until the best one is clear beyond its noise. After that the others are tried again now and then,
+// but what trials cost more than the best way is kept below a share of the whole run (1 %), so that
+// a network of no use, however large or hostile, costs no more. Checking every step is not tried
+// where the looks that planning saves cost more than planning may.
+//
+// Used through `Metered`; the state lives in the run, not in the detector.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "ricochet/hybrid/statistics.hpp"
+
+namespace ricochet {
+
+/// How `Metered` decides.
+struct MeterOptions {
+    enum class Decision : std::uint8_t {
+        measured,  ///< by costs sampled with a clock
+        counted,   ///< by the costs given here, so that the same run asks the same
+        always,    ///< asked whenever there is something to ask
+        never,
+        every_step,  ///< is checked: nothing is planned either
+    };
+    Decision decision = Decision::measured;
+    /// [s] of a look at the guard, an answer of the network and a step, if `counted`; not
+    /// negative, and the step above 0.
+    double guard = 0;
+    double network = 0;
+    double step = 0;
+    /// Of the run's time that trials may cost in vain, in [0, 1].
+    double trials = 0.01;
+    std::uint64_t piece = 128;  ///< steps between decisions, at least 1
+};
+
+/// What a meter has found so far. Costs in seconds, 0 before the first sample.
+struct MeterReading {
+    double guard = 0;    ///< of a look
+    double network = 0;  ///< of an answer
+    double step = 0;     ///< of a step without looks and answers, in the way that is best
+    std::uint64_t asked = 0;
+    std::uint64_t cleared = 0;  ///< answers that cleared something
+    double asking = 0;          ///< a step while the network is asked, all in all; 0: never tried
+    double not_asking = 0;      ///< a step while it is not, in the better way
+    double checking = 0;        ///< a step while every one is checked; 0: never tried
+    bool pays = false;          ///< to ask
+    bool checks = false;        ///< checking every step is the best way
+
+    [[nodiscard]] double share_cleared() const noexcept
+    {
+        return asked > 0 ? static_cast<double>(cleared) / static_cast<double>(asked) : 0;
+    }
+};
+
+/// A detector whose network is metered.
+template <class Detector>
+concept Metering = requires(const Detector& detector)
+{
+    detector.metering();
+};
+
+namespace detail {
+
+/// @throws std::invalid_argument naming the option.
+void validate(const MeterOptions& options);
+
+/// A cost [s], from samples of which some were disturbed.
+class SampledCost {
+public:
+    [[nodiscard]] double value() const noexcept { return value_; }
+    void set(double value) noexcept { value_ = value; }
+
+    void add(double sample) noexcept
+    {
+        ++samples_;
+        if (samples_ > 1) sample = std::min(sample, 3 * value_);
+        const double weight = std::max(1.0 / static_cast<double>(samples_), 1.0 / 16);
+        value_ += weight * (sample - value_);
+    }
+
+private:
+    double value_ = 0;
+    std::uint64_t samples_ = 0;
+};
+
+/// Stands for a meter where there is none.
+struct NoMeter {
+    static constexpr bool asks() noexcept { return true; }
+    static constexpr bool checks() noexcept { return false; }
+    static constexpr void note_cleared() noexcept {}
+    static constexpr void look_back(const Statistics&) noexcept {}
+    template <class Call>
+    static auto time_guard(Call&& call)
+    {
+        return call();
+    }
+    template <class Call>
+    static auto time_network(Call&& call)
+    {
+        return call();
+    }
+};
+
+class Meter {
+public:
+    /// `planned_guards`: how many there are, if their checks are planned; 0: without the network
+    /// every step is checked.
+    explicit Meter(const MeterOptions& options, std::size_t planned_guards = 0);
+
+    /// Whether the network is to be asked now.
+    [[nodiscard]] bool asks() const noexcept { return way_ == ask && asked_ < most_asked_; }
+    /// Whether every step is to be checked now.
+    [[nodiscard]] bool checks() const noexcept { return way_ == check; }
+    /// The answer has cleared something.
+    void note_cleared() noexcept { ++cleared_; }
+
+    template <class Call>
+    auto time_guard(Call&& call)
+    {
+        return timed(++looks_, guard_, call);
+    }
+    template <class Call>
+    auto time_network(Call&& call)
+    {
+        return timed(++asked_, network_, call);
+    }
+
+    /// Called now and then, with the counts of the run so far.
+    void look_back(const Statistics& counts)
+    {
+        if (!decides_) return;
+        if (counts.steps >= next_steps_ ||
+            (way_ != best_ && counts.guard_calls + asked_ >= next_check_) ||
+            asked_ >= most_asked_) {
+            consider(counts);
+        }
+    }
+
+    [[nodiscard]] MeterReading reading() const noexcept;
+
+private:
+    static constexpr std::uint64_t every = 32;  ///< of which one is timed, later of 512
+
+    enum Way : std::uint8_t { check, plan, ask };
+    static constexpr std::array<Way, 3> all_ways{check, plan, ask};
+
+    /// Steps and their cost in one of the ways, older pieces with less weight.
+    struct Account {
+        double steps = 0;
+        double cost = 0;     ///< [s]
+        double squares = 0;  ///< [s²] of what pieces cost beside their mean
+        std::uint64_t pieces = 0;
+        std::uint64_t wait = 1;  ///< pieces between trials
+        std::uint64_t waited = 0;
+
+        [[nodiscard]] double mean() const noexcept { return cost / steps; }
+        [[nodiscard]] double error() const noexcept { return std::sqrt(squares) / steps; }
+        void add(double more_steps, double more_cost) noexcept;
+    };
+    struct Counts {
+        double steps = 0;  ///< that stand
+        double work = 0;   ///< those taken back included
+        double looks = 0;
+        double asked = 0;
+    };
+
+    template <class Call>
+    auto timed(std::uint64_t count, SampledCost& cost, Call& call)
+    {
+        const std::uint64_t gap = count > 32 * every ? 16 * every : every;
+        const bool sampled = samples_ && (count <= 8 || count % gap == 0);
+        const double start = sampled ? seconds() : 0;
+        const auto answer = call();  // in one place, so that it is compiled as without a meter
+        if (sampled) cost.add(seconds() - start);
+        return answer;
+    }
+
+    [[nodiscard]] static double seconds() noexcept;  ///< [s] of a steady clock
+    void consider(const Statistics& counts);
+    void sample_step(const Counts& piece);
+    void close_piece(const Counts& piece, double cost);
+    void choose_next();
+    [[nodiscard]] Way first_way() const noexcept;
+    [[nodiscard]] bool has_way(Way way) const noexcept;
+    [[nodiscard]] double noise_between(Way a, Way b) const noexcept;
+    [[nodiscard]] Way find_best() const noexcept;
+    [[nodiscard]] Way next_way() noexcept;
+    [[nodiscard]] bool may_try(Way way) const noexcept;
+    [[nodiscard]] double allowance(Way way) const noexcept;
+    [[nodiscard]] SampledCost& step_of(Way way) noexcept;
+    [[nodiscard]] double step_cost(Way way) const noexcept;
+    [[nodiscard]] double cost_of(const Counts& piece) const noexcept;
+    [[nodiscard]] Account& of(Way way) noexcept { return accounts_[way]; }
+    [[nodiscard]] const Account& of(Way way) const noexcept { return accounts_[way]; }
+
+    MeterOptions options_;
+    double planned_guards_;
+    bool decides_;
+    bool samples_;
+    Way best_;
+    Way way_;  ///< another than the best one: on trial
+    SampledCost guard_, network_;
+    SampledCost checked_step_, planned_step_;  ///< without looks and answers
+    std::array<Account, 3> accounts_;
+    std::uint64_t looks_ = 0;
+    std::uint64_t asked_ = 0;
+    std::uint64_t cleared_ = 0;
+    std::uint64_t most_asked_ = std::numeric_limits<std::uint64_t>::max();  ///< in this piece
+    std::uint64_t next_steps_;
+    std::uint64_t next_check_ = 0;
+    Counts then_;  ///< when the piece began
+    double began_ = 0;  ///< [s] when the piece began
+    double spent_ = 0;  ///< [s] on trials in vain
+    double total_ = 0;  ///< [s] of the run
+};
+
+/// The meter of a detector that has one.
+template <class Detector>
+struct MeterOf {
+    using type = NoMeter;
+    static constexpr NoMeter make(const Detector&, std::size_t = 0) noexcept { return {}; }
+};
+template <Metering Detector>
+struct MeterOf<Detector> {
+    using type = Meter;
+    static Meter make(const Detector& detector, std::size_t planned_guards = 0)
+    {
+        return Meter(detector.metering(), planned_guards);
+    }
+};
+
+}  // namespace detail
+
+}  // namespace ricochet

@@ -1,0 +1,135 @@
+// Internal: what it declares may change without notice.
+//
+// Noise in a guard: values that no smooth function has, such as those of float arithmetic.
+//
+// A bracket cannot be narrowed below the noise, only moved about in it. That there is noise
+// must be beyond doubt, since close roots of a smooth guard change its sign as often: third
+// differences decide. Over a distance d those of a polynomial of degree n that is at most G in
+// a step of length h are below T_n'''(1) G (2 d / h)^3 (V. Markov), which is 4e6 G (d / h)^3
+// for n = 14; a kink spoils the three that straddle it, and no more.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "ricochet/detect/step_probe.hpp"
+
+namespace ricochet::detail {
+
+/// What is noise: of a guard that reaches |g| = `size` in a step of length `h`.
+struct NoiseScale {
+    double size = 0;
+    double h = 0;
+
+    /// Noise larger than this part of the guard is not expected from any arithmetic.
+    static constexpr double coarsest = 1e-5;
+    /// Noise smaller than this part is rounding of doubles, which close in by themselves.
+    static constexpr double finest = 1e-10;
+
+    /// Whether doubles must show such a change of the guard, though its terms be a hundred
+    /// times larger than itself.
+    [[nodiscard]] bool resolves(double change) const noexcept
+    {
+        return std::fabs(change) > 0x1p-46 * size;
+    }
+
+    [[nodiscard]] bool may_be(double value) const noexcept
+    {
+        const double g = std::fabs(value);
+        return g >= finest * size && g <= coarsest * size;
+    }
+};
+
+/// By how much the guard changes from `at` to the nearest place where it is another: that of
+/// a staircase, if there is one.
+template <class Probe>
+[[nodiscard]] double tread_height(Probe& probe, const GuardSample& sample, const GuardSample& at,
+                                  const NoiseScale& scale)
+{
+    double change = 0;
+    for (double part = 1e-8; part < 1e-5 && change == 0; part *= 8) {
+        change = probe.along_the_flow(sample, at.s - part * scale.h).value - at.value;
+    }
+    return change;
+}
+
+/// How far b is off the parabola through the other three.
+[[nodiscard]] inline double off_parabola(const GuardSample& a, const GuardSample& b,
+                                         const GuardSample& c, const GuardSample& d) noexcept
+{
+    const auto slope = [](const GuardSample& p, const GuardSample& q) {
+        return (q.value - p.value) / (q.s - p.s);
+    };
+    const double bend_before = (slope(a, c) - slope(a, b)) / (c.s - b.s);
+    const double bend_after = (slope(c, d) - slope(b, c)) / (d.s - b.s);
+    return std::fabs((bend_after - bend_before) / (d.s - a.s) * (b.s - a.s) * (b.s - c.s) *
+                     (b.s - d.s));
+}
+
+/// Goes on from a sample in noise, by some times `distance`, to the other side of the surface,
+/// and closes the bracket around the change of side; false if it is not near.
+template <class Probe>
+[[nodiscard]] bool reach_across(Probe& probe, const GuardSample& sample, GuardSample from,
+                                double distance, GuardSample& lo, GuardSample& hi)
+{
+    const bool left = probe.has_left(from);
+    for (int i = 0; i < 4; ++i) {
+        const double s = from.s + (left ? -3 : 3) * distance;
+        if (!(s > lo.s && s < hi.s)) return false;
+        const GuardSample at = probe.along_the_flow(sample, s);
+        (probe.has_left(at) ? hi : lo) = at;
+        if (probe.has_left(at) != left) return true;
+        from = at;
+    }
+    return false;
+}
+
+/// If the guard near `place` is noise of about `residue`: narrows the bracket to a change of
+/// side there, and returns the time [s] over which the noise hides the root; else 0. `sample`
+/// is the last that `value_and_rate` took, the motion straight from there.
+template <class Probe>
+[[nodiscard, gnu::noinline]] double close_in_noise(Probe& probe, const GuardSample& sample,
+                                                   double place, double residue,
+                                                   const NoiseScale& scale, GuardSample& lo,
+                                                   GuardSample& hi)
+{
+    constexpr int places = 8;
+    // Unevenly, so that the steps of a staircase do not look like a line.
+    constexpr std::array<double, places> offsets{-5, -3.9, -2.3, -0.8, 0.4, 2.1, 3.3, 4.9};
+    const double distance = std::fabs(residue / sample.rate);
+    const double first = place + offsets.front() * distance;
+    const double last = place + offsets.back() * distance;
+    if (!(distance > 0 && last > lo.s && first < hi.s)) return 0;
+    const double part = distance / scale.h;
+    const double smooth = std::max(1e7 * part * part * part, NoiseScale::finest) * scale.size;
+
+    std::array<GuardSample, places> at;
+    for (std::size_t i = 0; i < places; ++i) {
+        at[i] = probe.along_the_flow(sample, place + offsets[i] * distance);
+        if (!(std::fabs(at[i].value) <= 10 * NoiseScale::coarsest * scale.size)) return 0;
+    }
+    int rough = 0;
+    double noise = 0;
+    for (std::size_t i = 0; i + 3 < places; ++i) {
+        const double bend = off_parabola(at[i], at[i + 1], at[i + 2], at[i + 3]);
+        rough += bend > smooth;
+        noise = std::max(noise, bend);
+    }
+    if (rough < 4) return 0;
+
+    double returned = first;
+    bool crossed = false;
+    for (const GuardSample& value : at) {
+        const bool left = probe.has_left(value);
+        if (!left) returned = std::max(returned, value.s);
+        if (crossed || !(value.s > lo.s && value.s < hi.s)) continue;
+        crossed = left;
+        (left ? hi : lo) = value;
+    }
+    const bool near = hi.s - lo.s <= 4 * distance;
+    if (!near && !reach_across(probe, sample, crossed ? hi : lo, distance, lo, hi)) return 0;
+    return std::max(returned - lo.s, noise / std::fabs(sample.rate));
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,271 @@
+// Internal: what it declares may change without notice.
+//
+// Explicit Runge-Kutta methods, as departures from the tangent.
+//
+// With x(t0 + s) = x0 + s f0 + w(s) the first stage of w vanishes, and so does its start:
+// what is left of a tableau are the stages from the second on. The sums are formed in the
+// order of Boost.Odeint's steppers and have their bits; terms whose coefficient is zero are
+// left out.
+//
+// Tableaus: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; Cash and Karp, ACM
+// Trans. Math. Softw. 16 (1990) 201-222; Fehlberg, NASA TR R-287 (1968).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include "ricochet/detail/components.hpp"
+
+namespace ricochet::detail {
+
+struct EulerTableau {
+    static constexpr int order = 1;
+    static constexpr std::size_t stages = 1;
+    static constexpr std::array<double, 1> c = {0};
+    static constexpr std::array<std::array<double, 1>, 1> a = {};
+    static constexpr std::array<double, 1> b = {1};
+};
+
+struct Rk4Tableau {
+    static constexpr int order = 4;
+    static constexpr std::size_t stages = 4;
+    using Row = std::array<double, 4>;
+    static constexpr Row c = {0, 0.5, 0.5, 1};
+    static constexpr std::array<Row, 4> a = {{{}, {0.5}, {0, 0.5}, {0, 0, 1}}};
+    static constexpr Row b = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
+    /// h / 3 is not h * (1 / 3): the weights divide, as odeint's do.
+    static constexpr Row b_divisors = {6, 3, 3, 6};
+};
+
+struct CashKarp54Tableau {
+    static constexpr int order = 5;
+    static constexpr int error_order = 4;
+    static constexpr std::size_t stages = 6;
+    using Row = std::array<double, 6>;
+    static constexpr Row c = {0, 1.0 / 5, 3.0 / 10, 3.0 / 5, 1, 7.0 / 8};
+    static constexpr std::array<Row, 6> a = {
+        {{},
+         {1.0 / 5},
+         {3.0 / 40, 9.0 / 40},
+         {3.0 / 10, -9.0 / 10, 6.0 / 5},
+         {-11.0 / 54, 5.0 / 2, -70.0 / 27, 35.0 / 27},
+         {1631.0 / 55296, 175.0 / 512, 575.0 / 13824, 44275.0 / 110592, 253.0 / 4096}}};
+    static constexpr Row b = {37.0 / 378, 0, 250.0 / 621, 125.0 / 594, 0, 512.0 / 1771};
+    static constexpr Row error = {b[0] - 2825.0 / 27648,
+                                  0,
+                                  b[2] - 18575.0 / 48384,
+                                  b[3] - 13525.0 / 55296,
+                                  -277.0 / 14336,
+                                  b[5] - 1.0 / 4};
+};
+
+struct Dopri5Tableau {
+    static constexpr int order = 5;
+    static constexpr int error_order = 4;
+    static constexpr std::size_t stages = 6;
+    using Row = std::array<double, 6>;
+    static constexpr Row c = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1};
+    static constexpr std::array<Row, 6> a = {
+        {{},
+         {1.0 / 5},
+         {3.0 / 40, 9.0 / 40},
+         {44.0 / 45, -56.0 / 15, 32.0 / 9},
+         {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
+         {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656}}};
+    static constexpr Row b = {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84};
+    /// The last entry belongs to the rate at the end of the step (first same as last).
+    static constexpr std::array<double, 7> error = {b[0] - 5179.0 / 57600,
+                                                    0,
+                                                    b[2] - 7571.0 / 16695,
+                                                    b[3] - 393.0 / 640,
+                                                    b[4] - -92097.0 / 339200,
+                                                    b[5] - 187.0 / 2100,
+                                                    -1.0 / 40};
+
+    /// Weights of the rates in w(theta h) / h, of order 4 (Shampine, Math. Comp. 46 (1986)
+    /// 135-150; Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 2nd
+    /// ed., section II.6).
+    static constexpr std::array<double, 7> dense(double theta)
+    {
+        const double left = theta - 1;
+        const double square = theta * theta;
+        const double value = square * (3 - 2 * theta);
+        const double slope = square * left;
+        const double bump = square * left * left;
+        const double x3 = 100 * (882725551 - 15701508 * theta) / 32700410799;
+        const double x4 = 25 * (443332067 - 31403016 * theta) / 1880347072;
+        const double x5 = 32805 * (23143187 - 3489224 * theta) / 199316789632;
+        const double x6 = 55 * (29972135 - 7076736 * theta) / 822651844;
+        const double x7 = 10 * (7414447 - 829305 * theta) / 29380423;
+        return {0,
+                0,
+                value * b[2] + bump * x3,
+                value * b[3] - bump * x4,
+                value * b[4] + bump * x5,
+                value * b[5] - bump * x6,
+                slope + bump * x7};
+    }
+};
+
+struct Fehlberg78Tableau {
+    static constexpr int order = 8;
+    static constexpr int error_order = 7;
+    static constexpr std::size_t stages = 13;
+    using Row = std::array<double, 13>;
+    static constexpr Row c = {0,       2.0 / 27, 1.0 / 9, 1.0 / 6, 5.0 / 12, 1.0 / 2, 5.0 / 6,
+                              1.0 / 6, 2.0 / 3,  1.0 / 3, 1,       0,        1};
+    static constexpr std::array<Row, 13> a = {
+        {{},
+         {2.0 / 27},
+         {1.0 / 36, 1.0 / 12},
+         {1.0 / 24, 0, 1.0 / 8},
+         {5.0 / 12, 0, -25.0 / 16, 25.0 / 16},
+         {1.0 / 20, 0, 0, 1.0 / 4, 1.0 / 5},
+         {-25.0 / 108, 0, 0, 125.0 / 108, -65.0 / 27, 125.0 / 54},
+         {31.0 / 300, 0, 0, 0, 61.0 / 225, -2.0 / 9, 13.0 / 900},
+         {2, 0, 0, -53.0 / 6, 704.0 / 45, -107.0 / 9, 67.0 / 90, 3},
+         {-91.0 / 108, 0, 0, 23.0 / 108, -976.0 / 135, 311.0 / 54, -19.0 / 60, 17.0 / 6, -1.0 / 12},
+         {2383.0 / 4100, 0, 0, -341.0 / 164, 4496.0 / 1025, -301.0 / 82, 2133.0 / 4100, 45.0 / 82,
+          45.0 / 164, 18.0 / 41},
+         {3.0 / 205, 0, 0, 0, 0, -6.0 / 41, -3.0 / 205, -3.0 / 41, 3.0 / 41, 6.0 / 41},
+         {-1777.0 / 4100, 0, 0, -341.0 / 164, 4496.0 / 1025, -289.0 / 82, 2193.0 / 4100, 51.0 / 82,
+          33.0 / 164, 12.0 / 41, 0, 1}}};
+    static constexpr Row b = {0,         0,         0, 0,          0,         34.0 / 105, 9.0 / 35,
+                              9.0 / 35,  9.0 / 280, 9.0 / 280, 0,  41.0 / 840, 41.0 / 840};
+    static constexpr Row error = {-41.0 / 840, 0, 0, 0, 0,           0,          0,
+                                  0,           0, 0, -41.0 / 840, 41.0 / 840, 41.0 / 840};
+};
+
+/// One explicit method for states of type X; keeps its stages for the dense output.
+template <class Tableau, class X>
+class RungeKutta {
+public:
+    static constexpr int order_value = Tableau::order;
+    /// Whether the tableau has an embedded error estimate.
+    static constexpr bool estimates_error = requires { Tableau::error; };
+    /// Whether the estimate uses the rate at the end of the step (first same as last).
+    static constexpr bool fsal = []
+    {
+        if constexpr (requires { Tableau::error; }) {
+            return Tableau::error.size() > Tableau::stages;
+        }
+        return false;
+    }
+    ();
+    static constexpr int error_order_value = []
+    {
+        if constexpr (requires { Tableau::error_order; }) return Tableau::error_order;
+        return 0;
+    }
+    ();
+    static constexpr bool has_dense_output = requires { Tableau::dense(0.5); };
+
+    /// w(h) from the departures' own flow, `flow(w, w_rate, offset)`. Where the method is
+    /// FSAL, also the rate at the end; `with_error`, also the error estimate. `like` gives the
+    /// size of a state that is sized at run time.
+    template <bool with_error, class Flow>
+    [[gnu::always_inline]] void depart(const Flow& flow, const X& like, double h, X& w, X& rate,
+                                       X& error)
+    {
+        if constexpr (fixed_size<X>() == 0) {
+            for (X& k : k_) {
+                if (k.size() != like.size()) k = like;
+            }
+        }
+        inner_stages(flow, h, w, std::make_index_sequence<Tableau::stages - 1>{});
+        combine<Weights>(h, rate, w);
+        if constexpr (fsal) flow(w, rate, h);
+        if constexpr (with_error) combine<Errors>(h, rate, error);
+    }
+
+    /// w(s) on the dense output of the step of length h that was taken last; `rate` is its
+    /// departures' rate at the end.
+    void dense(double s, double h, const X& rate, X& w) const requires has_dense_output
+    {
+        const auto weights = Tableau::dense(s / h);
+        [&]<std::size_t... I>(std::index_sequence<I...>) {
+            for_each_component(w, [&](auto c) {
+                w[c] = (... + (h * weights[used<Weights>.at[I]] *
+                               stage<used<Weights>.at[I]>(rate)[c])) +
+                       h * weights[Tableau::stages] * rate[c];
+            });
+        }(std::make_index_sequence<used<Weights>.count>{});
+    }
+
+private:
+    template <std::size_t i>
+    struct Stage {
+        static constexpr auto coefficients = Tableau::a[i];
+        static constexpr double times(double h, std::size_t j) { return h * coefficients[j]; }
+    };
+    struct Weights {
+        static constexpr auto coefficients = Tableau::b;
+        static constexpr double times(double h, std::size_t j)
+        {
+            if constexpr (requires { Tableau::b_divisors; }) return h / Tableau::b_divisors[j];
+            return h * coefficients[j];
+        }
+    };
+    struct Errors {
+        static constexpr auto coefficients = Tableau::error;
+        static constexpr double times(double h, std::size_t j) { return h * coefficients[j]; }
+    };
+
+    /// The stages from the second on that a row uses.
+    template <class Row>
+    static constexpr auto used = []
+    {
+        struct {
+            std::array<std::size_t, Row::coefficients.size()> at{};
+            std::size_t count = 0;
+        } found;
+        for (std::size_t j = 1; j < Row::coefficients.size(); ++j) {
+            if (Row::coefficients[j] != 0) found.at[found.count++] = j;
+        }
+        return found;
+    }
+    ();
+
+    template <class Flow, std::size_t... I>
+    [[gnu::always_inline]] void inner_stages(const Flow& flow, [[maybe_unused]] double h, X& w,
+                                             std::index_sequence<I...>)
+    {
+        ((combine<Stage<I + 1>>(h, w, w), flow(w, k_[I], h * Tableau::c[I + 1])), ...);
+    }
+
+    template <class Row>
+    [[gnu::always_inline]] void combine(double h, const X& rate, X& w) const
+    {
+        combine<Row>(h, rate, w, std::make_index_sequence<used<Row>.count>{});
+    }
+
+    template <class Row, std::size_t... I>
+    [[gnu::always_inline]] void combine(double h, [[maybe_unused]] const X& rate, X& w,
+                                        std::index_sequence<I...>) const
+    {
+        if constexpr (sizeof...(I) == 0) {
+            for_each_component(w, [&](auto c) __attribute__((always_inline)) { w[c] = 0; });
+        } else {
+            const std::array<double, sizeof...(I)> weights = {Row::times(h, used<Row>.at[I])...};
+            for_each_component(
+                w, [&](auto c) __attribute__((always_inline)) {
+                    w[c] = (... + (weights[I] * stage<used<Row>.at[I]>(rate)[c]));
+                });
+        }
+    }
+
+    template <std::size_t j>
+    [[nodiscard]] const X& stage(const X& rate) const noexcept
+    {
+        if constexpr (j < Tableau::stages) {
+            return k_[j - 1];
+        } else {
+            return rate;
+        }
+    }
+
+    std::array<X, Tableau::stages - 1> k_{};  ///< rates of the stages from the second on
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,461 @@
+// Internal: what it declares may change without notice.
+//
+// How derivatives pass through events.
+//
+// With S the derivatives of the state at a fixed time, g the guard, R the reset, f⁻ and
+// f⁺ the flow before and after, an event moves by
+//
+//     dt = -(g_x S⁻ + g_p) / (g_t + g_x f⁻)
+//
+// and the derivatives become, through the saltation matrix,
+//
+//     S⁺ = R_x (S⁻ + f⁻ dt) + R_t dt + R_p - f⁺ dt
+//
+// (M. A. Aizerman and F. R. Gantmakher, On the stability of periodic motions, Journal of
+// Applied Mathematics and Mechanics 22, 1958; R. I. Leine and H. Nijmeijer, Dynamics and
+// Bifurcations of Non-Smooth Mechanical Systems, Springer, 2004; N. J. Kong, J. J. Payne,
+// J. Zhu and A. M. Johnson, Saltation matrices, arXiv:2306.06862, 2023.)
+//
+// Where several guards fire at one time, neighbouring motions meet them one after
+// another, in an order that depends on the neighbour. The derivative exists if every
+// order leads to the same state and the same derivatives (S. A. Burden, S. S. Sastry,
+// D. E. Koditschek and S. Revzen, Event-selected vector field discontinuities yield
+// piecewise-differentiable flows, SIAM Journal on Applied Dynamical Systems 15, 2016), and
+// that is what is tried.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/detail/linearization.hpp"
+#include "ricochet/detail/undefined.hpp"
+
+namespace ricochet::detail {
+
+/// A state at time t [s] and its derivatives there, a column for each direction.
+template <class X>
+struct Motion {
+    Mode mode;
+    double t;
+    X x;
+    Eigen::MatrixXd derivatives;
+};
+
+/// What is known of the events before.
+struct LastEvent {
+    double t;             ///< [s] of the last event
+    Eigen::VectorXd dt;   ///< its derivatives
+    bool any;             ///< whether there has been one
+    double flight_start;  ///< [s] of the last event of a guard, or of the start
+};
+
+/// Derivatives of an event's time, where they exist.
+struct EventTime {
+    Undefined undefined = Undefined::no;
+    Eigen::VectorXd dt;
+};
+
+/// Whether two sets of numbers are the same up to `relative` of the largest.
+template <class A, class B>
+[[nodiscard]] bool agree(const A& a, const B& b, double relative)
+{
+    if (a.size() != b.size()) return false;
+    double size = 0;
+    double difference = 0;
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(a.size()); ++i) {
+        const auto k = static_cast<decltype(a.size())>(i);
+        size = std::max({size, std::fabs(a[k]), std::fabs(b[k])});
+        difference = std::max(difference, std::fabs(a[k] - b[k]));
+    }
+    return difference <= relative * size;
+}
+
+template <class System, class X>
+class Saltation {
+public:
+    /// The first `initial` columns belong to the initial state, the others to the
+    /// parameters.
+    Saltation(Linearization<System, X> linearization, std::size_t initial, const Options& options)
+        : linearization_(std::move(linearization)),
+          initial_(initial),
+          rtol_(std::max(options.rtol, 64 * std::numeric_limits<double>::epsilon())),
+          atol_(options.atol),
+          event_tolerance_(std::max(options.event_tolerance, options.event_window)),
+          event_rtol_(options.event_rtol)
+    {
+    }
+
+    [[nodiscard]] const Linearization<System, X>& linearization() const noexcept
+    {
+        return linearization_;
+    }
+    [[nodiscard]] std::size_t columns() const noexcept
+    {
+        return initial_ + linearization_.parameters();
+    }
+
+    /// Index of the parameter of a column, or nothing for one of the initial state.
+    [[nodiscard]] std::optional<std::size_t> parameter_of(std::size_t column) const noexcept
+    {
+        if (column < initial_) return std::nullopt;
+        return column - initial_;
+    }
+
+    /// Whether events at these times [s] cannot be told apart.
+    [[nodiscard]] bool at_one_time(double earlier, double t) const noexcept
+    {
+        return std::fabs(t - earlier) <= window(t);
+    }
+
+    /// How the crossing of a guard at `motion` moves.
+    [[nodiscard]] EventTime crossing(std::size_t which, const Motion<X>& motion,
+                                     const LastEvent& last) const
+    {
+        if constexpr (Guarded<System, X>) {
+            return crossing_of_guard(which, motion, last);
+        } else {
+            return {Undefined::off_surface, {}};
+        }
+    }
+
+    /// How a time event moves: not at all, but with parameters that it depends on.
+    [[nodiscard]] EventTime time_event(double t) const
+    {
+        EventTime time{Undefined::no, Eigen::VectorXd::Zero(index(columns()))};
+        if constexpr (Timed<System>) {
+            const double reach = reach_of_time_event(t);
+            for (std::size_t j = 0; j < linearization_.parameters(); ++j) {
+                bool lost = false;
+                time.dt[index(initial_ + j)] =
+                    linearization_.by_parameter(j, [&](const System& system) {
+                        const double near = system.next_time_event(t - reach);
+                        lost = lost || !(std::fabs(near - t) < reach);
+                        return near;
+                    });
+                if (lost) return {Undefined::time_event_jumps, {}};
+            }
+        }
+        return time;
+    }
+
+    /// Takes the motion through a reset at an event that moves by dt; `held` if it
+    /// stands still from there on.
+    template <class Reset>
+    void pass(const Reset& reset, const Eigen::VectorXd& dt, Motion<X>& motion,
+              bool held = false) const
+    {
+        const Motion<X> before = motion;
+        const X f_before = linearization_.flow(before.mode, before.t, before.x);
+        motion.mode = reset.apply(system(), before.mode, before.t, motion.x);
+        const X f_after = held ? zeros_shaped_like(motion.x)
+                               : linearization_.flow(motion.mode, motion.t, motion.x);
+        motion.derivatives.resize(index(motion.x.size()), index(columns()));
+        for (std::size_t j = 0; j < columns(); ++j) {
+            const double moved = dt[index(j)];
+            X s = column_of(before.derivatives, j, before.x);
+            move(s, s, moved, f_before);
+            X after = linearization_.reset_along(reset, before.mode, before.t, before.x, moved, s);
+            if (const auto p = parameter_of(j)) {
+                const X by = linearization_.reset_by(*p, reset, before.mode, before.t, before.x);
+                move(after, after, 1, by);
+            }
+            move(after, after, -moved, f_after);
+            set_column(motion.derivatives, j, after);
+        }
+    }
+
+    /// Takes the motion through all that fired together, to the state `after` that
+    /// the run has; `last` becomes this event.
+    [[nodiscard]] Undefined pass_set(const FiredGuards& fired, const X& after, Motion<X>& motion,
+                                     LastEvent& last) const
+    {
+        Undefined undefined = Undefined::no;
+        if (fired.size() == 0) {
+            undefined = pass_time_event(motion, last);
+        } else if constexpr (Guarded<System, X>) {
+            undefined = pass_guards(fired, after, motion, last);
+        }
+        if (undefined == Undefined::no && !motion.derivatives.allFinite()) {
+            undefined = Undefined::non_finite;
+        }
+        return undefined;
+    }
+
+    /// Column j as a vector like x.
+    [[nodiscard]] static X column_of(const Eigen::MatrixXd& derivatives, std::size_t j, X x)
+    {
+        for_each_component(x, [&](auto i) { x[i] = derivatives(index(i), index(j)); });
+        return x;
+    }
+
+private:
+    // Orders of events are compared by numbers that come from differences.
+    static constexpr double same_state = 1e-9;
+    static constexpr double same_derivative = 1e-6;
+    static constexpr std::size_t most_orders = 5;  // 120 orders
+
+    struct Slope {
+        double guard;
+        double rate;
+        double blur;  // by which the run does not know the guard
+        X flow;
+    };
+
+    template <class Integer>
+    [[nodiscard]] static Eigen::Index index(Integer i) noexcept
+    {
+        return static_cast<Eigen::Index>(i);
+    }
+
+    static void set_column(Eigen::MatrixXd& derivatives, std::size_t j, const X& s)
+    {
+        for_each_component(s, [&](auto i) { derivatives(index(i), index(j)) = s[i]; });
+    }
+
+    [[nodiscard]] const System& system() const noexcept { return linearization_.system(); }
+
+    [[nodiscard]] EventTime crossing_of_guard(std::size_t which, const Motion<X>& motion,
+                                              const LastEvent& last) const
+    {
+        if (guard_info_of<X>(system(), which).boolean) return {Undefined::boolean_guard, {}};
+        const Slope slope = slope_at(which, motion);
+        const bool on_surface = std::fabs(slope.guard) <= slope.blur;
+        const bool follows = coincides(last, motion.t);
+        if (!on_surface) {
+            // A guard that an event at this time has pushed beyond its surface fires
+            // with that event.
+            return follows ? EventTime{Undefined::no, last.dt}
+                           : EventTime{Undefined::off_surface, {}};
+        }
+        if (grazes(which, motion, slope, motion.t - last.flight_start)) {
+            return {Undefined::grazing, {}};
+        }
+        EventTime time{Undefined::no, moves(which, motion, slope.rate)};
+        if (!time.dt.allFinite()) return {Undefined::non_finite, {}};
+        // Put on the surface by an event at this time: its neighbours are put on it
+        // too, or some of them beyond it and some not.
+        if (follows && !agree(time.dt, last.dt, same_derivative)) {
+            return {Undefined::simultaneous, {}};
+        }
+        return time;
+    }
+
+    /// How far apart two times [s] must be to be told apart.
+    [[nodiscard]] double window(double t) const noexcept
+    {
+        return event_tolerance_ + (event_rtol_ + 16 * epsilon) * std::fabs(t);
+    }
+
+    [[nodiscard]] bool coincides(const LastEvent& last, double t) const noexcept
+    {
+        return last.any && at_one_time(last.t, t);
+    }
+
+    [[nodiscard]] Slope slope_at(std::size_t which, const Motion<X>& m) const
+    {
+        Slope slope{.guard = linearization_.guard(which, m.mode, m.t, m.x),
+                    .rate = 0,
+                    .blur = 0,
+                    .flow = linearization_.flow(m.mode, m.t, m.x)};
+        slope.rate = linearization_.guard_rate(which, m.mode, m.t, m.x, slope.flow);
+        X unit = zeros_shaped_like(m.x);
+        for_each_component(m.x, [&](auto i) {
+            unit[i] = 1;
+            const double along = linearization_.guard_along(which, m.mode, m.t, m.x, unit);
+            unit[i] = 0;
+            slope.blur += std::fabs(along) * (atol_ + rtol_ * std::fabs(m.x[i]));
+        });
+        slope.blur += std::fabs(slope.rate) * window(m.t);
+        return slope;
+    }
+
+    /// Whether the guard turns back before it is beyond its surface by more than its
+    /// blur: its rate changes as much as it is worth within the time in which the guard
+    /// moves by the blur. Of a guard that turns often, as of a ball on its last bounces,
+    /// nothing else can be expected: that time is at most a hundredth of the time
+    /// since the last event.
+    [[nodiscard]] bool grazes(std::size_t which, const Motion<X>& m, const Slope& slope,
+                              double flight) const
+    {
+        if (slope.rate == 0) return true;
+        const double reach = std::min(slope.blur / std::fabs(slope.rate), std::fabs(flight) / 100);
+        for (const double s : {-reach, reach}) {
+            const X x = moved_along(m.x, s, slope.flow);
+            const X f = linearization_.flow(m.mode, m.t + s, x);
+            const double rate = linearization_.guard_rate(which, m.mode, m.t + s, x, f);
+            if (!(std::fabs(rate - slope.rate) < std::fabs(slope.rate))) return true;
+        }
+        return false;
+    }
+
+    /// dt = -(g_x S + g_p) / rate.
+    [[nodiscard]] Eigen::VectorXd moves(std::size_t which, const Motion<X>& m, double rate) const
+    {
+        Eigen::VectorXd dt(index(columns()));
+        for (std::size_t j = 0; j < columns(); ++j) {
+            const X s = column_of(m.derivatives, j, m.x);
+            double change = linearization_.guard_along(which, m.mode, m.t, m.x, s);
+            if (const auto p = parameter_of(j)) {
+                change += linearization_.guard_by(*p, which, m.mode, m.t, m.x);
+            }
+            dt[index(j)] = change == 0 ? 0 : -change / rate;
+        }
+        return dt;
+    }
+
+    /// How far around t no other time event lies [s].
+    [[nodiscard]] double reach_of_time_event(double t) const
+    {
+        double reach = std::min(system().next_time_event(t) - t, 1 + std::fabs(t)) / 4;
+        while (system().next_time_event(t - reach) < t && t - reach / 2 < t) reach /= 2;
+        return reach;
+    }
+
+    [[nodiscard]] Undefined pass_time_event(Motion<X>& motion, LastEvent& last) const
+    {
+        const EventTime time = time_event(motion.t);
+        if (time.undefined != Undefined::no) return time.undefined;
+        pass(TimeReset{}, time.dt, motion);
+        last = {motion.t, time.dt, true, last.flight_start};
+        return Undefined::no;
+    }
+
+    [[nodiscard]] Undefined pass_guards(const FiredGuards& fired, const X& after, Motion<X>& motion,
+                                        LastEvent& last) const
+    {
+        const std::vector<std::size_t> acting = acting_of(fired);
+        if (acting.empty()) return Undefined::no;
+        if (acting.size() == 1 && acting[0] != no_guard) {
+            const EventTime time = crossing(acting[0], motion, last);
+            if (time.undefined != Undefined::no) return time.undefined;
+            pass(ResetSet{fired}, time.dt, motion);
+            last = {motion.t, time.dt, true, motion.t};
+            return Undefined::no;
+        }
+        if (all_pushed(acting, motion, last)) {
+            pass(ResetSet{fired}, last.dt, motion);
+            return Undefined::no;
+        }
+        return pass_in_all_orders(acting, after, motion, last);
+    }
+
+    /// Those that reset something, with `no_guard` for a time event.
+    [[nodiscard]] std::vector<std::size_t> acting_of(const FiredGuards& fired) const
+    {
+        std::vector<std::size_t> acting;
+        for (const std::size_t which : fired) {
+            if (guard_info_of<X>(system(), which).resets) acting.push_back(which);
+        }
+        if (fired.time_event()) acting.push_back(no_guard);
+        return acting;
+    }
+
+    [[nodiscard]] Undefined pass_in_all_orders(std::vector<std::size_t> order, const X& after,
+                                               Motion<X>& motion, LastEvent& last) const
+    {
+        if (order.size() > most_orders) return Undefined::simultaneous;
+        std::sort(order.begin(), order.end());
+        std::optional<Motion<X>> first;
+        LastEvent first_last = last;
+        do {
+            Motion<X> way = motion;
+            LastEvent event = last;
+            const Undefined undefined = pass_in_order(order, way, event);
+            if (undefined != Undefined::no) return undefined;
+            if (!first) {
+                first = way;
+                first_last = event;
+            } else if (!same(way, *first)) {
+                return Undefined::simultaneous;
+            }
+        } while (std::next_permutation(order.begin(), order.end()));
+        if (!agree(first->x, after, same_state)) return Undefined::simultaneous;
+        motion = *first;
+        last = first_last;
+        return Undefined::no;
+    }
+
+    /// Whether one event at this time has pushed all of them beyond their surfaces.
+    [[nodiscard]] bool all_pushed(const std::vector<std::size_t>& acting, const Motion<X>& m,
+                                  const LastEvent& last) const
+    {
+        if (!coincides(last, m.t)) return false;
+        return std::all_of(acting.begin(), acting.end(), [&](std::size_t which) {
+            if (which == no_guard) return false;
+            const Slope slope = slope_at(which, m);
+            return std::fabs(slope.guard) > slope.blur;
+        });
+    }
+
+    /// One after the other, each from the state that those before have left.
+    [[nodiscard]] Undefined pass_in_order(const std::vector<std::size_t>& order, Motion<X>& way,
+                                          LastEvent& last) const
+    {
+        const Motion<X> start = way;
+        const LastEvent before = last;
+        bool together = true;
+        Eigen::VectorXd dt;
+        for (const std::size_t which : order) {
+            const bool timed = which == no_guard;
+            if (!timed && !still_fires(which, start, way)) continue;
+            LastEvent none = before;
+            if (dt.size() > 0) none.any = false;
+            const EventTime time = timed ? time_event(way.t) : crossing(which, way, none);
+            if (time.undefined == Undefined::off_surface && dt.size() > 0) {
+                return Undefined::simultaneous;
+            }
+            if (time.undefined != Undefined::no) return time.undefined;
+            together = together && (dt.size() == 0 || agree(dt, time.dt, same_derivative));
+            dt = time.dt;
+            if (timed) {
+                pass(TimeReset{}, dt, way);
+            } else {
+                pass(ResetOf{which}, dt, way);
+                last.flight_start = way.t;
+            }
+        }
+        // Events that move apart are no common cause for the next at this time.
+        last.any = together;
+        last.t = way.t;
+        last.dt = dt;
+        return Undefined::no;
+    }
+
+    /// Whether a guard that fired at `start` still does at `way`, where another one has
+    /// had its reset: it may be disabled by then, or have been turned back.
+    [[nodiscard]] bool still_fires(std::size_t which, const Motion<X>& start,
+                                   const Motion<X>& way) const
+    {
+        if (!call_enabled_in(system(), which, way.mode)) return false;
+        const auto rate = [&](const Motion<X>& m) {
+            return linearization_.guard_rate(which, m.mode, m.t, m.x,
+                                             linearization_.flow(m.mode, m.t, m.x));
+        };
+        return rate(start) * rate(way) > 0;
+    }
+
+    [[nodiscard]] static bool same(const Motion<X>& a, const Motion<X>& b)
+    {
+        return a.mode == b.mode && agree(a.x, b.x, same_state) &&
+               agree(a.derivatives.reshaped(), b.derivatives.reshaped(), same_derivative);
+    }
+
+    static constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+    Linearization<System, X> linearization_;
+    std::size_t initial_;
+    double rtol_;
+    double atol_;
+    double event_tolerance_;
+    double event_rtol_;
+};
+
+}  // namespace ricochet::detail

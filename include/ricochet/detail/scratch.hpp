@@ -1,0 +1,65 @@
+// Internal: what it declares may change without notice.
+//
+// Room for a few states in the middle of a function that must not allocate.
+//
+// A state of fixed size lives on the stack. One that is sized at run time would
+// allocate at every call; its room belongs to the thread instead, is taken on loan
+// and kept for the next call. Loans nest, so that a field may itself be a system that
+// borrows. What is in the room on arrival is arbitrary but for its size.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "ricochet/detail/components.hpp"
+
+namespace ricochet::detail {
+
+template <class X, std::size_t n, bool fixed = (fixed_size<X>() > 0)>
+class Scratch {
+public:
+    explicit Scratch(const X& /*like*/) noexcept {}
+    [[nodiscard]] X& operator[](std::size_t i) noexcept { return states_[i]; }
+
+private:
+    std::array<X, n> states_;
+};
+
+template <class X, std::size_t n>
+class Scratch<X, n, false> {
+public:
+    /// Room for n states of the size of `like`.
+    explicit Scratch(const X& like)
+    {
+        auto& rooms = loans().rooms;
+        if (loans().lent == rooms.size()) rooms.push_back(std::make_unique<Room>());
+        room_ = rooms[loans().lent].get();
+        for (X& x : *room_) {
+            if (x.size() != like.size()) x = like;
+        }
+        ++loans().lent;
+    }
+    ~Scratch() { --loans().lent; }
+    Scratch(const Scratch&) = delete;
+    Scratch& operator=(const Scratch&) = delete;
+
+    [[nodiscard]] X& operator[](std::size_t i) noexcept { return (*room_)[i]; }
+
+private:
+    using Room = std::array<X, n>;
+    struct Loans {
+        std::vector<std::unique_ptr<Room>> rooms;
+        std::size_t lent = 0;
+    };
+    [[nodiscard]] static Loans& loans()
+    {
+        thread_local Loans loans;
+        return loans;
+    }
+
+    Room* room_;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,194 @@
+// Internal: what it declares may change without notice.
+//
+// Do the events of a guard accumulate?
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/detail/instant.hpp"
+
+namespace ricochet::detail {
+
+/// Recognises accumulating events: three intervals in a row that shrink, and a
+/// geometric remainder d q / (1 - q) that is no longer worth resolving, or excursions of
+/// the guard between two events that its rounding swallows. And events that do not advance
+/// time at all. Legal event trains, however fast, keep a remainder that is worth resolving
+/// and excursions that can be told from rounding.
+class ShrinkingIntervals {
+public:
+    /// Takes note of an event at `t`, where a step would be of length `step` [s]; true
+    /// after a hundred in a row that time cannot tell apart.
+    [[nodiscard]] bool stalls(const Instant& t, double step) noexcept
+    {
+        step_ = step;
+        const double interval =
+            std::fabs((t.value - last_.value) + (t.remainder - last_.remainder));
+        stalled_ = interval < std::max(resolution(), std::numeric_limits<double>::min()) / 4
+                       ? stalled_ + 1
+                       : 0;
+        if (stalled_ > 100) return true;
+        const double instant = std::max(resolution(), std::numeric_limits<double>::min()) / 256;
+        if (interval <= instant && seen_ > 0) {  // another event of the same instant: no interval
+            last_ = t;
+            return false;
+        }
+        shrinking_ = seen_ >= 2 && interval < interval_ ? shrinking_ + 1 : 0;
+        const double ratio = shrinking_ > 0 ? interval / interval_ : 1;
+        geometric_ = interval + 4 * resolution() >= interval_ * ratio_ / 16;
+        ratio_ = ratio;
+        last_ = t;
+        interval_ = interval;
+        seen_ = std::min(seen_ + 1, 2u);
+        if (seen_ == 2) longest_ = std::max(longest_, interval);
+        return false;
+    }
+
+    /// Whether a guard that leaves its surface at `rate` [1/s] after the event just noted is
+    /// going to rise so little, or for so short, compared with earlier excursions, that its
+    /// rounding may matter.
+    [[nodiscard]] bool is_low_at(double rate) const noexcept
+    {
+        return seen_ >= 2 && (rise(rate) <= 1e-3 * peak_ || interval_ <= 0.03 * longest_);
+    }
+
+    /// The guard turns back from its surface at `rate` [1/s] after the event just noted, which
+    /// is `low` or not; infinity: it does not turn back.
+    void depart(double rate, bool low) noexcept
+    {
+        excursion_ = seen_ >= 2 ? rise(rate) : std::numeric_limits<double>::infinity();
+        low_ = low;
+        if (!std::isfinite(excursion_)) return;
+        peak_ = std::max(peak_, excursion_);
+        decay_ = 1 - excursion_ / last_excursion_;
+        last_excursion_ = excursion_;
+        if (!low) usual_decay_ = decay_;
+    }
+
+    /// Whether the last departure was low.
+    [[nodiscard]] bool is_low() const noexcept { return low_; }
+
+    /// Between the last two events [s].
+    [[nodiscard]] double interval() const noexcept { return interval_; }
+
+    /// Whether excursions sink into the guard's `rounding`: at the end of a shrinking series,
+    /// or three in a row. What a reset leaves of the guard adds to every excursion: with
+    /// restitution e they stay at 1 / (1 - e^2) of it, and decay less than half as fast from
+    /// twice that on.
+    [[nodiscard]] bool fades(double rounding) noexcept
+    {
+        const bool sunk = excursion_ <= rounding;
+        const bool lingers = excursion_ <= 32 * rounding && decay_ < usual_decay_ / 2;
+        sunk_ = sunk || lingers ? sunk_ + 1 : 0;
+        return sunk_ >= 3 || (sunk && shrinking_ >= 3);
+    }
+
+    /// Whether what is left after the event just noted is below `tolerance` [s] or
+    /// the resolution of its time. An interval that is far shorter than the ones before
+    /// made expect is the gap between two events, not the end of a series.
+    ///
+    /// An event that is located late by d, and whose reset puts the motion back on the surface,
+    /// gains speed: intervals with the ratio q then stay at 2 q d / (1 - q), and shrink less than
+    /// half as fast from twice that on.
+    [[nodiscard]] bool accumulate(double tolerance) noexcept
+    {
+        if (shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution())) {
+            return true;
+        }
+        if (interval_ * (1 - ratio_) > 16 * tolerance * ratio_) usual_ratio_ = ratio_;
+        const double decay = 1 - usual_ratio_;
+        const bool lingers = interval_ * decay <= 5 * late_ * usual_ratio_ &&
+                             1 - ratio_ < decay / 2 && interval_ <= longest_ / 4;
+        lingering_ = lingers ? lingering_ + 1 : 0;
+        return lingering_ >= 3;
+    }
+
+    /// The event just noted is known to `error` [s].
+    void blame(double error) noexcept
+    {
+        late_ = error;
+        blamed_ += error;
+    }
+
+    /// By how much [s] the limit may be off: an event that is late by d delays all later ones by
+    /// d (1 + q) / (1 - q) in the end.
+    [[nodiscard]] double error() const noexcept
+    {
+        const double q = std::min(usual_ratio_, ratio_);
+        return remainder() + (q < 1 ? blamed_ * (1 + q) / (1 - q) : blamed_) +
+               (lingering_ > 0 ? interval_ / (1 - q) : 0);
+    }
+
+    /// Extrapolated time [s] from the last event to the limit of all; 0 where the intervals
+    /// do not shrink, or only because events are late.
+    [[nodiscard]] double remainder() const noexcept
+    {
+        return ratio_ < 1 && lingering_ < 3 ? interval_ * ratio_ / (1 - ratio_) : 0;
+    }
+
+    /// Calls `visit` with every number that makes up the state.
+    template <class Visit>
+    void visit(Visit&& visit)
+    {
+        visit(last_.value);
+        visit(last_.remainder);
+        visit(interval_);
+        visit(ratio_);
+        visit(seen_);
+        visit(shrinking_);
+        visit(stalled_);
+        visit(step_);
+        visit(geometric_);
+        visit(excursion_);
+        visit(last_excursion_);
+        visit(peak_);
+        visit(longest_);
+        visit(decay_);
+        visit(usual_decay_);
+        visit(usual_ratio_);
+        visit(late_);
+        visit(blamed_);
+        visit(lingering_);
+        visit(sunk_);
+        visit(low_);
+    }
+
+private:
+    /// A parabola that leaves at `rate`, for an interval that shrinks as the last one did,
+    /// rises by rate * interval / 4.
+    [[nodiscard]] double rise(double rate) const noexcept
+    {
+        return std::fabs(rate) * interval_ * ratio_ / 4;
+    }
+
+    [[nodiscard]] double resolution() const noexcept
+    {
+        return 16 * finest_bracket(last_.value, step_);
+    }
+
+    Instant last_;
+    double interval_ = 0;
+    double ratio_ = 1;
+    double step_ = 0;
+    bool geometric_ = true;
+    std::uint32_t seen_ = 0;
+    std::uint32_t shrinking_ = 0;
+    std::uint32_t stalled_ = 0;
+    double excursion_ = std::numeric_limits<double>::infinity();  ///< expected next
+    double last_excursion_ = std::numeric_limits<double>::infinity();
+    double peak_ = 0;         ///< the largest excursion
+    double longest_ = 0;      ///< [s] interval
+    double decay_ = 0;        ///< part that the last excursion has lost of the one before
+    double usual_decay_ = 0;  ///< as it was before rounding mattered
+    double usual_ratio_ = 1;  ///< of intervals, before lateness mattered
+    double late_ = 0;         ///< [s] the error of the last event
+    double blamed_ = 0;       ///< [s] the sum of all
+    std::uint32_t lingering_ = 0;
+    std::uint32_t sunk_ = 0;
+    bool low_ = false;
+};
+
+}  // namespace ricochet::detail

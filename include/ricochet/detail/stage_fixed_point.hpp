@@ -1,0 +1,80 @@
+// Internal: what it declares may change without notice.
+//
+// Stages by a projected fixed point with an adapted step.
+#pragma once
+
+#include "ricochet/detail/inclusion_stage.hpp"
+
+namespace ricochet::detail {
+
+/// The iteration of the source, for G = E' with E E' = I:
+///
+///     z = w - rho F(w),   reaction = P(-(E z - s) / (rho sigma)),
+///     w = z + rho sigma G reaction
+///
+/// where F is the stage's defect without the reaction. After each iteration rho is cut to
+/// 0.66 of itself where rho |dF| / |dw| > 0.9, and raised by as much where it is < 0.3.
+/// Unlike the source's it starts from 1 / max |S_ii| in every solve, so that no solve
+/// depends on the one before, and its residual does not depend on rho.
+///
+/// (The Bathe / variational-inequality solver of D. M. Riley and others, Reinforcement
+/// Learning-based adaptive time-integration for nonsmooth dynamics, and its code.)
+template <class System>
+[[nodiscard]] StageReport solve_fixed_point(StageScratch<System>& scratch,
+                                            const detail::Stage<System>& stage,
+                                            const StageOptions& options, StateOf<System>& w,
+                                            ReactionOf<System>& reaction)
+{
+    const auto& m = scratch.m;
+    m.offset(stage.t, scratch.s);
+    const auto& factor = scratch.factor(stage, w);
+    scratch.set_rho(factor);
+    double largest = 0;
+    for (Eigen::Index i = 0; i < w.size(); ++i) {
+        largest = std::max(
+            largest, std::abs(stage.c * m.mass()(i, i) - stage.kappa * factor.jacobian(i, i)));
+    }
+    double rho = largest > 0 ? 1 / largest : 1;
+    auto& force = scratch.f_trial;  // F
+    auto& before = scratch.w0;
+    const auto defect = [&](const StateOf<System>& at, StateOf<System>& out) {
+        m.smooth(stage.t, at, scratch.f);
+        out.noalias() = stage.c * (m.mass() * at);
+        out -= stage.kappa * scratch.f + stage.q;
+    };
+    defect(w, force);
+    StageReport report;
+    const int limit = 100 * options.max_iterations;
+    for (int iteration = 1; iteration <= limit; ++iteration) {
+        before = w;
+        scratch.trial = force;
+        w -= rho * force;
+        const auto set = m.system().reaction_set(stage.t, before);
+        if (!fault_of(set).empty()) return {.iterations = iteration, .set = 0};
+        scratch.argument.noalias() = m.observe() * w;
+        scratch.argument -= scratch.s;
+        if constexpr (confines<System>() == Confines::reaction) {
+            scratch.argument /= -rho * stage.sigma;
+            set.project(span_of(scratch.argument), span_of(reaction));
+        } else {
+            set.project(span_of(scratch.argument), span_of(scratch.image));
+            reaction = (scratch.image - scratch.argument) / (rho * stage.sigma);
+        }
+        w.noalias() += (rho * stage.sigma) * (m.act() * reaction);
+        defect(w, force);
+        report =
+            scratch.residual(stage, m.system().reaction_set(stage.t, w), w, scratch.f, reaction);
+        report.iterations = iteration;
+        report.converged = report.residual <= options.tolerance;
+        if (report.converged || !std::isfinite(report.residual)) return report;
+        const double moved = (w - before).norm();
+        if (moved > 1e-14 + 1e-12 * (1 + w.norm())) {
+            const double ratio = rho * (force - scratch.trial).norm() / moved;
+            if (ratio > 0.9) rho *= 0.66;
+            if (ratio < 0.3) rho /= 0.66;
+        }
+    }
+    return report;
+}
+
+}  // namespace ricochet::detail

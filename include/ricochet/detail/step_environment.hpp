@@ -1,0 +1,96 @@
+// Internal: what it declares may change without notice.
+//
+// Steps chosen by reinforcement learning: a run as an environment, an action as a step.
+//
+//     const StepWorld world = step_world(StrikeSlipFault({.elements = 1}), 30);
+//     const TrainedPolicy trained = train_tqc(world.environment);
+//     const StepTrial trial = follow(world, trained.policy);   // its true errors
+//
+// An episode is one run of one problem. The action is the length of the next step, which is taken
+// if its stages can be solved, however wrong it is, as in
+//
+//   D. M. Riley and others, "Reinforcement learning-based adaptive time-integration for nonsmooth
+//   dynamics", section 4.
+//
+// What differs from it: work is counted rather than timed, so that runs repeat; the last step ends
+// where the run does; and what is observed are the intensive inputs of `StepPolicy`.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <numbers>
+
+#include "ricochet/learn/environment.hpp"
+#include "ricochet/learn/step_control.hpp"
+
+namespace ricochet::learn {
+
+enum class StepReward {
+    /// The source's equation 7, with x = (h - h_min) / (h_max - h_min) of the step taken:
+    ///
+    ///     x (1 - (w - 1) / (dear - 1)) exp(-alpha E),  or -x of a step that cannot be solved
+    ///
+    /// where w are the Newton iterations per solve, at most `dear`; systems whose solves all
+    /// cost the same have 1. E is the scaled error of the step.
+    published,
+    /// -work / work_unit - lambda (integral over the step of |y - y_ref|^2) / (that of |y_ref|^2
+    /// over the run): the sum over an episode is minus what the run costs, and is wrong.
+    additive,
+};
+
+/// From an action in [-1, 1] to a step in [h_min, h_max].
+enum class StepScale {
+    linear,       ///< as the source's code
+    logarithmic,  ///< equal factors
+};
+
+struct StepWorldOptions {
+    StepReward reward = StepReward::published;
+    double alpha = 2;       ///< zero or positive
+    double dear = 10;       ///< iterations per solve that earn nothing; above 1
+    double lambda = 100;    ///< zero or positive
+    double work_unit = 10;  ///< iterations of a fault, solves of other systems; positive
+    StepScale scale = StepScale::logarithmic;
+    double h_min = 1e-5;  ///< [s] positive
+    double h_max = 0;     ///< [s] above h_min; 0: the source's
+    /// `doubling` is the source's, with its norm and its atol = tolerance / 1000; it costs six
+    /// solves instead of two.
+    ErrorEstimate estimate = ErrorEstimate::embedded;
+    FirstStage first_stage = FirstStage::averaged;  ///< at_end: the source's
+    double tolerance = 1e-3;                        ///< to which E is scaled, positive
+    /// A fault's episode ends when nothing moves any more, nor will. The source goes on.
+    bool until_rest = false;
+    std::uint64_t max_attempts = 20'000;  ///< then an episode is cut
+    /// Told of the reference's run and of an episode after every step; false ends them.
+    StepWatch watch{};
+};
+
+/// The source's own.
+[[nodiscard]] StepWorldOptions published_step_world(double alpha = 2);
+
+/// How often in a row a step may not be solved before an episode ends.
+inline constexpr int step_world_failures = 10;
+
+/// An environment, and what the run in it has come to. Copies share the run.
+struct StepWorld {
+    /// Nine observations of order one: the error, length and share of switches of the last step,
+    /// and the state as of the system's `StepLayout`. Every episode is the same run.
+    Environment environment{};
+    std::function<StepTrial()> trial{};                ///< of the episode, ended or not
+    std::function<double(double action)> length_of{};  ///< [s]
+    std::function<double(double length)> action_of{};  ///< its inverse
+};
+
+/// @throws std::invalid_argument naming the option, and as the systems' runs.
+[[nodiscard]] StepWorld step_world(const StrikeSlipFault& fault, double t_end,
+                                   const StepWorldOptions& options = {});
+[[nodiscard]] StepWorld step_world(const SlidingMode& system, double from, double t_end,
+                                   const StepWorldOptions& options = {});
+[[nodiscard]] StepWorld step_world(const DiodeCircuit& system, const Eigen::Vector3d& start,
+                                   double t_end, const StepWorldOptions& options = {});
+
+/// One episode by a deterministic policy as the trainers make it: action = tanh(network).
+/// @throws std::invalid_argument if the model does not have the environment's inputs.
+[[nodiscard]] StepTrial follow(const StepWorld& world, const Model& policy);
+
+}  // namespace ricochet::learn

@@ -1,0 +1,49 @@
+// Internal: what it declares may change without notice.
+//
+// What a system tells a rule that chooses steps.
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <string>
+#include <string_view>
+
+#include "ricochet/integrate/step_controllers.hpp"
+
+namespace ricochet {
+
+/// An input of a policy, and roughly where it lies: it enters the network less `centre`, over
+/// `width`.
+struct StepInput {
+    std::string_view name;
+    double centre = 0;
+    double width = 1;
+};
+
+/// What a policy of one system is asked about.
+struct StepLayout {
+    std::string_view system;  ///< e.g. "fault"
+    int version = 1;          ///< of the meaning of the names
+    std::array<StepInput, StepView::state_inputs> state;
+
+    /// As a model file has it: "step-inputs-1: log_error log_tolerance ...".
+    [[nodiscard]] std::string recipe() const;
+};
+
+/// A system that declares inputs for policies: `step_inputs(t, w, rate, reaction, out)` of the end
+/// of a step, with the rate of w there, and the unit of time [s] over which steps are measured.
+template <class System, class State, class Reaction>
+concept DeclaresStepInputs = requires(const System& system, double t, const State& w,
+                                      const Reaction& reaction,
+                                      std::array<double, StepView::state_inputs>& out)
+{
+    {
+        System::step_layout()
+        } -> std::convertible_to<const StepLayout&>;
+    {
+        system.step_unit()
+        } -> std::convertible_to<double>;
+    system.step_inputs(t, w, w, reaction, out);
+};
+
+}  // namespace ricochet

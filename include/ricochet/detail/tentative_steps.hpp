@@ -1,0 +1,50 @@
+// Internal: what it declares may change without notice.
+//
+// Starts of the steps that have been taken, but not yet been closed by a look.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "ricochet/detail/explicit_step.hpp"
+
+namespace ricochet::detail {
+
+/// All that it takes to take a step again, and to forget that it was taken.
+template <class X>
+struct TentativeStep {
+    StepStart<X> start;
+    double h_next = 0;  ///< [s] what the step was proposed to be
+    double last_h = 0;  ///< [s] the step before it
+    std::size_t samples = 0;
+    std::size_t pieces = 0;
+    std::uint64_t rejected = 0;
+};
+
+/// A stretch of such steps, in room that is made once.
+template <class X>
+class TentativeSteps {
+public:
+    TentativeSteps(std::size_t most, const X& like) : steps_(most)
+    {
+        for (TentativeStep<X>& step : steps_) {
+            step.start.x = step.start.remainder = step.start.rate = like;
+        }
+    }
+
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+    [[nodiscard]] bool full() const noexcept { return size_ == steps_.size(); }
+    [[nodiscard]] const TentativeStep<X>& operator[](std::size_t k) const noexcept
+    {
+        return steps_[k];
+    }
+    [[nodiscard]] TentativeStep<X>& add() noexcept { return steps_[size_++]; }
+    void clear() noexcept { size_ = 0; }
+
+private:
+    std::vector<TentativeStep<X>> steps_;
+    std::size_t size_ = 0;
+};
+
+}  // namespace ricochet::detail

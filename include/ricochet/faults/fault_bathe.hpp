@@ -1,0 +1,142 @@
+// The rupture of a strike-slip fault by Bathe's implicit steps, for stiff variants, for comparison
+// with published runs, and for rules that choose the step.
+//
+//     const Rupture r = simulate(fault, {.t_end = 30, .step = 0.125}, BatheOptions{});
+//
+// A stage over g (a quarter or a third of the step) is the convex problem
+//
+//     A v + g b(s + g |v|) Sign(v)  contains  w,     A = 1 + g H + g^2 K
+//
+// whose stiffness is convex as long as g^2 times the steepest weakening is below the least
+// eigenvalue of A: steps up to 1.5 s at 3 km. It is solved by a semismooth Newton method: elements
+// slip forth, back or stick by where the proximal map puts them, and those that slip are
+// solved for by conjugate gradients. A is one polynomial in K.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+
+#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/faults/fault_rupture.hpp"
+
+namespace ricochet {
+
+/// Where the strength of a stage is taken.
+enum class FaultBound {
+    implicit,  ///< at the path of the stage's end
+    /// at the path extrapolated with the velocity of its start: always convex, also of order 2
+    extrapolated,
+};
+
+/// How the errors of the fields become one number.
+enum class FaultNorm {
+    /// the larger of the velocity's and the slip's, root mean square over rtol of that of the
+    /// field itself, at least `BatheOptions::floor` of the largest velocity so far
+    fields,
+    /// root mean square over all components of error / (atol + rtol |component|), of velocity,
+    /// displacement from the unloaded state, and path, in units of 0.1 mm, as the published code
+    components,
+};
+
+/// A step that was taken, without units (`StrikeSlipFault`): the fields at its start, at the end
+/// of its first stage and at its end.
+struct BatheStep {
+    double t = 0;  ///< of its start
+    double h = 0;
+    std::array<const Eigen::VectorXd*, 3> velocity{};
+    std::array<const Eigen::VectorXd*, 3> path{};
+};
+
+struct BatheOptions {
+    FirstStage first_stage = FirstStage::averaged;  ///< or at_end, the published scheme: order 1
+    FaultBound bound = FaultBound::implicit;
+    /// The first step, or all of them, is `RuptureOptions::step`, positive.
+    StepController controller = ConstantStep{};
+    ErrorEstimate estimate = ErrorEstimate::none;
+    FaultNorm norm = FaultNorm::fields;
+    double rtol = 1e-3;
+    double atol = 1e-6;       ///< of FaultNorm::components
+    double floor = 0.03;      ///< of FaultNorm::fields: a fault that stops needs no digits of that
+    double h_max = 0;         ///< [s]; 0: a fifth of the run
+    double tolerance = 1e-7;  ///< residual of a stage, relative to its velocities
+    int max_iterations = 50;  ///< of Newton's method
+    int max_inner = 200;      ///< of conjugate gradients, in one of them
+    /// Shown every step; of step doubling both halves.
+    std::function<void(const BatheStep&)> observer{};
+};
+
+/// What a step policy is asked about: of the fields at the end of an attempt, without units, the
+/// logarithm of the root mean square velocity, the rate of growth of its square (half of it, as
+/// asinh) and the logarithm of the time in which it would vanish at that rate, the mean of
+/// exp(-path), the share of elements that slip, and the logarithm of the mean drop of strength.
+[[nodiscard]] const StepLayout& fault_step_layout() noexcept;
+
+/// @throws std::invalid_argument naming the option.
+void validate(const BatheOptions& options);
+
+/// `RuptureOptions::rtol` is not used here. Rest is known to a step.
+/// @throws std::invalid_argument for what both `validate` refuse, and a bound of the polynomial
+/// that cannot be met.
+[[nodiscard]] Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
+                               const BatheOptions& bathe);
+
+/// A run whose steps are chosen from outside, one at a time.
+///
+///     BatheMotion motion = runs.start(options, bathe);
+///     while (!motion.ended()) motion.step(h);
+///
+/// The steps are those of `simulate`, to the bit. What made it must outlive it.
+class BatheMotion {
+public:
+    BatheMotion(BatheMotion&&) noexcept;
+    BatheMotion& operator=(BatheMotion&&) noexcept;
+    ~BatheMotion();
+
+    /// One attempt over h [s], positive, or over what is left. If a stage has no solution
+    /// nothing moves: false. The controller of the options is not asked.
+    bool step(double h);
+
+    [[nodiscard]] bool ended() const noexcept;
+    [[nodiscard]] double t() const noexcept;  ///< [s]
+    /// Whether nothing moves any more, nor will.
+    [[nodiscard]] bool rests();
+    /// The scaled error of the last step; 0 if none is estimated.
+    [[nodiscard]] double error() const noexcept;
+    /// Of the last step, or of the start.
+    [[nodiscard]] const StepView& view() const noexcept;
+    [[nodiscard]] const RuptureStatistics& statistics() const noexcept;
+    [[nodiscard]] double mean_slip() const;  ///< path [m]
+
+private:
+    friend class BatheRuns;
+    struct Parts;
+    explicit BatheMotion(std::unique_ptr<Parts> parts);
+    std::unique_ptr<Parts> parts_;
+};
+
+/// One fault under many rules: what depends on the fault alone, a third of a millisecond for one
+/// element, is made once. Not for two threads at a time.
+class BatheRuns {
+public:
+    /// @param polynomial_bound  in place of `RuptureOptions::polynomial_bound`
+    explicit BatheRuns(const StrikeSlipFault& fault, double polynomial_bound = 0);
+    BatheRuns(BatheRuns&&) noexcept;
+    BatheRuns& operator=(BatheRuns&&) noexcept;
+    ~BatheRuns();
+
+    [[nodiscard]] const StrikeSlipFault& fault() const noexcept;
+    /// As the function of that name.
+    [[nodiscard]] Rupture simulate(const RuptureOptions& options, const BatheOptions& bathe);
+    /// A run to be stepped, which must end before another begins. `RuptureOptions::step` is not
+    /// used, but for being positive.
+    [[nodiscard]] BatheMotion start(const RuptureOptions& options, const BatheOptions& bathe);
+
+private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace ricochet

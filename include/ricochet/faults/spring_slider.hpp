@@ -1,0 +1,123 @@
+// A block on a spring whose far end is moved, with rate-and-state friction: stick-slip.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/detail/variational_step.hpp"
+
+namespace ricochet {
+
+/// The far end of the spring: piecewise at constant velocity, continuous.
+class SliderLoad {
+public:
+    struct Piece {
+        double t = 0;         ///< [s] from when on
+        double velocity = 0;  ///< [m/s]
+    };
+
+    /// From `start` [m] at the time of the first piece.
+    /// @throws std::invalid_argument unless there is a piece, and their times rise.
+    SliderLoad(double start, std::vector<Piece> pieces);
+    SliderLoad(double start, double velocity) : SliderLoad(start, {{0, velocity}}) {}
+
+    /// x_p(t) [m]; the first piece holds before its time, too.
+    [[nodiscard]] double operator()(double t) const noexcept
+    {
+        std::size_t i = pieces_.size() - 1;
+        while (i > 0 && t < pieces_[i].t) --i;
+        return position_[i] + pieces_[i].velocity * (t - pieces_[i].t);
+    }
+
+    /// The first corner after t; infinite if there is none.
+    [[nodiscard]] double next_corner(double t) const noexcept;
+
+private:
+    std::vector<Piece> pieces_;
+    std::vector<double> position_;
+};
+
+struct SpringSlider {
+    RateStateParameters friction{};
+    StateEvolution evolution = StateEvolution::ageing;
+    SpringBlock block{};
+    SliderLoad load{0, 1e-4};
+};
+
+/// What may happen to the slip rate.
+enum class SliderEventKind {
+    onset,     ///< it rises through the threshold: slip begins
+    arrest,    ///< it falls through the threshold
+    reversal,  ///< it passes through zero
+};
+[[nodiscard]] std::string_view name(SliderEventKind kind) noexcept;
+
+struct SliderEvent {
+    SliderEventKind kind = SliderEventKind::onset;
+    SliderState at{};
+};
+
+enum class SliderOutcome {
+    reached_end,
+    unsolved,        ///< an equation had no solution found
+    step_underflow,  ///< no step above 1e-14 t met the tolerance
+    step_limit,
+    non_finite,
+    cancelled,  ///< `SliderOptions::cancelled` was set
+};
+[[nodiscard]] std::string_view describe(SliderOutcome outcome) noexcept;
+
+struct SliderOptions {
+    double t_end = 2;          ///< [s], after the start
+    int order = 4;             ///< 1, 2 or 4
+    double step = 0;           ///< [s]; 0: by error control
+    double rtol = 1e-8;        ///< of the slip rate, of x against |x| + D_RS, of xi against 1
+    double first_step = 1e-5;  ///< [s] under error control
+    double threshold = 0;      ///< [m/s] of onset and arrest; 0: not looked for
+    std::size_t samples = 0;   ///< evenly over the run, both ends included; 0: none
+    std::size_t max_steps = 10'000'000;
+    /// Set from another thread or a signal handler, it ends the run after the step in progress.
+    const std::atomic<bool>* cancelled = nullptr;
+};
+
+struct SliderRun {
+    SliderOutcome outcome = SliderOutcome::reached_end;
+    SliderState state{};
+    std::vector<SliderEvent> events{};
+    std::vector<SliderState> samples{};
+    std::size_t steps = 0, rejected = 0;
+    std::size_t iterations = 0, stages = 0;
+    int most_iterations = 0;
+    std::size_t unsolved = 0, not_convex = 0;  ///< stages of accepted steps
+    double residual = 0;                       ///< largest
+};
+
+/// Runs a slider by variational steps, with the asinh form of the direct effect. Steps end
+/// where the load has a corner. Events are located by repeating the step, to neighbouring
+/// doubles, and change nothing; two crossings within a step are found where the cubic
+/// through slip rates and accelerations shows them.
+///
+/// @throws std::invalid_argument for parameters or options outside their range.
+[[nodiscard]] SliderRun run_slider(const SpringSlider& slider, const SliderState& start,
+                                   const SliderOptions& options = {});
+
+/// Friction coefficient at a state of a slider.
+[[nodiscard]] double slider_friction(const SpringSlider& slider, const SliderState& state);
+
+/// A slider of the stability study: unit mass, N = 9.81 N, loaded at constant velocity.
+struct SliderCase {
+    SpringSlider slider;
+    double stiffness_ratio = 0;  ///< k / k_crit at the velocity of the load
+};
+
+/// 77 sliders, 35 of them softer than critical: k / k_crit log-uniform in [0.2, 0.95] or
+/// [1.05, 5], the velocity of the load in [0.5, 2] V*. They start at V*, xi = 0, with the
+/// spring drawn to N f*. (The source says only that such ranges were drawn from; these
+/// are ours.)
+[[nodiscard]] std::vector<SliderCase> slider_cases(std::uint64_t seed);
+[[nodiscard]] SliderState slider_case_start() noexcept;
+
+}  // namespace ricochet

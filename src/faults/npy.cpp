@@ -1,0 +1,128 @@
+// NumPy's file format, as numpy.lib.format describes it: versions 1 to 3.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "../files/read_file.hpp"
+#include "ricochet/detail/fault_kernel.hpp"
+
+namespace ricochet {
+
+namespace {
+
+[[noreturn]] void refuse(const std::filesystem::path& file, std::string_view why)
+{
+    throw std::invalid_argument(fmt::format("{}: {}", file.string(), why));
+}
+
+/// What follows 'key': in the header, up to `end`.
+std::string_view value_of(const std::filesystem::path& file, std::string_view header,
+                          std::string_view key, std::string_view end)
+{
+    const std::string name = fmt::format("'{}':", key);
+    const std::size_t at = header.find(name);
+    if (at == std::string_view::npos) refuse(file, fmt::format("no '{}' in its header", key));
+    std::string_view rest = header.substr(at + name.size());
+    if (rest.find(name) != std::string_view::npos) {
+        refuse(file, fmt::format("'{}' appears twice in its header", key));
+    }
+    rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
+    const std::string_view value = rest.substr(0, rest.find_first_of(end));
+    return value.substr(0, value.find_last_not_of(' ') + 1);
+}
+
+/// "(100, 100" to 100; anything but two equal numbers is refused.
+std::uint64_t side_of(const std::filesystem::path& file, std::string_view shape)
+{
+    const std::string text(shape.substr(std::min<std::size_t>(1, shape.size())));
+    unsigned long long rows = 0;
+    unsigned long long columns = 0;
+    int used = 0;
+    if (std::sscanf(text.c_str(), "%llu , %llu%n", &rows, &columns, &used) != 2 ||
+        static_cast<std::size_t>(used) != text.size() || rows != columns || rows == 0 ||
+        rows > 1'000'000) {
+        refuse(file, fmt::format("expected a square matrix, found shape {})", shape));
+    }
+    return rows;
+}
+
+struct Header {
+    std::uint64_t side = 0;
+    bool fortran = false;
+    bool single = false;
+    std::size_t data = 0;  ///< offset
+};
+
+constexpr std::string_view magic = "\x93NUMPY";
+
+Header header_of(const std::filesystem::path& file, std::string_view bytes)
+{
+    if (bytes.size() < 12 || !bytes.starts_with(magic)) refuse(file, "is no NumPy file (.npy)");
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(bytes[i]); };
+    if (byte(6) < 1 || byte(6) > 3) {
+        refuse(file, fmt::format("is of format {}, expected 1, 2 or 3", byte(6)));
+    }
+    const bool wide = byte(6) > 1;
+    std::size_t length = byte(8) + 256U * byte(9);
+    if (wide) length += (std::size_t{byte(10)} << 16) + (std::size_t{byte(11)} << 24);
+    const std::size_t start = wide ? 12 : 10;
+    if (length > bytes.size() - start) refuse(file, "ends within its header");
+    const std::string_view header = bytes.substr(start, length);
+    if (!header.starts_with('{') || header.find('}') == std::string_view::npos) {
+        refuse(file, "expected a header in braces");
+    }
+    const std::string_view type = value_of(file, header, "descr", ",}");
+    if (type != "'<f8'" && type != "'<f4'") {
+        refuse(file, fmt::format("expected numbers of type '<f8' or '<f4', found {}", type));
+    }
+    const std::string_view order = value_of(file, header, "fortran_order", ",}");
+    if (order != "True" && order != "False") {
+        refuse(file, fmt::format("expected a fortran_order of True or False, found {}", order));
+    }
+    return {.side = side_of(file, value_of(file, header, "shape", ")")),
+            .fortran = order == "True",
+            .single = type == "'<f4'",
+            .data = start + length};
+}
+
+template <class Number>
+Eigen::MatrixXd matrix(const char* data, std::uint64_t side)
+{
+    const auto n = static_cast<Eigen::Index>(side);
+    Eigen::Matrix<Number, Eigen::Dynamic, Eigen::Dynamic> out(n, n);
+    std::memcpy(out.data(), data, side * side * sizeof(Number));
+    return out.template cast<double>();
+}
+
+}  // namespace
+
+Eigen::MatrixXd read_npy_square(const std::filesystem::path& file)
+{
+    static_assert(std::endian::native == std::endian::little);
+    const std::string bytes = detail::read_file(
+        file, [&](const std::string& why) { refuse(file, "cannot be read: " + why); },
+        std::numeric_limits<std::ptrdiff_t>::max(), magic);
+    const Header header = header_of(file, bytes);
+    const std::uint64_t expected = header.side * header.side * (header.single ? 4 : 8);
+    if (bytes.size() - header.data != expected) {
+        refuse(file, fmt::format("a matrix of {0} x {0} has {1} bytes, found {2}", header.side,
+                                 expected, bytes.size() - header.data));
+    }
+    const char* data = bytes.data() + header.data;
+    Eigen::MatrixXd out =
+        header.single ? matrix<float>(data, header.side) : matrix<double>(data, header.side);
+    if (!out.allFinite()) refuse(file, "has entries that are no numbers, or infinite");
+    if (!header.fortran) out.transposeInPlace();
+    return out;
+}
+
+}  // namespace ricochet
