@@ -25,8 +25,8 @@
 #include <string_view>
 #include <vector>
 
-#include "../src/learn/certify_checkpoint.hpp"
-#include "../src/learn/checkpoint_file.hpp"
+#include "learn/certify_checkpoint.hpp"
+#include "learn/checkpoint_file.hpp"
 #include "mutator.hpp"
 #include "nn_models.hpp"
 #include "ricochet/faults/additive_pair.hpp"

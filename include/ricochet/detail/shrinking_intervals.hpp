@@ -98,7 +98,9 @@ public:
         if (shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution())) {
             return true;
         }
-        if (interval_ * (1 - ratio_) > 16 * tolerance * ratio_) usual_ratio_ = ratio_;
+        const bool shrinks = shrinking_ >= 3 && ratio_ < 0.999;
+        if (shrinks && interval_ * (1 - ratio_) > 16 * tolerance * ratio_) usual_ratio_ = ratio_;
+        if (tolerance == 0) return false;
         const double decay = 1 - usual_ratio_;
         const bool lingers = interval_ * decay <= 5 * late_ * usual_ratio_ &&
                              1 - ratio_ < decay / 2 && interval_ <= longest_ / 4;

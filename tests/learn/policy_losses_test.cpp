@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "../src/learn/td3_losses.hpp"
-#include "../src/learn/tqc_losses.hpp"
+#include "learn/td3_losses.hpp"
+#include "learn/tqc_losses.hpp"
 #include "gradient_check.hpp"
 
 namespace ricochet::learn {

@@ -1,4 +1,4 @@
-#include "../src/learn/workers.hpp"
+#include "learn/workers.hpp"
 
 #include <gtest/gtest.h>
 

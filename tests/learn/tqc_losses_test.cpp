@@ -1,4 +1,4 @@
-#include "../src/learn/tqc_losses.hpp"
+#include "learn/tqc_losses.hpp"
 
 #include <gtest/gtest.h>
 

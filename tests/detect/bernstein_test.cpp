@@ -835,7 +835,7 @@ TEST(Bernstein, NotANumberAtTheEndOfAStepEndsTheRun)
     const Timed system{[](double t) { return std::sqrt(0.55 - t); }};
     const auto run = run_timed(system, 0.1);
     EXPECT_EQ(run.outcome, Outcome::non_finite);
-    EXPECT_NEAR(run.t, 0.5, 1e-15);
+    EXPECT_NEAR(run.t, 0.55, 1e-14);  // the last step is taken again, shorter
 }
 
 TEST(Bernstein, WorkOnAHopelessGuardIsBounded)

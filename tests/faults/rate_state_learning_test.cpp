@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "../src/learn/friction_models.hpp"
+#include "learn/friction_models.hpp"
 #include "ricochet/detail/along_history.hpp"
 #include "ricochet/detail/friction_study.hpp"
 #include "ricochet/learn/train_friction.hpp"

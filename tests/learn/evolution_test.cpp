@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "../src/learn/checkpoint_file.hpp"
+#include "learn/checkpoint_file.hpp"
 
 namespace ricochet::learn {
 namespace {
