@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs the build tree and builds a consumer by find_package with every compiler given,
-# and one by add_subdirectory, which compiles the whole library, with the last of them.
+# Installs the build tree, the core alone and as a whole. With every compiler given, builds a
+# consumer of the core by find_package; with the last of them one by add_subdirectory, which
+# compiles the core, and one of each further component.
 # usage: run.sh BUILD_TREE SOURCE_TREE COMPILER...
 set -euo pipefail
 build=$(realpath "$1") source=$(realpath "$2")
@@ -8,22 +9,43 @@ shift 2
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-cmake --install "$build" --prefix "$work/prefix" >/dev/null
+cmake --install "$build" --prefix "$work/core" --component core >/dev/null
+cmake --install "$build" --prefix "$work/whole" >/dev/null
 export CMAKE_BUILD_PARALLEL_LEVEL=2
 
-for compiler in "$@"; do
-    ways=(find_package)
-    [ "$compiler" = "${!#}" ] && ways+=(add_subdirectory)
-    for way in "${ways[@]}"; do
-        tree="$work/$way-$(basename "$compiler")"
-        options=(-DCMAKE_PREFIX_PATH="$work/prefix")
-        [ "$way" = add_subdirectory ] && options=(-DRICOCHET_SOURCE="$source")
-        cmake -G Ninja -S "$source/tests/package" -B "$tree" -DCMAKE_CXX_COMPILER="$compiler" \
-            -DCMAKE_BUILD_TYPE=Debug "${options[@]}" >/dev/null
-        cmake --build "$tree" --target consumer >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
-        "$tree/consumer" >/dev/null
-        echo "$(basename "$compiler"), $way: builds without warnings and runs"
+# consume <compiler> <what it is> <options of the configuration> -- <programs>
+consume() {
+    local compiler=$1 what=$2 options=()
+    shift 2
+    while [ "$1" != -- ]; do
+        options+=("$1")
+        shift
     done
+    shift
+    local tree
+    tree=$(mktemp -d "$work/tree.XXXX")
+    cmake -G Ninja -S "$source/tests/package" -B "$tree" -DCMAKE_CXX_COMPILER="$compiler" \
+        -DCMAKE_BUILD_TYPE=Debug "${options[@]}" >/dev/null
+    cmake --build "$tree" --target "$@" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
+    for program in "$@"; do "$tree/$program" >/dev/null; done
+    echo "$(basename "$compiler"), $what: builds without warnings and runs"
+}
+
+for compiler in "$@"; do
+    consume "$compiler" "the core" -DCMAKE_PREFIX_PATH="$work/core" -- consumer
 done
-"$work/prefix/bin/ricochet" simulate bouncing-ball --step 0.01 --detector network --json >/dev/null
+last=${!#}
+consume "$last" "faults and learn" -DCMAKE_PREFIX_PATH="$work/whole" \
+    -DRICOCHET_COMPONENTS="faults;learn" -- faults learn
+consume "$last" "add_subdirectory" -DRICOCHET_SOURCE="$source" -- consumer
+
+if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_PATH="$work/core" \
+    -DRICOCHET_COMPONENTS=learn >"$work/log" 2>&1; then
+    echo "a component that is not installed was found"
+    exit 1
+fi
+grep -q learn "$work/log"
+[ ! -e "$work/core/include/ricochet/learn" ] && [ ! -e "$work/core/include/ricochet/faults" ]
+echo "the core alone: no other component is installed or found"
+"$work/whole/bin/ricochet" simulate bouncing-ball --step 0.01 --detector network --json >/dev/null
 echo "installed command line: finds its models"
