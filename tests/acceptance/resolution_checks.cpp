@@ -124,31 +124,31 @@ Measured end_anywhere()
 
 }  // namespace
 
-std::vector<Check> checks_of_part_8_events()
+std::vector<Check> resolution_checks()
 {
     return {
-        {.part = 8,
+        {.topic = "events",
          .id = "accumulation",
          .sentence = "Random balls on fixed, moving and vibrating floors fall through none and "
                      "do not flutter",
          .target = "0 of 100 000",
          .run = accumulate},
-        {.part = 8,
+        {.topic = "events",
          .id = "moving-guards",
          .sentence = "Guards that move faster than the state are resolved",
          .target = "no dip missed wider than an eighth of its step",
          .run = resolve_guards},
-        {.part = 8,
+        {.topic = "events",
          .id = "decaying-guards",
          .sentence = "Guards that decay to 1e-287 keep their crossings, and have no touches",
          .target = "0 lost",
          .run = follow_decaying_guards},
-        {.part = 8,
+        {.topic = "events",
          .id = "domain-ends",
          .sentence = "A flow that ends at its surface has its event there",
          .target = "<= 1e-12 relative",
          .run = drain},
-        {.part = 8,
+        {.topic = "events",
          .id = "far-ends",
          .sentence = "The ball's impacts are the same bits wherever its run ends",
          .target = "0 differ",

@@ -244,7 +244,7 @@ Measured detection_overhead()
 
 }  // namespace
 
-std::vector<Check> checks_of_part_1()
+std::vector<Check> ball_checks()
 {
     const auto controlled = [](double bound) {
         return [bound] {
@@ -252,7 +252,7 @@ std::vector<Check> checks_of_part_1()
         };
     };
     return {
-        {.part = 1,
+        {.topic = "ball",
          .id = "b1-rk4",
          .sentence = "B1, rk4 at steps 1e-4, 1e-3, 0.01, 0.037, 0.1, 0.3, 1; ends and extremum",
          .target = "all 13 impacts, error <= 2e-14 s",
@@ -260,44 +260,44 @@ std::vector<Check> checks_of_part_1()
              [] {
                  return largest_error(b1_cases({"rk4"}, {"ends", "extremum"}), 2e-14);
              }},
-        {.part = 1,
+        {.topic = "ball",
          .id = "b1-controlled",
          .sentence = "B1, dopri5 and fehlberg78 at rtol 1e-6 to 1e-13; ends and extremum",
          .target = "all 13 impacts, error <= 2e-13 s",
          .run = controlled(2e-13)},
-        {.part = 1,
+        {.topic = "ball",
          .id = "b1-controlled-stretch",
          .sentence = "B1, dopri5 and fehlberg78, rtol 1e-6 to 1e-13, as near as fixed steps",
          .target = "all 13 impacts, error <= 2e-14 s (a wish)",
          .run = controlled(2e-14),
          .required = false},
-        {.part = 1,
+        {.topic = "ball",
          .id = "b1-network",
          .sentence = "B1, rk4 with the network at its own step 0.01",
          .target = "all 13 impacts, error <= 2e-14 s",
          .run = [] { return largest_error(b1_cases({"rk4"}, {"network"}), 2e-14); }},
-        {.part = 1,
+        {.topic = "ball",
          .id = "b1-time",
          .sentence = "time of the 13 impacts, dopri5 at rtol 1e-10, extremum",
          .target = "<= 2.5 us a run at <= 2e-13 s",
          .run = time_of_impacts},
-        {.part = 1,
+        {.topic = "ball",
          .id = "no-allocation",
          .sentence = "heap allocations in a run of B1 with recording off",
          .target = "0",
          .run = no_allocation},
-        {.part = 1,
+        {.topic = "ball",
          .id = "order",
          .sentence = "order of convergence through events",
          .target = "at least 1, 4, 5, 5, 8 (7 would do), less 0.25",
          .run = observe_orders},
-        {.part = 1,
+        {.topic = "ball",
          .id = "state-types",
          .sentence =
              "std::array, std::vector, Eigen::Vector2d, Eigen::VectorXd give the same events",
          .target = "the same bits",
          .run = compare_state_types},
-        {.part = 1,
+        {.topic = "ball",
          .id = "overhead",
          .sentence = "detection overhead: no guard, ends, extremum, network",
          .target = "printed, at <= 2e-14 s",

@@ -155,16 +155,16 @@ Measured follow_mechanisms()
 
 }  // namespace
 
-std::vector<Check> checks_of_part_8_hand_over()
+std::vector<Check> inclusion_checks()
 {
     return {
-        {.part = 8,
+        {.topic = "nonsmooth",
          .id = "hand-over-families",
          .sentence = "14 families of 1000 random inclusions, T/200, T/1000, T/5000",
          .target = "0 wrong beyond the order of the step (was 68 of 496), 0 hang, < 1 in 1000 "
                    "reported, 0 break the law",
          .run = meet},
-        {.part = 8,
+        {.topic = "nonsmooth",
          .id = "mechanisms",
          .sentence = "1000 tipping blocks, woodpeckers and balls on moving plates: the contact "
                      "laws and the balance of energy in every step, balls against backward Euler",

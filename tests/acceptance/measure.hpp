@@ -1,8 +1,10 @@
-// What each part of the library must show, as checks that can be run.
+// What the library must show, by topic, as checks that can be run.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace ricochet::bench {
@@ -14,8 +16,11 @@ struct Measured {
     std::vector<std::string> details{};  ///< printed below it
 };
 
+inline constexpr std::array<std::string_view, 9> topics = {
+    "ball", "network", "events", "guards", "nonsmooth", "steps", "fault", "friction", "files"};
+
 struct Check {
-    int part = 0;
+    std::string_view topic;  ///< one of `topics`
     std::string id;        ///< e.g. "b1-rk4"
     std::string sentence;  ///< what is claimed
     std::string target;
@@ -24,37 +29,37 @@ struct Check {
 };
 
 /// The bouncing ball, end to end.
-[[nodiscard]] std::vector<Check> checks_of_part_1();
+[[nodiscard]] std::vector<Check> ball_checks();
 
 /// The network: kernels, models, training, gate.
-[[nodiscard]] std::vector<Check> checks_of_part_2();
+[[nodiscard]] std::vector<Check> network_checks();
 
 /// The semantics of events.
-[[nodiscard]] std::vector<Check> checks_of_part_3();
+[[nodiscard]] std::vector<Check> event_checks();
 
 /// Dear guards: the planner, networks, certificates.
-[[nodiscard]] std::vector<Check> checks_of_part_4();
+[[nodiscard]] std::vector<Check> guard_checks();
 
 /// Set-valued motion.
-[[nodiscard]] std::vector<Check> checks_of_part_5();
+[[nodiscard]] std::vector<Check> nonsmooth_checks();
 
 /// The learned time step and the strike-slip fault.
-[[nodiscard]] std::vector<Check> checks_of_part_6();
+[[nodiscard]] std::vector<Check> step_checks();
 
 /// Rate-and-state friction.
-[[nodiscard]] std::vector<Check> checks_of_part_7();
+[[nodiscard]] std::vector<Check> friction_checks();
 
 /// Events where guards accumulate, decay, or move faster than the state.
-[[nodiscard]] std::vector<Check> checks_of_part_8_events();
+[[nodiscard]] std::vector<Check> resolution_checks();
 
 /// Saved runs, potential files, runs that cannot go on.
-[[nodiscard]] std::vector<Check> checks_of_part_8_saved();
+[[nodiscard]] std::vector<Check> file_checks();
 
 /// The fault and the rules for its steps.
-[[nodiscard]] std::vector<Check> checks_of_part_8_fault();
+[[nodiscard]] std::vector<Check> fault_checks();
 
 /// Inclusions where several relays, contacts and diodes meet.
-[[nodiscard]] std::vector<Check> checks_of_part_8_hand_over();
+[[nodiscard]] std::vector<Check> inclusion_checks();
 
 /// The sliding mode and the diode circuit, handed over: changes, times, states.
 [[nodiscard]] Measured hand_over_sliding_mode();

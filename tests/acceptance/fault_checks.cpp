@@ -217,35 +217,35 @@ Measured leave_the_family()
 
 }  // namespace
 
-std::vector<Check> checks_of_part_8_fault()
+std::vector<Check> fault_checks()
 {
     return {
-        {.part = 8,
+        {.topic = "fault",
          .id = "fault-order-4",
          .sentence = "4 x 4 elements, a = 0.006, b = 0.024, D_RS = 6 mm, order 4, five overloads",
          .target = "the end is reached, every stage solved",
          .run = go_on_after_earthquakes},
-        {.part = 8,
+        {.topic = "fault",
          .id = "fault-any-friction",
          .sentence = "150 random faults with rate-and-state friction, order 4",
          .target = "all reach the end",
          .run = go_on_with_any_friction},
-        {.part = 8,
+        {.topic = "fault",
          .id = "fault-onset",
          .sentence = "time of the first onset by default against rtol 1e-6",
          .target = "within 1e-4 (was 1956 s of 4.03e6 s)",
          .run = time_onsets},
-        {.part = 8,
+        {.topic = "fault",
          .id = "fault-energy",
          .sentence = "work of the load = motion + strain + friction + radiation",
          .target = "to the order of the steps; 1e-3 through an earthquake",
          .run = balance_energy},
-        {.part = 8,
+        {.topic = "steps",
          .id = "step-control-watched",
          .sentence = "comparing steps on 7 x 7 elements, drop 0.4, residual 0.3: silence",
          .target = "at most 2 s (was 100 s)",
          .run = watch_long_runs},
-        {.part = 8,
+        {.topic = "steps",
          .id = "step-control-beyond",
          .sentence = "iterations for an error of 1e-2: constant, free estimate, learned",
          .target = "shown",

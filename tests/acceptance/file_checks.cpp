@@ -206,36 +206,36 @@ Measured refuse_potential_files()
 
 }  // namespace
 
-std::vector<Check> checks_of_part_8_saved()
+std::vector<Check> file_checks()
 {
     return {
-        {.part = 8,
+        {.topic = "files",
          .id = "other-runs",
          .sentence = "snapshots of a run are refused by any other: system, method, detector, "
                      "locator, times, tolerances",
          .target = "0 taken",
          .run = refuse_other_runs},
-        {.part = 8,
+        {.topic = "files",
          .id = "changed-snapshots",
          .sentence = "texts of snapshots, changed or cut",
          .target = "0 of 100 000 taken",
          .run = refuse_changed_texts},
-        {.part = 8,
+        {.topic = "files",
          .id = "hostile-snapshots",
          .sentence = "snapshots with a hostile number: refused, or run to an outcome",
          .target = "none beyond its end, no hang",
          .run = run_hostile_snapshots},
-        {.part = 8,
+        {.topic = "files",
          .id = "lost-components",
          .sentence = "flow, reset, rest or time_reset loses a component of the state",
          .target = "wrong_dimension before it is read, 10 of 10",
          .run = lose_components},
-        {.part = 8,
+        {.topic = "files",
          .id = "stalled",
          .sentence = "a run whose time stands still ends by default",
          .target = "stalled within 2e6 steps",
          .run = stand_still},
-        {.part = 8,
+        {.topic = "files",
          .id = "potential-files",
          .sentence = "potential files with wrong domains, types or depth, and 100 000 changed ones",
          .target = "0 wrong ones taken, no other exception",
