@@ -70,14 +70,20 @@ template <class Train>
 auto run_training(const Train& train, const TrainingRequest& request,
                   const learn::ProgressCallback& progress)
 {
+    bool samples = false;
     bool started = false;
     try {
         return train(request, [&](const learn::Progress& now) {
+            samples = samples || now.iteration > 0;
             started = started || now.stage == learn::Progress{}.stage;
             return progress(now);
         });
     } catch (const std::runtime_error& error) {
         if (request.resume && !started) throw BadInput(error.what());
+        throw;
+    } catch (const std::invalid_argument& error) {
+        // Only the samples have shown it: a training that fails, not an input that is refused.
+        if (samples) throw std::runtime_error(error.what());
         throw;
     }
 }
