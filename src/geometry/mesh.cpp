@@ -37,7 +37,8 @@ public:
             ++number_;
             line = line.substr(0, line.find('#'));
             if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-            out = std::istringstream(line);
+            out.clear();
+            out.str(line);
             return true;
         }
         return false;
