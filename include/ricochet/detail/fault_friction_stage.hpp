@@ -7,7 +7,7 @@
 //     M v + N f(V, xi) = F,    xi = xi^ + g xi'(V, xi),    M = A / g = 1/g + H + g K
 //
 // without units but for V = v times the unit of velocity. The states are eliminated element by
-// element (friction/stage.hpp). V spans twelve decades, so that neither v nor log V is a good
+// element (friction_stage.hpp). V spans twelve decades, so that neither v nor log V is a good
 // unknown: the friction of an element at rest hardly depends on v, that of a fast one not on log V.
 // The unknown is z = c v + N f, the force on an element that its own stage balances, c the
 // diagonal of M. Its stage is one scalar equation v = P(z) that always has a solution; coupled,
