@@ -7,11 +7,11 @@
 //
 //     rho L v' = -G/L K u - H u' + tau - sigma f(V, xi),    u = d - V_pl t,    xi' = xi'(V, xi)
 //
-// with a law of friction/laws.hpp. The plates move at V_pl: a fault that slides with them
+// with a law of laws.hpp. The plates move at V_pl: a fault that slides with them
 // everywhere loads nothing, one that is locked is loaded at the rate G/L K V_pl. Both u and its
 // rate are relative to that motion, so that sliding at V_pl is steady.
 //
-// Steps are singly diagonally implicit of order 1, 2 or 4 (friction/variational_step.hpp); a stage
+// Steps are singly diagonally implicit of order 1, 2 or 4 (variational_step.hpp); a stage
 // is that of fault_friction_stage.hpp.
 #pragma once
 
