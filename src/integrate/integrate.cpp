@@ -52,6 +52,13 @@ void throw_flow_does_not_fit(std::size_t components)
                     components));
 }
 
+void throw_no_error_estimate()
+{
+    throw std::invalid_argument(
+        "integrate: error control needs a method with an error estimate: cash_karp54, dopri5 or "
+        "fehlberg78, got euler or rk4");
+}
+
 void throw_forward_only()
 {
     throw std::invalid_argument(

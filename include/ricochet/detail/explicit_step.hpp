@@ -63,7 +63,8 @@ public:
 
     /// Places the step at (t, x) in `mode` and evaluates the flow there. `backward`:
     /// time runs backward, and offsets and rates with it.
-    ExplicitStep(const System& system, double t, const X& x, Mode mode = 0, bool backward = false)
+    ExplicitStep(const System& system, double t, const X& x, Mode mode = 0, bool backward = false,
+                 const Method& method = {})
         : system_(&system),
           start_{t, 0},
           mode_(mode),
@@ -76,6 +77,8 @@ public:
           w_rate1_(remainder_),
           x1_(x),
           rate1_(remainder_),
+          advancing_(stepper_of(method)),
+          probing_(stepper_of(method)),
           error_(remainder_),
           at_(remainder_),
           unused_rate_(remainder_)
@@ -108,16 +111,34 @@ public:
     [[nodiscard]] const X& x1() const noexcept { return x1_; }
     [[nodiscard]] const X& rate0() const noexcept { return rate0_; }
     [[nodiscard]] const X& rate1() const noexcept { return rate1_; }
-    [[nodiscard]] static constexpr int order() noexcept { return order_of<Stepper>(); }
+    [[nodiscard]] constexpr int order() const noexcept
+    {
+        if constexpr (by_name) {
+            return advancing_.order();
+        } else {
+            return order_of<Stepper>();
+        }
+    }
+    /// Of the error estimate; 0: there is none.
+    [[nodiscard]] constexpr int error_order() const noexcept
+    {
+        if constexpr (by_name) {
+            return advancing_.error_order();
+        } else if constexpr (has_error_estimate<Stepper>) {
+            return static_cast<int>(Stepper::error_order_value);
+        } else {
+            return 0;
+        }
+    }
 
     /// x(t0 + s) on the dense output: the method's own where it has one, else the
     /// polynomial of `dense`.
     [[gnu::noinline]] void interpolate(double s, X& x) const
     {
-        if constexpr (has_dense_output) {
+        if (interpolates()) {
             departure(s, x);
             add_tangent(s, x);
-        } else {
+        } else if constexpr (!always_interpolates) {
             const DenseView<X, false> view(dense(), s);
             for_components([&](auto i) { x[i] = view[i]; });
         }
@@ -127,10 +148,10 @@ public:
     /// ends where the method has no dense output of its own.
     [[gnu::noinline]] void peek(double s, X& x) const
     {
-        if constexpr (has_dense_output) {
+        if (interpolates()) {
             departure(s, x);
             add_tangent(s, x);
-        } else {
+        } else if constexpr (!always_interpolates) {
             const double u = s / h_;
             const double value = u * u * (3 - 2 * u);
             const double slope = h_ * u * u * (u - 1);
@@ -146,14 +167,18 @@ public:
     [[nodiscard]] DenseParts<X> dense() const
     {
         if (!dense_ready_) prepare_dense();
-        DenseParts<X> parts{
-            .nodes = dense_nodes, .h = h_, .x0 = &x0_, .remainder = &remainder_, .rate0 = &rate0_};
-        for (std::size_t k = 0; k < inner_nodes; ++k) {
+        DenseParts<X> parts{.nodes = dense_nodes(),
+                            .h = h_,
+                            .x0 = &x0_,
+                            .remainder = &remainder_,
+                            .rate0 = &rate0_};
+        const std::size_t inner = inner_nodes(parts.nodes);
+        for (std::size_t k = 0; k < inner; ++k) {
             parts.w[k] = &inner_w_[k];
-            if constexpr (!has_dense_output) parts.slope[k] = &inner_rate_[k];
+            if (!interpolates()) parts.slope[k] = &inner_rate_[k];
         }
-        parts.w[inner_nodes] = &w_;
-        parts.slope[inner_nodes] = &w_slope1_;
+        parts.w[inner] = &w_;
+        parts.slope[inner] = &w_slope1_;
         return parts;
     }
 
@@ -169,7 +194,7 @@ public:
     /// or a step of its own.
     void sample(double s, X& x) const
     {
-        if constexpr (has_dense_output) {
+        if (interpolates()) {
             interpolate(s, x);
         } else {
             restep(s, x);
@@ -182,7 +207,7 @@ public:
         ++resteps_;
         advance<false>(probing_, s, x, dxdt, error_);
         add_tangent(s, x);
-        if constexpr (is_fsal<Stepper>) {
+        if (has_end_rate()) {
             for_components([&](auto i) { dxdt[i] += rate0_[i]; });
         } else {
             flow(s, x, dxdt);
@@ -292,15 +317,64 @@ public:
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
 
 private:
-    static constexpr bool has_dense_output = has_interpolant<Stepper, X>;
+    /// What is a constant of the other methods is known of one by name at run time only.
+    static constexpr bool by_name = std::is_same_v<Method, MethodByName>;
+    static constexpr bool can_interpolate = by_name || has_interpolant<Stepper, X>;
+    static constexpr bool always_interpolates = can_interpolate && !by_name;
 
-    static constexpr DenseNodes dense_nodes = has_dense_output           ? DenseNodes::middle_end
-                                              : order_of<Stepper>() <= 4 ? DenseNodes::end
-                                              : order_of<Stepper>() <= 6 ? DenseNodes::half_end
-                                                                         : DenseNodes::thirds_end;
-    static constexpr std::size_t inner_nodes = dense_nodes == DenseNodes::end          ? 0
-                                               : dense_nodes == DenseNodes::thirds_end ? 2
-                                                                                       : 1;
+    [[nodiscard]] static Stepper stepper_of([[maybe_unused]] const Method& method)
+    {
+        if constexpr (by_name) {
+            return Stepper(method.name);
+        } else {
+            return Stepper();
+        }
+    }
+
+    /// Whether the method has a dense output of its own.
+    [[nodiscard]] constexpr bool interpolates() const noexcept
+    {
+        if constexpr (by_name) {
+            return advancing_.interpolates();
+        } else {
+            return can_interpolate;
+        }
+    }
+
+    /// Whether a step gives the rate at its end, too (first same as last).
+    [[nodiscard]] constexpr bool has_end_rate() const noexcept
+    {
+        if constexpr (by_name) {
+            return advancing_.is_fsal();
+        } else {
+            return is_fsal<Stepper>;
+        }
+    }
+
+    [[nodiscard]] static constexpr DenseNodes nodes_of(bool interpolates, int order) noexcept
+    {
+        return interpolates ? DenseNodes::middle_end
+               : order <= 4 ? DenseNodes::end
+               : order <= 6 ? DenseNodes::half_end
+                            : DenseNodes::thirds_end;
+    }
+    [[nodiscard]] constexpr DenseNodes dense_nodes() const noexcept
+    {
+        return nodes_of(interpolates(), order());
+    }
+    [[nodiscard]] static constexpr std::size_t inner_nodes(DenseNodes nodes) noexcept
+    {
+        return nodes == DenseNodes::end ? 0 : nodes == DenseNodes::thirds_end ? 2 : 1;
+    }
+    static constexpr std::size_t most_inner_nodes = []
+    {
+        if constexpr (by_name) {
+            return inner_nodes(DenseNodes::thirds_end);
+        } else {
+            return inner_nodes(nodes_of(can_interpolate, order_of<Stepper>()));
+        }
+    }
+    ();
 
     static constexpr bool fits_registers = is_small<X> && std::is_trivially_copyable_v<X>;
 
@@ -321,7 +395,7 @@ private:
             const std::uint64_t calls = flow_calls_;
             const std::uint64_t resteps = resteps_;
             const bool fits = flow_fits_;
-            *this = ExplicitStep(*system_, start.value, x, mode, backward);
+            *this = ExplicitStep(*system_, start.value, x, mode, backward, method());
             start_ = start;
             flow_calls_ = calls;
             resteps_ = resteps;
@@ -332,12 +406,21 @@ private:
         dense_ready_ = false;
     }
 
-    /// w(s) on the method's own interpolant.
-    void departure(double s, X& w) const requires has_dense_output
+    [[nodiscard]] Method method() const
     {
-        if constexpr (Departing<Stepper>) {
-            advancing_.dense(s, h_, w_rate1_, w);
+        if constexpr (by_name) {
+            return {advancing_.name()};
         } else {
+            return {};
+        }
+    }
+
+    /// w(s) on the method's own interpolant.
+    void departure([[maybe_unused]] double s, [[maybe_unused]] X& w) const
+    {
+        if constexpr (can_interpolate && Departing<Stepper>) {
+            advancing_.dense(s, h_, w_rate1_, w);
+        } else if constexpr (can_interpolate) {
             advancing_.calc_state(s, w, zero_, zero_, 0.0, w_, w_rate1_, h_);
         }
     }
@@ -345,12 +428,12 @@ private:
     [[gnu::noinline]] void prepare_dense() const
     {
         for_components([&](auto i) { w_slope1_[i] = rate1_[i] - rate0_[i]; });
-        if constexpr (has_dense_output) {
-            departure(h_ / 2, inner_w_[0]);
+        if (interpolates()) {
+            if constexpr (can_interpolate) departure(h_ / 2, inner_w_[0]);
         } else {
-            for (std::size_t k = 0; k < inner_nodes; ++k) {
-                prepare_node(h_ * static_cast<double>(k + 1) / static_cast<double>(inner_nodes + 1),
-                             k);
+            const std::size_t inner = inner_nodes(dense_nodes());
+            for (std::size_t k = 0; k < inner; ++k) {
+                prepare_node(h_ * static_cast<double>(k + 1) / static_cast<double>(inner + 1), k);
             }
         }
         dense_ready_ = true;
@@ -428,7 +511,7 @@ private:
         if constexpr (fits_registers) {
             // On copies that nothing else refers to, the compiler keeps a small
             // state in registers from stage to stage.
-            Stepper own;
+            Stepper own = stepper_of(method());
             X x;
             X rate0;
             assign(x, x0_);
@@ -444,7 +527,7 @@ private:
             assign(w, w_own);
             if constexpr (is_fsal<Stepper>) assign(rate, rate_own);
             if constexpr (with_error) assign(error, error_own);
-            if constexpr (has_dense_output) {
+            if constexpr (can_interpolate) {
                 if (&stepper == &advancing_) stepper = own;
             }
         } else {
@@ -465,7 +548,7 @@ private:
         dense_ready_ = false;
         assign(x1_, w_);
         add_tangent(h_, x1_);
-        if constexpr (is_fsal<Stepper>) {
+        if (has_end_rate()) {
             for_components([&](auto i) { rate1_[i] = rate0_[i] + w_rate1_[i]; });
         } else {
             flow(h_, x1_, rate1_);
@@ -483,7 +566,7 @@ private:
     mutable Stepper probing_;
     mutable X error_, at_, unused_rate_;
     mutable X w_slope1_ = zero_;
-    mutable std::array<X, inner_nodes> inner_w_, inner_rate_;
+    mutable std::array<X, most_inner_nodes> inner_w_, inner_rate_;
     mutable bool dense_ready_ = false;
     mutable bool flow_fits_ = true;
     mutable std::uint64_t flow_calls_ = 0;

@@ -17,7 +17,7 @@ namespace ricochet::detail {
 template <class CurrentStep>
 [[nodiscard]] double initial_step(const CurrentStep& step, const Options& options)
 {
-    constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
+    const int order = step.error_order() + 1;
     const auto& x = step.x0();
     const auto& dxdt = step.rate0();
     const auto scale = [&](auto i) { return options.atol + options.rtol * std::fabs(x[i]); };

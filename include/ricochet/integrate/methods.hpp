@@ -3,6 +3,7 @@
 
 #include <type_traits>
 
+#include "ricochet/detail/named_runge_kutta.hpp"
 #include "ricochet/detail/runge_kutta.hpp"
 
 namespace boost::numeric::odeint {
@@ -58,11 +59,21 @@ struct Fehlberg78 {
     using Stepper = detail::RungeKutta<detail::Fehlberg78Tableau, State>;
 };
 
+/// One of the five above, chosen at run time: the same bits from one compiled loop, for programs
+/// that offer all of them. Each step costs a branch more, and small states leave the registers.
+struct MethodByName {
+    template <class State>
+    using Stepper = detail::NamedRungeKutta<State>;
+
+    MethodName name = MethodName::dopri5;
+};
+
 /// Steps of the size `Options::step`; the last one is cut to end at `t_end`, and
 /// the grid starts anew at every event.
 template <class Method = Rk4>
 struct FixedStep {
     using method = Method;
+    [[no_unique_address]] Method value{};
 };
 
 /// Steps chosen so that the estimated error meets `Options::rtol` and `atol`.
@@ -70,6 +81,7 @@ struct FixedStep {
 template <class Method = Dopri5>
 struct ErrorControlled {
     using method = Method;
+    [[no_unique_address]] Method value{};
 };
 
 namespace detail {

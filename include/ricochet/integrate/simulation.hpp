@@ -62,6 +62,8 @@ namespace detail {
 [[noreturn]] void throw_flow_does_not_fit(std::size_t components);
 /// @throws std::invalid_argument: the start mode is none of the system's.
 [[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
+/// @throws std::invalid_argument: error control by a method without an estimate.
+[[noreturn]] void throw_no_error_estimate();
 /// @throws std::invalid_argument: a run backward in time of a system that has none.
 [[noreturn]] void throw_forward_only();
 /// @throws std::invalid_argument: no previous_time_event for a run backward in time.
@@ -117,7 +119,7 @@ class Simulation {
 public:
     /// As `integrate`, but does not start. Keeps a reference to `system`.
     Simulation(const System& system, const X& x0, const Options& options,
-               const Stepping& /*stepping*/ = {}, const Detector& detector = {},
+               const Stepping& stepping = {}, const Detector& detector = {},
                const Locator& locator = {})
         : system_(&system),
           options_(checked(options, x0)),
@@ -127,7 +129,7 @@ public:
           resolution_(options),
           backward_(options.t_end < options.t_start),
           components_(static_cast<std::size_t>(x0.size())),
-          step_(system, options.t_start, x0, options.mode, backward_),
+          step_(system, options.t_start, x0, options.mode, backward_, stepping.value),
           bank_(system, backward_),
           search_(x0, bank_.size(), resolution_),
           planner_(make_planner(x0)),
@@ -135,6 +137,7 @@ public:
     {
         h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
         if constexpr (error_controlled) {
+            if (step_.error_order() == 0) detail::throw_no_error_estimate();
             if (options_.step == 0) h_next_ = detail::initial_step(step_, options_);
             h_next_ = std::min(h_next_, options_.h_max);
         }
@@ -329,7 +332,10 @@ private:
     {
         using namespace detail;
         return properties_of_run({.system = name_of_system(*system_),
-                                  .stepping = plain_type_name(written_type<Stepping>()),
+                                  .stepping = plain_type_name(written_type<Stepping>()) +
+                                              (std::is_same_v<Method, MethodByName>
+                                                   ? " of order " + std::to_string(step_.order())
+                                                   : ""),
                                   .detector = plain_type_name(written_type<Detector>()),
                                   .locator = plain_type_name(written_type<Locator>()),
                                   .components = components_,
@@ -788,7 +794,7 @@ private:
     /// `proposed`: what the step would have been if nothing had cut it short.
     [[nodiscard]] bool take_controlled_step(double h, double proposed)
     {
-        constexpr int order = static_cast<int>(CurrentStep::Stepper::error_order_value) + 1;
+        const int order = step_.error_order() + 1;
         double largest = rule_.largest;
         for (;;) {
             const double error = step_.attempt(h, options_.rtol, options_.atol);
