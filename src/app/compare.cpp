@@ -395,7 +395,6 @@ std::string to_csv(const SystemEntry& system, const std::vector<double>& exact,
 int compare(const CompareRequest& request)
 {
     SystemEntry system = find_system(request.system);
-    if (system.compare != nullptr) return system.compare(system, request);
     if (!system.published_errors.empty()) return compare_set_valued(system, request);
     if (system.exact_events == nullptr) {
         throw BadInput(

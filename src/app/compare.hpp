@@ -10,7 +10,8 @@ namespace ricochet::app {
 
 struct CompareRequest {
     std::string system{};
-    std::vector<std::string> set{};  ///< name=value
+    std::vector<std::string> set{};   ///< name=value
+    std::optional<std::string> of{};  ///< system, of step-control
     bool json = false;
     std::optional<std::filesystem::path> csv{};
 };

@@ -34,7 +34,7 @@ TimedRun run_gated(const BoundedSystem& system, const std::vector<double>& x0,
                    const RunSettings& settings, int repeats)
 {
     const bool fixed = settings.fixed_step;
-    if (settings.stepper != (fixed ? StepperKind::rk4 : StepperKind::dopri5)) {
+    if (settings.stepper != (fixed ? MethodName::rk4 : MethodName::dopri5)) {
         throw BadInput(
             fmt::format("gates run with rk4 in fixed steps and dopri5 under error "
                         "control, got {}",

@@ -17,6 +17,7 @@
 #include "input.hpp"
 #include "json_text.hpp"
 #include "model_lookup.hpp"
+#include "policy_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/detail/gate_features.hpp"
@@ -25,8 +26,6 @@
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
-#include "step_actor.hpp"
-#include "step_policy.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {

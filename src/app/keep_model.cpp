@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "files.hpp"
+#include "input.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
 namespace ricochet::app {
@@ -58,6 +59,30 @@ void keep_model(const Model& model, const fs::path& file, const fs::path& checkp
                           "--resume writes the model",
                           why, checkpoint.string())
             : fmt::format("{}, and there is no room for the model elsewhere", why));
+}
+
+void claim_training(const fs::path& out, fs::path& checkpoint, bool resume)
+{
+    if (checkpoint.empty()) {
+        checkpoint = out;
+        checkpoint += ".checkpoint";
+    }
+    Claims claims;
+    claims.replaces("--out", out);
+    claims.keeps("--checkpoint", checkpoint, resume);
+}
+
+void say_what_is_kept(const fs::path& checkpoint, const std::string& trouble)
+{
+    std::error_code error;
+    if (!trouble.empty()) fmt::print(stderr, "ricochet: {}\n", printable(trouble));
+    if (fs::exists(checkpoint, error)) {
+        fmt::print(stderr,
+                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+                   checkpoint.string());
+    } else {
+        fmt::print(stderr, "ricochet: interrupted; nothing is kept\n");
+    }
 }
 
 }  // namespace ricochet::app

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "ricochet/nn/model.hpp"
 
@@ -13,5 +14,14 @@ namespace ricochet::app {
 ///         keeps the training, where there is one.
 void keep_model(const Model& model, const std::filesystem::path& file,
                 const std::filesystem::path& checkpoint);
+
+/// The files of a training; an empty checkpoint becomes the one beside the model.
+/// @throws BadInput if they cannot be what they are to be.
+void claim_training(const std::filesystem::path& out, std::filesystem::path& checkpoint,
+                    bool resume);
+
+/// Of what was interrupted: where it goes on from, on standard error.
+/// @param trouble  why its last checkpoint could not be written; empty: it was
+void say_what_is_kept(const std::filesystem::path& checkpoint, const std::string& trouble);
 
 }  // namespace ricochet::app

@@ -51,6 +51,7 @@ const std::vector<SystemEntry>& systems()
         incline_block_entry(),
         woodpecker_entry(),
         two_contact_block_entry(),
+        spring_slider_entry(),
     };
     return all;
 }

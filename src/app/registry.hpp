@@ -6,7 +6,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
@@ -15,8 +14,6 @@
 
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/run.hpp"
-#include "ricochet/learn/certify.hpp"
-#include "ricochet/learn/classifier.hpp"
 #include "settings.hpp"
 
 namespace ricochet::app {
@@ -74,31 +71,6 @@ struct TimedRun {
     std::vector<HandOverPhase> phases{};
 };
 
-/// What a training is asked for. What is absent has the library's default.
-struct TrainingRequest {
-    std::string kind;                ///< one of the system's
-    std::vector<std::string> set{};  ///< name=value
-    std::optional<double> step{};    ///< [s]
-    std::optional<std::size_t> states{}, fresh_events{}, iterations{};
-    std::optional<std::uint64_t> seed{};
-    std::filesystem::path checkpoint{};
-    bool resume = false;
-};
-
-/// A kind of classifier that can be trained for a system.
-struct TrainingKind {
-    std::string_view name;
-    std::string_view other_name;
-    std::string_view meaning;
-};
-
-/// The networks of a system; the first kind is the default.
-struct Training {
-    std::vector<TrainingKind> kinds;
-    learn::Trained (*train)(const TrainingRequest& request,
-                            const learn::ProgressCallback& progress);
-};
-
 /// Event times that somebody printed, for the default parameters.
 struct Published {
     std::string_view name;
@@ -113,18 +85,10 @@ struct OwnModel {
     bool any_step;          ///< else it is for one step only
 };
 
-struct CompareRequest;
-struct SimulateRequest;
-struct SystemEntry;
-
-/// `ricochet simulate` of a system that has a command of its own.
-using OwnSimulation = int (*)(const SystemEntry& system, const SimulateRequest& request);
-/// `ricochet compare` of such a system.
-using OwnComparison = int (*)(const SystemEntry& system, const CompareRequest& request);
-
 struct SystemEntry {
     std::string_view name;
     std::string_view description;  ///< one sentence
+    std::string_view source{};     ///< of the problem; empty: it is ricochet's own
     std::vector<Parameter> parameters;
     std::vector<Component> state;
     std::vector<GuardLabel> guards{};
@@ -157,12 +121,6 @@ struct SystemEntry {
     std::vector<Published> published{};
     double comparison_step = 0;  ///< [s] of the fixed steps in a comparison
 
-    std::optional<Training> training{};
-
-    /// What a certificate of a model has to prove; null where nothing bounds the guard.
-    /// @throws std::invalid_argument if the model does not fit
-    learn::GuardProblem (*guard_problem)(const Model& model) = nullptr;
-
     /// Names for --integrator, the default first; empty where there is but "event".
     std::vector<std::string_view> integrators{};
     double set_valued_step = 0;  ///< [s] of its set-valued steps by default
@@ -171,9 +129,8 @@ struct SystemEntry {
     std::vector<double> (*exact_state)(const std::vector<double>& parameters, double t) = nullptr;
     std::vector<std::string_view> published_errors{};  ///< lines of a source
 
-    /// It is simulated by this, and `start` and `run` are null; else null.
-    OwnSimulation simulate = nullptr;
-    OwnComparison compare = nullptr;
+    /// Of another program, `ricochet-<name>`, which simulates it; `start` and `run` are then null.
+    std::string_view program{};
 };
 
 [[nodiscard]] const std::vector<SystemEntry>& systems();

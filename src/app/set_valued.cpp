@@ -11,11 +11,11 @@
 #include "files.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
+#include "policy_lookup.hpp"
 #include "report.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 #include "run_watch.hpp"
-#include "step_policy.hpp"
 #include "systems/inclusion_options.hpp"
 #include "timing.hpp"
 
@@ -127,7 +127,7 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
     if (request.stepper) {
         const std::string stepper = one_of("stepper of a differential inclusion", request.stepper,
                                            {"dopri5", "fehlberg78"});
-        if (stepper == "fehlberg78") settings.stepper = StepperKind::fehlberg78;
+        if (stepper == "fehlberg78") settings.stepper = MethodName::fehlberg78;
     }
     Options& options = settings.options;
     if (!(options.t_end >= options.t_start)) {

@@ -33,11 +33,11 @@ constexpr Names<DetectorKind, 8> detectors{{{"ends", DetectorKind::ends},
 constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
                                           {"bisection", LocatorKind::bisection},
                                           {"toms748", LocatorKind::toms748}}};
-constexpr Names<StepperKind, 5> steppers{{{"rk4", StepperKind::rk4},
-                                          {"dopri5", StepperKind::dopri5},
-                                          {"fehlberg78", StepperKind::fehlberg78},
-                                          {"cash-karp54", StepperKind::cash_karp54},
-                                          {"euler", StepperKind::euler}}};
+constexpr Names<MethodName, 5> steppers{{{"rk4", MethodName::rk4},
+                                          {"dopri5", MethodName::dopri5},
+                                          {"fehlberg78", MethodName::fehlberg78},
+                                          {"cash-karp54", MethodName::cash_karp54},
+                                          {"euler", MethodName::euler}}};
 
 template <class Kind, std::size_t n>
 std::string_view name_in(const Names<Kind, n>& names, Kind kind)
@@ -74,7 +74,7 @@ void require_not_negative(std::string_view option, double value)
 void choose_stepping(const RunRequest& request, RunSettings& settings)
 {
     settings.fixed_step = request.step.has_value();
-    settings.stepper = settings.fixed_step ? StepperKind::rk4 : StepperKind::dopri5;
+    settings.stepper = settings.fixed_step ? MethodName::rk4 : MethodName::dopri5;
     if (request.stepper) settings.stepper = named("stepper", steppers, *request.stepper);
 
     Options& options = settings.options;
@@ -88,7 +88,7 @@ void choose_stepping(const RunRequest& request, RunSettings& settings)
         options.step = *request.step;
         return;
     }
-    if (settings.stepper == StepperKind::rk4 || settings.stepper == StepperKind::euler) {
+    if (settings.stepper == MethodName::rk4 || settings.stepper == MethodName::euler) {
         throw BadInput(
             fmt::format("stepper {} has no error estimate and needs --step; "
                         "steppers with error control are dopri5, fehlberg78, "
@@ -216,7 +216,7 @@ std::string_view name(LocatorKind kind) noexcept
 {
     return name_in(locators, kind);
 }
-std::string_view name(StepperKind kind) noexcept
+std::string_view name(MethodName kind) noexcept
 {
     return name_in(steppers, kind);
 }

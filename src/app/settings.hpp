@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ricochet/detect/network.hpp"
+#include "ricochet/integrate/methods.hpp"
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet {
@@ -31,11 +32,10 @@ enum class DetectorKind {
     calibrated
 };
 enum class LocatorKind { newton, bisection, toms748 };
-enum class StepperKind { rk4, dopri5, fehlberg78, cash_karp54, euler };
 
 [[nodiscard]] std::string_view name(DetectorKind kind) noexcept;
 [[nodiscard]] std::string_view name(LocatorKind kind) noexcept;
-[[nodiscard]] std::string_view name(StepperKind kind) noexcept;
+[[nodiscard]] std::string_view name(MethodName kind) noexcept;
 
 /// How a system that is a differential inclusion is integrated.
 struct SetValuedSettings {
@@ -50,7 +50,7 @@ struct SetValuedSettings {
 struct RunSettings {
     std::vector<double> parameters;  ///< in the order of the system's
     Options options;
-    StepperKind stepper = StepperKind::dopri5;
+    MethodName stepper = MethodName::dopri5;
     bool fixed_step = false;  ///< else error control
     DetectorKind detector = DetectorKind::extremum;
     LocatorKind locator = LocatorKind::newton;

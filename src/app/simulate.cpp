@@ -45,7 +45,6 @@ void claim_results(Claims& claims, const SimulateRequest& request)
 int simulate(const SimulateRequest& request)
 {
     const SystemEntry& system = find_system(request.system);
-    if (system.simulate != nullptr) return system.simulate(system, request);
     if (request.kernel) throw BadInput("--kernel is for the system fault");
     RunSettings settings = resolve(system, request.run);
     Claims claims;

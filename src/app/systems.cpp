@@ -4,9 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "json_text.hpp"
-#include "rate_and_state.hpp"
 #include "registry.hpp"
 #include "report.hpp"
 
@@ -40,6 +41,7 @@ Json json(const SystemEntry& system)
     Json guards = Json::array();
     for (const GuardLabel& guard : system.guards) guards.push_back(guard.name);
     return {{"name", system.name},       {"description", system.description},
+            {"source", system.source},
             {"parameters", parameters},  {"state", state},
             {"guards", guards},          {"modes", system.modes},
             {"t_start", system.t_start}, {"t_end", system.t_end}};
@@ -64,14 +66,74 @@ std::string text(const SystemEntry& system)
            fmt::format("    {:<15} {:>6} s     default end of a run\n", "t-end", system.t_end);
 }
 
+/// What is known of its solution, in words.
+std::string known_solution(const SystemEntry& system)
+{
+    if (system.exact_events != nullptr) {
+        return fmt::format("event times {}{}",
+                           system.numerical_reference ? "computed to higher accuracy" : "in closed form",
+                           system.any_parameters ? "" : ", for the default parameters");
+    }
+    if (system.exact_state != nullptr) return "the state at any time";
+    return "";
+}
+
+/// A section of docs/systems.md.
+std::string markdown(const SystemEntry& system)
+{
+    std::string out = fmt::format("## {}\n\n{}\n\n", system.name, system.description);
+    std::vector<std::string> state;
+    for (const Component& x : system.state) {
+        state.push_back(fmt::format("{} [{}], {}", x.name, x.unit, x.meaning));
+    }
+    out += fmt::format("- state: {}\n", fmt::join(state, "; "));
+    std::vector<std::string> guards;
+    for (const GuardLabel& guard : system.guards) {
+        guards.push_back(guard.name == guard.event
+                             ? std::string(guard.name)
+                             : fmt::format("{} ({})", guard.name, guard.event));
+    }
+    if (!guards.empty()) out += fmt::format("- guards: {}\n", fmt::join(guards, ", "));
+    if (!system.modes.empty()) out += fmt::format("- modes: {}\n", fmt::join(system.modes, ", "));
+    if (!system.integrators.empty()) {
+        out += fmt::format("- integrators: {}\n", fmt::join(system.integrators, ", "));
+    }
+    if (const std::string known = known_solution(system); !known.empty()) {
+        out += fmt::format("- known: {}\n", known);
+    }
+    out += fmt::format("- run by default from {} to {} s\n", system.t_start, system.t_end);
+    if (!system.source.empty()) out += fmt::format("- source: {}\n", system.source);
+    if (system.parameters.empty()) return out;
+    out += "\n| parameter | default | unit | range | meaning |\n|---|---|---|---|---|\n";
+    for (const Parameter& p : system.parameters) {
+        out += fmt::format("| `{}` | {} | {} | {} | {} |\n", p.name, p.initial, p.unit,
+                           to_string(p.range), p.meaning);
+    }
+    return out;
+}
+
+std::string markdown()
+{
+    std::string out =
+        "# The systems of the command line\n\n"
+        "Written by `ricochet systems --markdown` from the descriptors of the systems; a test holds "
+        "this page to them. `ricochet simulate NAME --set parameter=value` runs one, `ricochet "
+        "compare NAME` beside its known solution.\n";
+    for (const SystemEntry& system : systems()) out += '\n' + markdown(system);
+    return out;
+}
+
 }  // namespace
 
-int list_systems(bool as_json)
+int list_systems(ListFormat format)
 {
-    if (as_json) {
+    if (format == ListFormat::markdown) {
+        print(markdown());
+        return 0;
+    }
+    if (format == ListFormat::json) {
         Json all = Json::array();
         for (const SystemEntry& system : systems()) all.push_back(json(system));
-        all.push_back(json(spring_slider_entry()));
         print(json_text(all));
         return 0;
     }
@@ -80,7 +142,6 @@ int list_systems(bool as_json)
         if (!all.empty()) all += '\n';
         all += text(system);
     }
-    all += '\n' + text(spring_slider_entry());
     print(all);
     return 0;
 }

@@ -20,6 +20,15 @@ const Words with_guards{"pendulum",           "henon-heiles", "three-body", "hid
                         "coulomb-oscillator", "stick-slip"};
 const Words with_time_events{"detest-f1", "detest-f2", "detest-f3", "detest-f4", "detest-f5"};
 
+TEST_F(App, ThePageOfSystemsIsWhatTheCommandPrints)
+{
+    const Result page = run({"systems", "--markdown"});
+    EXPECT_EQ(page.status, 0);
+    const fs::path stored = fs::path(RICOCHET_MODELS).parent_path() / "docs" / "systems.md";
+    EXPECT_EQ(page.out, content(stored)) << "ricochet systems --markdown > docs/systems.md";
+    expect_refused({"systems", "--json", "--markdown"}, {"--json"});
+}
+
 TEST_F(App, SystemsListsEveryReadySystemWithItsGuardsAndModes)
 {
     const nlohmann::json all = json({"systems", "--json"});

@@ -1,18 +1,18 @@
 #include "../any_system.hpp"
-#include "../model_lookup.hpp"
 #include "entries.hpp"
+#include "scenes.hpp"
 #include "problems/planar_arm.hpp"
 
 namespace ricochet::app {
 
 namespace {
 
-using Arm = PlanarArm<4>;
-
 // the order of parameters
 enum : std::size_t { obstacles, seed, reach, clearance, drive, damping, restitution, least_rate };
 
-Arm system(const std::vector<double>& p)
+}  // namespace
+
+Arm arm_of(const std::vector<double>& p)
 {
     return Arm(ArmScene::Parameters{.obstacles = static_cast<std::size_t>(p[obstacles]),
                                     .seed = static_cast<std::uint64_t>(p[seed]),
@@ -24,22 +24,18 @@ Arm system(const std::vector<double>& p)
                                     .least_rate = p[least_rate]});
 }
 
+namespace {
+
 std::vector<double> start(const std::vector<double>& p)
 {
-    const Arm::State x = system(p).start();
+    const Arm::State x = arm_of(p).start();
     return {x.begin(), x.end()};
 }
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
+    return run_any(AnySystem(arm_of(settings.parameters)), start(settings.parameters), settings,
                    repeats);
-}
-
-learn::GuardProblem guard_problem(const Model& model)
-{
-    const Arm made = system(parameters_of(find_system(Arm::name), model));
-    return learn::guard_problem(made, model, made.start());
 }
 
 }  // namespace
@@ -83,7 +79,6 @@ SystemEntry arm_entry()
         .t_end = 10,
         .start = start,
         .run = run,
-        .guard_problem = guard_problem,
     };
 }
 

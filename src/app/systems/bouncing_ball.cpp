@@ -2,9 +2,7 @@
 
 #include <array>
 
-#include "../input.hpp"
 #include "entries.hpp"
-#include "ricochet/learn/bouncing_ball.hpp"
 #include "run_system.hpp"
 
 namespace ricochet::app {
@@ -62,38 +60,6 @@ std::vector<Published> published()
                        18.167573305040214, 19.063717908097843, 19.870248050849643}}};
 }
 
-learn::Trained train(const TrainingRequest& request, const learn::ProgressCallback& progress)
-{
-    const learn::BallModel kind = learn::ball_model_named(request.kind);
-    learn::BallTraining training = learn::ball_training(kind);
-    if (!request.set.empty() || request.step) {
-        if (kind == learn::BallModel::any_step) {
-            throw BadInput(
-                "an any-step model is for every gravity, height and step; "
-                "--set and --step are for --kind fixed-step");
-        }
-        const std::vector<double> p = parameter_values(find_system("bouncing-ball"), request.set);
-        training.gravity = p[gravity];
-        training.height = p[height];
-        training.step = request.step.value_or(training.step);
-    }
-    training.states = request.states.value_or(training.states);
-    training.fresh_events = request.fresh_events.value_or(training.fresh_events);
-    training.seed = request.seed.value_or(training.seed);
-    training.training.iterations = request.iterations.value_or(training.training.iterations);
-    training.training.checkpoint = request.checkpoint;
-    training.training.resume = request.resume;
-    return learn::train_bouncing_ball(kind, training, progress);
-}
-
-/// The height is a component of the state; no parameter has a part in it.
-learn::GuardProblem guard_problem(const Model& model)
-{
-    learn::detail::check_certifiable(model, "bouncing-ball", 2);
-    return {.guard = [](const double* x) { return x[0]; },
-            .slack = [](const double* half_widths) { return half_widths[0]; }};
-}
-
 }  // namespace
 
 SystemEntry bouncing_ball_entry()
@@ -103,6 +69,9 @@ SystemEntry bouncing_ball_entry()
         .description =
             "A point mass falls onto a rigid floor and bounces, losing speed at every "
             "impact.",
+        .source =
+            "Saunders, Steyer and Kuether, Machine learning for event detection in "
+            "non-smooth initial value problems, SAND2023-06682C, eqs. 1 and 2",
         .parameters =
             {{.name = "gravity",
               .initial = 9.81,
@@ -138,15 +107,6 @@ SystemEntry bouncing_ball_entry()
         .exact_events = exact_events,
         .published = published(),
         .comparison_step = 0.01,
-        .training =
-            Training{.kinds = {{.name = "fixed-step",
-                                .other_name = "paper",
-                                .meaning = "height and velocity in, for one step and gravity"},
-                               {.name = "any-step",
-                                .other_name = "dimensionless",
-                                .meaning = "for every gravity, restitution, height and step"}},
-                     .train = train},
-        .guard_problem = guard_problem,
     };
 }
 

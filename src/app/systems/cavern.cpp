@@ -1,8 +1,8 @@
 #include "problems/cavern.hpp"
 
 #include "../any_system.hpp"
-#include "../model_lookup.hpp"
 #include "entries.hpp"
+#include "scenes.hpp"
 
 namespace ricochet::app {
 
@@ -11,7 +11,9 @@ namespace {
 // the order of parameters
 enum : std::size_t { segments, seed, size, radius, gravity, turn, drag, restitution, kick, launch };
 
-Cavern system(const std::vector<double>& p)
+}  // namespace
+
+Cavern cavern_of(const std::vector<double>& p)
 {
     return Cavern({.segments = static_cast<std::size_t>(p[segments]),
                    .seed = static_cast<std::uint64_t>(p[seed]),
@@ -25,6 +27,8 @@ Cavern system(const std::vector<double>& p)
                    .launch_speed = p[launch]});
 }
 
+namespace {
+
 std::vector<double> start(const std::vector<double>& p)
 {
     return {0, 0, p[launch], 0};
@@ -32,14 +36,8 @@ std::vector<double> start(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
+    return run_any(AnySystem(cavern_of(settings.parameters)), start(settings.parameters), settings,
                    repeats);
-}
-
-learn::GuardProblem guard_problem(const Model& model)
-{
-    const Cavern made = system(parameters_of(find_system(Cavern::name), model));
-    return learn::guard_problem(made, model, made.start());
 }
 
 }  // namespace
@@ -78,7 +76,6 @@ SystemEntry cavern_entry()
         .t_end = 10,
         .start = start,
         .run = run,
-        .guard_problem = guard_problem,
     };
 }
 

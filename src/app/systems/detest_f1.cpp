@@ -24,6 +24,10 @@ SystemEntry detest_f1_entry()
     return {
         .name = DetestF1::name,
         .description = "A growing oscillator under a square wave of one second.",
+        .source =
+            "W. H. Enright and J. D. Pryce, Two FORTRAN packages for assessing initial "
+            "value methods, ACM Transactions on Mathematical Software 13, 1987, pages 1 to "
+            "27",
         .parameters = {},
         .state = {{.name = "y", .unit = "1", .meaning = "value"},
                   {.name = "v", .unit = "1", .meaning = "rate"}},

@@ -24,6 +24,10 @@ SystemEntry detest_f3_entry()
     return {
         .name = DetestF3::name,
         .description = "Van der Pol's oscillator under a rectified sine.",
+        .source =
+            "W. H. Enright and J. D. Pryce, Two FORTRAN packages for assessing initial "
+            "value methods, ACM Transactions on Mathematical Software 13, 1987, pages 1 to "
+            "27",
         .parameters = {},
         .state = {{.name = "y", .unit = "1", .meaning = "value"},
                   {.name = "v", .unit = "1", .meaning = "rate"}},

@@ -24,6 +24,10 @@ SystemEntry detest_f4_entry()
     return {
         .name = DetestF4::name,
         .description = "A steep pulse, then a decay.",
+        .source =
+            "W. H. Enright and J. D. Pryce, Two FORTRAN packages for assessing initial "
+            "value methods, ACM Transactions on Mathematical Software 13, 1987, pages 1 to "
+            "27",
         .parameters = {},
         .state = {{.name = "y", .unit = "1", .meaning = "value"}},
         .modes = mode_names<DetestF4>(),

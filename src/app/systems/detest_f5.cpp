@@ -24,6 +24,10 @@ SystemEntry detest_f5_entry()
     return {
         .name = DetestF5::name,
         .description = "A flow with a vertical tangent every second.",
+        .source =
+            "W. H. Enright and J. D. Pryce, Two FORTRAN packages for assessing initial "
+            "value methods, ACM Transactions on Mathematical Software 13, 1987, pages 1 to "
+            "27",
         .parameters = {},
         .state = {{.name = "y", .unit = "1", .meaning = "value"}},
         .t_end = DetestF5::t_end,

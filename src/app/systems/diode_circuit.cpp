@@ -48,6 +48,9 @@ SystemEntry diode_circuit_entry()
         .description =
             "A circuit with an element whose voltage is held at zero, or only has a "
             "sign.",
+        .source =
+            "D. M. Riley and others, Reinforcement Learning-based adaptive "
+            "time-integration for nonsmooth dynamics, section 5.2",
         .parameters = {{.name = "capacitance-1",
                         .initial = 1.0 / 9,
                         .unit = "F",

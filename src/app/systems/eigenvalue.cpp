@@ -1,8 +1,8 @@
 #include <algorithm>
 
 #include "../any_system.hpp"
-#include "../model_lookup.hpp"
 #include "entries.hpp"
+#include "scenes.hpp"
 #include "problems/least_eigenvalue.hpp"
 
 namespace ricochet::app {
@@ -11,7 +11,9 @@ namespace {
 
 enum : std::size_t { level, amplitude, frequency, slow, seed, table };  // the order of parameters
 
-LeastEigenvalue system(const std::vector<double>& p)
+}  // namespace
+
+LeastEigenvalue eigenvalue_of(const std::vector<double>& p)
 {
     return LeastEigenvalue({.level = p[level],
                             .amplitude = p[amplitude],
@@ -21,25 +23,18 @@ LeastEigenvalue system(const std::vector<double>& p)
                             .table = static_cast<std::size_t>(p[table])});
 }
 
+namespace {
+
 std::vector<double> start(const std::vector<double>& p)
 {
-    const LeastEigenvalue::State q = system(p).start();
+    const LeastEigenvalue::State q = eigenvalue_of(p).start();
     return {q.begin(), q.end()};
 }
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
+    return run_any(AnySystem(eigenvalue_of(settings.parameters)), start(settings.parameters), settings,
                    repeats);
-}
-
-/// Proofs ask for bounds over many boxes: a table repays itself.
-learn::GuardProblem guard_problem(const Model& model)
-{
-    std::vector<double> p = parameters_of(find_system(LeastEigenvalue::name), model);
-    p[table] = std::max(p[table], 16.0);
-    const LeastEigenvalue made = system(p);
-    return learn::guard_problem(made, model, made.start());
 }
 
 }  // namespace
@@ -76,7 +71,6 @@ SystemEntry eigenvalue_entry()
         .t_end = 40,
         .start = start,
         .run = run,
-        .guard_problem = guard_problem,
     };
 }
 

@@ -34,5 +34,6 @@ namespace ricochet::app {
 [[nodiscard]] SystemEntry incline_block_entry();
 [[nodiscard]] SystemEntry woodpecker_entry();
 [[nodiscard]] SystemEntry two_contact_block_entry();
+[[nodiscard]] SystemEntry spring_slider_entry();
 
 }  // namespace ricochet::app

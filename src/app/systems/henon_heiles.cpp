@@ -35,6 +35,9 @@ SystemEntry henon_heiles_entry()
         .name = HenonHeiles::name,
         .description =
             "A star moves in the plane of a galaxy; its passages through a plane are found.",
+        .source =
+            "M. Henon and C. Heiles, The applicability of the third integral of motion: "
+            "some numerical experiments, Astronomical Journal 69, 1964, pages 73 to 79",
         .parameters = {{.name = "vx",
                         .initial = HenonHeiles::start[0],
                         .unit = "1",

@@ -40,6 +40,9 @@ SystemEntry impact_oscillator_entry()
     return {
         .name = ImpactOscillator::name,
         .description = "A forced and damped oscillator hits a wall on one side.",
+        .source =
+            "S. W. Shaw and P. J. Holmes, A periodically forced piecewise linear "
+            "oscillator, Journal of Sound and Vibration 90, 1983, pages 129 to 155",
         .parameters =
             {{.name = "frequency",
               .initial = 0.7,

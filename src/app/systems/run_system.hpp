@@ -1,7 +1,7 @@
-// From settings to the templates: every stepper and detector for one system.
+// From settings to the templates: every detector for one system.
 //
-// Each combination is compiled, since steps and detection are the inner loop; the
-// locator, needed once an event, is chosen at run time. Included once per system.
+// Detectors are compiled, since detection is the inner loop; methods and locators are chosen at run
+// time. Included once per system.
 #pragma once
 
 #include <chrono>
@@ -45,21 +45,9 @@ struct ChosenLocator {
 template <class Use>
 TimedRun with_stepping(const RunSettings& settings, Use&& use)
 {
-    if (settings.fixed_step) {
-        switch (settings.stepper) {
-            case StepperKind::rk4: break;
-            case StepperKind::dopri5: return use(FixedStep<Dopri5>{});
-            case StepperKind::fehlberg78: return use(FixedStep<Fehlberg78>{});
-            case StepperKind::cash_karp54: return use(FixedStep<CashKarp54>{});
-            case StepperKind::euler: return use(FixedStep<Euler>{});
-        }
-        return use(FixedStep<Rk4>{});
-    }
-    switch (settings.stepper) {
-        case StepperKind::fehlberg78: return use(ErrorControlled<Fehlberg78>{});
-        case StepperKind::cash_karp54: return use(ErrorControlled<CashKarp54>{});
-        default: return use(ErrorControlled<Dopri5>{});
-    }
+    const MethodByName method{settings.stepper};
+    return settings.fixed_step ? use(FixedStep<MethodByName>{method})
+                               : use(ErrorControlled<MethodByName>{method});
 }
 
 /// Calls `use` with the detector of the settings.

@@ -39,6 +39,9 @@ SystemEntry sliding_mode_entry()
     return {
         .name = SlidingMode::name,
         .description = "A relay brings a disturbed state to zero and holds it there.",
+        .source =
+            "D. M. Riley and others, Reinforcement Learning-based adaptive "
+            "time-integration for nonsmooth dynamics, section 5.1",
         .parameters = {{.name = "amplitude",
                         .initial = 1.75,
                         .unit = "1/s",

@@ -71,6 +71,10 @@ SystemEntry stick_slip_entry()
     return {
         .name = StickSlip::name,
         .description = "A mass held by a spring sticks to a moving belt and slips, in turn.",
+        .source =
+            "R. I. Leine, D. H. van Campen, A. de Kraker and L. van den Steen, Stick-slip "
+            "vibrations induced by alternate friction models, Nonlinear Dynamics 16, 1998, "
+            "pages 41 to 54",
         .parameters = {{.name = "mass",
                         .initial = 1,
                         .unit = "kg",

@@ -36,6 +36,9 @@ SystemEntry super_twisting_entry()
         .name = SuperTwisting::name,
         .description =
             "A continuous control with a relay in its integral holds a disturbed state at zero.",
+        .source =
+            "A. Levant, Sliding order and sliding accuracy in sliding mode control, "
+            "International Journal of Control 58, 1993",
         .parameters =
             {{.name = "gain-1",
               .initial = 3,

@@ -46,6 +46,9 @@ SystemEntry thermostat_entry()
     return {
         .name = Thermostat::name,
         .description = "A heater is switched on and off by the temperature of its room.",
+        .source =
+            "R. Alur et al., The algorithmic analysis of hybrid systems, Theoretical "
+            "Computer Science 138, 1995",
         .parameters = {{.name = "rate",
                         .initial = 0.1,
                         .unit = "1/s",

@@ -43,6 +43,9 @@ SystemEntry three_body_entry()
         .description =
             "A spacecraft circles Earth and Moon; where it is farthest from its start and back "
             "there is found.",
+        .source =
+            "L. F. Shampine and M. K. Gordon, Computer solution of ordinary differential "
+            "equations: the initial value problem, Freeman, 1975, page 246",
         .parameters = {{.name = "mass-ratio",
                         .initial = 1 / 82.45,
                         .unit = "1",

@@ -39,6 +39,9 @@ SystemEntry woodpecker_entry()
     return {
         .name = Woodpecker::name,
         .description = "A toy bird on a spring climbs down a pole by impacts and jamming.",
+        .source =
+            "F. Pfeiffer, Mechanische Systeme mit unstetigen Übergängen, Ingenieur-Archiv "
+            "54, 1984; C. Glocker and C. Studer, Multibody System Dynamics 13, 2005",
         .parameters =
             {{.name = "friction",
               .initial = 0.3,

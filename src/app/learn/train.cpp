@@ -15,6 +15,7 @@
 #include "json_text.hpp"
 #include "keep_model.hpp"
 #include "progress_bar.hpp"
+#include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/nn/safetensors.hpp"
@@ -53,12 +54,12 @@ std::string text(const learn::Report& report, const learn::Progress& last)
     return out + fmt::format("{}\n", describe(report.outcome));
 }
 
-std::string_view kind_named(const SystemEntry& system, const Training& training,
+std::string_view kind_named(const SystemEntry& system, const std::vector<TrainingKind>& kinds,
                             std::string_view given)
 {
-    if (given.empty()) return training.kinds.front().name;
+    if (given.empty()) return kinds.front().name;
     std::vector<std::string_view> known;
-    for (const TrainingKind& kind : training.kinds) {
+    for (const TrainingKind& kind : kinds) {
         if (given == kind.name || given == kind.other_name) return kind.name;
         known.push_back(kind.name);
     }
@@ -195,39 +196,15 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
 
 }  // namespace
 
-void claim_training(const fs::path& out, fs::path& checkpoint, bool resume)
-{
-    if (checkpoint.empty()) {
-        checkpoint = out;
-        checkpoint += ".checkpoint";
-    }
-    Claims claims;
-    claims.replaces("--out", out);
-    claims.keeps("--checkpoint", checkpoint, resume);
-}
-
-void say_what_is_kept(const fs::path& checkpoint, const std::string& trouble)
-{
-    std::error_code error;
-    if (!trouble.empty()) fmt::print(stderr, "ricochet: {}\n", printable(trouble));
-    if (fs::exists(checkpoint, error)) {
-        fmt::print(stderr,
-                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
-                   checkpoint.string());
-    } else {
-        fmt::print(stderr, "ricochet: interrupted; nothing is kept\n");
-    }
-}
-
 int train(const TrainRequest& request)
 {
     const SystemEntry& system = find_system(request.system);
-    if (!system.training && !gate_kinds(system.name).empty()) return train_gate(system, request);
-    if (!system.training) {
+    if (!gate_kinds(system.name).empty()) return train_gate(system, request);
+    if (system.name != "bouncing-ball") {
         throw BadInput(fmt::format("there is no training for the system {}", system.name));
     }
     TrainingRequest training = request.training;
-    training.kind = kind_named(system, *system.training, training.kind);
+    training.kind = kind_named(system, ball_kinds(), training.kind);
     const bool own_checkpoint = training.checkpoint.empty();
     claim_training(request.out, training.checkpoint, training.resume);
 
@@ -235,7 +212,7 @@ int train(const TrainRequest& request)
     learn::Progress last;
     const Interrupts watch;
     const learn::Trained trained =
-        run_training(system.training->train, training, [&](const learn::Progress& progress) {
+        run_training(train_ball, training, [&](const learn::Progress& progress) {
             last = progress;
             bar.show(progress);
             return !Interrupts::any();

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "files.hpp"
+#include "guard_problems.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
@@ -96,11 +97,9 @@ learn::GuardProblem problem_of(const Model& model, const fs::path& file)
         return BadInput(fmt::format("model '{}' {}", file.string(), why));
     };
     std::vector<std::string_view> known;
-    for (const SystemEntry& system : systems()) {
-        if (system.guard_problem != nullptr && system.name == model.system) {
-            return system.guard_problem(model);
-        }
-        if (system.guard_problem != nullptr) known.push_back(system.name);
+    for (const GuardProblemOf& problem : guard_problems()) {
+        if (problem.system == model.system) return problem.make(model);
+        known.push_back(problem.system);
     }
     throw refuse(
         fmt::format("is for the system '{}'; those that bound how much their guard can "

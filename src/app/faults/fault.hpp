@@ -1,19 +1,18 @@
-// What the commands of the system fault share.
+// The fault and the spring-slider on the command line.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ricochet/faults/fault_rupture.hpp"
 
 namespace ricochet::app {
 
-struct Parameter;
 struct SystemEntry;
-struct CompareRequest;
 struct SimulateRequest;
 
 /// From the entry's parameters, in its order.
@@ -33,16 +32,24 @@ struct MeanSamples {
 /// x [km], depth [km], value; rows separated by blank lines, as gnuplot's images want them.
 [[nodiscard]] std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& values);
 
-/// Parameters of rate-and-state friction, whether they ask for it, and a run with it.
-[[nodiscard]] std::vector<Parameter> rate_state_parameters();
+/// Whether a parameter is among the assignments "name=value".
+[[nodiscard]] bool given(const std::vector<std::string>& set, std::string_view name);
+
+/// @throws BadInput unless the value of this parameter is a whole number.
+double whole(std::string_view name, double value);
+
+/// Whether these parameters ask for rate-and-state friction.
 [[nodiscard]] bool has_rate_and_state(const std::vector<double>& values);
+
+/// @throws BadInput if a parameter of rate-and-state friction is set.
+void refuse_rate_and_state(const std::vector<std::string>& set, const SystemEntry& system);
+
+/// `ricochet simulate` of the systems that the program ricochet-fault has; as `simulate`.
+[[nodiscard]] int simulate_fault(const SystemEntry& system, const SimulateRequest& request);
 [[nodiscard]] int simulate_rate_state_fault(const SystemEntry& system,
                                             const SimulateRequest& request,
                                             const std::vector<double>& values);
-/// @throws BadInput if one of them is set.
-void refuse_rate_and_state(const std::vector<std::string>& set, const SystemEntry& system);
-
-/// Explicit and implicit steps on one fault: work, time and true errors.
-[[nodiscard]] int compare_fault(const SystemEntry& system, const CompareRequest& request);
+[[nodiscard]] int simulate_spring_slider(const SystemEntry& system,
+                                         const SimulateRequest& request);
 
 }  // namespace ricochet::app

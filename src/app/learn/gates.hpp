@@ -6,6 +6,7 @@
 
 #include "registry.hpp"
 #include "ricochet/learn/gate.hpp"
+#include "train.hpp"
 
 namespace ricochet::app {
 

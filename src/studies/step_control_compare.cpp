@@ -1,4 +1,4 @@
-#include "step_control_compare.hpp"
+#include "studies.hpp"
 
 #include <fmt/format.h>
 
@@ -22,10 +22,10 @@
 #include "ricochet/systems/sliding_mode.hpp"
 #include "run_watch.hpp"
 #include "settings.hpp"
-#include "step_actor.hpp"
-#include "step_policy.hpp"
-#include "step_progress.hpp"
-#include "systems/fault.hpp"
+#include "learn/step_world.hpp"
+#include "policy_lookup.hpp"
+#include "faults/step_progress.hpp"
+#include "faults/fault.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -613,8 +613,9 @@ Json json(const Case& of, const std::vector<RuleRow>& rows, const std::vector<Be
 
 }  // namespace
 
-int compare_step_control(const CompareRequest& request, const std::string& system)
+int compare_step_control(const CompareRequest& request)
 {
+    const std::string system = request.of.value_or("");
     if (request.csv) throw BadInput("--csv is of event times; take --json");
     const std::vector<std::string_view> known{SlidingMode::name, DiodeCircuit::name, "fault"};
     std::vector<std::string> wanted{system};

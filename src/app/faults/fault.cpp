@@ -1,3 +1,5 @@
+#include "fault.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,34 +9,21 @@
 #include <utility>
 #include <vector>
 
-#include "../files.hpp"
-#include "../input.hpp"
-#include "../interrupt.hpp"
-#include "../json_text.hpp"
-#include "../plot.hpp"
-#include "../report.hpp"
-#include "../run_watch.hpp"
-#include "../simulate.hpp"
-#include "../step_policy.hpp"
-#include "../step_progress.hpp"
-#include "entries.hpp"
-#include "fault.hpp"
+#include "files.hpp"
+#include "input.hpp"
+#include "interrupt.hpp"
+#include "json_text.hpp"
+#include "plot.hpp"
+#include "report.hpp"
+#include "run_watch.hpp"
+#include "simulate.hpp"
+#include "policy_lookup.hpp"
+#include "step_progress.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
 
 namespace ricochet::app {
 
 namespace {
-
-constexpr double mib = 1048576;
-const StrikeSlipFault::Parameters defaults{};
-
-double whole(std::string_view name, double value)
-{
-    if (value != std::floor(value)) {
-        throw BadInput(fmt::format("{} of fault must be a whole number, got {}", name, value));
-    }
-    return value;
-}
 
 void refuse_what_is_not_for_faults(const RunRequest& run)
 {
@@ -283,6 +272,48 @@ void draw_rupture(const StrikeSlipFault& fault, const RuptureOptions& asked, con
     draw(files, script + "unset multiplot\n", file);
 }
 
+}  // namespace
+
+MeanSamples sampled(const Rupture& r, double t_end, std::size_t n)
+{
+    MeanSamples out;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double t = t_end * static_cast<double>(i) / static_cast<double>(n - 1);
+        while (at + 2 < r.times.size() && r.times[at + 1] < t) ++at;
+        const double span = r.times[at + 1] - r.times[at];
+        const double x = span > 0 ? std::clamp((t - r.times[at]) / span, 0.0, 1.0) : 1;
+        out.t.push_back(t);
+        out.slip.push_back(std::lerp(r.mean_slips[at], r.mean_slips[at + 1], x));
+        out.velocity.push_back(std::lerp(r.mean_velocities[at], r.mean_velocities[at + 1], x));
+    }
+    return out;
+}
+
+std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& values)
+{
+    std::string out;
+    const int n = fault.elements();
+    if (n == 1) {  // a picture of one point would be empty: of four
+        const double side = fault.parameters().side / 1000;
+        for (const double z : {0.25, 0.75}) {
+            for (const double x : {0.25, 0.75}) {
+                out += fmt::format("{} {} {}\n", x * side, z * side, values[0]);
+            }
+            out += '\n';
+        }
+        return out;
+    }
+    for (int z = 0; z < n; ++z) {
+        for (int x = 0; x < n; ++x) {
+            out += fmt::format("{} {} {}\n", fault.depth(x) / 1000, fault.depth(z) / 1000,
+                               values[Eigen::Index{z} * n + x]);
+        }
+        out += '\n';
+    }
+    return out;
+}
+
 int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
 {
     refuse_what_is_not_for_faults(request.run);
@@ -330,166 +361,6 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
          }});
     if (cancelled) return ended_early(fmt::format("at t = {} s", r.t));
     return r.outcome == RuptureOutcome::reached_end || r.outcome == RuptureOutcome::at_rest ? 0 : 1;
-}
-
-}  // namespace
-
-MeanSamples sampled(const Rupture& r, double t_end, std::size_t n)
-{
-    MeanSamples out;
-    std::size_t at = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-        const double t = t_end * static_cast<double>(i) / static_cast<double>(n - 1);
-        while (at + 2 < r.times.size() && r.times[at + 1] < t) ++at;
-        const double span = r.times[at + 1] - r.times[at];
-        const double x = span > 0 ? std::clamp((t - r.times[at]) / span, 0.0, 1.0) : 1;
-        out.t.push_back(t);
-        out.slip.push_back(std::lerp(r.mean_slips[at], r.mean_slips[at + 1], x));
-        out.velocity.push_back(std::lerp(r.mean_velocities[at], r.mean_velocities[at + 1], x));
-    }
-    return out;
-}
-
-std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& values)
-{
-    std::string out;
-    const int n = fault.elements();
-    if (n == 1) {  // a picture of one point would be empty: of four
-        const double side = fault.parameters().side / 1000;
-        for (const double z : {0.25, 0.75}) {
-            for (const double x : {0.25, 0.75}) {
-                out += fmt::format("{} {} {}\n", x * side, z * side, values[0]);
-            }
-            out += '\n';
-        }
-        return out;
-    }
-    for (int z = 0; z < n; ++z) {
-        for (int x = 0; x < n; ++x) {
-            out += fmt::format("{} {} {}\n", fault.depth(x) / 1000, fault.depth(z) / 1000,
-                               values[Eigen::Index{z} * n + x]);
-        }
-        out += '\n';
-    }
-    return out;
-}
-
-StrikeSlipFault::Parameters fault_parameters(const std::vector<double>& p,
-                                             const std::optional<std::filesystem::path>& kernel)
-{
-    constexpr double most = 1e9;  // far beyond any memory
-    StrikeSlipFault::Parameters out{
-        .elements = static_cast<int>(std::min(whole("elements", p[0]), most)),
-        .side = p[1],
-        .shear_modulus = p[2],
-        .poisson = p[3],
-        .density = p[4],
-        .damping = p[5],
-        .stress_gradient = p[6],
-        .residual_friction = p[7],
-        .friction_drop = p[8],
-        .slip_distance = p[9],
-        .overload = p[10],
-        .medium =
-            whole("half_space", p[11]) != 0 ? FaultMedium::half_space : FaultMedium::full_space,
-        .mesh = whole("tip_corrected", p[12]) != 0 ? FaultMesh::tip_corrected : FaultMesh::plain,
-        .memory_limit = p[13] * mib};
-    if (kernel) out.kernel = *kernel;
-    if (kernel && out.medium == FaultMedium::half_space) {
-        throw BadInput("--kernel stands for the medium: half_space must be 0 with it");
-    }
-    return out;
-}
-
-SystemEntry fault_entry()
-{
-    constexpr double inf = std::numeric_limits<double>::infinity();
-    const Range positive{.lower = 0};
-    const Range not_negative{.lower = 0, .lower_included = true};
-    const Range share{.lower = 0, .upper = 1, .lower_included = true, .upper_included = true};
-    SystemEntry entry{
-        .name = StrikeSlipFault::name,
-        .description = "A strike-slip fault of n x n elements slips in an earthquake.",
-        .parameters = {{.name = "elements",
-                        .initial = 1,
-                        .unit = "1",
-                        .range = {.lower = 1, .upper = inf, .lower_included = true},
-                        .meaning = "per side, a whole number"},
-                       {.name = "side",
-                        .initial = defaults.side,
-                        .unit = "m",
-                        .range = positive,
-                        .meaning = "of the square"},
-                       {.name = "shear_modulus",
-                        .initial = defaults.shear_modulus,
-                        .unit = "Pa",
-                        .range = positive,
-                        .meaning = "of the rock"},
-                       {.name = "poisson",
-                        .initial = defaults.poisson,
-                        .unit = "1",
-                        .range = {.lower = 0, .upper = 0.5, .lower_included = true},
-                        .meaning = "Poisson's ratio"},
-                       {.name = "density",
-                        .initial = defaults.density,
-                        .unit = "kg/m³",
-                        .range = positive,
-                        .meaning = "of the rock"},
-                       {.name = "damping",
-                        .initial = defaults.damping,
-                        .unit = "1",
-                        .range = not_negative,
-                        .meaning = "damping ratio of every mode"},
-                       {.name = "stress_gradient",
-                        .initial = defaults.stress_gradient,
-                        .unit = "Pa/m",
-                        .range = positive,
-                        .meaning = "effective normal stress by depth"},
-                       {.name = "residual_friction",
-                        .initial = defaults.residual_friction,
-                        .unit = "1",
-                        .range = not_negative,
-                        .meaning = "coefficient after much slip"},
-                       {.name = "friction_drop",
-                        .initial = defaults.friction_drop,
-                        .unit = "1",
-                        .range = positive,
-                        .meaning = "by which it begins higher"},
-                       {.name = "slip_distance",
-                        .initial = defaults.slip_distance,
-                        .unit = "m",
-                        .range = positive,
-                        .meaning = "over which friction falls"},
-                       {.name = "overload",
-                        .initial = defaults.overload,
-                        .unit = "1",
-                        .range = positive,
-                        .meaning = "stress beyond strength at the start"},
-                       {.name = "half_space",
-                        .initial = 0,
-                        .unit = "1",
-                        .range = share,
-                        .meaning = "1: under a free surface (Okada)"},
-                       {.name = "tip_corrected",
-                        .initial = 0,
-                        .unit = "1",
-                        .range = share,
-                        .meaning = "1: elements a quarter off the edges"},
-                       {.name = "memory",
-                        .initial = defaults.memory_limit / mib,
-                        .unit = "MiB",
-                        .range = positive,
-                        .meaning = "a larger mesh is refused"}},
-        .state = {{.name = "slip", .unit = "m", .meaning = "mean slip"},
-                  {.name = "velocity", .unit = "m/s", .meaning = "mean velocity"}},
-        .t_end = 30,
-        .start = nullptr,
-        .run = nullptr,
-        .simulate = simulate_fault,
-        .compare = compare_fault,
-    };
-    for (const Parameter& p : rate_state_parameters()) entry.parameters.push_back(p);
-    return entry;
 }
 
 }  // namespace ricochet::app

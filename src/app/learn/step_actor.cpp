@@ -1,4 +1,4 @@
-#include "step_actor.hpp"
+#include "step_policy.hpp"
 
 #include <fmt/format.h>
 
@@ -12,15 +12,12 @@
 #include "input.hpp"
 #include "json_text.hpp"
 #include "keep_model.hpp"
-#include "model_lookup.hpp"
+#include "policy_lookup.hpp"
 #include "progress_bar.hpp"
 #include "report.hpp"
 #include "ricochet/learn/td3.hpp"
 #include "ricochet/learn/tqc.hpp"
-#include "ricochet/nn/safetensors.hpp"
-#include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/systems/sliding_mode.hpp"
-#include "ricochet/faults/strike_slip_fault.hpp"
+#include "step_world.hpp"
 #include "timing.hpp"
 #include "train.hpp"
 
@@ -31,7 +28,6 @@ namespace {
 namespace fs = std::filesystem;
 using learn::PolicyOutcome;
 using learn::StepWorld;
-using learn::StepWorldOptions;
 using learn::TrainedPolicy;
 
 learn::PolicyTraining training_of(const TrainPolicyRequest& request)
@@ -74,22 +70,6 @@ Model named(Model actor, const std::string& system, double alpha, std::uint64_t 
 }
 
 }  // namespace
-
-StepWorld source_world(const std::string& system, const StepWorldOptions& options)
-{
-    const std::vector<std::string_view> known{"fault", SlidingMode::name, DiodeCircuit::name};
-    if (system == known[0]) {
-        return learn::step_world(StrikeSlipFault({.elements = 1}), 30, options);
-    }
-    if (system == known[1]) {
-        return learn::step_world(SlidingMode{}, SlidingMode::start, SlidingMode::t_end, options);
-    }
-    if (system == known[2]) {
-        return learn::step_world(DiodeCircuit{}, DiodeCircuit::start(), DiodeCircuit::t_end,
-                                 options);
-    }
-    throw unknown("system for a step policy", system, known);
-}
 
 int train_actor(const TrainPolicyRequest& request)
 {
@@ -137,32 +117,6 @@ int train_actor(const TrainPolicyRequest& request)
     }
     fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
     return 0;
-}
-
-Model shipped_actor(std::string_view system)
-{
-    const fs::path file = find_model(fmt::format("{}-tqc", system));
-    Model actor = load_model(file);
-    const auto refuse = [&](std::string_view what, const std::string& given,
-                            std::string_view expected) {
-        throw BadInput(fmt::format("model '{}': {} is '{}', expected '{}'", file.string(), what,
-                                   given, expected));
-    };
-    if (actor.kind != step_actor_kind) refuse("its kind", actor.kind, step_actor_kind);
-    if (actor.system != system) refuse("its system", actor.system, system);
-    if (actor.recipe != step_actor_recipe) refuse("its recipe", actor.recipe, step_actor_recipe);
-    if (!actor.parameters.contains("alpha")) refuse("parameter alpha", "missing", "a number");
-    return actor;
-}
-
-StepWorldOptions judged(const Model& actor)
-{
-    StepWorldOptions options = learn::published_step_world(actor.parameters.at("alpha"));
-    options.h_min = actor.step_min;
-    options.h_max = actor.step_max;
-    options.until_rest = true;
-    options.max_attempts = 5000;
-    return options;
 }
 
 }  // namespace ricochet::app

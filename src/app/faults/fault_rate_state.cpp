@@ -1,4 +1,5 @@
 // `simulate fault --set rate_and_state=1`.
+#include "fault.hpp"
 
 #include <fmt/format.h>
 
@@ -9,17 +10,15 @@
 #include <utility>
 #include <vector>
 
-#include "../files.hpp"
-#include "../input.hpp"
-#include "../interrupt.hpp"
-#include "../json_text.hpp"
-#include "../plot.hpp"
-#include "../report.hpp"
-#include "../run_watch.hpp"
-#include "../simulate.hpp"
-#include "../step_progress.hpp"
-#include "entries.hpp"
-#include "fault.hpp"
+#include "files.hpp"
+#include "input.hpp"
+#include "interrupt.hpp"
+#include "json_text.hpp"
+#include "plot.hpp"
+#include "report.hpp"
+#include "run_watch.hpp"
+#include "simulate.hpp"
+#include "step_progress.hpp"
 #include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet::app {
@@ -48,21 +47,6 @@ enum : std::size_t {
 
 /// Parameters of friction that weakens with slip; the slip distance is then but a unit.
 constexpr std::string_view of_weakening[] = {"residual_friction", "friction_drop", "slip_distance"};
-
-bool given(const std::vector<std::string>& set, std::string_view name)
-{
-    return std::any_of(set.begin(), set.end(), [name](const std::string& text) {
-        return text.size() > name.size() && text.starts_with(name) && text[name.size()] == '=';
-    });
-}
-
-double whole(std::string_view name, double value)
-{
-    if (value != std::floor(value)) {
-        throw BadInput(fmt::format("{} of fault must be a whole number, got {}", name, value));
-    }
-    return value;
-}
 
 FaultFriction friction_of(const std::vector<double>& p)
 {
@@ -269,21 +253,6 @@ void draw_cycle(const StrikeSlipFault& fault, const RateStateRupture& r,
 
 }  // namespace
 
-bool has_rate_and_state(const std::vector<double>& values)
-{
-    return whole("rate_and_state", values[rate_and_state]) != 0;
-}
-
-void refuse_rate_and_state(const std::vector<std::string>& set, const SystemEntry& system)
-{
-    for (std::size_t i = rate_and_state; i < all_parameters; ++i) {
-        const std::string_view name = system.parameters[i].name;
-        if (given(set, name) && i != rate_and_state) {
-            throw BadInput(fmt::format("{} of fault is for rate_and_state=1", name));
-        }
-    }
-}
-
 int simulate_rate_state_fault(const SystemEntry& system, const SimulateRequest& request,
                               const std::vector<double>& values)
 {
@@ -336,39 +305,6 @@ int simulate_rate_state_fault(const SystemEntry& system, const SimulateRequest& 
              }});
     if (cancelled) return ended_early(fmt::format("at t = {} s", r.rupture.t));
     return r.rupture.outcome == RuptureOutcome::reached_end ? 0 : 1;
-}
-
-std::vector<Parameter> rate_state_parameters()
-{
-    constexpr Range positive{.lower = 0};
-    constexpr Range not_negative{.lower = 0, .lower_included = true};
-    const FaultFriction f;
-    const RateStateOptions how;
-    return {{"rate_and_state",
-             0,
-             "1",
-             {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
-             "1: rate-and-state friction, with all that follows"},
-            {"a", f.law.a, "1", positive, "direct effect"},
-            {"b", f.law.b, "1", positive, "effect of the state"},
-            {"f_star", f.law.f_star, "1", positive, "steady friction coefficient at v_star"},
-            {"v_star", f.law.v_star, "m/s", positive, "reference slip rate"},
-            {"d_rs", f.law.d_rs, "m", positive, "characteristic slip distance"},
-            {"law",
-             0,
-             "1",
-             {.lower = 0, .upper = 2, .lower_included = true, .upper_included = true},
-             "0 ageing, 1 slip, 2 Perrin-Rice-Zheng"},
-            {"plate_velocity", f.plate_velocity, "m/s", not_negative, "that loads the fault"},
-            {"slip_rate", f.slip_rate, "m/s", positive, "at the start"},
-            {"theta", 0, "s", not_negative, "state at the start; 0: that of steady sliding"},
-            {"normal_stress", 0, "Pa", not_negative, "effective, everywhere; 0: by depth"},
-            {"threshold", how.threshold, "m/s", positive, "slip rate of an earthquake"},
-            {"order",
-             static_cast<double>(how.order),
-             "1",
-             {.lower = 1, .upper = 4, .lower_included = true, .upper_included = true},
-             "of the steps: 1, 2 or 4"}};
 }
 
 }  // namespace ricochet::app

@@ -1,9 +1,8 @@
-// Policies that choose steps, by name: training them and finding them.
+// Training policies that choose steps.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -41,18 +40,7 @@ int train_policy(const TrainPolicyRequest& request);
 /// @throws BadInput naming the systems that have some.
 [[nodiscard]] learn::StepFamily step_family(const std::string& system, std::uint64_t seed);
 
-/// The file of the policy that `named_policy` takes.
-/// @throws BadInput if it is not there.
-[[nodiscard]] std::filesystem::path policy_file(const StepLayout& layout,
-                                                const std::optional<std::string>& given);
-
-/// One sentence or two: what policies of a system were trained on, and when not to use the one that
-/// comes along. Empty for a system without.
-[[nodiscard]] std::string_view policy_advice(std::string_view system);
-
-/// The policy that the user named, or the one that comes along for the system.
-/// @throws BadInput or ModelError if it is not there, or not for that system and its inputs.
-[[nodiscard]] std::shared_ptr<const StepPolicy> named_policy(
-    const StepLayout& layout, const std::optional<std::string>& given);
+/// `train_policy` by TQC or TD3 on the source's problem of the system; prints its run there.
+int train_actor(const TrainPolicyRequest& request);
 
 }  // namespace ricochet::app

@@ -8,16 +8,18 @@
 #include <utility>
 #include <vector>
 
-#include "../compare.hpp"
-#include "../files.hpp"
-#include "../input.hpp"
-#include "../interrupt.hpp"
-#include "../json_text.hpp"
-#include "../report.hpp"
-#include "../run_watch.hpp"
-#include "../step_progress.hpp"
-#include "../timing.hpp"
-#include "fault.hpp"
+#include "compare.hpp"
+#include "faults/fault.hpp"
+#include "files.hpp"
+#include "input.hpp"
+#include "interrupt.hpp"
+#include "json_text.hpp"
+#include "registry.hpp"
+#include "report.hpp"
+#include "run_watch.hpp"
+#include "faults/step_progress.hpp"
+#include "studies.hpp"
+#include "timing.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
 
 namespace ricochet::app {
@@ -165,8 +167,9 @@ std::string json(const StrikeSlipFault& fault, const Rupture& exact,
 
 }  // namespace
 
-int compare_fault(const SystemEntry& system, const CompareRequest& request)
+int compare_fault(const CompareRequest& request)
 {
+    const SystemEntry& system = find_system("fault");
     if (request.csv) throw BadInput("--csv is of event times, and a fault has none; take --json");
     const std::vector<double> values = parameter_values(system, request.set);
     if (has_rate_and_state(values)) {

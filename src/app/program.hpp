@@ -1,0 +1,37 @@
+// What `ricochet` and its further programs, `ricochet-<name>`, have in common.
+//
+// Exit status: 0 fine; 1 a run or training that ended otherwise than hoped (its
+// result is printed all the same) or a file that could not be written in the end;
+// 2 bad input: one sentence on standard error, nothing printed, nothing written;
+// 130 and 143 a run or comparison ended by a signal, its result printed as incomplete.
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+#include "compare.hpp"
+#include "simulate.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace ricochet::app {
+
+/// Adds the commands of a program; each sets the exit status when it is run.
+using AddCommands = std::function<void(CLI::App& app, int& status)>;
+
+using SimulateHandler = int (*)(const SimulateRequest& request);
+using CompareHandler = int (*)(const CompareRequest& request);
+
+/// `simulate` and `compare` with all their options, which several programs take.
+void add_simulate(CLI::App& app, int& status, SimulateHandler handler);
+void add_compare(CLI::App& app, int& status, CompareHandler handler);
+
+/// The main function of a program with these commands. @return the exit status
+int run_program(const AddCommands& add, int count, char** arguments);
+
+/// The same for a program of one command, which is not typed: `ricochet-train SYSTEM ...`.
+int run_command(std::string_view command, const AddCommands& add, int count, char** arguments);
+
+}  // namespace ricochet::app

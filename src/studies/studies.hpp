@@ -1,0 +1,22 @@
+// Comparisons that take a minute and more: `ricochet compare` of these names runs the program
+// ricochet-studies.
+#pragma once
+
+#include "compare.hpp"
+
+namespace ricochet::app {
+
+/// `compare step-control`: rules that choose steps, at equal true error. Prints for every rule the
+/// coarsest setting from which on its error stays below the target, and what that takes.
+/// @return 0 if every rule got there, else 1.
+/// @throws BadInput or ModelError.
+int compare_step_control(const CompareRequest& request);
+
+/// `compare rate-and-state`: the tables of the published study beside ours, computed anew in about
+/// a minute.
+int compare_rate_and_state(const CompareRequest& request);
+
+/// `compare fault`: explicit and implicit steps on one fault: work, time and true errors.
+int compare_fault(const CompareRequest& request);
+
+}  // namespace ricochet::app

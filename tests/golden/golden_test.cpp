@@ -1,0 +1,160 @@
+// The bits of today's runs: every system of the command line by every method, detector and locator
+// that it takes.
+//
+// A line of runs.txt is a run: a hash of its outcome, its events (times, states before and after,
+// modes, slopes, errors) and its end, and its counts. A change of the engine that is meant to keep
+// the bits keeps this file; one that is not says in its commit which lines change and why. The
+// file holds for one mathematical library, which its first line identifies by a hash of its own:
+// with another the test is skipped. RICOCHET_WRITE_GOLDEN=1 writes runs.txt anew.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "input.hpp"
+#include "registry.hpp"
+
+namespace ricochet::app {
+namespace {
+
+/// FNV-1a of 64 bits.
+class Hash {
+public:
+    void add(std::uint64_t bits)
+    {
+        for (int i = 0; i < 8; ++i) {
+            value_ = (value_ ^ (bits & 255)) * 0x100000001b3ULL;
+            bits >>= 8;
+        }
+    }
+    void add(double x) { add(std::bit_cast<std::uint64_t>(x)); }
+    void add(const std::vector<double>& x)
+    {
+        for (const double each : x) add(each);
+    }
+    [[nodiscard]] std::uint64_t value() const { return value_; }
+
+private:
+    std::uint64_t value_ = 0xcbf29ce484222325ULL;
+};
+
+/// Of the functions of the mathematical library that the systems use.
+std::uint64_t mathematical_library()
+{
+    Hash hash;
+    for (int i = 1; i < 2000; ++i) {
+        const double x = 0.0137 * i;
+        for (const double y : {std::sin(x), std::cos(x), std::exp(-x), std::log(x), std::pow(x, 0.2),
+                               std::tanh(x), std::atan2(x, 3.0), std::hypot(x, 1.7)}) {
+            hash.add(y);
+        }
+    }
+    return hash.value();
+}
+
+std::string line_of(const SystemEntry& system, const RunRequest& request)
+{
+    const auto shown = [](const std::optional<std::string>& text) { return text.value_or("-"); };
+    std::string out = fmt::format("{} {} {} {} {} {}", system.name,
+                                  request.step ? fmt::format("step={}", *request.step) : "control",
+                                  shown(request.stepper), shown(request.detector),
+                                  shown(request.locator), shown(request.integrator));
+    TimedRun timed;
+    try {
+        timed = system.run(resolve(system, request), 1);
+    } catch (const BadInput&) {
+        return out + " refused";
+    }
+    const Run<std::vector<double>>& run = timed.run;
+    Hash hash;
+    hash.add(static_cast<std::uint64_t>(run.outcome));
+    hash.add(run.t);
+    hash.add(run.x);
+    hash.add(static_cast<std::uint64_t>(run.mode));
+    for (const auto& event : run.events) {
+        hash.add(event.t);
+        hash.add(static_cast<std::uint64_t>(event.kind));
+        hash.add(static_cast<std::uint64_t>(event.guard));
+        hash.add(static_cast<std::uint64_t>(event.mode_before));
+        hash.add(static_cast<std::uint64_t>(event.mode_after));
+        hash.add(event.before);
+        hash.add(event.after);
+        hash.add(event.slope);
+        hash.add(event.error);
+    }
+    const Statistics& s = run.statistics;
+    return out + fmt::format(" {:016x} events={} steps={} rejected={} flow={} guard={}", hash.value(),
+                             run.events.size(), s.steps, s.rejected, s.flow_calls, s.guard_calls);
+}
+
+std::vector<RunRequest> requests(const SystemEntry& system)
+{
+    std::vector<RunRequest> all;
+    RunRequest request;
+    request.max_steps = 20'000;
+    if (!system.integrators.empty()) {
+        for (const std::string_view integrator : system.integrators) {
+            request.integrator = integrator;
+            all.push_back(request);
+        }
+        if (system.integrators.front() != "event") return all;
+        request.integrator.reset();
+    }
+    const auto add = [&](std::string_view stepper, std::string_view detector,
+                         std::string_view locator) {
+        request.stepper = stepper;
+        request.detector = detector;
+        request.locator = locator;
+        all.push_back(request);
+    };
+    const std::vector<std::string_view> detectors{"extremum", "ends", "bernstein"};
+    for (const std::string_view stepper : {"dopri5", "fehlberg78", "cash-karp54"}) {
+        for (const std::string_view detector : detectors) add(stepper, detector, "newton");
+    }
+    for (const std::string_view locator : {"bisection", "toms748"}) add("dopri5", "extremum", locator);
+    request.step = system.comparison_step > 0 ? system.comparison_step
+                                              : (system.t_end - system.t_start) / 2000;
+    for (const std::string_view stepper : {"rk4", "euler", "dopri5"}) {
+        for (const std::string_view detector : detectors) add(stepper, detector, "newton");
+    }
+    return all;
+}
+
+std::vector<std::string> all_lines()
+{
+    std::vector<std::string> out{fmt::format("mathematical library {:016x}", mathematical_library())};
+    for (const SystemEntry& system : systems()) {
+        if (system.run == nullptr) continue;
+        for (const RunRequest& request : requests(system)) out.push_back(line_of(system, request));
+    }
+    return out;
+}
+
+TEST(Golden, RunsHaveTheirBits)
+{
+    const std::string file = RICOCHET_GOLDEN_RUNS;
+    const std::vector<std::string> lines = all_lines();
+    if (std::getenv("RICOCHET_WRITE_GOLDEN") != nullptr) {
+        std::ofstream out(file);
+        for (const std::string& line : lines) out << line << '\n';
+        return;
+    }
+    std::vector<std::string> stored;
+    std::ifstream in(file);
+    for (std::string line; std::getline(in, line);) stored.push_back(line);
+    ASSERT_FALSE(stored.empty()) << file;
+    if (stored.front() != lines.front()) GTEST_SKIP() << "another mathematical library";
+    ASSERT_EQ(stored.size(), lines.size());
+    for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(lines[i], stored[i]);
+}
+
+}  // namespace
+}  // namespace ricochet::app
