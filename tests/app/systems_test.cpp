@@ -87,7 +87,9 @@ TEST_F(App, CompareFindsEveryEventOfTheSystemsWithGuards)
     // 3e-5 of the orbit that passes near the Moon is the largest measured.
     for (const std::string& name : with_guards) {
         const Result result = run({"compare", name, "--json"});
-        ASSERT_TRUE(result.err.empty()) << result.err;
+        // A slow machine may be told that the program is still at work.
+        ASSERT_TRUE(result.err.empty() || result.err.starts_with("ricochet: still running"))
+            << result.err;
         const nlohmann::json table = nlohmann::json::parse(result.out);
         EXPECT_GT(table["reference"].size(), 1U) << name;
         for (const nlohmann::json& method : table["methods"]) {
