@@ -1,0 +1,15 @@
+// The one training set that takes seconds to make.
+#include "learn/training_data.hpp"
+
+namespace ricochet::studies {
+namespace {
+
+TEST(ImpactOscillatorGate, IsTheStoredSetAndTheOneThatTheNetworkIsScaledBy)
+{
+    const TrainingSet set = data_of("impact-oscillator-gate").make({});
+    expect_stored("impact-oscillator-gate", set);
+    expect_trained_on("impact-oscillator-gate", set, 1e-9);
+}
+
+}  // namespace
+}  // namespace ricochet::studies
