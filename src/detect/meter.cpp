@@ -1,12 +1,11 @@
 #include "ricochet/detail/meter.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
+
+#include "../checks/require.hpp"
 
 namespace ricochet::detail {
 
@@ -38,21 +37,15 @@ double Meter::seconds() noexcept
 
 void validate(const MeterOptions& options)
 {
-    const auto refuse = [](const char* what, double given, const char* expected) {
-        throw std::invalid_argument(
-            fmt::format("MeterOptions: {} must be {}, got {}", what, expected, given));
-    };
+    constexpr detail::Require require{"MeterOptions"};
     const auto cost = [](double seconds) { return seconds >= 0 && std::isfinite(seconds); };
-    if (!cost(options.guard)) refuse("guard", options.guard, "zero or positive [s]");
-    if (!cost(options.network)) refuse("network", options.network, "zero or positive [s]");
+    require(cost(options.guard), "guard must be zero or positive [s]", options.guard);
+    require(cost(options.network), "network must be zero or positive [s]", options.network);
     const bool counted = options.decision == MeterOptions::Decision::counted;
-    if (!cost(options.step) || (counted && options.step == 0)) {
-        refuse("step", options.step, "positive where costs are counted [s]");
-    }
-    if (!(options.trials >= 0 && options.trials <= 1)) {
-        refuse("trials", options.trials, "in [0, 1]");
-    }
-    if (options.piece == 0) refuse("piece", 0, "at least 1 step");
+    require(cost(options.step) && !(counted && options.step == 0),
+            "step must be positive where costs are counted [s]", options.step);
+    require(options.trials >= 0 && options.trials <= 1, "trials must be in [0, 1]", options.trials);
+    require(options.piece > 0, "piece must be at least 1 step", 0);
 }
 
 void Meter::Account::add(double more_steps, double more_cost) noexcept

@@ -5,17 +5,16 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "../checks/require.hpp"
+
 namespace ricochet::detail {
 
 void validate(const PlannerOptions& options)
 {
-    if (!(options.margin >= 0 && std::isfinite(options.margin))) {
-        throw std::invalid_argument(fmt::format(
-            "Planned: margin must be zero or positive and finite, got {}", options.margin));
-    }
-    if (options.longest_stretch == 0) {
-        throw std::invalid_argument("Planned: longest_stretch must be at least 1 step, got 0");
-    }
+    constexpr Require require{"Planned"};
+    require(options.margin >= 0 && std::isfinite(options.margin),
+            "margin must be zero or positive and finite", options.margin);
+    require(options.longest_stretch > 0, "longest_stretch must be at least 1 step", 0);
 }
 
 void throw_no_steps_between_looks()

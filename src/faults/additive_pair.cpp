@@ -6,7 +6,7 @@
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 #include "fast_tanh.hpp"
 
 namespace ricochet {
@@ -17,9 +17,8 @@ constexpr std::size_t width = MonotoneNet::most_units;
 
 void require_rising(const MonotoneNet& net, std::string_view name)
 {
-    const auto refuse = [&](const std::string& what) {
-        throw std::invalid_argument(fmt::format("AdditivePair: net '{}': {}", name, what));
-    };
+    const std::string who = fmt::format("AdditivePair: net '{}'", name);
+    const detail::Refuse refuse{who};
     if (net.units > width) refuse(fmt::format("at most {} units, found {}", width, net.units));
     if (!(net.slope >= 0 && std::isfinite(net.slope) && std::isfinite(net.offset))) {
         refuse(fmt::format("the slope must be zero or positive, found {}", net.slope));

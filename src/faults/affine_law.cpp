@@ -4,8 +4,9 @@
 
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
+
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
@@ -18,10 +19,7 @@ double integral(const Function& f, double from, double to)
     return boost::math::quadrature::gauss_kronrod<double, 21>::integrate(f, from, to, 15, 1e-14);
 }
 
-[[noreturn]] void refuse(const std::string& what)
-{
-    throw std::invalid_argument("AffineLawPotential: " + what);
-}
+constexpr detail::Refuse refuse{"AffineLawPotential"};
 
 }  // namespace
 

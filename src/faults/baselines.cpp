@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../checks/require.hpp"
 #include "fault_forces.hpp"
 #include "rupture_record.hpp"
 
@@ -517,10 +518,7 @@ private:
     double rest_time_ = std::numeric_limits<double>::quiet_NaN();
 };
 
-[[noreturn]] void refuse(std::string_view what)
-{
-    throw std::invalid_argument(fmt::format("BatheOptions: {}", what));
-}
+constexpr detail::Refuse refuse{"BatheOptions"};
 
 }  // namespace
 

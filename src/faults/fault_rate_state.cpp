@@ -1,16 +1,13 @@
 #include "ricochet/faults/fault_rate_state.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
-#include "../systems/require.hpp"
-#include "ricochet/detail/variational_step.hpp"
+#include "../checks/require.hpp"
 #include "ricochet/detail/fault_friction_stage.hpp"
+#include "ricochet/detail/variational_step.hpp"
 #include "rupture_record.hpp"
 
 namespace ricochet {

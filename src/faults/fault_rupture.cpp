@@ -1,13 +1,11 @@
 #include "ricochet/faults/fault_rupture.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <complex>
-#include <stdexcept>
 #include <utility>
 
+#include "../checks/require.hpp"
 #include "fault_forces.hpp"
 #include "rupture_record.hpp"
 
@@ -25,12 +23,6 @@ using Eigen::VectorXd;
 constexpr double default_step = 0.28867513459481287;  // time units: 0.25 s at 3 km
 constexpr double default_bound = 1e-4;
 constexpr double stable_share = 0.95;
-
-[[noreturn]] void refuse(std::string_view option, std::string_view expected, double given)
-{
-    throw std::invalid_argument(
-        fmt::format("RuptureOptions: {} must {}, got {}", option, expected, given));
-}
 
 /// How much finer than the defaults a small mesh is taken.
 double finer(const StrikeSlipFault& fault)
@@ -342,21 +334,21 @@ double detail::polynomial_bound(const StrikeSlipFault& fault, const RuptureOptio
 
 void validate(const RuptureOptions& o)
 {
+    constexpr detail::Require require{"RuptureOptions"};
     // Shares of still shorter runs would not be numbers of full precision.
-    if (!(o.t_end >= 1e-300 && std::isfinite(o.t_end)))
-        refuse("t_end", "be at least 1e-300 s and finite", o.t_end);
-    if (!(o.step >= 0 && std::isfinite(o.step))) refuse("step", "be zero or positive", o.step);
-    if (!(o.rtol > 0)) refuse("rtol", "be positive", o.rtol);
-    if (!(o.polynomial_bound >= 0)) {
-        refuse("polynomial_bound", "be zero or positive", o.polynomial_bound);
-    }
+    require(o.t_end >= 1e-300 && std::isfinite(o.t_end),
+            "t_end must be at least 1e-300 s and finite", o.t_end);
+    require(o.step >= 0 && std::isfinite(o.step), "step must be zero or positive", o.step);
+    require(o.rtol > 0, "rtol must be positive", o.rtol);
+    require(o.polynomial_bound >= 0, "polynomial_bound must be zero or positive",
+            o.polynomial_bound);
     if (!std::is_sorted(o.snapshot_times.begin(), o.snapshot_times.end())) {
-        throw std::invalid_argument("RuptureOptions: snapshot_times must ascend");
+        detail::Refuse{require.who}("snapshot_times must ascend");
     }
     for (const double t : o.snapshot_times) {
-        if (!(t >= 0 && t <= o.t_end)) refuse("snapshot_times", "lie within [0, t_end]", t);
+        require(t >= 0 && t <= o.t_end, "snapshot_times must lie within [0, t_end]", t);
     }
-    if (o.max_steps == 0) refuse("max_steps", "be positive", 0);
+    require(o.max_steps > 0, "max_steps must be positive", 0);
 }
 
 std::string_view name(RuptureOutcome outcome) noexcept

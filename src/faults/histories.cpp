@@ -8,16 +8,14 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "../checks/require.hpp"
 #include "../systems/random.hpp"
 
 namespace ricochet {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& what)
-{
-    throw std::invalid_argument("friction history: " + what);
-}
+constexpr detail::Refuse refuse{"friction history"};
 
 double log_uniform(detail::Random& random, double lower, double upper)
 {

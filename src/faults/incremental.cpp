@@ -1,6 +1,6 @@
 #include "ricochet/detail/incremental.hpp"
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

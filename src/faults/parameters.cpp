@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

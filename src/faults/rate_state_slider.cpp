@@ -1,6 +1,6 @@
 #include "ricochet/faults/rate_state_slider.hpp"
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

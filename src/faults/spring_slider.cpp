@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../checks/require.hpp"
 #include "../systems/random.hpp"
-#include "../systems/require.hpp"
 
 namespace ricochet {
 

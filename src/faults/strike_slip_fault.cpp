@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 #include "ricochet/detail/fault_kernel.hpp"
 
 namespace ricochet {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet::detail {
 

@@ -3,62 +3,55 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <stdexcept>
+
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
 namespace {
 
-void require(bool fulfilled, const char* option, double given, const char* expected)
-{
-    if (!fulfilled) {
-        throw std::invalid_argument(
-            fmt::format("integrate: {} must be {}, got {}", option, expected, given));
-    }
-}
+constexpr detail::Refuse refuse{"integrate"};
+constexpr detail::Require require{"integrate"};
 
 }  // namespace
 
 void validate(const Options& options, bool step_required)
 {
     const Options& o = options;
-    require(std::isfinite(o.t_start), "t_start", o.t_start, "a finite time");
-    require(std::isfinite(o.t_end), "t_end", o.t_end, "a finite time");
+    require(std::isfinite(o.t_start), "t_start must be a finite time", o.t_start);
+    require(std::isfinite(o.t_end), "t_end must be a finite time", o.t_end);
     if (!std::isfinite(o.t_end - o.t_start)) {
-        throw std::invalid_argument(fmt::format(
-            "integrate: t_end - t_start must be finite, got {} - {}", o.t_end, o.t_start));
+        refuse(fmt::format("t_end - t_start must be finite, got {} - {}", o.t_end, o.t_start));
     }
     if (step_required) {
-        require(std::isfinite(o.step) && o.step > 0, "step", o.step,
-                "positive and finite for a fixed-step run");
+        require(std::isfinite(o.step) && o.step > 0,
+                "step must be positive and finite for a fixed-step run", o.step);
     } else {
-        require(std::isfinite(o.step) && o.step >= 0, "step", o.step,
-                "positive, or zero to have it estimated");
-        require(std::isfinite(o.rtol) && o.rtol >= 0, "rtol", o.rtol, "zero or positive");
-        require(std::isfinite(o.atol) && o.atol >= 0, "atol", o.atol, "zero or positive");
-        require(o.rtol > 0 || o.atol > 0, "rtol", o.rtol, "positive where atol is zero");
-        require(std::isfinite(o.h_min) && o.h_min >= 0, "h_min", o.h_min, "zero or positive");
-        require(o.h_max > o.h_min, "h_max", o.h_max, "above h_min");
+        require(std::isfinite(o.step) && o.step >= 0,
+                "step must be positive, or zero to have it estimated", o.step);
+        require(std::isfinite(o.rtol) && o.rtol >= 0, "rtol must be zero or positive", o.rtol);
+        require(std::isfinite(o.atol) && o.atol >= 0, "atol must be zero or positive", o.atol);
+        require(o.rtol > 0 || o.atol > 0, "rtol must be positive where atol is zero", o.rtol);
+        require(std::isfinite(o.h_min) && o.h_min >= 0, "h_min must be zero or positive", o.h_min);
+        require(o.h_max > o.h_min, "h_max must be above h_min", o.h_max);
     }
-    require(std::isfinite(o.event_tolerance) && o.event_tolerance >= 0, "event_tolerance",
-            o.event_tolerance, "zero or positive");
-    require(std::isfinite(o.event_rtol) && o.event_rtol >= 0, "event_rtol", o.event_rtol,
-            "zero or positive");
-    require(std::isfinite(o.event_window) && o.event_window >= 0, "event_window", o.event_window,
-            "zero or positive");
+    require(std::isfinite(o.event_tolerance) && o.event_tolerance >= 0,
+            "event_tolerance must be zero or positive", o.event_tolerance);
+    require(std::isfinite(o.event_rtol) && o.event_rtol >= 0, "event_rtol must be zero or positive",
+            o.event_rtol);
+    require(std::isfinite(o.event_window) && o.event_window >= 0,
+            "event_window must be zero or positive", o.event_window);
 
     const bool backward = o.t_end < o.t_start;
     double previous = o.t_start;
     for (const double t : o.sample_times) {
         if (backward ? t < o.t_end : t > o.t_end) {
-            throw std::invalid_argument(
-                fmt::format("integrate: sample time {} lies beyond the end of the run, t_end = {}",
-                            t, o.t_end));
+            refuse(fmt::format("sample time {} lies beyond the end of the run, t_end = {}", t,
+                               o.t_end));
         }
         if (!(backward ? t <= previous : t >= previous)) {
-            throw std::invalid_argument(
-                fmt::format("integrate: sample_times must go from {} towards {}, got {} after {}",
-                            o.t_start, o.t_end, t, previous));
+            refuse(fmt::format("sample_times must go from {} towards {}, got {} after {}",
+                               o.t_start, o.t_end, t, previous));
         }
         previous = t;
     }

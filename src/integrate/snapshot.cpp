@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <stdexcept>
+
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
@@ -15,10 +16,7 @@ constexpr std::string_view heading = "ricochet-snapshot 2";
 constexpr std::string_view between = " = ";
 constexpr std::string_view last_line = "checksum ";
 
-[[noreturn]] void refuse(const std::string& what)
-{
-    throw std::invalid_argument("snapshot: " + what);
-}
+constexpr detail::Refuse refuse{"snapshot"};
 
 /// The last line: 64 bits that differ where two texts do (Fowler, Noll and Vo's hash, 1a).
 std::string checksum(std::string_view text)

@@ -1,12 +1,11 @@
 #include "ricochet/integrate/step_controllers.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <type_traits>
+
+#include "../checks/require.hpp"
 
 namespace ricochet {
 namespace {
@@ -109,10 +108,7 @@ double FilteredStep::failed() noexcept
 
 void validate(const StepController& controller)
 {
-    const auto require = [](bool holds, const char* what, double given) {
-        if (!holds)
-            throw std::invalid_argument(fmt::format("step controller: {}, got {}", what, given));
-    };
+    constexpr detail::Require require{"step controller"};
     std::visit(
         [&](const auto& c) {
             using C = std::decay_t<decltype(c)>;
@@ -131,7 +127,7 @@ void validate(const StepController& controller)
                 require(least > 0, "prescribed steps must be positive", least);
             }
             if constexpr (std::is_same_v<C, LearnedStep>) {
-                if (!c.policy) throw std::invalid_argument("step controller: no policy was given");
+                if (!c.policy) detail::Refuse{require.who}("no policy was given");
                 validate(StepController(c.plain));
             }
             if constexpr (std::is_same_v<C, FilteredStep>) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <new>
 
+#include "../checks/require.hpp"
 #include "branch_and_bound.hpp"
 #include "certify_checkpoint.hpp"
 #include "checkpoint_file.hpp"
@@ -26,10 +27,7 @@ double seconds_since(Clock::time_point start)
 
 void check(const CertifyOptions& o)
 {
-    const auto require = [](bool holds, std::string_view what, double given) {
-        if (holds) return;
-        throw std::invalid_argument(fmt::format("certify: {}, got {}", what, given));
-    };
+    constexpr ricochet::detail::Require require{"certify"};
     const auto number = [](std::size_t n) { return static_cast<double>(n); };
     require(std::isfinite(o.margin) && o.margin >= 0, "margin must be finite and not negative",
             o.margin);

@@ -13,6 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "../checks/require.hpp"
 #include "checkpoint_file.hpp"
 #include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/detail/trainable_mlp.hpp"
@@ -21,10 +22,7 @@ namespace ricochet::learn {
 
 namespace {
 
-void refuse(const std::string& what)
-{
-    throw std::invalid_argument("train: " + what);
-}
+constexpr ricochet::detail::Refuse refuse{"train"};
 
 void require_share(double value, const char* name)
 {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "../checks/require.hpp"
 #include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
@@ -76,9 +77,7 @@ Split split(const DataSet& data, double share, std::uint64_t seed)
 void check(const DataSet& data)
 {
     const std::size_t n = data.size();
-    const auto refuse = [](const std::string& what) {
-        throw std::invalid_argument("data set: " + what);
-    };
+    constexpr ricochet::detail::Refuse refuse{"data set"};
     if (data.width() == 0) refuse("no columns");
     if (data.features.size() != n * data.width()) {
         refuse("expected " + std::to_string(n) + " x " + std::to_string(data.width()) +

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
+#include "../checks/require.hpp"
 #include "checkpoint_file.hpp"
 #include "ricochet/detail/random.hpp"
 #include "workers.hpp"
@@ -23,10 +23,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::string_view first_line = "ricochet evolution checkpoint 1\n";
 constexpr double checkpoint_interval = 1;  // [s]: an interruption costs no more
 
-[[noreturn]] void refuse(const std::string& what)
-{
-    throw std::invalid_argument("evolve: " + what);
-}
+constexpr ricochet::detail::Refuse refuse{"evolve"};
 
 void check(std::span<const double> x0, const EvolutionOptions& o)
 {

@@ -14,12 +14,13 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../checks/require.hpp"
 #include "checkpoint_file.hpp"
 #include "ricochet/detail/assessment.hpp"
 #include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/learn/train_gate.hpp"
 #include "ricochet/detail/trainable_mlp.hpp"
+#include "ricochet/learn/train_gate.hpp"
 
 namespace ricochet::learn {
 
@@ -27,16 +28,11 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-[[noreturn]] void refuse(const std::string& what)
-{
-    throw std::invalid_argument("train_gate: " + what);
-}
+constexpr ricochet::detail::Refuse refuse{"train_gate"};
 
 void require_positive(double value, const char* name)
 {
-    if (!(value > 0 && std::isfinite(value))) {
-        refuse(fmt::format("{} must be positive and finite, got {}", name, value));
-    }
+    ricochet::detail::require_positive(refuse.who, name, value);
 }
 
 /// What the network is to say of a state: the higher, the nearer.

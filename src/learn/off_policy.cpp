@@ -10,6 +10,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "../checks/require.hpp"
+
 namespace ricochet::learn {
 
 namespace {
@@ -404,9 +406,7 @@ std::string_view describe(PolicyOutcome outcome) noexcept
 
 void check(const std::string& name, const Environment& environment, const PolicyTraining& o)
 {
-    const auto refuse = [&name](const std::string& what) {
-        throw std::invalid_argument(name + ": " + what);
-    };
+    const ricochet::detail::Refuse refuse{name};
     if (environment.observations == 0 || environment.actions == 0) {
         refuse(fmt::format("expected at least one observation and one action, got {} and {}",
                            environment.observations, environment.actions));

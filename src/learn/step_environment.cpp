@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "../checks/require.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "step_reference.hpp"
 
@@ -343,15 +344,9 @@ StepWorld world_of(std::shared_ptr<Episodes<Run>> episodes)
     return out;
 }
 
-void require(bool holds, std::string_view what, double given)
-{
-    if (!holds) {
-        throw std::invalid_argument(fmt::format("StepWorldOptions: {}, got {}", what, given));
-    }
-}
-
 StepWorldOptions checked(StepWorldOptions o, double longest)
 {
+    constexpr ricochet::detail::Require require{"StepWorldOptions"};
     if (o.h_max == 0) o.h_max = longest;
     require(o.alpha >= 0 && std::isfinite(o.alpha), "alpha must be zero or positive", o.alpha);
     require(o.dear > 1, "dear must be above 1", o.dear);

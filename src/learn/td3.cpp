@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
+#include "../checks/require.hpp"
 #include "off_policy.hpp"
 #include "td3_losses.hpp"
 #include "trained_vector.hpp"
@@ -20,9 +20,7 @@ constexpr std::size_t part_rows = 64;  // as in tqc.cpp
 
 void check(const Td3Options& o)
 {
-    const auto refuse = [](const std::string& what) {
-        throw std::invalid_argument("train_td3: " + what);
-    };
+    constexpr ricochet::detail::Refuse refuse{"train_td3"};
     for (const auto* hidden : {&o.actor, &o.critic}) {
         if (hidden->empty() || std::ranges::count(*hidden, std::size_t{0}) > 0) {
             refuse("actor and critic need hidden layers of at least one unit each");

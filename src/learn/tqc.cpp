@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
+#include "../checks/require.hpp"
 #include "off_policy.hpp"
 #include "tqc_losses.hpp"
 #include "trained_vector.hpp"
@@ -22,9 +22,7 @@ constexpr std::size_t part_rows = 64;
 
 void check(const TqcOptions& o)
 {
-    const auto refuse = [](const std::string& what) {
-        throw std::invalid_argument("train_tqc: " + what);
-    };
+    constexpr ricochet::detail::Refuse refuse{"train_tqc"};
     for (const auto* hidden : {&o.actor, &o.critic}) {
         if (hidden->empty() || std::ranges::count(*hidden, std::size_t{0}) > 0) {
             refuse("actor and critic need hidden layers of at least one unit each");

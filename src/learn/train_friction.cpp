@@ -7,11 +7,11 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
-#include <stdexcept>
 
+#include "../checks/require.hpp"
 #include "friction_models.hpp"
-#include "ricochet/detail/variational_step.hpp"
 #include "ricochet/detail/adam.hpp"
+#include "ricochet/detail/variational_step.hpp"
 
 namespace ricochet::learn {
 
@@ -20,10 +20,7 @@ namespace {
 using detail::FrictionModel;
 using detail::sum_of_squares;
 
-[[noreturn]] void refuse(const std::string& what)
-{
-    throw std::invalid_argument("train_friction: " + what);
-}
+constexpr ricochet::detail::Refuse refuse{"train_friction"};
 
 double processor_time()
 {

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "../checks/require.hpp"
 #include "ricochet/detail/pack.hpp"
 
 namespace ricochet {
@@ -24,10 +24,7 @@ double gamma(std::size_t n, double u = unit) noexcept
     return 2 * nu / (1 - nu);
 }
 
-[[noreturn]] void refuse(const std::string& what)
-{
-    throw std::invalid_argument("NetworkBounds: " + what);
-}
+constexpr detail::Refuse refuse{"NetworkBounds"};
 
 /// Half a block: registers of every x86-64 hold two doubles.
 using Pair = double __attribute__((vector_size(2 * sizeof(double))));

@@ -1,5 +1,6 @@
 #include "ricochet/nn/mlp.hpp"
 
+#include "../checks/require.hpp"
 #include "kernel_table.hpp"
 #include "ricochet/detail/pack.hpp"
 
@@ -93,9 +94,7 @@ InstructionSet best_instruction_set() noexcept
 
 void detail::check_layers(const Model& model, std::string_view who)
 {
-    const auto refuse = [&](const std::string& what) {
-        throw std::invalid_argument(std::string(who) + ": " + what);
-    };
+    const Refuse refuse{who};
     const auto number = [](std::size_t value) { return std::to_string(value); };
     constexpr std::size_t max_layers = Mlp<float>::max_layers;
     static_assert(Mlp<float>::max_width == max_width);

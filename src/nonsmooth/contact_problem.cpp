@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "../checks/require.hpp"
+
 namespace ricochet {
 
 namespace {
@@ -53,10 +55,8 @@ bool close_form(const Eigen::Matrix3d& w, const Eigen::Vector3d& q, double frict
 
 ContactSolver::ContactSolver(const ContactOptions& options) : options_(options)
 {
-    if (!(options.tolerance > 0)) {
-        throw std::invalid_argument(
-            fmt::format("ContactOptions: tolerance must be positive, got {}", options.tolerance));
-    }
+    detail::require(options.tolerance > 0, "ContactOptions", "tolerance", "be positive",
+                    options.tolerance);
 }
 
 void ContactSolver::scale(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,

@@ -1,6 +1,6 @@
 #include "ricochet/nonsmooth/hand_over.hpp"
 
-#include <fmt/format.h>
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
@@ -60,15 +60,12 @@ std::string_view name(PhaseCause cause) noexcept
 
 HandOverOptions hand_over_options(const Options& options)
 {
-    const auto refuse = [](bool given, std::string_view what) {
-        if (given) {
-            throw std::invalid_argument(
-                fmt::format("integrate: a run that may be handed over has no {}", what));
-        }
-    };
-    refuse(options.stop_at_event, "stop_at_event");
-    refuse(options.record_steps, "record_steps");
-    refuse(options.t_end < options.t_start, "backward direction");
+    constexpr detail::Refuse refuse{"integrate"};
+    if (options.stop_at_event) refuse("a run that may be handed over has no stop_at_event");
+    if (options.record_steps) refuse("a run that may be handed over has no record_steps");
+    if (options.t_end < options.t_start) {
+        refuse("a run that may be handed over has no backward direction");
+    }
     HandOverOptions out;
     out.t_start = options.t_start;
     out.t_end = options.t_end;
@@ -86,11 +83,7 @@ namespace detail {
 
 HandOverOptions completed(HandOverOptions options, bool locate)
 {
-    const auto require = [](bool holds, std::string_view what, double given) {
-        if (!holds) {
-            throw std::invalid_argument(fmt::format("HandOverOptions: {}, got {}", what, given));
-        }
-    };
+    constexpr Require require{"HandOverOptions"};
     require(std::isfinite(options.t_start), "t_start must be finite", options.t_start);
     require(std::isfinite(options.t_end) && options.t_end >= options.t_start,
             "t_end must be finite and no earlier than t_start", options.t_end);

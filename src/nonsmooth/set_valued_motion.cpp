@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "../checks/require.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
 
 namespace ricochet {
@@ -35,11 +36,7 @@ std::string_view describe(SetValuedOutcome outcome) noexcept
 
 void validate(const SetValuedOptions& options)
 {
-    const auto require = [](bool holds, std::string_view what, double given) {
-        if (!holds) {
-            throw std::invalid_argument(fmt::format("SetValuedOptions: {}, got {}", what, given));
-        }
-    };
+    constexpr detail::Require require{"SetValuedOptions"};
     require(std::isfinite(options.t_start), "t_start must be finite", options.t_start);
     require(std::isfinite(options.t_end) && options.t_end >= options.t_start,
             "t_end must be finite and no earlier than t_start", options.t_end);

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../checks/require.hpp"
+
 namespace ricochet {
 
 namespace {
@@ -68,9 +70,7 @@ std::vector<Interval> StepRanges::domain(double margin) const
 
 StepPolicy::StepPolicy(Model model) : model_(std::move(model)), network_(model_)
 {
-    const auto refuse = [](const std::string& what) {
-        throw std::invalid_argument("step policy: " + what);
-    };
+    constexpr detail::Refuse refuse{"step policy"};
     if (model_.kind != kind) {
         refuse(fmt::format("the model must be of the kind \"{}\", not \"{}\"", kind, model_.kind));
     }

@@ -8,9 +8,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "last_answer.hpp"
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 #include "geometry/distance_grid.hpp"
+#include "last_answer.hpp"
 
 namespace ricochet {
 

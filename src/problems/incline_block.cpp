@@ -1,6 +1,6 @@
 #include "problems/incline_block.hpp"
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "../checks/require.hpp"
 #include "../systems/random.hpp"
-#include "../systems/require.hpp"
 #include "geometry/concave_table.hpp"
 #include "problems/opaque.hpp"
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -8,11 +8,11 @@
 #include <optional>
 #include <stdexcept>
 
-#include "last_answer.hpp"
+#include "../checks/require.hpp"
 #include "../systems/random.hpp"
-#include "../systems/require.hpp"
 #include "geometry/distance_grid.hpp"
 #include "geometry/outline.hpp"
+#include "last_answer.hpp"
 
 namespace ricochet {
 

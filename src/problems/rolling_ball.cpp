@@ -1,6 +1,6 @@
 #include "problems/rolling_ball.hpp"
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
 #include "problems/super_twisting.hpp"
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
 #include "problems/three_body.hpp"
 
-#include "../systems/require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

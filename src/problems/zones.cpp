@@ -3,8 +3,8 @@
 #include <complex>
 #include <numbers>
 
+#include "../checks/require.hpp"
 #include "../systems/random.hpp"
-#include "../systems/require.hpp"
 
 namespace ricochet {
 

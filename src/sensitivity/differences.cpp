@@ -2,34 +2,22 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
-namespace {
-
-void require_positive(double given, const char* what)
-{
-    if (!(given > 0 && std::isfinite(given))) {
-        throw std::invalid_argument(
-            fmt::format("Differences: {} must be positive and finite, got {}", what, given));
-    }
-}
-
-}  // namespace
-
 void validate(const Differences& differences, std::size_t components)
 {
-    require_positive(differences.step, "step");
-    require_positive(differences.time_scale, "time_scale [s]");
+    constexpr std::string_view who = "Differences";
+    detail::require_positive(who, "step", differences.step);
+    detail::require_positive(who, "time_scale [s]", differences.time_scale);
     for (const double scale : differences.scale) {
-        require_positive(scale, "every scale");
+        detail::require_positive(who, "every scale", scale);
     }
     const std::size_t given = differences.scale.size();
     if (given != 0 && given != components) {
-        throw std::invalid_argument(
-            fmt::format("Differences: expected no scales or one for each of {} components, got {}",
-                        components, given));
+        detail::Refuse{who}(fmt::format(
+            "expected no scales or one for each of {} components, got {}", components, given));
     }
 }
 

@@ -2,21 +2,16 @@
 
 #include <fmt/format.h>
 
+#include "../checks/require.hpp"
+
 namespace ricochet::detail {
 
 void validate_parameter(std::size_t index, bool callable, double nominal, double scale,
                         const std::vector<double>& start, std::size_t components)
 {
-    const auto require = [&](bool fulfilled, const char* what, double given) {
-        if (!fulfilled) {
-            throw std::invalid_argument(
-                fmt::format("Parameter {}: {}, got {}", index, what, given));
-        }
-    };
-    if (!callable) {
-        throw std::invalid_argument(fmt::format(
-            "Parameter {}: `with` is empty; it must make a system with a given value", index));
-    }
+    const std::string who = fmt::format("Parameter {}", index);
+    const Require require{who};
+    if (!callable) Refuse{who}("`with` is empty; it must make a system with a given value");
     require(std::isfinite(nominal), "nominal must be finite", nominal);
     require(std::isfinite(scale) && scale >= 0, "scale must be positive, or zero for its default",
             scale);

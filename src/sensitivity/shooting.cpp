@@ -1,10 +1,10 @@
 #include "ricochet/sensitivity/shooting.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <complex>
+
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
@@ -48,18 +48,13 @@ std::string_view describe(ShootingEnd end) noexcept
 
 void validate(const Shooting& shooting)
 {
-    const auto require = [](bool fulfilled, const char* member, double given,
-                            const char* expected) {
-        if (!fulfilled) {
-            throw std::invalid_argument(
-                fmt::format("Shooting: {} must be {}, got {}", member, expected, given));
-        }
-    };
+    constexpr detail::Require require{"Shooting"};
     const Shooting& s = shooting;
-    require(std::isfinite(s.period) && s.period > 0, "period", s.period, "positive and finite [s]");
-    require(std::isfinite(s.tolerance) && s.tolerance > 0, "tolerance", s.tolerance,
-            "positive and finite");
-    require(s.max_iterations >= 0, "max_iterations", s.max_iterations, "zero or positive");
+    require(std::isfinite(s.period) && s.period > 0, "period must be positive and finite [s]",
+            s.period);
+    require(std::isfinite(s.tolerance) && s.tolerance > 0, "tolerance must be positive and finite",
+            s.tolerance);
+    require(s.max_iterations >= 0, "max_iterations must be zero or positive", s.max_iterations);
 }
 
 namespace detail {

@@ -1,23 +1,18 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
-#include <stdexcept>
+
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
 BouncingBall::BouncingBall(const Parameters& parameters)
     : gravity_(parameters.gravity), restitution_(parameters.restitution)
 {
-    if (!(gravity_ > 0 && std::isfinite(gravity_))) {
-        throw std::invalid_argument(fmt::format(
-            "BouncingBall: gravity must be positive and finite [m/s2], got {}", gravity_));
-    }
-    if (!(restitution_ >= 0 && restitution_ <= 1)) {
-        throw std::invalid_argument(
-            fmt::format("BouncingBall: restitution must lie in [0, 1], got {}", restitution_));
-    }
+    constexpr detail::Require require{"BouncingBall"};
+    require(gravity_ > 0 && std::isfinite(gravity_), "gravity must be positive and finite [m/s2]",
+            gravity_);
+    require(restitution_ >= 0 && restitution_ <= 1, "restitution must lie in [0, 1]", restitution_);
 }
 
 double BouncingBall::first_impact(double height, double velocity) const noexcept

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
 #include "ricochet/systems/friction_inclusion.hpp"
 
-#include "require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "require.hpp"
+#include "../checks/require.hpp"
 
 namespace ricochet {
 
