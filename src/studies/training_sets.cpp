@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "learn/gate_specs.hpp"
+#include "ricochet/detail/gate_specs.hpp"
 #include "ricochet/faults/histories.hpp"
 #include "ricochet/learn/bouncing_ball.hpp"
 

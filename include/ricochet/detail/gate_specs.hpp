@@ -1,3 +1,5 @@
+// Internal: what it declares may change without notice.
+//
 // The runs from which the gates are trained that come with the library.
 #pragma once
 
