@@ -459,3 +459,39 @@ Finding first_event(const BernsteinTask& task, Watch& watch, const double* value
 }
 
 }  // namespace ricochet::detail
+
+namespace ricochet {
+
+Finding Bernstein::examine(GuardPath& path, Watch& watch) const
+{
+    watch.side_after = watch.side;
+    const double width = watch.end.s - watch.start.s;
+    if (watch.side == Side::plateau || !(width > 0)) {
+        return Finding::clear(Evidence::checked);
+    }
+    const int degree = path.degree();
+    // How far a time in the step may be rounded [s].
+    const double clock =
+        1.2e-16 * std::max(std::fabs(path.time(0)), std::fabs(path.time(path.h())));
+    const detail::BernsteinTask task{.crossing = path.crossing(),
+                                     .degree = degree <= detail::most_bernstein_degree ? degree : 0,
+                                     .clock = clock,
+                                     .goes_on = path.is_polynomial()};
+    const int n = task.degree > 0 ? task.degree : detail::sampled_degree;
+    const double* nodes = detail::bernstein_nodes(n);
+    std::array<double, detail::most_bernstein_degree + 1> values;
+    const auto at = [&](int j) -> double& { return values[static_cast<std::size_t>(j)]; };
+    const auto sample = [&](int j) {
+        return path.dense_value(watch.start.s + width * nodes[j]).value;
+    };
+    at(0) = watch.start.s == 0 ? watch.start.value : sample(0);
+    for (int j = 1; j < n; ++j) at(j) = sample(j);
+    at(n) = watch.end.s == path.h() ? watch.end.value : sample(n);
+
+    if (detail::stays_on_side(task, watch, values.data())) {
+        return Finding::clear(task.degree > 0 ? Evidence::proved : Evidence::checked);
+    }
+    return detail::first_event(task, watch, values.data(), detail::GuardCurve(path));
+}
+
+}  // namespace ricochet

@@ -1,17 +1,47 @@
 #include "ricochet/locate/toms748.hpp"
 
+#include <algorithm>
 #include <boost/math/tools/toms748_solve.hpp>
+#include <cmath>
 #include <cstdint>
 
-namespace ricochet::detail {
+#include "jump.hpp"
 
-void toms748(const ValueSearch& search, double a, double b, double value_a, double value_b)
+namespace ricochet {
+
+Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                              double tolerance) const
 {
-    std::uintmax_t iterations = 200;
-    boost::math::tools::toms748_solve(
-        [&](double s) { return search.value(search.caller, s); }, a, b, value_a, value_b,
-        [&](double lo, double hi) { return search.narrow_enough(search.caller, lo, hi); },
-        iterations);
+    const auto narrow_enough = [&](double a, double b) {
+        const double middle = a + (b - a) / 2;
+        return b - a <= std::max(tolerance, path.finest(b)) || middle <= a || middle >= b;
+    };
+    const double end = hi.s;
+    double size = detail::larger(detail::larger(0, lo.value), hi.value);
+    const auto sample_at = [&](double s) {
+        const GuardSample sample = path.value(s);
+        size = detail::larger(size, sample.value);
+        if (path.has_left(sample)) {
+            if (s < hi.s) hi = sample;
+        } else if (s > lo.s) {
+            lo = sample;
+        }
+        return sample.value;
+    };
+    const auto halve = [&] { (void)sample_at(lo.s + (hi.s - lo.s) / 2); };
+    // A step that begins on the surface, or a rounding behind it, has no sign there.
+    while (path.has_left(lo) && !narrow_enough(lo.s, hi.s)) halve();
+    if (lo.value * hi.value < 0 && std::isfinite(lo.value * hi.value) &&
+        !narrow_enough(lo.s, hi.s)) {
+        std::uintmax_t iterations = 200;
+        boost::math::tools::toms748_solve(sample_at, lo.s, hi.s, lo.value, hi.value, narrow_enough,
+                                          iterations);
+    }
+    // An exact zero ends the search from one side: close the other.
+    if (!narrow_enough(lo.s, hi.s)) (void)sample_at(hi.s - path.finest(hi.s));
+    while (!narrow_enough(lo.s, hi.s)) halve();
+    if (detail::jumps(path, lo, hi, size)) return detail::jump_at(path, lo, hi, end);
+    return {.lo = lo.s, .hi = hi.s, .root = hi.s, .slope = hi.rate, .error = hi.s - lo.s};
 }
 
-}  // namespace ricochet::detail
+}  // namespace ricochet

@@ -87,8 +87,7 @@ LocatorCalls located;
 
 /// Newton, watched.
 struct WatchedNewton {
-    template <class Probe>
-    [[nodiscard]] Location locate(Probe& probe, const GuardSample& lo, const GuardSample& hi,
+    [[nodiscard]] Location locate(GuardPath& probe, const GuardSample& lo, const GuardSample& hi,
                                   double tolerance) const
     {
         const std::uint64_t before = counted_calls;

@@ -29,10 +29,11 @@ public:
         return Exact::leaves_plainly(sign, start, end, touch);
     }
 
-    template <class Probe>
-    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    /// `path` is a `GuardPath`, or what a detector of the user's takes.
+    template <class Path>
+    [[nodiscard]] Finding examine(Path& path, Watch& watch) const
     {
-        return exact_.examine(probe, watch);
+        return exact_.examine(path, watch);
     }
 
 private:

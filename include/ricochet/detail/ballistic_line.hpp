@@ -52,8 +52,7 @@ struct BallisticLine {
         return false;
     }
 
-    template <class Probe>
-    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    [[nodiscard]] Finding examine(GuardPath& probe, Watch& watch) const
     {
         return detail::examine_prediction(probe, watch);
     }

@@ -120,6 +120,9 @@ public:
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
     [[nodiscard]] Crossing crossing() const noexcept { return crossing_; }
 
+    /// Of the guard as a polynomial in time and state; 0: not declared.
+    [[nodiscard]] int degree() const { return guard_info_of<X>(*system_, which_).degree; }
+
     /// Counts an evaluation that somebody else makes.
     void count() const noexcept { ++*calls_; }
 

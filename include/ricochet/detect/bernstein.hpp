@@ -19,7 +19,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "ricochet/detail/finding.hpp"
+#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/hybrid/step.hpp"
 #include "ricochet/hybrid/system.hpp"
@@ -39,19 +39,13 @@ inline constexpr int sampled_degree = 8;
 /// The guard along the step's polynomial, as a function of the offset [s].
 class GuardCurve {
 public:
-    /// Keeps a reference to the probe.
-    template <class Probe>
-    explicit GuardCurve(Probe& probe) noexcept
-        : probe_(&probe),
-          value_([](void* of, double s) { return static_cast<Probe*>(of)->dense_value(s).value; })
-    {
-    }
+    /// Keeps a reference to the path.
+    explicit GuardCurve(GuardPath& path) noexcept : path_(&path) {}
 
-    [[nodiscard]] double operator()(double s) const { return value_(probe_, s); }
+    [[nodiscard]] double operator()(double s) const { return path_->dense_value(s).value; }
 
 private:
-    void* probe_;
-    double (*value_)(void*, double);
+    GuardPath* path_;
 };
 
 /// What is looked for, and on what.
@@ -97,64 +91,7 @@ struct Bernstein {
         return false;
     }
 
-    template <class Probe>
-    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
-    {
-        watch.side_after = watch.side;
-        const double width = watch.end.s - watch.start.s;
-        if (watch.side == Side::plateau || !(width > 0)) {
-            return Finding::clear(Evidence::checked);
-        }
-        const detail::BernsteinTask task{.crossing = probe.guard().crossing(),
-                                         .degree = degree(probe),
-                                         .clock = clock(probe),
-                                         .goes_on = is_polynomial<Probe>};
-        const int n = task.degree > 0 ? task.degree : detail::sampled_degree;
-        const double* nodes = detail::bernstein_nodes(n);
-        std::array<double, detail::most_bernstein_degree + 1> values;
-        const auto at = [&](int j) -> double& { return values[static_cast<std::size_t>(j)]; };
-        const auto sample = [&](int j) {
-            return probe.dense_value(watch.start.s + width * nodes[j]).value;
-        };
-        at(0) = watch.start.s == 0 ? watch.start.value : sample(0);
-        for (int j = 1; j < n; ++j) at(j) = sample(j);
-        at(n) = watch.end.s == probe.step().h() ? watch.end.value : sample(n);
-
-        if (detail::stays_on_side(task, watch, values.data())) {
-            return Finding::clear(task.degree > 0 ? Evidence::proved : Evidence::checked);
-        }
-        return detail::first_event(task, watch, values.data(), detail::GuardCurve(probe));
-    }
-
-private:
-    template <class Probe>
-    static constexpr bool is_polynomial =
-        DenseStep<std::remove_cvref_t<decltype(std::declval<Probe>().step())>,
-                  typename Probe::State>;
-
-    /// Degree of the guard in the offset, 0 if not known or too high.
-    template <class Probe>
-    [[nodiscard]] static int degree(const Probe& probe)
-    {
-        if constexpr (is_polynomial<Probe>) {
-            const auto& guard = probe.guard();
-            const int in_state =
-                guard_info_of<typename Probe::State>(guard.system(), guard.which()).degree;
-            if (in_state <= 0 || in_state > detail::most_bernstein_degree) return 0;
-            const int n = in_state * degree_of(probe.step().dense().nodes);
-            return n <= detail::most_bernstein_degree ? n : 0;
-        } else {
-            return 0;
-        }
-    }
-
-    /// How far a time in the step may be rounded [s].
-    template <class Probe>
-    [[nodiscard]] static double clock(const Probe& probe) noexcept
-    {
-        const auto& step = probe.step();
-        return 1.2e-16 * std::max(std::fabs(step.time(0)), std::fabs(step.time(step.h())));
-    }
+    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const;
 };
 
 }  // namespace ricochet

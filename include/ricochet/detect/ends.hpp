@@ -4,7 +4,7 @@
 // so "no event" is only assumed.
 #pragma once
 
-#include "ricochet/detail/finding.hpp"
+#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet {
 
@@ -27,12 +27,11 @@ struct Ends {
         return sign * end.value < 0;
     }
 
-    template <class Probe>
-    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    [[nodiscard]] Finding examine(GuardPath& probe, Watch& watch) const
     {
         const bool left = has_left(watch.side, watch.end.value);
         watch.side_after = left ? opposite(watch.side) : watch.side;
-        if (left && counts(watch.side, probe.guard().crossing())) {
+        if (left && counts(watch.side, probe.crossing())) {
             return Finding::leaving(watch.side, watch.start, watch.end);
         }
         return Finding::clear(Evidence::assumed);

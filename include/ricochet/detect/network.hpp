@@ -38,13 +38,11 @@ void check_model_step(const Model& model, double smallest, double largest);
 
 /// Looks at the end of a step that was not cleared. An event whose guard had left
 /// its side before the step began was missed by an earlier prediction, and is late.
-template <class Probe>
-[[nodiscard]] Finding examine_prediction(Probe& probe, Watch& watch)
+[[nodiscard]] inline Finding examine_prediction(GuardPath& probe, Watch& watch)
 {
     Finding finding = Ends{}.examine(probe, watch);
     if (finding.hit && watch.start.s == 0) {
-        const auto& step = probe.step();
-        finding.lo.value = probe.guard().value(step.time(0), step.x0());
+        finding.lo.value = probe.start_value();
         finding.late = side_of(finding.lo.value) == opposite(finding.side);
     }
     return finding;
@@ -118,8 +116,7 @@ public:
         return false;
     }
 
-    template <class Probe>
-    [[nodiscard]] Finding examine(Probe& probe, Watch& watch) const
+    [[nodiscard]] Finding examine(GuardPath& probe, Watch& watch) const
     {
         return detail::examine_prediction(probe, watch);
     }

@@ -1,5 +1,8 @@
 // One guard along one step: how detectors and locators look inside.
 //
+// Detectors and locators are compiled once, over `GuardPath`; `StepProbe` is the path of a guard of
+// any system along a step of any method.
+//
 // There are two ways to a state inside a step. Repeating the step from its start with
 // another length is as accurate as the method, and is used where the motion changes
 // course. The step's polynomial is nearly as accurate and can be had one component at
@@ -47,20 +50,30 @@ enum class Path {
     dense,   ///< the step's polynomial
 };
 
-template <class Guard, class Step>
-class StepProbe {
+/// What is known of a guard on a step before it is evaluated.
+struct PathProperties {
+    double h = 0;  ///< [s] length of the step
+    Crossing crossing = Crossing::falling;
+    bool is_rated = true;        ///< the system gives the guard's rate; else it is a difference
+    bool is_polynomial = false;  ///< the step has a polynomial, which goes on beyond its end
+};
+
+/// A guard on a step as a function of the offset s in [0, h]: all that a detector or a locator sees
+/// of a motion. Evaluations may cost a step of the method.
+class GuardPath {
 public:
-    using State = typename Guard::State;
+    GuardPath(const GuardPath&) = delete;
+    GuardPath& operator=(const GuardPath&) = delete;
 
-    /// Keeps references to all three.
-    StepProbe(const Guard& guard, const Step& step, ProbeSpace<State>& space,
-              Path path = Path::restep) noexcept
-        : guard_(&guard), step_(&step), space_(&space), path_(path)
-    {
-    }
+    [[nodiscard]] double h() const noexcept { return properties_.h; }
+    [[nodiscard]] Crossing crossing() const noexcept { return properties_.crossing; }
+    [[nodiscard]] bool is_rated() const noexcept { return properties_.is_rated; }
+    [[nodiscard]] bool is_polynomial() const noexcept { return properties_.is_polynomial; }
 
-    [[nodiscard]] const Guard& guard() const noexcept { return *guard_; }
-    [[nodiscard]] const Step& step() const noexcept { return *step_; }
+    /// Whether samples are taken from the step's polynomial.
+    [[nodiscard]] bool on_polynomial() const noexcept { return path_ == Path::dense; }
+
+    /// The side whose leaving is looked for.
     [[nodiscard]] Side side() const noexcept { return side_; }
 
     /// The guard's leaving of `side` is what is looked for from here on.
@@ -75,8 +88,81 @@ public:
         return ricochet::has_left(side_, sample.value);
     }
 
+    /// Narrowest useful bracket near offset s.
+    [[nodiscard]] double finest(double s) const noexcept { return finest_bracket(s, h()); }
+
+    /// The time [s] at offset s.
+    [[nodiscard]] virtual double time(double s) const = 0;
+    /// The guard at the start of the step.
+    [[nodiscard]] virtual double start_value() = 0;
     /// The guard at offset s.
-    [[nodiscard]] GuardSample value(double s)
+    [[nodiscard]] virtual GuardSample value(double s) = 0;
+    /// The guard and its rate at offset s.
+    [[nodiscard]] virtual GuardSample value_and_rate(double s) = 0;
+    /// The guard at offset s on the step's polynomial, whatever the path.
+    [[nodiscard]] virtual GuardSample dense_value(double s) = 0;
+    /// The guard and its rate at offset s on the step's polynomial, whatever the path.
+    [[nodiscard]] virtual GuardSample dense_value_and_rate(double s) = 0;
+    /// The guard at offset s, on the straight line through `sample`, the last that
+    /// `value_and_rate` took, or on the polynomial.
+    [[nodiscard]] virtual GuardSample along_the_flow(const GuardSample& sample, double s) = 0;
+    /// The root lies `correction` after `sample`, the last that `value_and_rate` took,
+    /// and the motion is straight until there.
+    virtual void settle(double correction) = 0;
+    /// The rate of the guard at a sample where it is not known yet.
+    virtual void complete(GuardSample& sample) = 0;
+    /// What 8 units in the last place of the time and of each component of the state make of
+    /// the guard at offset s, by its slopes.
+    [[nodiscard]] virtual double rounding(double s) = 0;
+    /// What 64 units in the last place of the time and of each component of the state make of
+    /// the guard at offset s, at a kink, too.
+    [[nodiscard]] virtual double blur(double s) = 0;
+    /// Degree of the guard in the offset on the step's polynomial; 0: not known.
+    [[nodiscard]] virtual int degree() const = 0;
+
+protected:
+    GuardPath(const PathProperties& properties, Path path) noexcept
+        : properties_(properties), path_(path)
+    {
+    }
+    ~GuardPath() = default;
+
+    PathProperties properties_;
+    Path path_;
+    Side side_ = Side::plateau;
+    bool settled_ = false;
+};
+
+template <class Guard, class Step>
+class StepProbe final : public GuardPath {
+public:
+    using State = typename Guard::State;
+
+    /// Keeps references to all three.
+    StepProbe(const Guard& guard, const Step& step, ProbeSpace<State>& space,
+              Path path = Path::restep) noexcept
+        : GuardPath({.h = step.h(),
+                     .crossing = guard.crossing(),
+                     .is_rated = rated(),
+                     .is_polynomial = DenseStep<Step, State>},
+                    path),
+          guard_(&guard),
+          step_(&step),
+          space_(&space)
+    {
+    }
+
+    [[nodiscard]] const Guard& guard() const noexcept { return *guard_; }
+    [[nodiscard]] const Step& step() const noexcept { return *step_; }
+
+    [[nodiscard]] double time(double s) const override { return step_->time(s); }
+
+    [[nodiscard]] double start_value() override
+    {
+        return guard_->value(step_->time(0), step_->x0());
+    }
+
+    [[nodiscard]] GuardSample value(double s) override
     {
         if constexpr (by_component) {
             if (path_ == Path::dense) {
@@ -87,8 +173,7 @@ public:
         return {.s = s, .value = guard_->value(step_->time(s), space_->x)};
     }
 
-    /// The guard at offset s on the step's polynomial, whatever the path.
-    [[nodiscard]] GuardSample dense_value(double s)
+    [[nodiscard]] GuardSample dense_value(double s) override
     {
         const double t = step_->time(s);
         if constexpr (by_component) {
@@ -100,8 +185,7 @@ public:
         }
     }
 
-    /// The guard and its rate at offset s on the step's polynomial, whatever the path.
-    [[nodiscard]] GuardSample dense_value_and_rate(double s)
+    [[nodiscard]] GuardSample dense_value_and_rate(double s) override
     {
         const double t = step_->time(s);
         if constexpr (by_component) {
@@ -130,8 +214,7 @@ public:
         }
     }
 
-    /// The guard and its rate at offset s.
-    [[nodiscard]] GuardSample value_and_rate(double s)
+    [[nodiscard]] GuardSample value_and_rate(double s) override
     {
         if constexpr (by_component) {
             if (path_ == Path::dense) return dense_value_and_rate(s);
@@ -149,12 +232,7 @@ public:
                 .rate = guard_->rate(t, space_->x, space_->dxdt, step_->h())};
     }
 
-    /// Whether samples are taken from the step's polynomial.
-    [[nodiscard]] bool on_polynomial() const noexcept { return path_ == Path::dense; }
-
-    /// The guard at offset s, on the straight line through `sample`, the last that
-    /// `value_and_rate` took, or on the polynomial.
-    [[nodiscard]] GuardSample along_the_flow(const GuardSample& sample, double s)
+    [[nodiscard]] GuardSample along_the_flow(const GuardSample& sample, double s) override
     {
         if (path_ == Path::dense) {
             GuardSample at = value(s);
@@ -165,9 +243,7 @@ public:
         return {.s = s, .value = guard_->value(step_->time(s), space_->root), .rate = sample.rate};
     }
 
-    /// The root lies `correction` after `sample`, the last that `value_and_rate` took,
-    /// and the motion is straight until there.
-    void settle(double correction)
+    void settle(double correction) override
     {
         if (path_ == Path::dense) return;
         detail::move(space_->root, space_->x, correction, space_->dxdt);
@@ -182,8 +258,7 @@ public:
         return space_->x;
     }
 
-    /// The rate of the guard at a sample where it is not known yet.
-    void complete(GuardSample& sample)
+    void complete(GuardSample& sample) override
     {
         if (sample.rate == sample.rate) return;
         if (sample.s == 0) {
@@ -196,17 +271,13 @@ public:
         }
     }
 
-    /// What 8 units in the last place of the time and of each component of the state make of
-    /// the guard at offset s, by its slopes.
-    [[nodiscard]] double rounding(double s)
+    [[nodiscard]] double rounding(double s) override
     {
         constexpr double nudge = 1e-8;
         return 8 * std::numeric_limits<double>::epsilon() / nudge * nudged(s, nudge);
     }
 
-    /// What 64 units in the last place of the time and of each component of the state make of
-    /// the guard at offset s, at a kink, too.
-    [[nodiscard]] double blur(double s)
+    [[nodiscard]] double blur(double s) override
     {
         return nudged(s, 64 * std::numeric_limits<double>::epsilon());
     }
@@ -224,13 +295,28 @@ public:
         }
     }
 
-    /// Narrowest useful bracket near offset s.
-    [[nodiscard]] double finest(double s) const noexcept { return finest_bracket(s, step_->h()); }
+    [[nodiscard]] int degree() const override
+    {
+        if constexpr (DenseStep<Step, State>) {
+            return guard_->degree() * degree_of(step_->dense().nodes);
+        } else {
+            return 0;
+        }
+    }
 
 private:
     using View = DenseView<State, false>;
     using RateView = DenseView<State, true>;
     static constexpr bool by_component = DenseStep<Step, State> && Guard::template sees<View>;
+
+    [[nodiscard]] static constexpr bool rated() noexcept
+    {
+        if constexpr (requires { Guard::is_rated; }) {
+            return Guard::is_rated;
+        } else {
+            return true;
+        }
+    }
 
     [[nodiscard]] View view(double s) const { return View(step_->dense(), s); }
 
@@ -267,10 +353,7 @@ private:
     const Guard* guard_;
     const Step* step_;
     ProbeSpace<State>* space_;
-    Path path_;
-    Side side_ = Side::plateau;
     double placed_ = std::numeric_limits<double>::quiet_NaN();
-    bool settled_ = false;
 };
 
 /// A detector's look at a whole step of a host's own integrator: the guard armed on

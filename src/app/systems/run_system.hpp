@@ -28,16 +28,15 @@ namespace ricochet::app {
 struct ChosenLocator {
     LocatorKind kind;
 
-    template <class Probe>
-    [[nodiscard]] Location locate(Probe& probe, const GuardSample& lo, const GuardSample& hi,
+    [[nodiscard]] Location locate(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
                                   double tolerance) const
     {
         switch (kind) {
             case LocatorKind::newton: break;
-            case LocatorKind::bisection: return Bisection{}.locate(probe, lo, hi, tolerance);
-            case LocatorKind::toms748: return Toms748{}.locate(probe, lo, hi, tolerance);
+            case LocatorKind::bisection: return Bisection{}.locate(path, lo, hi, tolerance);
+            case LocatorKind::toms748: return Toms748{}.locate(path, lo, hi, tolerance);
         }
-        return Newton{}.locate(probe, lo, hi, tolerance);
+        return Newton{}.locate(path, lo, hi, tolerance);
     }
 };
 

@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // Noise in a guard: values that no smooth function has, such as those of float arithmetic.
 //
 // A bracket cannot be narrowed below the noise, only moved about in it. That there is noise
@@ -43,13 +41,12 @@ struct NoiseScale {
 
 /// By how much the guard changes from `at` to the nearest place where it is another: that of
 /// a staircase, if there is one.
-template <class Probe>
-[[nodiscard]] double tread_height(Probe& probe, const GuardSample& sample, const GuardSample& at,
+[[nodiscard]] inline double tread_height(GuardPath& path, const GuardSample& sample, const GuardSample& at,
                                   const NoiseScale& scale)
 {
     double change = 0;
     for (double part = 1e-8; part < 1e-5 && change == 0; part *= 8) {
-        change = probe.along_the_flow(sample, at.s - part * scale.h).value - at.value;
+        change = path.along_the_flow(sample, at.s - part * scale.h).value - at.value;
     }
     return change;
 }
@@ -69,17 +66,16 @@ template <class Probe>
 
 /// Goes on from a sample in noise, by some times `distance`, to the other side of the surface,
 /// and closes the bracket around the change of side; false if it is not near.
-template <class Probe>
-[[nodiscard]] bool reach_across(Probe& probe, const GuardSample& sample, GuardSample from,
+[[nodiscard]] inline bool reach_across(GuardPath& path, const GuardSample& sample, GuardSample from,
                                 double distance, GuardSample& lo, GuardSample& hi)
 {
-    const bool left = probe.has_left(from);
+    const bool left = path.has_left(from);
     for (int i = 0; i < 4; ++i) {
         const double s = from.s + (left ? -3 : 3) * distance;
         if (!(s > lo.s && s < hi.s)) return false;
-        const GuardSample at = probe.along_the_flow(sample, s);
-        (probe.has_left(at) ? hi : lo) = at;
-        if (probe.has_left(at) != left) return true;
+        const GuardSample at = path.along_the_flow(sample, s);
+        (path.has_left(at) ? hi : lo) = at;
+        if (path.has_left(at) != left) return true;
         from = at;
     }
     return false;
@@ -88,8 +84,7 @@ template <class Probe>
 /// If the guard near `place` is noise of about `residue`: narrows the bracket to a change of
 /// side there, and returns the time [s] over which the noise hides the root; else 0. `sample`
 /// is the last that `value_and_rate` took, the motion straight from there.
-template <class Probe>
-[[nodiscard, gnu::noinline]] double close_in_noise(Probe& probe, const GuardSample& sample,
+[[nodiscard, gnu::noinline]] inline double close_in_noise(GuardPath& path, const GuardSample& sample,
                                                    double place, double residue,
                                                    const NoiseScale& scale, GuardSample& lo,
                                                    GuardSample& hi)
@@ -106,7 +101,7 @@ template <class Probe>
 
     std::array<GuardSample, places> at;
     for (std::size_t i = 0; i < places; ++i) {
-        at[i] = probe.along_the_flow(sample, place + offsets[i] * distance);
+        at[i] = path.along_the_flow(sample, place + offsets[i] * distance);
         if (!(std::fabs(at[i].value) <= 10 * NoiseScale::coarsest * scale.size)) return 0;
     }
     int rough = 0;
@@ -121,14 +116,14 @@ template <class Probe>
     double returned = first;
     bool crossed = false;
     for (const GuardSample& value : at) {
-        const bool left = probe.has_left(value);
+        const bool left = path.has_left(value);
         if (!left) returned = std::max(returned, value.s);
         if (crossed || !(value.s > lo.s && value.s < hi.s)) continue;
         crossed = left;
         (left ? hi : lo) = value;
     }
     const bool near = hi.s - lo.s <= 4 * distance;
-    if (!near && !reach_across(probe, sample, crossed ? hi : lo, distance, lo, hi)) return 0;
+    if (!near && !reach_across(path, sample, crossed ? hi : lo, distance, lo, hi)) return 0;
     return std::max(returned - lo.s, noise / std::fabs(sample.rate));
 }
 

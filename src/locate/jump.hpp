@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // Does the guard change sign without a zero? Poles and jumps do.
 #pragma once
 
@@ -33,39 +31,37 @@ inline constexpr double jump_part = 1e-3;
 /// narrowed, as long as the guard differs too much at its ends, until the middle shows a
 /// straight line or there is none. `size`: |g| in the step. What rounding of the time and
 /// the state may change is no jump.
-template <class Probe>
-[[nodiscard, gnu::noinline]] bool jumps(Probe& probe, GuardSample lo, GuardSample hi, double size)
+[[nodiscard, gnu::noinline]] inline bool jumps(GuardPath& path, GuardSample lo, GuardSample hi, double size)
 {
     while (may_jump(lo, hi, size)) {
         const double middle = lo.s + (hi.s - lo.s) / 2;
-        if (hi.s - lo.s <= probe.finest(hi.s) || middle <= lo.s || middle >= hi.s) {
+        if (hi.s - lo.s <= path.finest(hi.s) || middle <= lo.s || middle >= hi.s) {
             // By one way of following the motion: two differ by the error of the step.
-            lo = probe.value(lo.s);
-            hi = probe.value(hi.s);
+            lo = path.value(lo.s);
+            hi = path.value(hi.s);
             const double change = std::fabs(hi.value - lo.value);
-            return probe.has_left(lo) != probe.has_left(hi) &&
-                   (!std::isfinite(change) || change > probe.rounding(hi.s));
+            return path.has_left(lo) != path.has_left(hi) &&
+                   (!std::isfinite(change) || change > path.rounding(hi.s));
         }
-        const GuardSample sample = probe.value(middle);
+        const GuardSample sample = path.value(middle);
         const double change = std::fabs(hi.value - lo.value);
         const double bend = std::fabs(sample.value - (lo.value + hi.value) / 2);
         if (std::isfinite(change) && bend <= change / 4) return false;
         size = larger(size, sample.value);
-        (probe.has_left(sample) ? hi : lo) = sample;
+        (path.has_left(sample) ? hi : lo) = sample;
     }
     return false;
 }
 
 /// Where the guard jumps. On a pole itself it is not finite, and no state to go on from: the
 /// bracket then reaches a few doubles beyond it, at most to `end`.
-template <class Probe>
-[[nodiscard, gnu::noinline]] Location jump_at(Probe& probe, const GuardSample& lo, GuardSample hi,
+[[nodiscard, gnu::noinline]] inline Location jump_at(GuardPath& path, const GuardSample& lo, GuardSample hi,
                                               double end)
 {
-    double beyond = probe.finest(hi.s);
+    double beyond = path.finest(hi.s);
     for (int i = 0; i < 40 && !std::isfinite(hi.value) && hi.s + beyond < end; ++i) {
-        const GuardSample next = probe.value(hi.s + beyond);
-        if (std::isfinite(next.value) && !probe.has_left(next)) break;
+        const GuardSample next = path.value(hi.s + beyond);
+        if (std::isfinite(next.value) && !path.has_left(next)) break;
         hi = next;
         beyond *= 2;
     }

@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // Roots of any order by values alone, where Newton's method converges linearly.
 //
 // Near a root of order m a guard behaves as sign(u) |u|^m, and its signed power 1/m as u:
@@ -14,7 +12,7 @@
 #include <limits>
 
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/detail/jump.hpp"
+#include "jump.hpp"
 
 namespace ricochet::detail {
 
@@ -63,8 +61,7 @@ struct PowerRoot {
 /// Narrows the bracket by values alone, to `tolerance` or neighbouring doubles; to
 /// `handed_back` already if the guard turns out to be a straight line there. Interpolation
 /// that does not shrink the bracket is given up for bisection.
-template <class Probe>
-void narrow_by_values(Probe& probe, GuardSample& lo, GuardSample& hi, GuardSample recent,
+inline void narrow_by_values(GuardPath& path, GuardSample& lo, GuardSample& hi, GuardSample recent,
                       double tolerance, double handed_back, double& size)
 {
     int patience = 8;
@@ -74,7 +71,7 @@ void narrow_by_values(Probe& probe, GuardSample& lo, GuardSample& hi, GuardSampl
     double width_before = hi.s - lo.s;
     for (int count = 1;; ++count) {
         const double width = hi.s - lo.s;
-        const double finest = probe.finest(hi.s);
+        const double finest = path.finest(hi.s);
         if (width <= std::max(tolerance, finest)) return;
         const PowerRoot guess = patience > 0 ? power_root({lo, recent, hi}) : PowerRoot{};
         if (guess.power == 1 && width <= handed_back) return;
@@ -96,9 +93,9 @@ void narrow_by_values(Probe& probe, GuardSample& lo, GuardSample& hi, GuardSampl
         }
         if (s <= lo.s || s >= hi.s) s = lo.s + width / 2;
         if (s <= lo.s || s >= hi.s) return;  // neighbouring doubles
-        const GuardSample sample = probe.value(s);
+        const GuardSample sample = path.value(s);
         size = larger(size, sample.value);
-        GuardSample& end = probe.has_left(sample) ? hi : lo;
+        GuardSample& end = path.has_left(sample) ? hi : lo;
         recent = end;
         end = sample;
         last = s;

@@ -1,0 +1,247 @@
+#include "ricochet/detect/extremum.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ricochet {
+
+namespace {
+
+/// The guard times the sign of its armed side on a stretch, as a cubic over u in
+/// [0, 1] through the values and rates at both ends.
+struct GuardCubic {
+    double v0, r0, v1, r1;  ///< values and rates per unit of u
+
+    GuardCubic(double sign, const GuardSample& a, const GuardSample& b) noexcept
+        : v0(sign * a.value),
+          r0(sign * a.rate * (b.s - a.s)),
+          v1(sign * b.value),
+          r1(sign * b.rate * (b.s - a.s))
+    {
+    }
+
+    /// Second derivatives at the ends, per unit of u squared.
+    [[nodiscard]] double curvature0() const noexcept { return 6 * (v1 - v0) - 4 * r0 - 2 * r1; }
+    [[nodiscard]] double curvature1() const noexcept { return 6 * (v0 - v1) + 2 * r0 + 4 * r1; }
+
+    /// Where the cubic has its minimum (or maximum), if inside (0, 1); else 0.5.
+    [[nodiscard]] double critical(bool minimum) const noexcept
+    {
+        // p'(u) = r0 + 2 b u + 3 c u^2
+        const double b = 3 * (v1 - v0) - 2 * r0 - r1;
+        const double c = 3 * (2 * (v0 - v1) + r0 + r1);
+        const double root = std::sqrt(std::max(b * b - c * r0, 0.0));
+        // At a minimum p'' = 2 (b + c u) > 0, so b + c u = root.
+        const double signed_root = minimum ? root : -root;
+        const double sum = b + signed_root;
+        double u = minimum == (b >= 0) ? -r0 / sum : (signed_root - b) / c;
+        if (!(u > 0 && u < 1)) u = 0.5;
+        return u;
+    }
+};
+
+/// Of the scale of the guard, below which rounding of its terms is thought of.
+constexpr double near = 1e-3;
+
+constexpr int most_samples = 80;
+
+/// Of a step, below which a rate that is a difference over 1e-5 of it rounds a kink off.
+constexpr double coarse_part = 1e-3;
+
+/// Whether a sample cannot be told from zero: by the rounding of the guard's values, or
+/// of the terms that it is made of.
+[[nodiscard]] bool is_on_surface(GuardPath& path, const Watch& watch,
+                                        const GuardSample& sample)
+{
+    const double size = std::fabs(sample.value);
+    if (size <= watch.touch) return true;
+    return size <= near * watch.scale && size <= path.blur(sample.s);
+}
+
+/// Whether a guard that is across its surface, or on it, and falls at this rate will turn
+/// at once: within the rounding of a rate. One that is not yet there may be overlooked
+/// at the end of a step, and is looked at from the start of the next.
+[[nodiscard]] bool turns_now(double value, double rate, double curvature) noexcept
+{
+    return value <= 0 && (rate == 0 || (rate < 0 && -rate <= 1e-9 * curvature));
+}
+
+/// Whether a guard that is on its surface at the end is about to turn back there. Where
+/// it leaves the band beyond the step says so; a guard that stays where it is has
+/// arrived, and in a wide band its cubic has to tell. If it is still falling, the next
+/// step will see where it turns.
+[[nodiscard, gnu::noinline]] bool turns_back(GuardPath& path, const Watch& watch,
+                                                    const GuardCubic& cubic)
+{
+    const double sign = watch.side == Side::above ? 1 : -1;
+    const double width = path.h();
+    for (const double part : {1.0 / 64, 1.0 / 8, 1.0}) {
+        const double beyond = sign * path.value(watch.end.s + part * width).value;
+        if (std::fabs(beyond) > watch.touch) return beyond > 0;
+        if (beyond == cubic.v1) return false;
+    }
+    const double curvature = cubic.curvature1();
+    return curvature > 0 && cubic.v1 - cubic.r1 * cubic.r1 / (2 * curvature) >= -watch.touch;
+}
+
+/// The larger of the slopes between three samples.
+[[nodiscard]] double steepest(const GuardSample& a, const GuardSample& b,
+                                     const GuardSample& c) noexcept
+{
+    return std::max(std::fabs((b.value - a.value) / (b.s - a.s)),
+                    std::fabs((c.value - b.value) / (c.s - b.s)));
+}
+
+/// Where to look for the turn of the guard times `sign`, which falls at `lo` and rises at
+/// `hi`, as a fraction of the stretch: the minimum of the cubic. Where that does not
+/// converge soon there is a kink or a flat place, and the stretch is halved.
+[[nodiscard]] double turn(double sign, const GuardSample& lo, const GuardSample& hi,
+                                 int i) noexcept
+{
+    return i < 7 ? GuardCubic(sign, lo, hi).critical(true) : 0.5;
+}
+
+/// The guard leaves its side before `beyond` and is back at the end.
+[[nodiscard]] Finding pair(const GuardPath& path, const Watch& watch,
+                                  const GuardSample& beyond)
+{
+    if (counts(watch.side, path.crossing())) {
+        return Finding::leaving(watch.side, watch.start, beyond);
+    }
+    return Finding::leaving(opposite(watch.side), beyond, watch.end);
+}
+
+/// The guard has left its side at the end, but its cubic says that it may have left
+/// before, come back and left again.
+[[gnu::noinline]] Finding first_of_three(GuardPath& path, Watch watch,
+                                                GuardCubic cubic)
+{
+    const Side side = watch.side;
+    const bool leaving_counts = counts(side, path.crossing());
+    const double width = watch.end.s - watch.start.s;
+    const double s1 = watch.start.s + width * cubic.critical(true);
+    const double s2 = watch.start.s + width * cubic.critical(false);
+    const GuardSample lowest = path.value_and_rate(s1);
+    const GuardSample highest = path.value_and_rate(s2);
+    const bool dips = s1 < s2 && !has_left(side, highest.value);
+    const bool touches = dips && is_on_surface(path, watch, lowest);
+    // It has to rise again, by more than the rounding of a flat root.
+    const bool rises =
+        std::fabs(highest.value) > std::max(watch.touch, 2 * std::fabs(lowest.value));
+    if (touches && rises && leaving_counts && std::fabs(cubic.v0) > watch.touch) {
+        return Finding::touching(side, lowest);
+    }
+    const bool pair = dips && has_left(side, lowest.value) && !touches;
+    if (leaving_counts) {
+        return Finding::leaving(side, watch.start, pair ? lowest : watch.end);
+    }
+    if (pair) return Finding::leaving(opposite(side), lowest, highest);
+    return Finding::clear(Evidence::checked);
+}
+
+/// Both ends are on the armed side: is the extremum between them, too?
+[[gnu::noinline]] Finding look_for_pair(GuardPath& path, Watch watch,
+                                               GuardCubic cubic)
+{
+    GuardSample lo = watch.start;
+    GuardSample hi = watch.end;
+    if (std::fabs(cubic.v0) <= watch.touch &&
+        turns_now(cubic.v0, cubic.r0, cubic.curvature0())) {
+        return Finding::clear(Evidence::checked);  // the step before has seen it turn
+    }
+    if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {
+        // No turn between the ends; a dip in a slope, if anything.
+        if (cubic.v0 + cubic.r0 / 3 > 0 && cubic.v1 - cubic.r1 / 3 > 0) {
+            return Finding::clear(Evidence::checked);
+        }
+        const double width = hi.s - lo.s;
+        const GuardSample dip = path.value_and_rate(lo.s + width * cubic.critical(true));
+        if (is_on_surface(path, watch, dip)) {
+            // In the band at an end, it is there that the guard touches; and where it goes
+            // on falling it has not turned.
+            const double nearest = std::min(std::fabs(cubic.v0), std::fabs(cubic.v1));
+            return nearest <= watch.touch || cubic.v1 <= std::fabs(dip.value) ||
+                           !counts(watch.side, path.crossing())
+                       ? Finding::clear(Evidence::checked)
+                       : Finding::touching(watch.side, dip);
+        }
+        if (!has_left(watch.side, dip.value)) return Finding::clear(Evidence::checked);
+        return pair(path, watch, dip);
+    }
+    const double sign = watch.side == Side::above ? 1 : -1;
+    // A kink has its extremum in a point, which only the polynomial gives exactly.
+    const double resolution = path.on_polynomial() ? path.finest(hi.s) : 1e-9 * (hi.s - lo.s);
+    GuardSample lowest = hi;
+    for (int i = 0; i < most_samples && hi.s - lo.s > resolution; ++i) {
+        const double width = hi.s - lo.s;
+        double s = lo.s + turn(sign, lo, hi, i) * width;
+        if (!(s > lo.s && s < hi.s)) s = lo.s + width / 2;
+        if (!(s > lo.s && s < hi.s)) break;  // neighbouring doubles
+        const GuardSample sample = path.value_and_rate(s);
+        const double value = sign * sample.value;
+        const double rate = sign * sample.rate;
+        if (value <= 0 && !is_on_surface(path, watch, sample)) {
+            return pair(path, watch, sample);
+        }
+        if (!std::isfinite(value) || !std::isfinite(rate)) break;
+        if (sign * lowest.value >= value) lowest = sample;
+        // What is still to come: a parabola falls by rate^2 / (2 curvature).
+        const double bend = std::min(rate - sign * lo.rate, sign * hi.rate - rate) / width;
+        double fall = bend > 0 ? rate * rate / (2 * bend) : std::fabs(rate) * width;
+        if (width <= coarse_part * path.h() && !path.is_rated()) {
+            fall = std::max(fall, steepest(lo, sample, hi) * width);
+        }
+        if (value > watch.touch + 4 * fall && (value > near * watch.scale + 4 * fall ||
+                                               value > path.blur(sample.s) + 4 * fall)) {
+            return Finding::clear(Evidence::checked);
+        }
+        if (fall <= watch.touch / 64) break;
+        (rate <= 0 ? lo : hi) = sample;
+    }
+    if (!is_on_surface(path, watch, lowest)) {
+        return has_left(watch.side, lowest.value) ? pair(path, watch, lowest)
+                                                  : Finding::clear(Evidence::checked);
+    }
+    // One that falls from its surface to its surface has not been away.
+    const bool stays = watch.departs && is_on_surface(path, watch, watch.start);
+    if (stays || !counts(watch.side, path.crossing())) {
+        return Finding::clear(Evidence::checked);
+    }
+    return Finding::touching(watch.side, lowest);
+}
+
+}  // namespace
+
+Finding Extremum::examine(GuardPath& path, Watch& watch) const
+{
+    const Side side = watch.side;
+    const double sign = side == Side::above ? 1 : -1;
+    watch.side_after = side;
+    if (side == Side::plateau) return Finding::clear(Evidence::checked);
+
+    const GuardCubic cubic(sign, watch.start, watch.end);
+    const bool on_surface = is_on_surface(path, watch, watch.end);
+    // A stretch that ends inside the step ends at an event, which others have looked at.
+    const bool whole = watch.end.s == path.h();
+    const bool returns = on_surface && whole && turns_back(path, watch, cubic);
+    const bool left = has_left(side, watch.end.value) && !returns;
+    const bool known = std::isfinite(cubic.r0) && std::isfinite(cubic.r1);
+    if (returns && cubic.r0 < 0 && turns_now(cubic.v1, cubic.r1, cubic.curvature1()) &&
+        counts(side, path.crossing())) {
+        return Finding::touching(side, watch.end);
+    }
+    if (left) {
+        watch.side_after = opposite(side);
+        if (known && cubic.v0 + cubic.r0 / 3 < 0 && cubic.v1 - cubic.r1 / 3 > 0) {
+            return first_of_three(path, watch, cubic);
+        }
+        if (counts(side, path.crossing())) {
+            return Finding::leaving(side, watch.start, watch.end);
+        }
+        return Finding::clear(Evidence::checked);
+    }
+    if (!known) return Finding::clear(Evidence::checked);
+    return look_for_pair(path, watch, cubic);
+}
+
+}  // namespace ricochet

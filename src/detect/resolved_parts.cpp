@@ -1,0 +1,83 @@
+#include "ricochet/detail/resolved_parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ricochet/detail/cubic_look.hpp"
+
+namespace ricochet::detail {
+
+void ResolvedParts::resolve(GuardPath& path, std::size_t i, const Watch& watch, double declared_touch,
+             bool everywhere)
+{
+    const GuardSample& start = watch.start;
+    const GuardSample& end = watch.end;
+    whole_ = watch;
+    if (guard_ == i) return;
+    guard_ = i;
+    count_ = 0;
+    many_.clear();
+    divided_ = unresolved_ = nearly_cubic_ = false;
+    if (!std::isfinite(start.rate) || !std::isfinite(end.rate)) return;
+    noise_ = -1;
+    declared_touch_ = declared_touch;
+    const double smallest = smallest_part * path.h();
+    if (!everywhere) return divide(path, start, end, smallest, 0);
+    GuardSample from = start;
+    const double width = end.s - start.s;
+    for (const double u : CubicLook::places) {
+        const GuardSample node = path.dense_value_and_rate(start.s + u * width);
+        divide(path, from, node, smallest, 1);
+        if (node.value != 0) keep(node);
+        from = node;
+    }
+    divided_ = true;
+    divide(path, from, end, smallest, 1);
+}
+
+void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const GuardSample& end, double smallest,
+            int depth)
+{
+    const double width = end.s - start.s;
+    const CubicLook look(start.value, start.rate, end.value, end.rate, width);
+    double deviation = 0;
+    for (const double u : {CubicLook::inside, CubicLook::further}) {
+        const double e = look.deviation(u, path.dense_value(start.s + u * width).value);
+        deviation = e <= deviation ? deviation : e;  // NaN stays
+    }
+    if (start.s == whole_.start.s && end.s == whole_.end.s) {
+        nearly_cubic_ = CubicLook::most * deviation <= look.size();
+    }
+    if (look.stays_clear(deviation) || look.keeps_shape(deviation)) return;
+    if (look.size() + deviation <= declared_touch_) return;
+    if (width <= smallest) {
+        // A kink keeps its shape however short the part.
+        unresolved_ = unresolved_ || !(deviation <= 0x1p-24 * look.size());
+        return;
+    }
+    // Rounding has none; that of a guard that decays is less here than where it was asked for.
+    if (depth >= shallow && !(noise_ >= 0)) noise_ = path.blur(end.s);
+    if (deviation <= noise_) noise_ = path.blur(end.s);
+    if (deviation <= noise_) return;
+    const GuardSample middle = path.dense_value_and_rate(start.s + cut * width);
+    divided_ = true;
+    divide(path, start, middle, smallest, depth + 1);
+    // A node that cannot be told from the surface is no end of a part.
+    constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
+    const double touch = std::max(declared_touch_, ulps * look.size());
+    if (std::fabs(middle.value) > std::max(noise_, touch)) keep(middle);
+    divide(path, middle, end, smallest, depth + 1);
+}
+
+void ResolvedParts::keep(const GuardSample& node)
+{
+    if (count_ < few_.size()) {
+        few_[count_] = node;
+    } else {
+        many_.push_back(node);
+    }
+    ++count_;
+}
+
+}  // namespace ricochet::detail
