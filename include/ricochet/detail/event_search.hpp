@@ -67,6 +67,9 @@ struct Note {
     Location where;
 };
 
+/// Drops the notes beyond the offset s, and sorts the others by time.
+void sort_notes_until(double s, std::vector<Note>& notes);
+
 /// How a guard changes its sign at a place that a locator found.
 [[nodiscard]] inline EventKind kind_of(const Location& where) noexcept
 {
@@ -286,11 +289,7 @@ public:
     /// Drops what was noted beyond the offset s, and sorts the rest by time.
     void keep_notes_until(double s)
     {
-        std::erase_if(notes_, [&](const Note& note) { return note.where.root > s; });
-        // std::stable_sort would allocate.
-        std::sort(notes_.begin(), notes_.end(), [](const Note& a, const Note& b) {
-            return a.where.root != b.where.root ? a.where.root < b.where.root : a.guard < b.guard;
-        });
+        if (!notes_.empty()) sort_notes_until(s, notes_);
     }
 
     /// The state at a note on the step's polynomial.
