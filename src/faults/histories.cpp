@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "../checks/require.hpp"
-#include "../systems/random.hpp"
+#include "ricochet/detail/splitmix.hpp"
 
 namespace ricochet {
 
@@ -17,18 +17,18 @@ namespace {
 
 constexpr detail::Refuse refuse{"friction history"};
 
-double log_uniform(detail::Random& random, double lower, double upper)
+double log_uniform(detail::SplitMix& random, double lower, double upper)
 {
     return lower * std::exp(std::log(upper / lower) * random.uniform(0, 1));
 }
 
-std::size_t below(detail::Random& random, std::size_t n)
+std::size_t below(detail::SplitMix& random, std::size_t n)
 {
     return static_cast<std::size_t>(random.uniform(0, static_cast<double>(n)));
 }
 
 /// `n` different sample indices between the first and the last, sorted.
-std::vector<std::size_t> instants(detail::Random& random, std::size_t n, std::size_t samples)
+std::vector<std::size_t> instants(detail::SplitMix& random, std::size_t n, std::size_t samples)
 {
     std::vector<std::size_t> out;
     while (out.size() < n) {
@@ -42,7 +42,7 @@ std::vector<std::size_t> instants(detail::Random& random, std::size_t n, std::si
 constexpr std::size_t samples = 100;
 constexpr double spacing = 0.02;  // [s]
 
-FrictionHistory with_jumps(detail::Random& random, double v_star)
+FrictionHistory with_jumps(detail::SplitMix& random, double v_star)
 {
     FrictionHistory h{.between = FrictionHistory::Between::constant};
     const std::vector<std::size_t> jumps = instants(random, 1 + below(random, 5), samples);
@@ -59,7 +59,7 @@ FrictionHistory with_jumps(detail::Random& random, double v_star)
     return h;
 }
 
-FrictionHistory with_corners(detail::Random& random, double v_star)
+FrictionHistory with_corners(detail::SplitMix& random, double v_star)
 {
     FrictionHistory h{.between = FrictionHistory::Between::linear};
     std::vector<std::size_t> knots = instants(random, 2 + below(random, 7), samples);
@@ -185,7 +185,7 @@ std::vector<FrictionHistory> make_histories(std::size_t count, std::uint64_t see
                                             const RateStateParameters& parameters)
 {
     validate(parameters);
-    detail::Random random(seed);
+    detail::SplitMix random(seed);
     std::vector<FrictionHistory> out;
     out.reserve(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -206,7 +206,7 @@ FrictionData make_friction_data(std::uint64_t seed, const RateStateParameters& p
 
 void add_noise(std::vector<FrictionHistory>& histories, double deviation, std::uint64_t seed)
 {
-    detail::Random random(seed);
+    detail::SplitMix random(seed);
     for (FrictionHistory& history : histories) {
         for (double& f : history.friction) {
             // Box and Muller.

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "../checks/require.hpp"
-#include "../systems/random.hpp"
+#include "ricochet/detail/splitmix.hpp"
 
 namespace ricochet {
 
@@ -322,7 +322,7 @@ std::vector<SliderCase> slider_cases(std::uint64_t seed)
 {
     constexpr int soft = 35;
     constexpr int all = 77;
-    detail::Random random(seed);
+    detail::SplitMix random(seed);
     const auto log_uniform = [&](double lower, double upper) {
         return lower * std::exp(std::log(upper / lower) * random.uniform(0, 1));
     };

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "../checks/require.hpp"
-#include "../systems/random.hpp"
+#include "ricochet/detail/splitmix.hpp"
 #include "geometry/distance_grid.hpp"
 #include "geometry/outline.hpp"
 #include "last_answer.hpp"
@@ -35,7 +35,7 @@ std::vector<Point2> random_wall(const Cavern::Parameters& p)
     detail::require(p.segments >= 8, "Cavern", "segments", "be at least 8",
                     static_cast<double>(p.segments));
     detail::require_positive("Cavern", "size", p.size);
-    detail::Random random(p.seed);
+    detail::SplitMix random(p.seed);
     std::array<double, waves> height{};
     std::array<double, waves> phase{};
     double sum = 0;

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "../checks/require.hpp"
-#include "../systems/random.hpp"
+#include "ricochet/detail/splitmix.hpp"
 #include "geometry/concave_table.hpp"
 #include "problems/opaque.hpp"
 
@@ -19,7 +19,7 @@ constexpr int n = static_cast<int>(LeastEigenvalue::order);
 using Matrix = Eigen::Matrix<double, n, n>;
 using Solver = Eigen::SelfAdjointEigenSolver<Matrix>;
 
-Matrix random_symmetric(double size, detail::Random& random)
+Matrix random_symmetric(double size, detail::SplitMix& random)
 {
     Matrix out;
     for (int i = 0; i < n; ++i) {
@@ -66,7 +66,7 @@ LeastEigenvalue::LeastEigenvalue(const Parameters& parameters) : p_(parameters)
                     static_cast<double>(p_.table));
     detail::require(p_.slow >= 0 && p_.slow <= 1, self, "slow", "lie in [0, 1] s", p_.slow);
 
-    detail::Random random(p_.seed);
+    detail::SplitMix random(p_.seed);
     Matrices matrices;
     // Eigenvalues from 2 to 25, turned by a random rotation.
     const Solver rotation(random_symmetric(1, random));

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "../checks/require.hpp"
-#include "../systems/random.hpp"
+#include "ricochet/detail/splitmix.hpp"
 #include "geometry/distance_grid.hpp"
 #include "geometry/outline.hpp"
 #include "last_answer.hpp"
@@ -87,7 +87,7 @@ ArmScene::ArmScene(const Parameters& parameters, std::size_t joints)
                     "lie in [1, 1000]", static_cast<double>(p_.obstacles));
     choose_joints();
     // Octagons between a quarter and the whole of the reach, not around the arm at its start.
-    detail::Random random(p_.seed + 1000);
+    detail::SplitMix random(p_.seed + 1000);
     const double largest =
         0.6 * p_.reach / std::sqrt(static_cast<double>(std::max<std::size_t>(p_.obstacles, 8)));
     std::array<double, most> folded{};
@@ -145,7 +145,7 @@ void ArmScene::check() const
 
 void ArmScene::choose_joints()
 {
-    detail::Random random(p_.seed);
+    detail::SplitMix random(p_.seed);
     for (std::size_t i = 0; i < n_; ++i) {
         Joint& joint = joints_[i];
         joint.middle = i == 0 ? 0.4 : (i % 2 == 0 ? -1.0 : 1.0) * random.uniform(0.6, 1.2);

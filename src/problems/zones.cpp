@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "../checks/require.hpp"
-#include "../systems/random.hpp"
+#include "ricochet/detail/splitmix.hpp"
 
 namespace ricochet {
 
@@ -37,7 +37,7 @@ Zones::Zones(const Parameters& parameters) : size_(parameters.size)
     stiffness_[0] = parameters.frequency * parameters.frequency;
     stiffness_[1] = stiffness_[0] * std::numbers::phi * std::numbers::phi;
 
-    detail::Random random(parameters.seed);
+    detail::SplitMix random(parameters.seed);
     std::vector<Zone> zones(parameters.count);
     // As many zones as fill a tenth of the field, whatever their number.
     const double scale = size_ / std::sqrt(static_cast<double>(parameters.count));

@@ -16,6 +16,8 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detail/splitmix.hpp"
+
 namespace ricochet::learn {
 
 /// A stream of random numbers; a value, so that a copy repeats the stream.
@@ -25,13 +27,8 @@ public:
 
     explicit constexpr Random(std::uint64_t seed) noexcept
     {
-        for (std::uint64_t& word : state_) {
-            seed += 0x9e3779b97f4a7c15U;
-            std::uint64_t z = seed;
-            z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9U;
-            z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
-            word = z ^ (z >> 31U);
-        }
+        ricochet::detail::SplitMix words(seed);
+        for (std::uint64_t& word : state_) word = words.bits();
     }
 
     /// Continues a stream where `state()` was taken.
