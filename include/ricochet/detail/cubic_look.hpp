@@ -76,4 +76,9 @@ struct CubicLook {
     }
 };
 
+/// `CubicLook::inside` as a constant of the program.
+struct InsideOf {
+    static constexpr double u = CubicLook::inside;
+};
+
 }  // namespace ricochet::detail

@@ -163,7 +163,7 @@ public:
         late_ = false;
         std::size_t suspects = 0;
         std::size_t last = 0;
-        for (std::size_t i = 0; i < bank.size(); ++i) {
+        for (const std::size_t i : bank.suspects()) {
             if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
             ++suspects;
             last = i;
@@ -583,7 +583,7 @@ private:
                                   const Locator& locator, const EventResolution& resolution,
                                   std::uint64_t& calls)
     {
-        for (std::size_t i = 0; i < bank.size(); ++i) {
+        for (const std::size_t i : bank.suspects()) {
             if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
             examine(step, bank, i, detector, calls);
         }

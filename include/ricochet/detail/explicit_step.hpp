@@ -162,6 +162,23 @@ public:
         }
     }
 
+    /// As `peek` at the part `Part::u` of the step, of which the dense output has its weights
+    /// from the compiler.
+    template <class Part>
+    [[gnu::always_inline]] void peek(X& x) const
+    {
+        const double s = Part::u * h_;
+        if constexpr (requires { advancing_.template weights<Part>(h_); }) {
+            const auto weights = advancing_.template weights<Part>(h_);
+            for_components([&](auto i) __attribute__((always_inline)) {
+                const double w = advancing_.dense(weights, w_rate1_, i);
+                x[i] = x0_[i] + (s * rate0_[i] + (w + remainder_[i]));
+            });
+        } else {
+            peek(s, x);
+        }
+    }
+
     /// The step as a polynomial of the order that the method reaches over many steps.
     /// Its inner nodes are computed when it is first asked for.
     [[nodiscard]] DenseParts<X> dense() const

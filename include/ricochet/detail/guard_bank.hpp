@@ -6,6 +6,7 @@
 // are screened in one loop; what only events need lies beside them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -13,6 +14,7 @@
 #include <limits>
 #include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "ricochet/detail/cubic_look.hpp"
@@ -49,6 +51,8 @@ public:
     [[nodiscard]] const T& operator[](std::size_t i) const noexcept { return items_[i]; }
     [[nodiscard]] T* begin() noexcept { return items_.data(); }
     [[nodiscard]] T* end() noexcept { return items_.data() + size_; }
+    [[nodiscard]] const T* begin() const noexcept { return items_.data(); }
+    [[nodiscard]] const T* end() const noexcept { return items_.data() + size_; }
     [[nodiscard]] std::span<const T> span() const noexcept { return {items_.data(), size_}; }
 
 private:
@@ -111,7 +115,10 @@ public:
     static constexpr bool looks = LooksInside<Detector> && !Bounded<System, X>;
 
     GuardBank(const System& system, bool backward)
-        : system_(&system), backward_(backward), count_(guard_count_of<X>(system))
+        : system_(&system),
+          backward_(backward),
+          count_(guard_count_of<X>(system)),
+          suspects_(count_)
     {
         if constexpr (fixed == counted_at_run_time) {
             if constexpr (looks) inside_.resize(count_);
@@ -126,6 +133,7 @@ public:
             records_[i].info = guard_info_of<X>(system, i);
             bands_ = bands_ || records_[i].info.touch > 0;
         }
+        heed_enabled();
     }
 
     [[nodiscard]] std::size_t size() const noexcept
@@ -186,6 +194,7 @@ public:
     {
         sample(step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h(), calls, g1_,
                rate1_);
+        screened_ = false;
     }
 
     /// Evaluates all guards inside a step, at its state `x` there.
@@ -205,8 +214,9 @@ public:
     {
         if constexpr (looks) {
             sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
+            const double h = step.h();
             for (std::size_t i = 0; i < size(); ++i) {
-                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], step.h());
+                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
                 const double e = look.deviation(u, further_[i]);
                 worst_[i] = looked_further_ && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
             }
@@ -219,20 +229,16 @@ public:
     [[nodiscard]] bool looked_everywhere() const noexcept { return looked_everywhere_; }
 
     /// Whether any guard deserves a second evaluation inside the step, or a search.
-    [[nodiscard]] bool doubtful(double h) const noexcept
+    [[nodiscard]] bool doubtful(double h) noexcept
     {
         if constexpr (looks) {
             if (looked_ && !waiting_ && !bands_) {
-                double any = 0;  // a double, so that the loop is vectorised
-                for (std::size_t i = 0; i < size(); ++i) {
+                return any_of(0, size(), [this, h](std::size_t i) __attribute__((always_inline)) {
                     const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
                     const double e = look.deviation(CubicLook::inside, inside_[i]);
-                    const int low = !(look.lowest(sign_[i]) > CubicLook::doubt * e);
-                    const int suspected =
-                        Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
-                    any = ((low | suspected) & (sign_[i] != 0)) != 0 ? 1.0 : any;
-                }
-                return any != 0;
+                    const bool near = !(look.lowest(sign_[i]) > CubicLook::doubt * e);
+                    return (near | suspects(i, h)) & (sign_[i] != 0);
+                });
             }
         }
         return suspicious(h);
@@ -253,18 +259,17 @@ public:
     }
 
     /// Whether any guard deserves a search.
-    [[nodiscard]] bool suspicious(double h) const noexcept
+    [[nodiscard]] bool suspicious(double h) noexcept
     {
         if (waiting_ && leaves_plateau()) return true;
-        if (bands_ || looked()) return any_suspicious(h);
-        double any = 0;  // a double, so that the loop is vectorised
-        for (std::size_t i = 0; i < size(); ++i) {
-            const int suspected =
-                Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
-            const int lost = !is_finite(g1_[i]);
-            any = ((suspected | lost) & (sign_[i] != 0)) != 0 ? 1.0 : any;
-        }
-        return any != 0;
+        screen(h);
+        return !suspects_.empty();
+    }
+
+    /// The guards that deserve a search, in ascending order, as `begin_search` found them.
+    [[nodiscard]] std::span<const std::size_t> suspects() const noexcept
+    {
+        return suspects_.span();
     }
 
     /// Whether guard i may leave its side inside the step without its ends telling.
@@ -296,15 +301,21 @@ public:
 
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
+        if (sign_[i] == 0) return false;
         const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
-        return sign_[i] != 0 && (Detector::suspects(sign_[i], g0_[i] - band, rate0_[i],
-                                                    g1_[i] - band, rate1_[i], h) ||
-                                 !is_finite(g1_[i]) || (looked() && hides(i, h)));
+        return Detector::suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i],
+                                  h) ||
+               !is_finite(g1_[i]) || (looked() && hides(i, h));
     }
 
     /// The first guard that is not finite at the end of the step, or `no_guard`.
     [[nodiscard]] std::size_t first_not_finite() const noexcept
     {
+        if (!any_of(0, size(), [this](std::size_t i) __attribute__((always_inline)) {
+                return !is_finite(g1_[i]);
+            })) {
+            return no_guard;
+        }
         for (std::size_t i = 0; i < size(); ++i) {
             const bool idle = !records_[i].enabled || records_[i].asleep;
             if (!idle && !std::isfinite(g1_[i])) return i;
@@ -397,6 +408,7 @@ public:
     void wake(std::size_t i, const GuardSample& start, const GuardSample& end) noexcept
     {
         records_[i].asleep = false;
+        screened_ = false;
         g0_[i] = start.value;
         rate0_[i] = start.rate;
         g1_[i] = end.value;
@@ -417,10 +429,12 @@ public:
         }
     }
 
-    /// Nothing inside the step has been looked at.
-    void begin_search() noexcept
+    /// Nothing inside the step has been looked at. What a search changes belongs to `suspects`;
+    /// all other guards are at its end what they were at its start.
+    void begin_search(double h) noexcept
     {
-        for (std::size_t i = 0; i < size(); ++i) records_[i].next = records_[i].side;
+        if (puts_off || waiting_ || !screened_) screen(h);
+        for (const std::size_t i : suspects_) records_[i].next = records_[i].side;
     }
 
     /// The guard goes on from `start` inside the step, on `side`.
@@ -436,33 +450,26 @@ public:
     /// The end of a clear step becomes the start of the next.
     void pass_on() noexcept
     {
-        double plateaus = 0;
-        for (std::size_t i = 0; i < size(); ++i) {
-            g0_[i] = g1_[i];
-            plateaus = sign_[i] == 0 ? 1.0 : plateaus;
-        }
-        if (Detector::uses_rates) {
+        if constexpr (remembers) {
             for (std::size_t i = 0; i < size(); ++i) {
-                rate0_[i] = rate1_[i];
-                if constexpr (remembers) {
-                    sizes_[i] = std::fmax(std::fabs(g1_[i]), sizes_[i]);
-                }
+                sizes_[i] = std::fmax(std::fabs(g1_[i]), sizes_[i]);
             }
         }
-        if (plateaus == 0) return;
-        for (std::size_t i = 0; i < size(); ++i) leave_plateau(i);
+        hand_over(g1_, g0_);
+        if constexpr (Detector::uses_rates) hand_over(rate1_, rate0_);
+        const bool plateaus = any_of(
+            0, size(), [this](std::size_t i) __attribute__((always_inline)) { return sign_[i] == 0; });
+        if (!plateaus) return;
+        for (std::size_t i = 0; i < size(); ++i) leave_plateau(i, g0_[i]);
     }
 
     /// A guard on a plateau takes the side that it is on at the end of the step.
-    void leave_plateau(std::size_t i) noexcept
-    {
-        if (sign_[i] == 0 && records_[i].enabled && !records_[i].asleep) arm(i, side_of(g1_[i]));
-    }
+    void leave_plateau(std::size_t i) noexcept { leave_plateau(i, g1_[i]); }
 
     /// As `pass_on`, after events inside the step.
     void pass_on_after_events() noexcept
     {
-        for (std::size_t i = 0; i < size(); ++i) {
+        for (const std::size_t i : suspects_) {
             records_[i].from = 0;
             arm(i, records_[i].next);
         }
@@ -508,6 +515,16 @@ public:
         }
         visit(waiting_);
         visit(armed_at_);
+        heed_enabled();
+    }
+
+    /// Some guards may have been enabled or disabled.
+    void heed_enabled() noexcept
+    {
+        selective_ = false;
+        for (std::size_t i = 0; i < size(); ++i) {
+            selective_ = selective_ || records_[i].info.boolean || !records_[i].enabled;
+        }
     }
 
     /// Guard i is on a plateau; if it leaves that away from `side`, it has its event.
@@ -540,6 +557,91 @@ private:
 
     using Doubles = PerGuard<double, fixed>;
 
+    /// Guards that are screened together: where one of them is suspected, each is looked at.
+    static constexpr std::size_t block = 16;
+
+    /// Whether `condition`, which has no branches, holds for a guard from `first` on and before
+    /// `last`.
+    template <class Condition>
+    [[nodiscard, gnu::always_inline]] static bool any_of(std::size_t first, std::size_t last,
+                                                         const Condition& condition) noexcept
+    {
+        double any = 0;  // a double, so that the loop is vectorised
+        for (std::size_t i = first; i < last; ++i) any = condition(i) ? 1.0 : any;
+        return any != 0;
+    }
+
+    [[nodiscard, gnu::always_inline]] bool suspects(std::size_t i, double h) const noexcept
+    {
+        return Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+    }
+
+    /// Finds the guards that deserve a search.
+    [[gnu::noinline]] void screen(double h) noexcept
+    {
+        suspects_.clear();
+        screened_ = true;
+        if (bands_ || (fixed != counted_at_run_time && fixed < block)) {
+            return add_suspects(0, size(), h);
+        }
+        const auto ends = [this, h](std::size_t i) __attribute__((always_inline)) {
+            return (suspects(i, h) | !is_finite(g1_[i])) & (sign_[i] != 0);
+        };
+        if constexpr (looks) {
+            const auto hidden = [this, h](std::size_t i, double e) __attribute__((always_inline)) {
+                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+                return !(look.lowest(sign_[i]) > CubicLook::most * e) & (sign_[i] != 0);
+            };
+            const auto inside = [this, h](std::size_t i) __attribute__((always_inline)) {
+                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+                return look.deviation(CubicLook::inside, inside_[i]);
+            };
+            if (looked_further_ && looked_) {
+                return screen_blocks(h, [&](std::size_t i) __attribute__((always_inline)) {
+                    const double e = inside(i);
+                    return ends(i) | hidden(i, worst_[i] <= e ? e : worst_[i]);
+                });
+            }
+            if (looked_) {
+                return screen_blocks(h, [&](std::size_t i) __attribute__((always_inline)) {
+                    return ends(i) | hidden(i, inside(i));
+                });
+            }
+        }
+        screen_blocks(h, ends);
+    }
+
+    template <class Condition>
+    [[gnu::always_inline]] void screen_blocks(double h, const Condition& condition) noexcept
+    {
+        for (std::size_t first = 0; first < size(); first += block) {
+            const std::size_t last = std::min(first + block, size());
+            if (any_of(first, last, condition)) add_suspects(first, last, h);
+        }
+    }
+
+    void add_suspects(std::size_t first, std::size_t last, double h) noexcept
+    {
+        for (std::size_t i = first; i < last; ++i) {
+            if (suspicious(i, h)) suspects_.push_back(i);
+        }
+    }
+
+    /// What belongs to the end of a step belongs to the start of the next.
+    static void hand_over(Doubles& from, Doubles& to) noexcept
+    {
+        if constexpr (fixed == counted_at_run_time && !puts_off) {
+            std::swap(from, to);
+        } else {
+            to = from;
+        }
+    }
+
+    void leave_plateau(std::size_t i, double g) noexcept
+    {
+        if (sign_[i] == 0 && records_[i].enabled && !records_[i].asleep) arm(i, side_of(g));
+    }
+
     [[nodiscard]] static constexpr bool is_finite(double g) noexcept
     {
         return std::fabs(g) <= std::numeric_limits<double>::max();
@@ -551,14 +653,6 @@ private:
         const double e = look.deviation(CubicLook::inside, inside_[i]);
         if (!looked_further_) return e;
         return worst_[i] <= e ? e : worst_[i];  // NaN stays
-    }
-
-    [[gnu::noinline]] bool any_suspicious(double h) const noexcept
-    {
-        for (std::size_t i = 0; i < size(); ++i) {
-            if (suspicious(i, h)) return true;
-        }
-        return false;
     }
 
     [[nodiscard]] static double known(double rate) noexcept
@@ -593,6 +687,15 @@ private:
             if constexpr (RatesTogether<System, X>) {
                 rates_together(mode, t, x, dxdt, rates);
             } else if constexpr (RateAlone<System, X> || GuardAlone<System, X>) {
+                if constexpr (RateAlone<System, X>) {
+                    if (!selective_ && !backward_) {
+                        double* to = rates.data();
+                        for (std::size_t i = 0; i < size(); ++i) {
+                            to[i] = call_rate(*system_, i, mode, t, x, dxdt);
+                        }
+                        return;
+                    }
+                }
                 for (std::size_t i = 0; i < size(); ++i) {
                     rates[i] = records_[i].info.boolean || !records_[i].enabled
                                    ? 0
@@ -634,6 +737,8 @@ private:
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     bool waiting_ = false;  ///< whether any guard may be on a plateau
     bool bands_ = false;    ///< whether any guard declares one
+    bool selective_ = false;  ///< whether any guard is disabled or has no rate
+    bool screened_ = false;   ///< whether `suspects_` is of the step in hand
     Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{};
     bool looked_ = false;  ///< inside the step in hand
     struct None {};
@@ -643,6 +748,7 @@ private:
     [[no_unique_address]] std::conditional_t<looks, Doubles, None> worst_{};  ///< of further looks
     [[no_unique_address]] std::conditional_t<keeps_sizes, Doubles, None> sizes_{};
     X there_{};
+    GuardList<std::size_t, fixed> suspects_;
     PerGuard<GuardRecord, fixed> records_{};
 };
 

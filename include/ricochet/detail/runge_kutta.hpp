@@ -183,13 +183,30 @@ public:
     /// departures' rate at the end.
     void dense(double s, double h, const X& rate, X& w) const requires has_dense_output
     {
-        const auto weights = Tableau::dense(s / h);
-        [&]<std::size_t... I>(std::index_sequence<I...>) {
-            for_each_component(w, [&](auto c) {
-                w[c] = (... + (h * weights[used<Weights>.at[I]] *
-                               stage<used<Weights>.at[I]>(rate)[c])) +
-                       h * weights[Tableau::stages] * rate[c];
-            });
+        auto weights = Tableau::dense(s / h);
+        for (double& weight : weights) weight *= h;
+        for_each_component(w, [&](auto c) { w[c] = dense(weights, rate, c); });
+    }
+
+    /// Weights of the rates in w at the part `Part::u` of a step of length h.
+    template <class Part>
+    [[nodiscard, gnu::always_inline]] static constexpr auto weights(double h) noexcept
+        requires has_dense_output
+    {
+        constexpr auto unit = Tableau::dense(Part::u);
+        auto weights = unit;
+        for (double& weight : weights) weight *= h;
+        return weights;
+    }
+
+    /// One component of w on the dense output, from the weights of the rates.
+    template <class Array, class Index>
+    [[nodiscard, gnu::always_inline]] double dense(const Array& weights, const X& rate,
+                                                   Index c) const
+    {
+        return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+            return (... + (weights[used<Weights>.at[I]] * stage<used<Weights>.at[I]>(rate)[c])) +
+                   weights[Tableau::stages] * rate[c];
         }(std::make_index_sequence<used<Weights>.count>{});
     }
 

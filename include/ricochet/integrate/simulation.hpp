@@ -985,9 +985,8 @@ private:
     {
         if constexpr (Bank::looks) {
             if (!options_.look_inside) return bank_.suspicious(step_.h());
+            look_inside();
             X& x = search_.space(step_.x0());
-            step_.peek(detail::CubicLook::inside * step_.h(), x);
-            bank_.sample_inside(step_, x, calls());
             if (error_controlled && hardly_moves()) {
                 for (const double u : detail::CubicLook::places) look_again(u, x);
                 bank_.has_looked_everywhere();
@@ -997,6 +996,20 @@ private:
             if (bank_.needs_second_look(step_.h())) look_again(detail::CubicLook::further, x);
         }
         return bank_.suspicious(step_.h());
+    }
+
+    void look_inside()
+    {
+        if constexpr (std::is_trivially_copyable_v<X>) {
+            // Components that no guard reads are not computed.
+            X x{};
+            step_.template peek<detail::InsideOf>(x);
+            bank_.sample_inside(step_, x, calls());
+        } else {
+            X& x = search_.space(step_.x0());
+            step_.template peek<detail::InsideOf>(x);
+            bank_.sample_inside(step_, x, calls());
+        }
     }
 
     void look_again(double u, X& x)
@@ -1010,11 +1023,19 @@ private:
     {
         const X& x0 = step_.x0();
         const X& x1 = step_.x1();
-        bool still = true;
-        detail::for_each_component(x0, [&](auto i) {
-            still &= std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]);
-        });
-        return still;
+        const auto is_still = [&](auto i) {
+            return std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]);
+        };
+        if constexpr (detail::is_small<X>) {
+            bool still = true;
+            detail::for_each_component(x0, [&](auto i) { still &= is_still(i); });
+            return still;
+        } else {
+            for (decltype(x0.size()) i = 0; i < x0.size(); ++i) {
+                if (!is_still(i)) return false;
+            }
+            return true;
+        }
     }
 
     /// Whether the network predicts that the step is free of events.
@@ -1037,8 +1058,8 @@ private:
             }
         }
         search_.begin(step_.x0());
-        bank_.begin_search();
         if (bank_.waiting()) end_plateaus();
+        bank_.begin_search(step_.h());
         while (search_.find_set(step_, bank_, detector_, locator_, resolution_, time_event_due_,
                                 calls())) {
             if (predicts && (cleared || search_.late())) ++run_.statistics.missed_events;
@@ -1460,6 +1481,7 @@ private:
             if (record.newly_enabled) record.last = std::numeric_limits<double>::quiet_NaN();
             record.enabled = enabled;
         }
+        bank_.heed_enabled();
     }
 
     /// Arms every guard at the start of a flight. The members have fired and count as
@@ -1641,7 +1663,7 @@ private:
 
     void note_crossings(double s)
     {
-        for (std::size_t i = 0; i < bank_.size(); ++i) {
+        for (const std::size_t i : bank_.suspects()) {
             if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
             search_.note_crossings(step_, bank_, i, bank_.end(i, s), detector_, locator_,
                                    resolution_, calls());
@@ -1653,7 +1675,7 @@ private:
     void note_crossings_to_set()
     {
         if (search_.members().size() == bank_.size()) return;
-        for (std::size_t i = 0; i < bank_.size(); ++i) {
+        for (const std::size_t i : bank_.suspects()) {
             detail::GuardRecord& record = bank_[i];
             if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
             const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
