@@ -179,6 +179,74 @@ public:
         }
     }
 
+    /// x(t0 + s) of the polynomial of `dense`, or its derivative, a component at a time. Of a
+    /// large state the inner node is computed for the components that are asked for alone,
+    /// until they are as many as the state has.
+    template <bool derivative>
+    class ComponentView {
+    public:
+        ComponentView(const ExplicitStep& step, double s) noexcept
+            : step_(&step),
+              s_(s),
+              weights_(dense_weights(DenseNodes::middle_end, s / step.h_, derivative)),
+              middle_(step.advancing_.template weights<Middle>(step.h_))
+        {
+            const double unit = derivative ? 1 / step.h_ : 1;
+            for (std::size_t k = 0; k < 2; ++k) weights_.value[k] *= unit;
+            weights_.slope[1] *= unit * step.h_;
+        }
+
+        template <class Index>
+        [[nodiscard]] double operator[](Index index) const noexcept
+        {
+            const auto i = static_cast<decltype(step_->x0_.size())>(index);
+            const double rate0 = step_->rate0_[i];
+            double bent = 0;
+            bent += weights_.value[0] * middle(i);
+            bent += weights_.value[1] * step_->w_[i];
+            bent += weights_.slope[1] * (step_->rate1_[i] - rate0);
+            if constexpr (derivative) {
+                return rate0 + bent;
+            } else {
+                return step_->x0_[i] + (s_ * rate0 + (bent + step_->remainder_[i]));
+            }
+        }
+
+        [[nodiscard]] auto size() const noexcept { return step_->x0_.size(); }
+
+    private:
+        struct Middle {
+            static constexpr double u = 0.5;
+        };
+
+        template <class Index>
+        [[nodiscard]] double middle(Index i) const noexcept
+        {
+            if (step_->dense_ready_) return step_->inner_w_[0][i];
+            ++step_->asked_alone_;
+            return step_->advancing_.dense(middle_, step_->w_rate1_, i);
+        }
+
+        const ExplicitStep* step_;
+        double s_;
+        DenseWeights weights_;
+        std::array<double, Stepper::dense_weights_count> middle_;
+    };
+
+    /// The polynomial at offset s, or its derivative, a component at a time.
+    template <bool derivative>
+    [[nodiscard]] auto component_view(double s) const
+    {
+        if constexpr (components_alone) {
+            if (!dense_ready_ && asked_alone_ >= static_cast<std::size_t>(x0_.size())) {
+                prepare_dense();
+            }
+            return ComponentView<derivative>(*this, s);
+        } else {
+            return DenseView<X, derivative>(dense(), s);
+        }
+    }
+
     /// The step as a polynomial of the order that the method reaches over many steps.
     /// Its inner nodes are computed when it is first asked for.
     [[nodiscard]] DenseParts<X> dense() const
@@ -251,8 +319,9 @@ public:
     /// atol + rtol max(|x0|, |x1|); NaN if anything is not finite.
     [[nodiscard]] double attempt(double h, double rtol, double atol)
     {
-        static_assert(has_error_estimate<Stepper>,
-                      "ricochet: error control needs a method with an error estimate, such as Dopri5");
+        static_assert(
+            has_error_estimate<Stepper>,
+            "ricochet: error control needs a method with an error estimate, such as Dopri5");
         h_ = h;
         advance<true>(advancing_, h, w_, w_rate1_, error_);
         finish_attempt();
@@ -393,6 +462,13 @@ private:
     }
     ();
 
+    static constexpr bool components_alone = [] {
+        if constexpr (requires { Stepper::dense_weights_count; }) {
+            return Stepper::has_dense_output && !is_small<X>;
+        }
+        return false;
+    }();
+
     static constexpr bool fits_registers = is_small<X> && std::is_trivially_copyable_v<X>;
 
     template <class Function>
@@ -420,7 +496,7 @@ private:
         }
         assign(x0_, x);
         assign(remainder_, zero_);
-        dense_ready_ = false;
+        forget_dense();
     }
 
     [[nodiscard]] Method method() const
@@ -560,9 +636,15 @@ private:
         for_components([&](auto i) { w[i] = x0_[i] + (s * rate0_[i] + (w[i] + remainder_[i])); });
     }
 
-    void finish_attempt()
+    void forget_dense() noexcept
     {
         dense_ready_ = false;
+        asked_alone_ = 0;
+    }
+
+    void finish_attempt()
+    {
+        forget_dense();
         assign(x1_, w_);
         add_tangent(h_, x1_);
         if (has_end_rate()) {
@@ -585,6 +667,7 @@ private:
     mutable X w_slope1_ = zero_;
     mutable std::array<X, most_inner_nodes> inner_w_, inner_rate_;
     mutable bool dense_ready_ = false;
+    mutable std::size_t asked_alone_ = 0;  ///< components of the inner node, by views
     mutable bool flow_fits_ = true;
     mutable std::uint64_t flow_calls_ = 0;
     mutable std::uint64_t resteps_ = 0;

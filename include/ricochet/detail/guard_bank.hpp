@@ -19,12 +19,12 @@
 
 #include "ricochet/detail/cubic_look.hpp"
 #include "ricochet/detail/finding.hpp"
+#include "ricochet/detail/guard_view.hpp"
+#include "ricochet/detail/shrinking_intervals.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/event.hpp"
-#include "ricochet/detail/guard_view.hpp"
 #include "ricochet/hybrid/system.hpp"
-#include "ricochet/detail/shrinking_intervals.hpp"
 
 namespace ricochet::detail {
 
@@ -118,7 +118,8 @@ public:
         : system_(&system),
           backward_(backward),
           count_(guard_count_of<X>(system)),
-          suspects_(count_)
+          suspects_(count_),
+          marks_(count_)
     {
         if constexpr (fixed == counted_at_run_time) {
             if constexpr (looks) inside_.resize(count_);
@@ -194,7 +195,7 @@ public:
     {
         sample(step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h(), calls, g1_,
                rate1_);
-        screened_ = false;
+        forget_screening();
     }
 
     /// Evaluates all guards inside a step, at its state `x` there.
@@ -203,42 +204,48 @@ public:
     {
         if constexpr (looks) {
             sample_values(step.mode(), step.time(CubicLook::inside * step.h()), x, calls, inside_);
-            looked_ = true;
-            looked_further_ = looked_everywhere_ = false;
+            looked_ = Looked::inside;
+            marked_ = false;
         }
     }
 
-    /// And once more, at the part u of the step where the state is `x`.
+    /// And once more, at the part `CubicLook::further` of the step where the state is `x`.
     template <class Step>
-    void sample_further(const Step& step, double u, const X& x, std::uint64_t& calls)
+    void sample_further(const Step& step, const X& x, std::uint64_t& calls)
+    {
+        if constexpr (looks) {
+            const double s = CubicLook::further * step.h();
+            sample_values(step.mode(), step.time(s), x, calls, further_);
+            looked_ = Looked::further;
+        }
+    }
+
+    /// And once more, at the part `u` of the step, one of `CubicLook::places`.
+    template <class Step>
+    void sample_place(const Step& step, double u, const X& x, std::uint64_t& calls)
     {
         if constexpr (looks) {
             sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
             const double h = step.h();
+            const bool first = looked_ != Looked::everywhere;
             for (std::size_t i = 0; i < size(); ++i) {
-                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
-                const double e = look.deviation(u, further_[i]);
-                worst_[i] = looked_further_ && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
+                const double e = cubic(i, h).deviation(u, further_[i]);
+                worst_[i] = !first && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
             }
-            looked_further_ = true;
+            looked_ = Looked::everywhere;
         }
     }
 
-    /// Guards have been evaluated at all places of `CubicLook::places`.
-    void has_looked_everywhere() noexcept { looked_everywhere_ = true; }
-    [[nodiscard]] bool looked_everywhere() const noexcept { return looked_everywhere_; }
+    [[nodiscard]] bool looked_everywhere() const noexcept { return looked_ == Looked::everywhere; }
 
     /// Whether any guard deserves a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
     {
         if constexpr (looks) {
-            if (looked_ && !waiting_ && !bands_) {
-                return any_of(0, size(), [this, h](std::size_t i) __attribute__((always_inline)) {
-                    const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
-                    const double e = look.deviation(CubicLook::inside, inside_[i]);
-                    const bool near = !(look.lowest(sign_[i]) > CubicLook::doubt * e);
-                    return (near | suspects(i, h)) & (sign_[i] != 0);
-                });
+            if (looked() && !waiting_ && !bands_) {
+                if (are_few()) return any_of(in_doubt(h));
+                mark(h);
+                return !marks_.empty();
             }
         }
         return suspicious(h);
@@ -250,7 +257,7 @@ public:
     {
         if constexpr (looks) {
             for (std::size_t i = 0; i < size(); ++i) {
-                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+                const CubicLook look = cubic(i, h);
                 const double e = look.deviation(CubicLook::inside, inside_[i]);
                 if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
             }
@@ -276,7 +283,7 @@ public:
     [[nodiscard]] bool hides(std::size_t i, double h) const noexcept
     {
         if constexpr (looks) {
-            const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            const CubicLook look = cubic(i, h);
             return !(look.lowest(sign_[i]) > CubicLook::most * deviation(look, i));
         } else {
             return false;
@@ -288,8 +295,8 @@ public:
     [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
     {
         if constexpr (looks) {
-            if (!looked_) return true;
-            const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            if (!looked()) return true;
+            const CubicLook look = cubic(i, h);
             return 0x1p16 * deviation(look, i) <= look.size();
         } else {
             return true;
@@ -297,7 +304,7 @@ public:
     }
 
     /// Whether the guards have been evaluated inside the step.
-    [[nodiscard]] bool looked() const noexcept { return looks && looked_; }
+    [[nodiscard]] bool looked() const noexcept { return looks && looked_ != Looked::not_at_all; }
 
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
@@ -311,9 +318,8 @@ public:
     /// The first guard that is not finite at the end of the step, or `no_guard`.
     [[nodiscard]] std::size_t first_not_finite() const noexcept
     {
-        if (!any_of(0, size(), [this](std::size_t i) __attribute__((always_inline)) {
-                return !is_finite(g1_[i]);
-            })) {
+        if (!any_of([this](std::size_t i)
+                        __attribute__((always_inline)) { return !is_finite(g1_[i]); })) {
             return no_guard;
         }
         for (std::size_t i = 0; i < size(); ++i) {
@@ -408,7 +414,7 @@ public:
     void wake(std::size_t i, const GuardSample& start, const GuardSample& end) noexcept
     {
         records_[i].asleep = false;
-        screened_ = false;
+        forget_screening();
         g0_[i] = start.value;
         rate0_[i] = start.rate;
         g1_[i] = end.value;
@@ -433,7 +439,9 @@ public:
     /// all other guards are at its end what they were at its start.
     void begin_search(double h) noexcept
     {
-        if (puts_off || waiting_ || !screened_) screen(h);
+        // A guard that wakes or leaves its plateau is another than the one that was screened.
+        if (puts_off || waiting_) forget_screening();
+        if (!screened_) screen(h);
         for (const std::size_t i : suspects_) records_[i].next = records_[i].side;
     }
 
@@ -455,10 +463,13 @@ public:
                 sizes_[i] = std::fmax(std::fabs(g1_[i]), sizes_[i]);
             }
         }
+        const auto on_plateau = [this](std::size_t i) __attribute__((always_inline))
+        {
+            return sign_[i] == 0;
+        };
+        const bool plateaus = any_of(on_plateau);
         hand_over(g1_, g0_);
         if constexpr (Detector::uses_rates) hand_over(rate1_, rate0_);
-        const bool plateaus = any_of(
-            0, size(), [this](std::size_t i) __attribute__((always_inline)) { return sign_[i] == 0; });
         if (!plateaus) return;
         for (std::size_t i = 0; i < size(); ++i) leave_plateau(i, g0_[i]);
     }
@@ -559,21 +570,94 @@ private:
 
     /// Guards that are screened together: where one of them is suspected, each is looked at.
     static constexpr std::size_t block = 16;
+    [[nodiscard]] bool are_few() const noexcept { return size() < block; }
 
-    /// Whether `condition`, which has no branches, holds for a guard from `first` on and before
-    /// `last`.
+    /// Whether `condition`, which has no branches, holds for a guard.
     template <class Condition>
-    [[nodiscard, gnu::always_inline]] static bool any_of(std::size_t first, std::size_t last,
-                                                         const Condition& condition) noexcept
+    [[nodiscard, gnu::always_inline]] bool any_of(const Condition& condition) const noexcept
     {
         double any = 0;  // a double, so that the loop is vectorised
-        for (std::size_t i = first; i < last; ++i) any = condition(i) ? 1.0 : any;
+        for (std::size_t i = 0; i < size(); ++i) any = condition(i) ? 1.0 : any;
         return any != 0;
     }
 
-    [[nodiscard, gnu::always_inline]] bool suspects(std::size_t i, double h) const noexcept
+    /// Calls `visit(i)` for the guards for which `condition`, which has no branches, holds, in
+    /// ascending order.
+    template <class Condition, class Visit>
+    [[gnu::always_inline]] void for_each_that(const Condition& condition,
+                                              const Visit& visit) const noexcept
     {
-        return Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+        std::size_t first = 0;
+        for (; first + block <= size(); first += block) {
+            std::array<double, block> holds;  // doubles, so that the loop is vectorised
+            double any = 0;
+            for (std::size_t k = 0; k < block; ++k) {
+                holds[k] = condition(first + k) ? 1.0 : 0.0;
+                any = holds[k] != 0 ? 1.0 : any;
+            }
+            if (any == 0) continue;
+            for (std::size_t k = 0; k < block; ++k) {
+                if (holds[k] != 0) visit(first + k);
+            }
+        }
+        for (; first < size(); ++first) {
+            if (condition(first)) visit(first);
+        }
+    }
+
+    [[nodiscard, gnu::always_inline]] CubicLook cubic(std::size_t i, double h) const noexcept
+    {
+        return {g0_[i], rate0_[i], g1_[i], rate1_[i], h};
+    }
+
+    /// Whether the ends of the step tell of guard i that it deserves a search.
+    [[nodiscard, gnu::always_inline]] auto shows(double h) const noexcept
+    {
+        return [ this, h ](std::size_t i) __attribute__((always_inline))
+        {
+            const bool suspected =
+                Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            const bool armed = sign_[i] != 0;
+            return suspected & armed;
+        };
+    }
+
+    /// Whether guard i may leave its side where a deviation is `factor` times as large as at
+    /// the part `u`, where the guards are `values`.
+    [[nodiscard, gnu::always_inline]] auto strays(double h, double u, double factor,
+                                                  const Doubles& values) const noexcept
+    {
+        return [ this, h, u, factor, &values ](std::size_t i) __attribute__((always_inline))
+        {
+            const CubicLook look = cubic(i, h);
+            const bool clear = look.lowest(sign_[i]) > factor * look.deviation(u, values[i]);
+            const bool armed = sign_[i] != 0;
+            return !clear & armed;
+        };
+    }
+
+    /// Whether guard i deserves a second evaluation inside the step, or a search.
+    [[nodiscard, gnu::always_inline]] auto in_doubt(double h) const noexcept
+    {
+        return [
+            shows = shows(h), strays = strays(h, CubicLook::inside, CubicLook::doubt, inside_)
+        ](std::size_t i) __attribute__((always_inline))
+        {
+            const bool shown = shows(i);
+            const bool strayed = strays(i);
+            return shown | strayed;
+        };
+    }
+
+    /// The step in hand is another, or what is known of its guards.
+    void forget_screening() noexcept { screened_ = marked_ = false; }
+
+    /// Finds the guards in doubt.
+    void mark(double h) noexcept
+    {
+        marks_.clear();
+        marked_ = true;
+        for_each_that(in_doubt(h), [this](std::size_t i) { marks_.push_back(i); });
     }
 
     /// Finds the guards that deserve a search.
@@ -581,50 +665,59 @@ private:
     {
         suspects_.clear();
         screened_ = true;
-        if (bands_ || (fixed != counted_at_run_time && fixed < block)) {
-            return add_suspects(0, size(), h);
+        if (are_few() || bands_) {
+            for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
+            return;
         }
-        const auto ends = [this, h](std::size_t i) __attribute__((always_inline)) {
-            return (suspects(i, h) | !is_finite(g1_[i])) & (sign_[i] != 0);
-        };
         if constexpr (looks) {
-            const auto hidden = [this, h](std::size_t i, double e) __attribute__((always_inline)) {
-                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
-                return !(look.lowest(sign_[i]) > CubicLook::most * e) & (sign_[i] != 0);
-            };
-            const auto inside = [this, h](std::size_t i) __attribute__((always_inline)) {
-                const CubicLook look(g0_[i], rate0_[i], g1_[i], rate1_[i], h);
-                return look.deviation(CubicLook::inside, inside_[i]);
-            };
-            if (looked_further_ && looked_) {
-                return screen_blocks(h, [&](std::size_t i) __attribute__((always_inline)) {
-                    const double e = inside(i);
-                    return ends(i) | hidden(i, worst_[i] <= e ? e : worst_[i]);
-                });
-            }
-            if (looked_) {
-                return screen_blocks(h, [&](std::size_t i) __attribute__((always_inline)) {
-                    return ends(i) | hidden(i, inside(i));
-                });
+            if (looked()) {
+                // One that deserves a search is in doubt, or deviates elsewhere.
+                if (!marked_) mark(h);
+                if (looked_ == Looked::inside)
+                    return screen_marked(h, [](std::size_t) { return false; });
+                if (looked_ == Looked::further) {
+                    return screen_marked(h,
+                                         strays(h, CubicLook::further, CubicLook::most, further_));
+                }
+                return screen_marked(
+                    h, [ this, h ](std::size_t i) __attribute__((always_inline)) {
+                        const bool clear =
+                            cubic(i, h).lowest(sign_[i]) > CubicLook::most * worst_[i];
+                        const bool armed = sign_[i] != 0;
+                        return !clear & armed;
+                    });
             }
         }
-        screen_blocks(h, ends);
+        marks_.clear();
+        const auto condition =
+            [ this, shows = shows(h) ](std::size_t i) __attribute__((always_inline))
+        {
+            const bool shown = shows(i);
+            const bool armed = sign_[i] != 0;
+            const bool lost = !is_finite(g1_[i]);
+            return shown | (lost & armed);
+        };
+        if (any_of(condition)) screen_marked(h, condition);
     }
 
+    /// Looks at each guard that is marked, or for which `condition` holds.
     template <class Condition>
-    [[gnu::always_inline]] void screen_blocks(double h, const Condition& condition) noexcept
+    [[gnu::always_inline]] void screen_marked(double h, const Condition& condition) noexcept
     {
-        for (std::size_t first = 0; first < size(); first += block) {
-            const std::size_t last = std::min(first + block, size());
-            if (any_of(first, last, condition)) add_suspects(first, last, h);
-        }
+        const std::size_t* mark = marks_.begin();
+        const std::size_t* const end = marks_.end();
+        for_each_that(condition, [&](std::size_t i) {
+            for (; mark != end && *mark <= i; ++mark) {
+                if (*mark < i) add_if_suspicious(*mark, h);
+            }
+            add_if_suspicious(i, h);
+        });
+        for (; mark != end; ++mark) add_if_suspicious(*mark, h);
     }
 
-    void add_suspects(std::size_t first, std::size_t last, double h) noexcept
+    void add_if_suspicious(std::size_t i, double h) noexcept
     {
-        for (std::size_t i = first; i < last; ++i) {
-            if (suspicious(i, h)) suspects_.push_back(i);
-        }
+        if (suspicious(i, h)) suspects_.push_back(i);
     }
 
     /// What belongs to the end of a step belongs to the start of the next.
@@ -651,8 +744,10 @@ private:
     [[nodiscard]] double deviation(const CubicLook& look, std::size_t i) const noexcept
     {
         const double e = look.deviation(CubicLook::inside, inside_[i]);
-        if (!looked_further_) return e;
-        return worst_[i] <= e ? e : worst_[i];  // NaN stays
+        if (looked_ == Looked::inside) return e;
+        const double other =
+            looked_everywhere() ? worst_[i] : look.deviation(CubicLook::further, further_[i]);
+        return other <= e ? e : other;  // NaN stays
     }
 
     [[nodiscard]] static double known(double rate) noexcept
@@ -735,20 +830,22 @@ private:
     bool backward_;
     std::size_t count_;
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
-    bool waiting_ = false;  ///< whether any guard may be on a plateau
-    bool bands_ = false;    ///< whether any guard declares one
+    bool waiting_ = false;    ///< whether any guard may be on a plateau
+    bool bands_ = false;      ///< whether any guard declares one
     bool selective_ = false;  ///< whether any guard is disabled or has no rate
     bool screened_ = false;   ///< whether `suspects_` is of the step in hand
     Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{};
-    bool looked_ = false;  ///< inside the step in hand
+    /// Where in the step in hand the guards have been evaluated.
+    enum class Looked : std::uint8_t { not_at_all, inside, further, everywhere };
+    Looked looked_ = Looked::not_at_all;
+    bool marked_ = false;  ///< whether `marks_` is of the step in hand
     struct None {};
-    bool looked_further_ = false;
-    bool looked_everywhere_ = false;
     [[no_unique_address]] std::conditional_t<looks, Doubles, None> inside_{}, further_{};
     [[no_unique_address]] std::conditional_t<looks, Doubles, None> worst_{};  ///< of further looks
     [[no_unique_address]] std::conditional_t<keeps_sizes, Doubles, None> sizes_{};
     X there_{};
     GuardList<std::size_t, fixed> suspects_;
+    GuardList<std::size_t, fixed> marks_;  ///< guards in doubt
     PerGuard<GuardRecord, fixed> records_{};
 };
 

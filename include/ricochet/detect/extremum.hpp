@@ -39,7 +39,7 @@ struct Extremum {
         const double lowest = std::min(std::min(b1, b2), v1);
         const double highest = std::max(std::max(b1, b2), v1);
         const bool turns = (sign * slope0 <= 0) & (sign * slope1 > 0);
-        const bool clear = (v1 > 0) & (lowest > 0) & (!turns | (5 * lowest > 4 * highest));
+        const bool clear = (v1 > 0) & (lowest > 0) & (!turns | (1.25 * lowest > highest));
         return !clear;
     }
 

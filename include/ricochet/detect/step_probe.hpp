@@ -12,9 +12,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
-#include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/hybrid/step.hpp"
 
@@ -191,7 +192,7 @@ public:
         if constexpr (by_component) {
             GuardSample sample{.s = s, .value = guard_->value(t, view(s))};
             if constexpr (Guard::template sees_rate<View, RateView>) {
-                sample.rate = guard_->rate(t, view(s), RateView(step_->dense(), s), step_->h());
+                sample.rate = guard_->rate(t, view(s), component_view<true>(*step_, s), step_->h());
             } else {
                 const double delta = 1e-5 * step_->h();
                 sample.rate =
@@ -202,7 +203,7 @@ public:
             step_->interpolate(s, space_->x);
             if constexpr (DenseStep<Step, State>) {
                 // The polynomial's own: a flow that jumps does not agree with it.
-                const RateView rate(step_->dense(), s);
+                const DenseView<State, true> rate(step_->dense(), s);
                 detail::for_each_component(space_->x, [&](auto i) { space_->dxdt[i] = rate[i]; });
             } else {
                 step_->flow(s, space_->x, space_->dxdt);
@@ -305,8 +306,19 @@ public:
     }
 
 private:
-    using View = DenseView<State, false>;
-    using RateView = DenseView<State, true>;
+    template <bool derivative>
+    [[nodiscard]] static auto component_view(const Step& step, double s)
+    {
+        if constexpr (requires { step.template component_view<derivative>(s); }) {
+            return step.template component_view<derivative>(s);
+        } else if constexpr (DenseStep<Step, State>) {
+            return DenseView<State, derivative>(step.dense(), s);
+        } else {
+            return DenseView<State, derivative>({}, s);  // of no use
+        }
+    }
+    using View = decltype(component_view<false>(std::declval<const Step&>(), 0.0));
+    using RateView = decltype(component_view<true>(std::declval<const Step&>(), 0.0));
     static constexpr bool by_component = DenseStep<Step, State> && Guard::template sees<View>;
 
     [[nodiscard]] static constexpr bool rated() noexcept
@@ -318,7 +330,7 @@ private:
         }
     }
 
-    [[nodiscard]] View view(double s) const { return View(step_->dense(), s); }
+    [[nodiscard]] View view(double s) const { return component_view<false>(*step_, s); }
 
     /// By how much the guard at offset s changes in all with relative changes of the time and
     /// of one component of the state after the other.

@@ -22,22 +22,22 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detail/meter.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/detail/declarations.hpp"
-#include "ricochet/hybrid/system.hpp"
 #include "ricochet/detail/event_search.hpp"
 #include "ricochet/detail/explicit_step.hpp"
 #include "ricochet/detail/guard_bank.hpp"
 #include "ricochet/detail/initial_step.hpp"
 #include "ricochet/detail/merged_resets.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/detail/meter.hpp"
 #include "ricochet/detail/planner.hpp"
+#include "ricochet/detail/step_control.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/hybrid/bounds.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/integrate/snapshot.hpp"
-#include "ricochet/detail/step_control.hpp"
 #include "ricochet/locate/newton.hpp"
 
 namespace ricochet {
@@ -988,12 +988,17 @@ private:
             look_inside();
             X& x = search_.space(step_.x0());
             if (error_controlled && hardly_moves()) {
-                for (const double u : detail::CubicLook::places) look_again(u, x);
-                bank_.has_looked_everywhere();
+                for (const double u : detail::CubicLook::places) {
+                    step_.peek(u * step_.h(), x);
+                    bank_.sample_place(step_, u, x, calls());
+                }
                 return bank_.suspicious(step_.h());
             }
             if (!bank_.doubtful(step_.h())) return false;
-            if (bank_.needs_second_look(step_.h())) look_again(detail::CubicLook::further, x);
+            if (bank_.needs_second_look(step_.h())) {
+                step_.peek(detail::CubicLook::further * step_.h(), x);
+                bank_.sample_further(step_, x, calls());
+            }
         }
         return bank_.suspicious(step_.h());
     }
@@ -1010,12 +1015,6 @@ private:
             step_.template peek<detail::InsideOf>(x);
             bank_.sample_inside(step_, x, calls());
         }
-    }
-
-    void look_again(double u, X& x)
-    {
-        step_.peek(u * step_.h(), x);
-        bank_.sample_further(step_, u, x, calls());
     }
 
     /// Whether the state hardly changes in the step, which error control then does not limit.
@@ -1396,8 +1395,7 @@ private:
     [[nodiscard]] bool is_away(std::size_t i, double rounding)
     {
         detail::GuardRecord& record = bank_[i];
-        const double g =
-            bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
+        const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
         if (!(detail::sign_of(record.last_side) * g > 1024 * rounding)) return false;
         record.turned = true;
         return true;
