@@ -319,9 +319,8 @@ public:
     /// atol + rtol max(|x0|, |x1|); NaN if anything is not finite.
     [[nodiscard]] double attempt(double h, double rtol, double atol)
     {
-        static_assert(
-            has_error_estimate<Stepper>,
-            "ricochet: error control needs a method with an error estimate, such as Dopri5");
+        static_assert(has_error_estimate<Stepper>,
+                      "ricochet: error control needs a method with an error estimate, such as Dopri5");
         h_ = h;
         advance<true>(advancing_, h, w_, w_rate1_, error_);
         finish_attempt();

@@ -19,12 +19,12 @@
 
 #include "ricochet/detail/cubic_look.hpp"
 #include "ricochet/detail/finding.hpp"
-#include "ricochet/detail/guard_view.hpp"
-#include "ricochet/detail/shrinking_intervals.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/event.hpp"
+#include "ricochet/detail/guard_view.hpp"
 #include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/shrinking_intervals.hpp"
 
 namespace ricochet::detail {
 

@@ -14,8 +14,8 @@
 #include <limits>
 #include <utility>
 
-#include "ricochet/detail/components.hpp"
 #include "ricochet/detail/finding.hpp"
+#include "ricochet/detail/components.hpp"
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/hybrid/step.hpp"
 

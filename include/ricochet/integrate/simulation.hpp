@@ -22,22 +22,22 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detail/meter.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/detail/declarations.hpp"
+#include "ricochet/hybrid/system.hpp"
 #include "ricochet/detail/event_search.hpp"
 #include "ricochet/detail/explicit_step.hpp"
 #include "ricochet/detail/guard_bank.hpp"
 #include "ricochet/detail/initial_step.hpp"
 #include "ricochet/detail/merged_resets.hpp"
-#include "ricochet/detail/meter.hpp"
-#include "ricochet/detail/planner.hpp"
-#include "ricochet/detail/step_control.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/hybrid/bounds.hpp"
-#include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/options.hpp"
+#include "ricochet/detail/planner.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/integrate/snapshot.hpp"
+#include "ricochet/detail/step_control.hpp"
 #include "ricochet/locate/newton.hpp"
 
 namespace ricochet {
@@ -1005,7 +1005,7 @@ private:
 
     void look_inside()
     {
-        if constexpr (std::is_trivially_copyable_v<X>) {
+        if constexpr (detail::is_small<X> && std::is_trivially_copyable_v<X>) {
             // Components that no guard reads are not computed.
             X x{};
             step_.template peek<detail::InsideOf>(x);
@@ -1395,7 +1395,8 @@ private:
     [[nodiscard]] bool is_away(std::size_t i, double rounding)
     {
         detail::GuardRecord& record = bank_[i];
-        const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
+        const double g =
+            bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
         if (!(detail::sign_of(record.last_side) * g > 1024 * rounding)) return false;
         record.turned = true;
         return true;
