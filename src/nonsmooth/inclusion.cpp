@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/detail/any_inclusion.hpp"
 
 #include <fmt/format.h>
 
@@ -12,6 +12,14 @@ void refuse_inclusion(std::string_view what)
 void refuse_inclusion(std::string_view what, double given)
 {
     throw std::invalid_argument(fmt::format("inclusion: {} {}", what, given));
+}
+
+Eigen::Index invert(const Eigen::MatrixXd& a, Eigen::MatrixXd& inverse)
+{
+    const Eigen::FullPivLU<Eigen::MatrixXd> lu(a);
+    const Eigen::Index rank = lu.rank();
+    if (rank == a.cols()) inverse = lu.inverse();
+    return rank;
 }
 
 }  // namespace ricochet::detail

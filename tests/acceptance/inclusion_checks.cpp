@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "inclusions_of_six.hpp"
 #include "measure.hpp"
 #include "random_inclusions.hpp"
 #include "random_mechanisms.hpp"
-#include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet::bench {
 

@@ -1,10 +1,9 @@
 // Where several relays, contacts and diodes meet: random inclusions against backward Euler.
 
 #include "random_inclusions.hpp"
+#include "inclusions_of_six.hpp"
 
 #include <gtest/gtest.h>
-
-#include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet {
 namespace {

@@ -30,26 +30,21 @@ namespace ricochet {
 
 namespace detail {
 
-template <class System>
-constexpr bool has_branch_modes() noexcept
-{
-    constexpr int n = state_size<System>;
-    constexpr int m = reaction_size<System>;
-    return BoxSet<SetOf<System>> && confines<System>() == Confines::reaction &&
-           n != Eigen::Dynamic && m != Eigen::Dynamic && m <= most_cases;
-}
-
-/// A bound that is smooth beyond y = 0 on its branch, where the system gives one.
-template <class System>
-concept ContinuesBounds = requires(const System& system, double t, const StateOf<System>& w, int i) {
-    { system.branch_bound(t, w, i, Branch::upper) } -> std::convertible_to<double>;
-};
+/// Whether inclusions of these sizes have branches that are modes, if their sets are boxes of
+/// reactions.
+template <int N, int M>
+inline constexpr bool has_modes = N != Eigen::Dynamic&& M != Eigen::Dynamic&& M <= most_cases;
 
 }  // namespace detail
 
 /// Inclusions whose branches are modes.
 template <class System>
-concept Branching = Inclusion<System> && detail::has_branch_modes<System>();
+concept Branching = Inclusion<System> &&
+    detail::has_modes<state_size<System>, reaction_size<System>> && BoxSet<SetOf<System>> &&
+    detail::confines<System>()
+== Confines::reaction;
+
+namespace detail {
 
 /// The hybrid system. Digit i to base 3 of a mode is the branch of reaction i: 0 lower (y > 0),
 /// 1 inside (held), 2 upper. Three more modes say that the motion cannot go on by itself:
@@ -65,15 +60,13 @@ concept Branching = Inclusion<System> && detail::has_branch_modes<System>();
 /// that of `reaction_set` is not, as with F(|y|), the system declares
 ///
 ///     double branch_bound(t, w, i, branch) const
-template <Branching System>
-class BranchModes {
+template <int N, int M>
+class RICOCHET_ALIGNED AnyModes {
 public:
-    static constexpr int N = state_size<System>;
-    static constexpr int M = reaction_size<System>;
     using State = std::array<double, static_cast<std::size_t>(N)>;
-    using Matrices = InclusionMatrices<System>;
-    using Vector = StateOf<System>;
-    using Reaction = ReactionOf<System>;
+    using Matrices = AnyMatrices<N, M>;
+    using Vector = typename Matrices::State;
+    using Reaction = typename Matrices::Reaction;
     using Branches = Eigen::Matrix<Branch, M, 1>;
     using Slacks = std::array<double, 2>;  ///< above the lower bound, below the upper one
     using Rooms = std::array<double, 2 * static_cast<std::size_t>(M)>;  ///< of all reactions
@@ -88,14 +81,7 @@ public:
     static constexpr Mode empty = branch_modes + 2;
 
     /// @throws std::invalid_argument for matrices that `InclusionMatrices` refuses.
-    explicit BranchModes(const System& system) : matrices_(system)
-    {
-        lever_ = matrices_.inverse_mass() * matrices_.act();
-        delassus_ = matrices_.observe() * lever_;
-        inverse_diagonal_ = matrices_.inverse_mass().diagonal();
-        diagonal_ = matrices_.inverse_mass().isDiagonal(0);
-        for (std::size_t mask = 0; mask < masks; ++mask) prepare(mask);
-    }
+    explicit AnyModes(const AnyInclusion<N, M>& inclusion);
 
     [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
 
@@ -155,65 +141,14 @@ public:
 
     // --- the contract of a system ---
 
-    void flow(Mode mode, double t, const State& x, State& dxdt) const
-    {
-        Eigen::Map<Vector> rate(dxdt.data());
-        if (mode >= branch_modes) {
-            rate.setZero();
-            return;
-        }
-        const Vector w = vector(x);
-        Vector free;
-        Reaction reaction;
-        reactions(mode, t, w, free, reaction);
-        rate = free + lever_.lazyProduct(reaction);
-        // To the last bit where y is a component.
-        for (Eigen::Index i = 0; i < M; ++i) {
-            if (!is_held(i, mode)) continue;
-            if (const Eigen::Index k = matrices_.selected(i); k >= 0) rate[k] = offset_rate(t)[i];
-        }
-    }
+    void flow(Mode mode, double t, const State& x, State& dxdt) const;
 
     /// What acts in a mode at (t, w).
-    [[nodiscard]] Reaction reaction(Mode mode, double t, const Vector& w) const
-    {
-        Vector free;
-        Reaction r;
-        reactions(mode, t, w, free, r);
-        return r;
-    }
+    [[nodiscard]] Reaction reaction(Mode mode, double t, const Vector& w) const;
 
     /// How far every held reaction is from its bounds; infinite where there is no bound, and for
     /// reactions that are not held. Writes the rate of the motion and the reactions, too.
-    void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const
-    {
-        constexpr double infinity = std::numeric_limits<double>::infinity();
-        reactions(mode, t, w, rate, r);
-        rate += lever_.lazyProduct(r);
-        const auto set = [&] {
-            if constexpr (detail::ContinuesBounds<System>) {
-                return 0;
-            } else {
-                return matrices_.system().reaction_set(t, w);
-            }
-        }();
-        Mode rest = mode;
-        for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
-            const auto k = static_cast<std::size_t>(i);
-            rooms[2 * k] = rooms[2 * k + 1] = infinity;
-            if (rest % 3 != 1) continue;
-            double lower, upper;
-            if constexpr (detail::ContinuesBounds<System>) {
-                lower = bound(t, w, i, Branch::lower);
-                upper = bound(t, w, i, Branch::upper);
-            } else {
-                lower = set.lower(k);
-                upper = set.upper(k);
-            }
-            if (!std::isinf(lower)) rooms[2 * k] = r[i] - lower;
-            if (!std::isinf(upper)) rooms[2 * k + 1] = upper - r[i];
-        }
-    }
+    void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const;
 
     /// What rounding of the terms may make of the held reactions.
     [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
@@ -223,164 +158,49 @@ public:
                (holds_[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
     }
 
-    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
-    {
-        const auto i = static_cast<Eigen::Index>(which / 4);
-        const Vector w = vector(x);
-        if (which >= first_set_guard) {
-            return is_set(which - first_set_guard, mode, t, w, observed(t, w));
-        }
-        if (which % 4 < 2) {
-            const double y = observed(t, w)[i];
-            return which % 4 == 0 ? y : -y;
-        }
-        return slacks(i, t, w, reaction(mode, t, w)[i])[which % 4 - 2];
-    }
+    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const;
 
     /// All of them, from one evaluation of the reactions.
-    void guards(Mode mode, double t, const State& x, std::span<double> g) const
-    {
-        const Vector w = vector(x);
-        const Reaction y = observed(t, w);
-        const Reaction r = reaction(mode < branch_modes ? mode : 0, t, w);
-        for (Eigen::Index i = 0; i < M; ++i) {
-            const auto k = static_cast<std::size_t>(i);
-            const auto slack = slacks(i, t, w, r[i]);
-            g[4 * k] = y[i];
-            g[4 * k + 1] = -y[i];
-            g[4 * k + 2] = slack[0];
-            g[4 * k + 3] = slack[1];
-            g[first_set_guard + k] = is_set(k, mode, t, w, y);
-        }
-    }
+    void guards(Mode mode, double t, const State& x, std::span<double> g) const;
 
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const State& x,
-                                    const State& dxdt) const
-    {
-        if (which >= first_set_guard) return 0;
-        const auto i = static_cast<Eigen::Index>(which / 4);
-        const Vector w = vector(x);
-        const Vector dwdt = vector(dxdt);
-        if (which % 4 >= 2) return slack_rates(i, mode, t, w, dwdt)[which % 4 - 2];
-        const double rate = observed_rate(i, mode, t, w, dwdt);
-        return which % 4 == 0 ? rate : -rate;
-    }
+                                    const State& dxdt) const;
 
     /// Those that the mode enables; the others are 0.
     void guard_rates(Mode mode, double t, const State& x, const State& dxdt,
-                     std::span<double> rates) const
-    {
-        std::fill(rates.begin(), rates.end(), 0.0);
-        if (mode >= branch_modes) return;
-        const Vector w = vector(x);
-        const Vector dwdt = vector(dxdt);
-        for (Eigen::Index i = 0; i < M; ++i) {
-            const auto k = static_cast<std::size_t>(i);
-            if (is_held(i, mode)) {
-                const Slacks of = slack_rates(i, mode, t, w, dwdt);
-                rates[4 * k + 2] = of[0];
-                rates[4 * k + 3] = of[1];
-            } else {
-                const double rate = observed_rate(i, mode, t, w, dwdt);
-                (branch(k, mode) == Branch::lower ? rates[4 * k] : rates[4 * k + 1]) =
-                    branch(k, mode) == Branch::lower ? rate : -rate;
-            }
-        }
-    }
+                     std::span<double> rates) const;
 
     /// All that happened at one instant, together.
-    [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, State& x) const
-    {
-        Branches branches = branches_of(mode);
-        int left = 0;
-        int arrived = 0;
-        Branches held = branches;
-        Vector w = vector(x);
-        // Reactions at a bound whose y is zero as well, as of contacts that depend on one another.
-        const Branches zero = zero_branches(t, w);
-        int undecided = 0;
-        for (Eigen::Index i = 0; i < M; ++i) {
-            if (zero[i] != Branch::inside || branches[i] == Branch::inside) continue;
-            held[i] = Branch::inside;
-            ++undecided;
-        }
-        for (const std::size_t which : fired) {
-            if (which >= first_set_guard) return empty;
-            const auto i = static_cast<Eigen::Index>(which / 4);
-            if (which % 4 < 2) {
-                if (held[i] == Branch::inside) --undecided;
-                held[i] = Branch::inside;
-                ++arrived;
-            } else {
-                branches[i] = which % 4 == 2 ? Branch::lower : Branch::upper;
-                ++left;
-            }
-        }
-        hold(held, t, w);
-        Eigen::Map<Vector>(x.data()) = w;
-        if (faulty(t, w) >= 0) return empty;
-        if (left + arrived + undecided > 1 && left > 0) return several;
-        if (left == 1) return checked(mode_of(branches));
-        return settle(held, t, w);
-    }
+    [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, State& x) const;
 
     // --- entering ---
 
     /// The mode of the motion from (t, w), whose observed components that are zero up to
     /// rounding are made so; `several` where rates do not tell.
     /// @throws std::invalid_argument for what `minimal_selection` refuses.
-    [[nodiscard]] Mode mode_at(double t, Vector& w) const
-    {
-        (void)minimal_selection(matrices_, t, w);
-        const Branches held = zero_branches(t, w);
-        hold(held, t, w);
-        return settle(held, t, w);
-    }
+    [[nodiscard]] Mode mode_at(double t, Vector& w) const;
 
     /// The branches that the signs of y ask for; inside where y is zero up to rounding.
-    [[nodiscard]] Branches zero_branches(double t, const Vector& w) const
-    {
-        const Reaction y = observed(t, w);
-        const Reaction size = matrices_.observe().cwiseAbs() * w.cwiseAbs() + offset(t).cwiseAbs();
-        Branches out;
-        for (Eigen::Index i = 0; i < M; ++i) {
-            const double rounding = 16 * std::numeric_limits<double>::epsilon() * size[i];
-            const bool zero = std::abs(y[i]) <= rounding;
-            out[i] = zero ? Branch::inside : y[i] > 0 ? Branch::lower : Branch::upper;
-        }
-        return out;
-    }
+    [[nodiscard]] Branches zero_branches(double t, const Vector& w) const;
 
     /// Puts every held y at zero, along the reactions that hold it.
-    void hold(const Branches& branches, double t, Vector& w) const
-    {
-        const Hold& mine = holds_[mask_of(mode_of(branches))];
-        Reaction y = observed(t, w);
-        bool any = false;
-        for (Eigen::Index i = 0; i < M; ++i) {
-            if (branches[i] != Branch::inside) y[i] = 0;
-            any = any || (branches[i] == Branch::inside && matrices_.selected(i) < 0);
-        }
-        if (any && mine.determined) w -= lever_ * (mine.inverse * y);
-        const Reaction s = offset(t);
-        for (Eigen::Index i = 0; i < M; ++i) {
-            if (branches[i] == Branch::inside) matrices_.hold(i, 0, s[i], w);
-        }
-    }
+    void hold(const Branches& branches, double t, Vector& w) const;
 
     /// y = E w - s(t).
     [[nodiscard]] Reaction observed(double t, const Vector& w) const
     {
         Reaction y;
         y = matrices_.observe().lazyProduct(w);
-        if constexpr (moves) y -= offset(t);
+        if (moves()) y -= offset(t);
         return y;
     }
 
     /// The first reaction whose bounds make no interval; -1 if all do.
     [[nodiscard]] int faulty(double t, const Vector& w) const
     {
-        return detail::faulty_interval(matrices_.system().reaction_set(t, w));
+        LinearInequality<M> inequality;
+        matrices_.inclusion().bounds(t, w, inequality.lower, inequality.upper);
+        return inequality.faulty();
     }
 
     [[nodiscard]] static Vector vector(const State& x)
@@ -390,8 +210,7 @@ public:
 
 private:
     static constexpr std::size_t masks = std::size_t{1} << M;
-    static constexpr bool moves =
-        requires(const System& system, Reaction& s) { system.offset(0.0, s); };
+    [[nodiscard]] bool moves() const noexcept { return matrices_.traits().moves; }
 
     /// The inverse of the block of D = E A^-1 G of the held reactions, zero elsewhere.
     struct Hold {
@@ -415,10 +234,8 @@ private:
         for (Eigen::Index i = 0; i < count; ++i) {
             for (Eigen::Index j = 0; j < count; ++j) block(i, j) = delassus_(at(i), at(j));
         }
-        const Eigen::FullPivLU<Eigen::MatrixXd> lu(block);
-        hold.determined = lu.isInvertible();
+        hold.determined = invert(block, block) == count;
         if (!hold.determined) return;
-        block = lu.inverse();
         hold.largest = block.cwiseAbs().maxCoeff();
         for (Eigen::Index i = 0; i < count; ++i) {
             for (Eigen::Index j = 0; j < count; ++j) hold.inverse(at(i), at(j)) = block(i, j);
@@ -444,12 +261,12 @@ private:
         matrices_.offset(t, s);
         return s;
     }
-    [[nodiscard]] Reaction offset_rate([[maybe_unused]] double t) const
+    [[nodiscard]] Reaction offset_rate(double t) const
     {
         Reaction rate;
-        if constexpr (requires { matrices_.system().offset_rate(t, rate); }) {
-            matrices_.system().offset_rate(t, rate);
-        } else if constexpr (moves) {
+        if (matrices_.traits().gives_offset_rate) {
+            matrices_.inclusion().offset_rate(t, rate);
+        } else if (moves()) {
             const double step = 1e-5 * std::max(1.0, std::abs(t));
             rate = (offset(t + step) - offset(t - step)) / (2 * step);
         } else {
@@ -460,13 +277,7 @@ private:
 
     [[nodiscard]] double bound(double t, const Vector& w, Eigen::Index i, Branch side) const
     {
-        if constexpr (detail::ContinuesBounds<System>) {
-            return matrices_.system().branch_bound(t, w, static_cast<int>(i), side);
-        } else {
-            const auto set = matrices_.system().reaction_set(t, w);
-            const auto k = static_cast<std::size_t>(i);
-            return side == Branch::lower ? set.lower(k) : set.upper(k);
-        }
+        return matrices_.inclusion().bound(t, w, i, side);
     }
 
     /// The reactions of a mode, and A^-1 f.
@@ -487,7 +298,7 @@ private:
             }
             const Eigen::Index k = matrices_.selected(0);
             double rate = k >= 0 ? free[k] : matrices_.observe().row(0).dot(free);
-            if constexpr (moves) rate -= offset_rate(t)[0];
+            if (moves()) rate -= offset_rate(t)[0];
             r[0] = -holds_[1].inverse(0, 0) * rate;
             return;
         }
@@ -501,30 +312,33 @@ private:
         if (!any_held) return;
         Reaction rate = matrices_.observe().lazyProduct(free);
         rate += delassus_.lazyProduct(r);
-        if constexpr (moves) rate -= offset_rate(t);
+        if (moves()) rate -= offset_rate(t);
         r -= holds_[mask_of(mode)].inverse.lazyProduct(rate);
     }
 
     /// How far a reaction is above its lower bound and below its upper one; 1 or -1 where
     /// there is none.
-    [[nodiscard]] Slacks slacks(Eigen::Index i, double t, const Vector& w, double r) const
+    [[nodiscard]] static Slacks slacks(double lower, double upper, double r) noexcept
     {
-        const double lower = bound(t, w, i, Branch::lower);
-        const double upper = bound(t, w, i, Branch::upper);
         return {std::isinf(lower) ? std::copysign(1.0, -lower) : r - lower,
                 std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
     }
 
-    /// 1 where the bounds of reaction k make an interval, else -1. Beyond y = 0, where the
-    /// branch ends, bounds that depend on y need not make one.
-    [[nodiscard]] double is_set(std::size_t k, Mode mode, double t, const Vector& w,
-                                const Reaction& y) const
+    [[nodiscard]] Slacks slacks(Eigen::Index i, double t, const Vector& w, double r) const
     {
-        const auto set = matrices_.system().reaction_set(t, w);
-        if (set.lower(k) <= set.upper(k)) return 1;
-        const double at = y[static_cast<Eigen::Index>(k)];
-        const Branch side = branch(k, mode);
-        return (side == Branch::lower && at < 0) || (side == Branch::upper && at > 0) ? 1 : -1;
+        Reaction lower, upper;
+        matrices_.inclusion().branch_bounds(t, w, lower, upper);
+        return slacks(lower[i], upper[i], r);
+    }
+
+    /// 1 where the bounds of reaction i make an interval, else -1. Beyond y = 0, where the
+    /// branch ends, bounds that depend on y need not make one.
+    [[nodiscard]] static double is_set(Mode mode, Eigen::Index i, double lower, double upper,
+                                       double y) noexcept
+    {
+        if (lower <= upper) return 1;
+        const Branch side = branch(static_cast<std::size_t>(i), mode);
+        return (side == Branch::lower && y < 0) || (side == Branch::upper && y > 0) ? 1 : -1;
     }
 
     /// y', and zero where rounding decides its sign: the bending of a motion that is tangent
@@ -533,7 +347,7 @@ private:
                                        const Vector& dwdt) const
     {
         double rate = matrices_.observe().row(i) * dwdt;
-        if constexpr (moves) rate -= offset_rate(t)[i];
+        if (moves()) rate -= offset_rate(t)[i];
         double size = 0;
         Mode rest = mode;
         for (Eigen::Index j = 0; j < M; ++j, rest /= 3) {
@@ -547,22 +361,23 @@ private:
     [[nodiscard]] Slacks slack_rates(Eigen::Index i, Mode mode, double t, const Vector& w,
                                      const Vector& dwdt) const
     {
-        const double lower = bound(t, w, i, Branch::lower);
-        const double upper = bound(t, w, i, Branch::upper);
-        if (std::isinf(lower) && std::isinf(upper)) return {0, 0};
-        const double width = upper - lower;
+        Reaction lower, upper;
+        matrices_.inclusion().branch_bounds(t, w, lower, upper);
+        if (std::isinf(lower[i]) && std::isinf(upper[i])) return {0, 0};
+        const double width = upper[i] - lower[i];
         const auto at = [&](double s, const Vector& there) {
             const Slacks slack = slacks(i, t + s, there, reaction(mode, t + s, there)[i]);
-            return detail::Exits{slack[0], slack[1], 0, 0};
+            return Exits{slack[0], slack[1], 0, 0};
         };
-        const detail::Exits here = at(0, w);
+        const Slacks slack = slacks(lower[i], upper[i], reaction(mode, t, w)[i]);
+        const Exits here{slack[0], slack[1], 0, 0};
         const double size =
             std::isfinite(width) ? width : std::max({std::abs(here[0]), std::abs(here[1]), 1.0});
         if (!(size > 0)) return {0, 0};
-        const detail::TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
-                                       dwdt.template lpNorm<Eigen::Infinity>());
+        const TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
+                               dwdt.template lpNorm<Eigen::Infinity>());
         const auto later = [&](double s) { return at(s, w + s * dwdt); };
-        const detail::Exits rates = detail::fitted_rates(later, here, size, times);
+        const Exits rates = fitted_rates(later, here, size, times);
         return {rates[0], rates[1]};
     }
 
@@ -579,10 +394,9 @@ private:
         LinearInequality<M> inequality;
         inequality.w = delassus_;
         inequality.y0.noalias() = matrices_.observe() * (matrices_.inverse_mass() * f);
-        if constexpr (moves) inequality.y0 -= offset_rate(t);
+        if (moves()) inequality.y0 -= offset_rate(t);
+        matrices_.inclusion().branch_bounds(t, w, inequality.lower, inequality.upper);
         for (Eigen::Index i = 0; i < M; ++i) {
-            inequality.lower[i] = bound(t, w, i, Branch::lower);
-            inequality.upper[i] = bound(t, w, i, Branch::upper);
             if (at[i] == Branch::lower) inequality.upper[i] = inequality.lower[i];
             if (at[i] == Branch::upper) inequality.lower[i] = inequality.upper[i];
             // A reaction without influence on y' is all or nothing.
@@ -630,14 +444,14 @@ private:
         Eigen::Map<Vector>(x.data()) = w;
         flow(leaving, t, x, dxdt);
         const Vector rate = vector(dxdt);
-        const detail::TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
-                                       rate.template lpNorm<Eigen::Infinity>());
+        const TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
+                               rate.template lpNorm<Eigen::Infinity>());
         const double step = 1e-5 * times.shortest;
         const auto rate_of_y = [&](double s) {
             Eigen::Map<Vector>(x.data()) = w + s * rate;
             flow(leaving, t + s, x, dxdt);
             double y = matrices_.observe().row(i) * vector(dxdt);
-            if constexpr (moves) y -= offset_rate(t + s)[i];
+            if (moves()) y -= offset_rate(t + s)[i];
             return y;
         };
         const double bending = rate_of_y(step) - rate_of_y(-step);
@@ -656,6 +470,228 @@ private:
     Vector inverse_diagonal_;               // of A^-1, most often all there is
     bool diagonal_ = false;
     std::array<Hold, masks> holds_;
+};
+
+template <int N, int M>
+AnyModes<N, M>::AnyModes(const AnyInclusion<N, M>& inclusion) : matrices_(inclusion)
+{
+    lever_ = matrices_.inverse_mass() * matrices_.act();
+    delassus_ = matrices_.observe() * lever_;
+    inverse_diagonal_ = matrices_.inverse_mass().diagonal();
+    diagonal_ = matrices_.inverse_mass().isDiagonal(0);
+    for (std::size_t mask = 0; mask < masks; ++mask) prepare(mask);
+}
+
+template <int N, int M>
+void AnyModes<N, M>::flow(Mode mode, double t, const State& x, State& dxdt) const
+{
+    Eigen::Map<Vector> rate(dxdt.data());
+    if (mode >= branch_modes) {
+        rate.setZero();
+        return;
+    }
+    const Vector w = vector(x);
+    Vector free;
+    Reaction reaction;
+    reactions(mode, t, w, free, reaction);
+    rate = free + lever_.lazyProduct(reaction);
+    // To the last bit where y is a component.
+    for (Eigen::Index i = 0; i < M; ++i) {
+        if (!is_held(i, mode)) continue;
+        if (const Eigen::Index k = matrices_.selected(i); k >= 0) rate[k] = offset_rate(t)[i];
+    }
+}
+
+template <int N, int M>
+auto AnyModes<N, M>::reaction(Mode mode, double t, const Vector& w) const -> Reaction
+{
+    Vector free;
+    Reaction r;
+    reactions(mode, t, w, free, r);
+    return r;
+}
+
+template <int N, int M>
+void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r,
+                           Rooms& rooms) const
+{
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    reactions(mode, t, w, rate, r);
+    rate += lever_.lazyProduct(r);
+    Reaction lower, upper;
+    matrices_.inclusion().branch_bounds(t, w, lower, upper);
+    Mode rest = mode;
+    for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
+        const auto k = static_cast<std::size_t>(i);
+        rooms[2 * k] = rooms[2 * k + 1] = infinity;
+        if (rest % 3 != 1) continue;
+        if (!std::isinf(lower[i])) rooms[2 * k] = r[i] - lower[i];
+        if (!std::isinf(upper[i])) rooms[2 * k + 1] = upper[i] - r[i];
+    }
+}
+
+template <int N, int M>
+double AnyModes<N, M>::guard(std::size_t which, Mode mode, double t, const State& x) const
+{
+    const auto i = static_cast<Eigen::Index>(which / 4);
+    const Vector w = vector(x);
+    if (which >= first_set_guard) {
+        Reaction lower, upper;
+        matrices_.inclusion().bounds(t, w, lower, upper);
+        const auto k = static_cast<Eigen::Index>(which - first_set_guard);
+        return is_set(mode, k, lower[k], upper[k], observed(t, w)[k]);
+    }
+    if (which % 4 < 2) {
+        const double y = observed(t, w)[i];
+        return which % 4 == 0 ? y : -y;
+    }
+    return slacks(i, t, w, reaction(mode, t, w)[i])[which % 4 - 2];
+}
+
+template <int N, int M>
+void AnyModes<N, M>::guards(Mode mode, double t, const State& x, std::span<double> g) const
+{
+    const Vector w = vector(x);
+    const Reaction y = observed(t, w);
+    const Reaction r = reaction(mode < branch_modes ? mode : 0, t, w);
+    Reaction lower, upper;
+    matrices_.inclusion().bounds(t, w, lower, upper);
+    Reaction lower_here = lower, upper_here = upper;
+    if (matrices_.traits().continues_bounds) {
+        matrices_.inclusion().branch_bounds(t, w, lower_here, upper_here);
+    }
+    for (Eigen::Index i = 0; i < M; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const Slacks slack = slacks(lower_here[i], upper_here[i], r[i]);
+        g[4 * k] = y[i];
+        g[4 * k + 1] = -y[i];
+        g[4 * k + 2] = slack[0];
+        g[4 * k + 3] = slack[1];
+        g[first_set_guard + k] = is_set(mode, i, lower[i], upper[i], y[i]);
+    }
+}
+
+template <int N, int M>
+double AnyModes<N, M>::guard_rate(std::size_t which, Mode mode, double t, const State& x,
+                                  const State& dxdt) const
+{
+    if (which >= first_set_guard) return 0;
+    const auto i = static_cast<Eigen::Index>(which / 4);
+    const Vector w = vector(x);
+    const Vector dwdt = vector(dxdt);
+    if (which % 4 >= 2) return slack_rates(i, mode, t, w, dwdt)[which % 4 - 2];
+    const double rate = observed_rate(i, mode, t, w, dwdt);
+    return which % 4 == 0 ? rate : -rate;
+}
+
+template <int N, int M>
+void AnyModes<N, M>::guard_rates(Mode mode, double t, const State& x, const State& dxdt,
+                                 std::span<double> rates) const
+{
+    std::fill(rates.begin(), rates.end(), 0.0);
+    if (mode >= branch_modes) return;
+    const Vector w = vector(x);
+    const Vector dwdt = vector(dxdt);
+    for (Eigen::Index i = 0; i < M; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        if (is_held(i, mode)) {
+            const Slacks of = slack_rates(i, mode, t, w, dwdt);
+            rates[4 * k + 2] = of[0];
+            rates[4 * k + 3] = of[1];
+        } else {
+            const double rate = observed_rate(i, mode, t, w, dwdt);
+            (branch(k, mode) == Branch::lower ? rates[4 * k] : rates[4 * k + 1]) =
+                branch(k, mode) == Branch::lower ? rate : -rate;
+        }
+    }
+}
+
+template <int N, int M>
+Mode AnyModes<N, M>::reset(const FiredGuards& fired, Mode mode, double t, State& x) const
+{
+    Branches branches = branches_of(mode);
+    int left = 0;
+    int arrived = 0;
+    Branches held = branches;
+    Vector w = vector(x);
+    // Reactions at a bound whose y is zero as well, as of contacts that depend on one another.
+    const Branches zero = zero_branches(t, w);
+    int undecided = 0;
+    for (Eigen::Index i = 0; i < M; ++i) {
+        if (zero[i] != Branch::inside || branches[i] == Branch::inside) continue;
+        held[i] = Branch::inside;
+        ++undecided;
+    }
+    for (const std::size_t which : fired) {
+        if (which >= first_set_guard) return empty;
+        const auto i = static_cast<Eigen::Index>(which / 4);
+        if (which % 4 < 2) {
+            if (held[i] == Branch::inside) --undecided;
+            held[i] = Branch::inside;
+            ++arrived;
+        } else {
+            branches[i] = which % 4 == 2 ? Branch::lower : Branch::upper;
+            ++left;
+        }
+    }
+    hold(held, t, w);
+    Eigen::Map<Vector>(x.data()) = w;
+    if (faulty(t, w) >= 0) return empty;
+    if (left + arrived + undecided > 1 && left > 0) return several;
+    if (left == 1) return checked(mode_of(branches));
+    return settle(held, t, w);
+}
+
+template <int N, int M>
+Mode AnyModes<N, M>::mode_at(double t, Vector& w) const
+{
+    (void)minimal_selection(matrices_, t, w);
+    const Branches held = zero_branches(t, w);
+    hold(held, t, w);
+    return settle(held, t, w);
+}
+
+template <int N, int M>
+auto AnyModes<N, M>::zero_branches(double t, const Vector& w) const -> Branches
+{
+    const Reaction y = observed(t, w);
+    const Reaction size = matrices_.observe().cwiseAbs() * w.cwiseAbs() + offset(t).cwiseAbs();
+    Branches out;
+    for (Eigen::Index i = 0; i < M; ++i) {
+        const double rounding = 16 * std::numeric_limits<double>::epsilon() * size[i];
+        const bool zero = std::abs(y[i]) <= rounding;
+        out[i] = zero ? Branch::inside : y[i] > 0 ? Branch::lower : Branch::upper;
+    }
+    return out;
+}
+
+template <int N, int M>
+void AnyModes<N, M>::hold(const Branches& branches, double t, Vector& w) const
+{
+    const Hold& mine = holds_[mask_of(mode_of(branches))];
+    Reaction y = observed(t, w);
+    bool any = false;
+    for (Eigen::Index i = 0; i < M; ++i) {
+        if (branches[i] != Branch::inside) y[i] = 0;
+        any = any || (branches[i] == Branch::inside && matrices_.selected(i) < 0);
+    }
+    if (any && mine.determined) w -= lever_ * (mine.inverse * y);
+    const Reaction s = offset(t);
+    for (Eigen::Index i = 0; i < M; ++i) {
+        if (branches[i] == Branch::inside) matrices_.hold(i, 0, s[i], w);
+    }
+}
+
+}  // namespace detail
+
+/// The modes of a system.
+template <Branching System>
+class BranchModes : public detail::AnyModes<state_size<System>, reaction_size<System>> {
+public:
+    explicit BranchModes(const System& system)
+        : BranchModes::AnyModes(detail::TypedInclusion<System>(system))
+    {
+    }
 };
 
 }  // namespace ricochet

@@ -11,13 +11,20 @@
 
 namespace ricochet {
 
+namespace detail {
+
+template <int N, int M>
+struct RICOCHET_ALIGNED StateWithReaction {
+    double t = 0;
+    Eigen::Matrix<double, N, 1> w;
+    Eigen::Matrix<double, M, 1> reaction;
+};
+
+}  // namespace detail
+
 /// Where a set-valued motion is: the reaction belongs to the state.
 template <Inclusion System>
-struct SetValuedState {
-    double t = 0;
-    StateOf<System> w;
-    ReactionOf<System> reaction;
-};
+using SetValuedState = detail::StateWithReaction<state_size<System>, reaction_size<System>>;
 
 enum class Scheme {
     /// Over half the step the trapezoidal rule, then backward differences of three points
@@ -54,69 +61,38 @@ void validate(const SchemeOptions& options);
 namespace detail {
 
 /// Whether E A^-1 G of at most 64 reactions is singular to working precision.
-template <class System>
-[[nodiscard]] bool has_dependent_reactions(const InclusionMatrices<System>& m)
+template <int N, int M>
+[[nodiscard]] bool has_dependent_reactions(const AnyMatrices<N, M>& m)
 {
     if (m.reactions() > 64) return false;
-    const Eigen::MatrixXd w = m.observe() * (m.inverse_mass() * m.act());
-    return !Eigen::FullPivLU<Eigen::MatrixXd>(w).isInvertible();
+    Eigen::MatrixXd w = m.observe() * (m.inverse_mass() * m.act());
+    return invert(w, w) < w.rows();
 }
-
-}  // namespace detail
 
 /// Steps from any state to the next. Nothing is carried from one step to another but
 /// factors of constant matrices, so that the same state and step give the same bits.
-template <Inclusion System>
-class CompositeStep {
+template <int N, int M>
+class RICOCHET_ALIGNED AnyStep {
 public:
-    using Matrices = InclusionMatrices<System>;
-    using Vector = StateOf<System>;
-    using Reaction = ReactionOf<System>;
-    using State = SetValuedState<System>;
-    using Branches = detail::BranchesOf<System>;
-    static constexpr bool box = BoxSet<SetOf<System>>;
+    using Matrices = AnyMatrices<N, M>;
+    using Vector = typename Matrices::State;
+    using Reaction = typename Matrices::Reaction;
+    using State = StateWithReaction<N, M>;
+    using Branches = BranchesOf<M>;
 
     /// @throws std::invalid_argument for what `SchemeOptions` and `InclusionMatrices` refuse,
     /// and for StageMethod::cases where the set is no box of at most four reactions.
-    explicit CompositeStep(const System& system, const SchemeOptions& options = {})
-        : matrices_(system), options_(options), scratch_(matrices_), newton_(matrices_)
-    {
-        validate(options);
-        method_ = options.stage.method;
-        const bool few = box && matrices_.reactions() <= most_cases;
-        falls_back_ = method_ == StageMethod::automatic;
-        if (method_ == StageMethod::automatic) {
-            // Where reactions depend on one another Newton's equations are singular.
-            const bool by_cases = few || (box && detail::has_dependent_reactions(matrices_));
-            method_ = by_cases ? StageMethod::cases : StageMethod::newton;
-            falls_back_ = !by_cases;
-        } else if (method_ == StageMethod::cases && !few) {
-            detail::refuse_inclusion("cases need a box of at most four reactions, not",
-                                     static_cast<double>(matrices_.reactions()));
-        }
-        const Eigen::Index n = matrices_.size();
-        for (Vector* v : {&f_, &stage_.q}) v->setZero(n);
-        middle_.w.setZero(n);
-        middle_.reaction.setZero(matrices_.reactions());
-        branches_.setConstant(matrices_.reactions(), Branch::inside);
-    }
-    CompositeStep(const CompositeStep& other) : CompositeStep(other.system(), other.options_) {}
-    CompositeStep& operator=(const CompositeStep&) = delete;
+    AnyStep(const AnyInclusion<N, M>& inclusion, const SchemeOptions& options);
+    AnyStep(const AnyStep& other) : AnyStep(other.matrices_.inclusion(), other.options_) {}
+    AnyStep& operator=(const AnyStep&) = delete;
 
-    [[nodiscard]] const System& system() const noexcept { return matrices_.system(); }
     [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
     [[nodiscard]] const SchemeOptions& options() const noexcept { return options_; }
 
     /// The state after a step of h from `from`. If it has not converged, `to` means nothing.
     /// `frozen`: with these branches, whether the solution lies on them or not.
     [[nodiscard]] StageReport take(const State& from, double h, State& to,
-                                   const Branches* frozen = nullptr)
-    {
-        frozen_ = frozen;
-        if (options_.scheme == Scheme::bathe) return composite(from, h, to);
-        const double theta = options_.scheme == Scheme::theta ? options_.theta : 1;
-        return one_stage(from, h, theta, 1 / h, to);
-    }
+                                   const Branches* frozen = nullptr);
 
     /// The state at the end of the first stage of the last step.
     [[nodiscard]] const State& middle() const noexcept { return middle_; }
@@ -126,64 +102,16 @@ public:
     /// a sum,
     ///
     ///     (w_{n+1} - 4 w_g + 3 w_n + h A^-1 (f_n + G reaction_n)) / 2.
-    void embedded_error(const State& from, double h, const State& to, Vector& error) const
-    {
-        error.noalias() = matrices_.act() * from.reaction;
-        error += f_;
-        error = (0.5 * h) * (matrices_.inverse_mass() * error).eval();
-        error += 0.5 * (to.w - 4 * middle_.w + 3 * from.w);
-    }
+    void embedded_error(const State& from, double h, const State& to, Vector& error) const;
 
     /// Where the pair of reaction and y is on its graph: for a set of reactions the sign of
     /// y tells, and where that is zero up to rounding the place of the reaction in the
-    /// set; for a set of states the place of y.
-    void branches_of(const State& state, Branches& branches)
-        requires box
-    {
-        const auto set = system().reaction_set(state.t, state.w);
-        constexpr bool of_reactions = detail::confines<System>() == Confines::reaction;
-        matrices_.observed(state.t, state.w, scratch_.y);
-        matrices_.offset(state.t, scratch_.s);
-        scratch_.argument = matrices_.observe().cwiseAbs() * state.w.cwiseAbs() + scratch_.s.cwiseAbs();
-        for (Eigen::Index i = 0; i < branches.size(); ++i) {
-            const auto k = static_cast<std::size_t>(i);
-            const double y = scratch_.y[i];
-            if (of_reactions && std::abs(y) > 1e-14 * scratch_.argument[i]) {
-                branches[i] = y > 0 ? Branch::lower : Branch::upper;
-                continue;
-            }
-            const double lower = set.lower(k);
-            const double upper = set.upper(k);
-            const double at = of_reactions ? state.reaction[i] : y;
-            // Bounds that depend on the state are met within the solver's tolerance.
-            const double near = 1e-9 * (std::abs(at) + std::min(std::abs(lower), std::abs(upper)));
-            branches[i] = at <= lower + near   ? Branch::lower
-                          : at >= upper - near ? Branch::upper
-                                               : Branch::inside;
-        }
-    }
+    /// set; for a set of states the place of y. Boxes only.
+    void branches_of(const State& state, Branches& branches);
 
-    /// How far a state is inside its branches, as `LinearInequality::slack`.
-    [[nodiscard]] double slack(const State& state, const Branches& branches, Eigen::Index* which = nullptr)
-        requires box
-    {
-        auto& inequality = scratch_.inequality;
-        inequality.confines = detail::confines<System>();
-        const auto set = system().reaction_set(state.t, state.w);
-        matrices_.observed(state.t, state.w, scratch_.y);
-        double least = std::numeric_limits<double>::infinity();
-        for (Eigen::Index i = 0; i < branches.size(); ++i) {
-            inequality.lower[i] = set.lower(static_cast<std::size_t>(i));
-            inequality.upper[i] = set.upper(static_cast<std::size_t>(i));
-            const double here =
-                inequality.slack(i, branches[i], state.reaction[i], scratch_.y[i]);
-            if (here < least) {
-                least = here;
-                if (which) *which = i;
-            }
-        }
-        return least;
-    }
+    /// How far a state is inside its branches, as `LinearInequality::slack`. Boxes only.
+    [[nodiscard]] double slack(const State& state, const Branches& branches,
+                               Eigen::Index* which = nullptr);
 
 private:
     [[nodiscard]] StageReport composite(const State& from, double h, State& to)
@@ -211,18 +139,16 @@ private:
         matrices_.smooth(from.t, from.w, f_);
         const bool averages = options_.first_stage != FirstStage::at_end && theta < 1;
         StageReport report = attempt(from, span, theta, c, averages, to);
-        if constexpr (box) {
-            if (averages && report.converged && !frozen_ &&
-                options_.first_stage == FirstStage::switch_aware) {
-                Branches before = branches_;
-                Branches after = branches_;
-                branches_of(from, before);
-                branches_of(to, after);
-                if (before != after) {
-                    const int spent = report.iterations;
-                    report = attempt(from, span, theta, c, false, to);
-                    report.iterations += spent;
-                }
+        if (matrices_.traits().box && averages && report.converged && !frozen_ &&
+            options_.first_stage == FirstStage::switch_aware) {
+            Branches before = branches_;
+            Branches after = branches_;
+            branches_of(from, before);
+            branches_of(to, after);
+            if (before != after) {
+                const int spent = report.iterations;
+                report = attempt(from, span, theta, c, false, to);
+                report.iterations += spent;
             }
         }
         return report;
@@ -246,20 +172,17 @@ private:
 
     [[nodiscard]] StageReport solve(State& to)
     {
-        if constexpr (box) {
-            if (frozen_) {
-                branches_ = *frozen_;
-                return detail::solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction,
-                                           branches_, true);
-            }
-            if (method_ == StageMethod::cases) {
-                branches_.setConstant(Branch::inside);
-                return detail::solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction,
-                                           branches_);
-            }
+        if (frozen_) {
+            branches_ = *frozen_;
+            return solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_,
+                               true);
+        }
+        if (method_ == StageMethod::cases) {
+            branches_.setConstant(Branch::inside);
+            return solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_);
         }
         if (method_ == StageMethod::fixed_point) {
-            return detail::solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
+            return solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
         }
         const Vector start = to.w;
         const Reaction reaction = to.reaction;
@@ -275,12 +198,11 @@ private:
     [[nodiscard]] StageReport solve_again(State& to, const StageReport& before)
     {
         StageReport report;
-        if constexpr (box) {
+        if (matrices_.traits().box) {
             branches_.setConstant(Branch::inside);
-            report =
-                detail::solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_);
+            report = solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_);
         } else {
-            report = detail::solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
+            report = solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
         }
         const int spent = report.iterations + before.iterations;
         if (!report.converged && before.residual < report.residual) report = before;
@@ -292,13 +214,115 @@ private:
     SchemeOptions options_;
     StageMethod method_ = StageMethod::cases;
     bool falls_back_ = false;  // from Newton's method, where it was not asked for
-    StageScratch<System> scratch_;
-    detail::StageNewton<System> newton_;
-    detail::Stage<System> stage_;
+    StageScratch<N, M> scratch_;
+    StageNewton<N, M> newton_;
+    Stage<N, M> stage_;
     Vector f_;  // f_n
     State middle_;
     Branches branches_;
     const Branches* frozen_ = nullptr;
+};
+
+template <int N, int M>
+AnyStep<N, M>::AnyStep(const AnyInclusion<N, M>& inclusion, const SchemeOptions& options)
+    : matrices_(inclusion), options_(options), scratch_(matrices_), newton_(matrices_)
+{
+    validate(options);
+    method_ = options.stage.method;
+    const bool box = matrices_.traits().box;
+    const bool few = box && matrices_.reactions() <= most_cases;
+    falls_back_ = method_ == StageMethod::automatic;
+    if (method_ == StageMethod::automatic) {
+        // Where reactions depend on one another Newton's equations are singular.
+        const bool by_cases = few || (box && has_dependent_reactions(matrices_));
+        method_ = by_cases ? StageMethod::cases : StageMethod::newton;
+        falls_back_ = !by_cases;
+    } else if (method_ == StageMethod::cases && !few) {
+        refuse_inclusion("cases need a box of at most four reactions, not",
+                         static_cast<double>(matrices_.reactions()));
+    }
+    const Eigen::Index n = matrices_.size();
+    for (Vector* v : {&f_, &stage_.q}) v->setZero(n);
+    middle_.w.setZero(n);
+    middle_.reaction.setZero(matrices_.reactions());
+    branches_.setConstant(matrices_.reactions(), Branch::inside);
+}
+
+template <int N, int M>
+StageReport AnyStep<N, M>::take(const State& from, double h, State& to, const Branches* frozen)
+{
+    frozen_ = frozen;
+    if (options_.scheme == Scheme::bathe) return composite(from, h, to);
+    const double theta = options_.scheme == Scheme::theta ? options_.theta : 1;
+    return one_stage(from, h, theta, 1 / h, to);
+}
+
+template <int N, int M>
+void AnyStep<N, M>::embedded_error(const State& from, double h, const State& to,
+                                   Vector& error) const
+{
+    error.noalias() = matrices_.act() * from.reaction;
+    error += f_;
+    error = (0.5 * h) * (matrices_.inverse_mass() * error).eval();
+    error += 0.5 * (to.w - 4 * middle_.w + 3 * from.w);
+}
+
+template <int N, int M>
+void AnyStep<N, M>::branches_of(const State& state, Branches& branches)
+{
+    const bool of_reactions = matrices_.traits().of_reactions();
+    matrices_.inclusion().bounds(state.t, state.w, scratch_.lower, scratch_.upper);
+    matrices_.observed(state.t, state.w, scratch_.y);
+    matrices_.offset(state.t, scratch_.s);
+    scratch_.argument = matrices_.observe().cwiseAbs() * state.w.cwiseAbs() + scratch_.s.cwiseAbs();
+    for (Eigen::Index i = 0; i < branches.size(); ++i) {
+        const double y = scratch_.y[i];
+        if (of_reactions && std::abs(y) > 1e-14 * scratch_.argument[i]) {
+            branches[i] = y > 0 ? Branch::lower : Branch::upper;
+            continue;
+        }
+        const double lower = scratch_.lower[i];
+        const double upper = scratch_.upper[i];
+        const double at = of_reactions ? state.reaction[i] : y;
+        // Bounds that depend on the state are met within the solver's tolerance.
+        const double near = 1e-9 * (std::abs(at) + std::min(std::abs(lower), std::abs(upper)));
+        branches[i] = at <= lower + near   ? Branch::lower
+                      : at >= upper - near ? Branch::upper
+                                           : Branch::inside;
+    }
+}
+
+template <int N, int M>
+double AnyStep<N, M>::slack(const State& state, const Branches& branches, Eigen::Index* which)
+{
+    auto& inequality = scratch_.inequality;
+    matrices_.inclusion().bounds(state.t, state.w, inequality.lower, inequality.upper);
+    matrices_.observed(state.t, state.w, scratch_.y);
+    double least = std::numeric_limits<double>::infinity();
+    for (Eigen::Index i = 0; i < branches.size(); ++i) {
+        const double here = inequality.slack(i, branches[i], state.reaction[i], scratch_.y[i]);
+        if (here < least) {
+            least = here;
+            if (which) *which = i;
+        }
+    }
+    return least;
+}
+
+}  // namespace detail
+
+/// Steps of a system, from any state to the next.
+template <Inclusion System>
+class CompositeStep : public detail::AnyStep<state_size<System>, reaction_size<System>> {
+public:
+    static constexpr bool box = BoxSet<SetOf<System>>;
+
+    /// @throws std::invalid_argument for what `SchemeOptions` and `InclusionMatrices` refuse,
+    /// and for StageMethod::cases where the set is no box of at most four reactions.
+    explicit CompositeStep(const System& system, const SchemeOptions& options = {})
+        : CompositeStep::AnyStep(detail::TypedInclusion<System>(system), options)
+    {
+    }
 };
 
 }  // namespace ricochet

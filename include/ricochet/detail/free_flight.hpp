@@ -14,30 +14,24 @@
 #include <array>
 #include <vector>
 
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/any_mechanism.hpp"
 #include "ricochet/detail/contact_problem.hpp"
+#include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
 
-/// State x = (q, v). An impact allocates memory; flight does not. That of one contact without
-/// friction, or with one tangent, is a closed form: at restitution 1 it keeps the energy to
-/// rounding.
-template <class System>
-class FreeFlight {
+namespace detail {
+
+template <int N>
+class RICOCHET_ALIGNED AnyFlight {
 public:
-    static constexpr int N = System::coordinates;
-    static constexpr int C = System::contacts;
-    static constexpr int D = 1 + System::tangents;
     using State = std::array<double, 2 * static_cast<std::size_t>(N)>;
     using Vector = Eigen::Matrix<double, N, 1>;
     using Square = Eigen::Matrix<double, N, N>;
-    using Gaps = Eigen::Matrix<double, C, 1>;
-    using Directions = Eigen::Matrix<double, C * D, N>;
 
     static constexpr bool forward_only = true;
-    static constexpr std::size_t guard_count = static_cast<std::size_t>(C);
 
-    explicit FreeFlight(const System& system, const ContactOptions& contacts = {})
+    explicit AnyFlight(const AnyMechanism<N>& system, const ContactOptions& contacts = {})
         : system_(system), contacts_(contacts)
     {
     }
@@ -58,6 +52,10 @@ public:
         return Eigen::Map<const Vector>(x.data() + N);
     }
 
+    [[nodiscard]] std::size_t guard_count() const noexcept
+    {
+        return static_cast<std::size_t>(system_->contacts);
+    }
     [[nodiscard]] static GuardInfo guard_info(std::size_t /*contact*/) noexcept
     {
         GuardInfo info;
@@ -72,24 +70,20 @@ public:
         const Vector v = velocity(x);
         Square mass;
         Vector force;
-        system_.mass(q, mass);
-        system_.force(t, q, v, force);
+        system_->mass(q, mass);
+        system_->force(t, q, v, force);
         Eigen::Map<Vector>(dxdt.data()) = v;
         Eigen::Map<Vector>(dxdt.data() + N) = mass.llt().solve(force);
     }
 
     [[nodiscard]] double guard(std::size_t contact, double /*t*/, const State& x) const
     {
-        Gaps gaps;
-        system_.gaps(position(x), gaps);
-        return gaps[static_cast<Eigen::Index>(contact)];
+        return system_->gap(static_cast<int>(contact), position(x));
     }
     [[nodiscard]] double guard_rate(std::size_t contact, double /*t*/, const State& x,
                                     const State& /*dxdt*/) const
     {
-        Directions directions;
-        system_.directions(position(x), directions);
-        return directions.row(static_cast<Eigen::Index>(contact) * D).dot(velocity(x));
+        return system_->gap_rate(static_cast<int>(contact), position(x), velocity(x));
     }
 
     /// The impact. Where its contact problem has no solution that the solver finds, the
@@ -98,23 +92,24 @@ public:
     {
         const Vector q = position(x);
         Vector v = velocity(x);
-        Directions all;
-        system_.directions(q, all);
+        const int D = system_->components;
+        typename AnyMechanism<N>::Directions all;
+        system_->directions(q, all);
         const auto count = static_cast<Eigen::Index>(fired.size());
         Eigen::Matrix<double, Eigen::Dynamic, N> h(count * D, N);
         std::vector<double> friction;
         for (Eigen::Index k = 0; k < count; ++k) {
             const auto c = static_cast<int>(fired[static_cast<std::size_t>(k)]);
             h.middleRows(k * D, D) = all.middleRows(c * D, D);
-            friction.push_back(system_.friction(c));
+            friction.push_back(system_->friction(c));
         }
         Square mass;
-        system_.mass(q, mass);
+        system_->mass(q, mass);
         const Eigen::Matrix<double, N, Eigen::Dynamic> lever = mass.llt().solve(h.transpose());
         Eigen::VectorXd u = h * v;
         for (Eigen::Index k = 0; k < count; ++k) {
             const auto c = static_cast<int>(fired[static_cast<std::size_t>(k)]);
-            u[k * D] *= 1 + system_.restitution(c);
+            u[k * D] *= 1 + system_->restitution(c);
         }
         Eigen::VectorXd p = Eigen::VectorXd::Zero(count * D);
         ContactSolver solver(contacts_);
@@ -126,8 +121,26 @@ public:
     }
 
 private:
-    System system_;
+    Owned<AnyMechanism<N>> system_;
     ContactOptions contacts_;
+};
+
+}  // namespace detail
+
+/// State x = (q, v). An impact allocates memory; flight does not. That of one contact without
+/// friction, or with one tangent, is a closed form: at restitution 1 it keeps the energy to
+/// rounding.
+template <class System>
+class FreeFlight : public detail::AnyFlight<System::coordinates> {
+public:
+    static constexpr int N = System::coordinates;
+    static constexpr int C = System::contacts;
+    static constexpr int D = 1 + System::tangents;
+
+    explicit FreeFlight(const System& system, const ContactOptions& contacts = {})
+        : FreeFlight::AnyFlight(detail::TypedMechanism<System>(system), contacts)
+    {
+    }
 };
 
 }  // namespace ricochet

@@ -18,10 +18,10 @@
 namespace ricochet::detail {
 
 /// Remembers the end of the last step, which is the start of the next one.
-template <Branching System>
-class HeldReactions {
-    using Modes = BranchModes<System>;
-    using Vector = StateOf<System>;
+template <int N, int M>
+class RICOCHET_ALIGNED HeldReactions {
+    using Modes = AnyModes<N, M>;
+    using Vector = typename Modes::Vector;
     using Rooms = typename Modes::Rooms;
 
 public:

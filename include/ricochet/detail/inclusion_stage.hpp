@@ -15,20 +15,19 @@
 
 #include <limits>
 
-#include "ricochet/nonsmooth/inclusion.hpp"
-#include "ricochet/detail/linear_cases.hpp"
+#include "ricochet/detail/any_inclusion.hpp"
 
 namespace ricochet {
 
 namespace detail {
 
-template <class System>
-struct Stage {
+template <int N, int M>
+struct RICOCHET_ALIGNED Stage {
     double t = 0;
     double c = 1;
     double kappa = 1;
     double sigma = 1;
-    StateOf<System> q;
+    Eigen::Matrix<double, N, 1> q;
 };
 
 }  // namespace detail
@@ -55,13 +54,15 @@ struct StageOptions {
     bool line_search = true;   ///< of `newton`
 };
 
+namespace detail {
+
 /// S^-1 and what follows from it.
-template <class System>
-struct StageFactor {
-    static constexpr int N = state_size<System>;
+template <int N, int M>
+struct RICOCHET_ALIGNED StageFactor {
     static constexpr bool direct = N != Eigen::Dynamic && N <= 4;
-    using Matrices = InclusionMatrices<System>;
-    using Square = SquareOf<System>;
+    using Matrices = AnyMatrices<N, M>;
+    using State = typename Matrices::State;
+    using Square = typename Matrices::Square;
 
     double c = 0, kappa = 0, sigma = 0;
     bool valid = false;
@@ -71,7 +72,7 @@ struct StageFactor {
     typename Matrices::Action influence;   // sigma S^-1 G
     typename Matrices::Delassus delassus;  // E influence
 
-    void compute(const Matrices& m, const detail::Stage<System>& stage)
+    void compute(const Matrices& m, const Stage<N, M>& stage)
     {
         c = stage.c, kappa = stage.kappa, sigma = stage.sigma;
         if constexpr (direct) {
@@ -86,7 +87,7 @@ struct StageFactor {
         valid = true;
     }
 
-    void solve(const StateOf<System>& right, StateOf<System>& w) const
+    void solve(const State& right, State& w) const
     {
         if constexpr (direct) {
             w.noalias() = inverse * right;
@@ -97,38 +98,41 @@ struct StageFactor {
 };
 
 /// What the stage solvers need to know of one another's work, and their memory.
-template <class System>
-struct StageScratch {
-    using Matrices = InclusionMatrices<System>;
-    using State = StateOf<System>;
-    using Reaction = ReactionOf<System>;
-    static constexpr int N = state_size<System>;
-    static constexpr int M = reaction_size<System>;
+template <int N, int M>
+struct RICOCHET_ALIGNED StageScratch {
+    using Matrices = AnyMatrices<N, M>;
+    using State = typename Matrices::State;
+    using Reaction = typename Matrices::Reaction;
 
-    explicit StageScratch(const Matrices& matrices) : m(matrices)
+    explicit StageScratch(const Matrices& matrices)
+        : m(matrices), inclusion(matrices.inclusion()), traits(matrices.traits())
     {
         const Eigen::Index n = matrices.size();
         const Eigen::Index k = matrices.reactions();
         for (State* v : {&f, &f_trial, &w0, &trial, &defect, &base}) v->setZero(n);
-        for (Reaction* v : {&s, &y, &reaction, &argument, &image, &rho}) v->setZero(k);
+        for (Reaction* v : {&s, &y, &reaction, &argument, &image, &rho, &lower, &upper})
+            v->setZero(k);
         for (auto& factor : factors) factor.jacobian.setZero(n, n);
         inequality.w.setZero(k, k);
         for (Reaction* v : {&inequality.y0, &inequality.lower, &inequality.upper}) v->setZero(k);
+        inequality.confines = traits.confines;
     }
 
     const Matrices& m;
+    const AnyInclusion<N, M>& inclusion;
+    const InclusionTraits& traits;
     State f, f_trial, w0, trial, defect, base;
-    Reaction s, y, reaction, argument, image, rho;
+    Reaction s, y, reaction, argument, image, rho, lower, upper;
     LinearInequality<M> inequality;
     // Steps of constant length have two stages, and halved ones as many again.
-    std::array<StageFactor<System>, detail::is_affine<System>() ? 4 : 1> factors;
+    std::array<StageFactor<N, M>, 4> factors;
     std::size_t next_factor = 0;
 
     /// The factor of S at (t, w): an earlier one where f is affine and the weights are
     /// the same.
-    StageFactor<System>& factor(const detail::Stage<System>& stage, const State& w)
+    StageFactor<N, M>& factor(const Stage<N, M>& stage, const State& w)
     {
-        if constexpr (detail::is_affine<System>()) {
+        if (traits.affine) {
             for (auto& known : factors) {
                 if (known.valid && known.c == stage.c && known.kappa == stage.kappa &&
                     known.sigma == stage.sigma) {
@@ -137,14 +141,14 @@ struct StageScratch {
             }
         }
         auto& fresh = factors[next_factor];
-        next_factor = (next_factor + 1) % factors.size();
+        if (traits.affine) next_factor = (next_factor + 1) % factors.size();
         m.jacobian(stage.t, w, fresh.jacobian);
         fresh.compute(m, stage);
         return fresh;
     }
 
     /// rho, from the diagonal of W. Sets that are no boxes need one value for all.
-    void set_rho(const StageFactor<System>& by)
+    void set_rho(const StageFactor<N, M>& by)
     {
         double sum = 0;
         for (Eigen::Index i = 0; i < rho.size(); ++i) {
@@ -152,31 +156,38 @@ struct StageScratch {
             rho[i] = w > 0 ? 1 / w : 1;
             sum += w;
         }
-        if constexpr (!BoxSet<SetOf<System>>) {
-            rho.setConstant(sum > 0 ? static_cast<double>(rho.size()) / sum : 1);
+        if (!traits.box) rho.setConstant(sum > 0 ? static_cast<double>(rho.size()) / sum : 1);
+    }
+
+    /// What is projected in the law of (w, r): reaction - rho y, or for a set of states
+    /// y - reaction / rho.
+    void law_argument(const State& w, const Reaction& r)
+    {
+        y.noalias() = m.observe() * w;
+        y -= s;
+        if (traits.of_reactions()) {
+            argument = r - rho.cwiseProduct(y);
+        } else {
+            argument = y - r.cwiseQuotient(rho);
         }
     }
 
     /// image = reaction - P(reaction - rho y), or for a set of states
     /// rho (P(y - reaction / rho) - y) with the sign of a reaction.
-    template <class Set>
-    void law_defect(const Set& set, const Reaction& r, const Reaction& y_at)
+    void law_defect(double t, const State& w, const Reaction& r)
     {
-        if constexpr (detail::confines<System>() == Confines::reaction) {
-            argument = r - rho.cwiseProduct(y_at);
-            set.project(detail::span_of(argument), detail::span_of(image));
+        law_argument(w, r);
+        inclusion.project(t, w, argument, image);
+        if (traits.of_reactions()) {
             image = r - image;
         } else {
-            argument = y_at - r.cwiseQuotient(rho);
-            set.project(detail::span_of(argument), detail::span_of(image));
-            image = rho.cwiseProduct(image - y_at);
+            image = rho.cwiseProduct(image - y);
         }
     }
 
     /// The residual of (w, r), with f = f(t, w) given; tells which law is worst.
-    template <class Set>
-    StageReport residual(const detail::Stage<System>& stage, const Set& set, const State& w,
-                         const State& f_at, const Reaction& r)
+    StageReport residual(const Stage<N, M>& stage, const State& w, const State& f_at,
+                         const Reaction& r)
     {
         base.noalias() = stage.c * (m.mass() * w);
         defect = base - stage.kappa * f_at - stage.q;
@@ -188,9 +199,7 @@ struct StageScratch {
         scale = std::max(scale, base.template lpNorm<Eigen::Infinity>());
         StageReport report{.residual = defect.template lpNorm<Eigen::Infinity>()};
 
-        y.noalias() = m.observe() * w;
-        y -= s;
-        law_defect(set, r, y);
+        law_defect(stage.t, w, r);
         for (Eigen::Index i = 0; i < image.size(); ++i) {
             const double force = stage.sigma * std::abs(image[i]) *
                                  m.act().col(i).template lpNorm<Eigen::Infinity>();
@@ -207,5 +216,7 @@ struct StageScratch {
         return report;
     }
 };
+
+}  // namespace detail
 
 }  // namespace ricochet

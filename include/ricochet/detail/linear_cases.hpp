@@ -16,6 +16,7 @@
 #include <array>
 #include <cmath>
 
+#include "ricochet/detail/alignment.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
 
 namespace ricochet {
@@ -28,7 +29,7 @@ enum class Branch : signed char { lower = -1, inside = 0, upper = 1 };
 inline constexpr int most_cases = 4;
 
 template <int M>
-struct LinearInequality {
+struct RICOCHET_ALIGNED LinearInequality {
     using Vector = Eigen::Matrix<double, M, 1>;
     using Matrix = Eigen::Matrix<double, M, M>;
     using Branches = Eigen::Matrix<Branch, M, 1>;
@@ -42,6 +43,16 @@ struct LinearInequality {
     Vector y0;
     Vector lower, upper;    ///< of K
 
+    /// The first component whose interval is empty or has a bound that is not a number; -1 if
+    /// none has.
+    [[nodiscard]] int faulty() const noexcept
+    {
+        for (Eigen::Index i = 0; i < lower.size(); ++i) {
+            if (!(lower[i] <= upper[i])) return static_cast<int>(i);
+        }
+        return -1;
+    }
+
     /// The solution on the branch where the search meets it first, `branches` before any
     /// other; these are overwritten. False if none was found.
     [[nodiscard]] bool solve(Vector& reaction, Vector& y, Branches& branches) const
@@ -49,19 +60,10 @@ struct LinearInequality {
         if constexpr (M == 1) {
             if (w(0, 0) > 0) return solve_one(reaction, y, branches);
         }
-        if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
-        const int m = static_cast<int>(y0.size());
-        if (m > most_cases) return solve_by_pivots(reaction, y, branches);
-        int count = 1;
-        for (int i = 0; i < m; ++i) count *= 3;
-        for (int code = 0; code < count; ++code) {
-            for (int i = 0, rest = code; i < m; ++i, rest /= 3) {
-                branches[i] = static_cast<Branch>(rest % 3 - 1);
-            }
-            if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
-        }
-        return false;
+        return search(reaction, y, branches);
     }
+
+    [[nodiscard]] bool search(Vector& reaction, Vector& y, Branches& branches) const;
 
     /// For any number of unknowns and a positive semidefinite W, reactions that depend on one
     /// another included: proximal steps from reaction = 0,
@@ -72,72 +74,11 @@ struct LinearInequality {
     /// algorithm for large-scale strictly monotone linear complementarity problems, Computers and
     /// Operations Research 21, 1994). False where pivots or proximal steps do not end, as they
     /// need not where W is indefinite.
-    [[nodiscard]] bool solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const
-    {
-        LinearInequality strict = *this;
-        const double largest = w.diagonal().cwiseAbs().maxCoeff();
-        const Vector eps = (w.diagonal().cwiseAbs() * 1e-7).cwiseMax(1e-12 * largest);
-        strict.w.diagonal() += eps;
-        Vector before = y0;
-        before.setZero();
-        for (int step = 0; step < 100; ++step) {
-            strict.y0 = y0 - eps.cwiseProduct(before);
-            if (!strict.pivot(reaction, y, branches)) return false;
-            bool moves = false;
-            for (Eigen::Index i = 0; i < y0.size(); ++i) {
-                const double off = eps[i] * std::abs(reaction[i] - before[i]);
-                moves = moves || !(off <= 1e-14 * terms(i, reaction));
-            }
-            before = reaction;
-            if (!moves) break;
-        }
-        y.noalias() = w * reaction;
-        y += y0;
-        for (Eigen::Index i = 0; i < y0.size(); ++i) {
-            if (held(branches[i])) y[i] = target(i, branches[i]);
-        }
-        return y.allFinite();
-    }
+    [[nodiscard]] bool solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const;
 
     /// The solution of the equations of the given branches, whether it lies on them or
     /// not. False if they have none.
-    [[nodiscard]] bool solve_on(const Branches& branches, Vector& reaction, Vector& y) const
-    {
-        const Eigen::Index m = y0.size();
-        y = y0;
-        for (Eigen::Index i = 0; i < m; ++i) {
-            reaction[i] = held(branches[i]) ? 0 : fixed_reaction(i, branches[i]);
-            if (!std::isfinite(reaction[i])) return false;
-        }
-        // Reactions that hold their y at its target; the others are known.
-        Matrix a = w;
-        Vector b = y0;
-        for (Eigen::Index i = 0; i < m; ++i) {
-            if (held(branches[i])) {
-                b[i] = target(i, branches[i]) - y0[i];
-                for (Eigen::Index j = 0; j < m; ++j) {
-                    if (held(branches[j])) continue;
-                    b[i] -= w(i, j) * reaction[j];
-                    a(i, j) = 0;
-                }
-            } else {
-                a.row(i).setZero();
-                a(i, i) = 1;
-                b[i] = reaction[i];
-            }
-        }
-        if constexpr (M == 1) {
-            reaction[0] = b[0] / a(0, 0);
-        } else {
-            reaction = a.partialPivLu().solve(b);
-        }
-        if (!reaction.allFinite()) return false;
-        y.noalias() += w * reaction;
-        for (Eigen::Index i = 0; i < m; ++i) {
-            if (held(branches[i])) y[i] = target(i, branches[i]);
-        }
-        return y.allFinite();
-    }
+    [[nodiscard]] bool solve_on(const Branches& branches, Vector& reaction, Vector& y) const;
 
     [[nodiscard]] bool held(Branch branch) const noexcept
     {
@@ -272,5 +213,97 @@ private:
         return std::isfinite(reaction[0]) && std::isfinite(y[0]);
     }
 };
+
+template <int M>
+bool LinearInequality<M>::search(Vector& reaction, Vector& y, Branches& branches) const
+{
+    if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
+    const int m = static_cast<int>(y0.size());
+    if (m > most_cases) return solve_by_pivots(reaction, y, branches);
+    int count = 1;
+    for (int i = 0; i < m; ++i) count *= 3;
+    for (int code = 0; code < count; ++code) {
+        for (int i = 0, rest = code; i < m; ++i, rest /= 3) {
+            branches[i] = static_cast<Branch>(rest % 3 - 1);
+        }
+        if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
+    }
+    return false;
+}
+
+template <int M>
+bool LinearInequality<M>::solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const
+{
+    LinearInequality strict = *this;
+    const double largest = w.diagonal().cwiseAbs().maxCoeff();
+    const Vector eps = (w.diagonal().cwiseAbs() * 1e-7).cwiseMax(1e-12 * largest);
+    strict.w.diagonal() += eps;
+    Vector before = y0;
+    before.setZero();
+    for (int step = 0; step < 100; ++step) {
+        strict.y0 = y0 - eps.cwiseProduct(before);
+        if (!strict.pivot(reaction, y, branches)) return false;
+        bool moves = false;
+        for (Eigen::Index i = 0; i < y0.size(); ++i) {
+            const double off = eps[i] * std::abs(reaction[i] - before[i]);
+            moves = moves || !(off <= 1e-14 * terms(i, reaction));
+        }
+        before = reaction;
+        if (!moves) break;
+    }
+    y.noalias() = w * reaction;
+    y += y0;
+    for (Eigen::Index i = 0; i < y0.size(); ++i) {
+        if (held(branches[i])) y[i] = target(i, branches[i]);
+    }
+    return y.allFinite();
+}
+
+template <int M>
+bool LinearInequality<M>::solve_on(const Branches& branches, Vector& reaction, Vector& y) const
+{
+    const Eigen::Index m = y0.size();
+    y = y0;
+    for (Eigen::Index i = 0; i < m; ++i) {
+        reaction[i] = held(branches[i]) ? 0 : fixed_reaction(i, branches[i]);
+        if (!std::isfinite(reaction[i])) return false;
+    }
+    // Reactions that hold their y at its target; the others are known.
+    Matrix a = w;
+    Vector b = y0;
+    for (Eigen::Index i = 0; i < m; ++i) {
+        if (held(branches[i])) {
+            b[i] = target(i, branches[i]) - y0[i];
+            for (Eigen::Index j = 0; j < m; ++j) {
+                if (held(branches[j])) continue;
+                b[i] -= w(i, j) * reaction[j];
+                a(i, j) = 0;
+            }
+        } else {
+            a.row(i).setZero();
+            a(i, i) = 1;
+            b[i] = reaction[i];
+        }
+    }
+    if constexpr (M == 1) {
+        reaction[0] = b[0] / a(0, 0);
+    } else {
+        reaction = a.partialPivLu().solve(b);
+    }
+    if (!reaction.allFinite()) return false;
+    y.noalias() += w * reaction;
+    for (Eigen::Index i = 0; i < m; ++i) {
+        if (held(branches[i])) y[i] = target(i, branches[i]);
+    }
+    return y.allFinite();
+}
+
+#if RICOCHET_ALIGNED_AS_LIBRARY
+extern template struct LinearInequality<1>;
+extern template struct LinearInequality<2>;
+extern template struct LinearInequality<3>;
+extern template struct LinearInequality<4>;
+extern template struct LinearInequality<Eigen::Dynamic>;
+#endif
 
 }  // namespace ricochet

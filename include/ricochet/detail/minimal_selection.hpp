@@ -3,6 +3,10 @@
 // Which of the reactions allowed at a state does the motion take?
 #pragma once
 
+#include <limits>
+#include <string>
+#include <type_traits>
+
 #include "ricochet/detail/composite_step.hpp"
 
 namespace ricochet {
@@ -10,26 +14,28 @@ namespace ricochet {
 namespace detail {
 
 /// reaction = P(reaction - rho (y / delta + q + W reaction)) by Newton's method.
-template <class System>
-struct SelectionProblem {
-    using Reaction = ReactionOf<System>;
-    const SetOf<System>& set;
-    const typename InclusionMatrices<System>::Delassus& w;
+template <int N, int M>
+struct RICOCHET_ALIGNED SelectionProblem {
+    using Reaction = typename AnyMatrices<N, M>::Reaction;
+    using Matrix = typename AnyMatrices<N, M>::Delassus;
+    const AnyInclusion<N, M>& inclusion;
+    double t;
+    const typename AnyMatrices<N, M>::State& state;
+    const Matrix& w;
     const Reaction& constant;
     double rho;
 
     void residual(const Reaction& r, Reaction& f) const
     {
         const Reaction z = r - rho * (constant + w * r);
-        set.project(span_of(z), span_of(f));
+        inclusion.project(t, state, z, f);
         f = r - f;
     }
     [[nodiscard]] bool direction(const Reaction& r, const Reaction& f, Reaction& d) const
     {
-        using Matrix = typename InclusionMatrices<System>::Delassus;
         const Reaction z = r - rho * (constant + w * r);
         Matrix slope = w;
-        set.derivative(span_of(z), {slope.data(), static_cast<std::size_t>(slope.size())});
+        inclusion.derivative(t, state, z, slope.data());
         Matrix v = Matrix::Identity(w.rows(), w.cols()) - slope;
         v.noalias() += rho * slope * w;
         Eigen::PartialPivLU<Matrix> lu;
@@ -40,9 +46,9 @@ struct SelectionProblem {
 /// Whether -y is in the normal cone of the set at r, to a millionth: r = P(r - rho y), with
 /// rho y of the size of r. Where no reaction opposes y, inside an obstacle, the r of an
 /// approximate problem is finite all the same, and off by its own size.
-template <ConvexSet Set, class Reaction>
-[[nodiscard]] bool opposes(const Set& set, const Reaction& r, const Reaction& y,
-                           const Reaction& rate, double mean)
+template <int N, int M, class State, class Reaction>
+[[nodiscard]] bool opposes(const AnyInclusion<N, M>& inclusion, double t, const State& w,
+                           const Reaction& r, const Reaction& y, const Reaction& rate, double mean)
 {
     const double length = y.template lpNorm<Eigen::Infinity>();
     if (length == 0) return true;
@@ -50,7 +56,7 @@ template <ConvexSet Set, class Reaction>
     if (mean > 0) size += rate.template lpNorm<Eigen::Infinity>() / mean;
     if (size == 0) size = 1;
     Reaction z = r - (size / length) * y;
-    set.project(span_of(z), span_of(z));
+    inclusion.project(t, w, z, z);
     return (z - r).template lpNorm<Eigen::Infinity>() <= 1e-6 * size;
 }
 
@@ -67,22 +73,25 @@ template <ConvexSet Set, class Reaction>
 ///
 /// @throws std::invalid_argument where the set is empty, where w lies outside a set of
 /// states, or where the reaction would have to be infinite (inside an obstacle).
-template <Inclusion System>
-[[nodiscard]] ReactionOf<System> minimal_selection(const InclusionMatrices<System>& m, double t,
-                                                   const StateOf<System>& w)
+template <int N, int M>
+[[nodiscard]] Eigen::Matrix<double, M, 1> minimal_selection(
+    const detail::AnyMatrices<N, M>& m, double t,
+    const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w)
 {
-    using Reaction = ReactionOf<System>;
-    constexpr bool of_reactions = detail::confines<System>() == Confines::reaction;
+    using Matrices = detail::AnyMatrices<N, M>;
+    using Reaction = typename Matrices::Reaction;
+    const auto& inclusion = m.inclusion();
+    const bool of_reactions = m.traits().of_reactions();
     if (!w.allFinite()) detail::refuse_inclusion("the initial state is not finite");
-    const auto set = m.system().reaction_set(t, w);
-    if (const auto fault = fault_of(set); !fault.empty()) {
-        detail::refuse_inclusion(std::string("the set at the start ") + std::string(fault));
+    if (const std::string fault = inclusion.fault(t, w); !fault.empty()) {
+        detail::refuse_inclusion("the set at the start " + fault);
     }
-    if (static_cast<Eigen::Index>(set.dimension()) != m.reactions()) {
+    if (const std::size_t dimension = inclusion.set_dimension(t, w);
+        static_cast<Eigen::Index>(dimension) != m.reactions()) {
         detail::refuse_inclusion("the set must have the dimension of the reaction, not",
-                                 static_cast<double>(set.dimension()));
+                                 static_cast<double>(dimension));
     }
-    StateOf<System> f = w;
+    typename Matrices::State f = w;
     m.smooth(t, w, f);
     if (!f.allFinite()) detail::refuse_inclusion("f is not finite at the start");
     Reaction y, s;
@@ -90,32 +99,31 @@ template <Inclusion System>
     m.offset(t, s);
     // y' without the reaction, and what the reaction adds.
     Reaction rate = m.observe() * (m.inverse_mass() * f);
-    if constexpr (requires { m.system().offset(t, s); }) {
+    if (m.traits().moves) {
         const double step = 1e-5 * std::max(1.0, std::abs(t));
         Reaction ahead, behind;
         m.offset(t + step, ahead);
         m.offset(t - step, behind);
         rate -= (ahead - behind) / (2 * step);
     }
-    typename InclusionMatrices<System>::Delassus delassus =
-        m.observe() * (m.inverse_mass() * m.act());
+    const typename Matrices::Delassus delassus = m.observe() * (m.inverse_mass() * m.act());
     const Reaction size = m.observe().cwiseAbs() * w.cwiseAbs() + s.cwiseAbs();
 
     Reaction reaction;
     reaction.setZero(m.reactions());
-    if constexpr (BoxSet<SetOf<System>>) {
+    if (m.traits().box) {
         if (m.reactions() <= most_cases || detail::has_dependent_reactions(m)) {
-            LinearInequality<reaction_size<System>> inequality;
+            LinearInequality<M> inequality;
             inequality.w = delassus;
             inequality.y0 = rate;
             inequality.lower = inequality.upper = reaction;
+            inclusion.bounds(t, w, inequality.lower, inequality.upper);
             for (Eigen::Index i = 0; i < reaction.size(); ++i) {
-                const auto k = static_cast<std::size_t>(i);
-                double lower = set.lower(k);
-                double upper = set.upper(k);
+                double lower = inequality.lower[i];
+                double upper = inequality.upper[i];
                 const double touch = 16 * std::numeric_limits<double>::epsilon() * size[i];
                 constexpr double infinity = std::numeric_limits<double>::infinity();
-                if constexpr (of_reactions) {
+                if (of_reactions) {
                     if (std::abs(y[i]) > touch) lower = upper = y[i] > 0 ? lower : upper;
                     if (std::isinf(lower) && lower == upper) {
                         detail::refuse_inclusion("the initial state is inside an obstacle: y is",
@@ -139,7 +147,7 @@ template <Inclusion System>
                 // Without influence on y' a reaction that is asked for is all or nothing.
                 if (delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
             }
-            typename LinearInequality<reaction_size<System>>::Branches branches;
+            typename LinearInequality<M>::Branches branches;
             branches.setConstant(m.reactions(), Branch::inside);
             Reaction unused = reaction;
             if (!inequality.solve(reaction, unused, branches)) {
@@ -148,7 +156,7 @@ template <Inclusion System>
             return reaction;
         }
     }
-    if constexpr (of_reactions) {
+    if (of_reactions) {
         // A nonzero y outweighs any y'.
         double smallest = std::numeric_limits<double>::infinity();
         for (Eigen::Index i = 0; i < y.size(); ++i) {
@@ -160,18 +168,19 @@ template <Inclusion System>
         const double delta = std::isfinite(smallest) && largest > 0 ? 1e-9 * smallest / largest : 1;
         const Reaction constant = y / delta + rate;
         const double mean = delassus.diagonal().cwiseAbs().mean();
-        detail::SelectionProblem<System> problem{set, delassus, constant, mean > 0 ? 1 / mean : 1};
+        detail::SelectionProblem<N, M> problem{inclusion, t,        w,
+                                               delassus,  constant, mean > 0 ? 1 / mean : 1};
         (void)semismooth_newton(problem, reaction, {.tolerance = 1e-13, .max_iterations = 100});
         // Where Newton stalls at a kink the fixed point gets there, at its own pace.
         const double rho = 1 / std::max(delassus.norm(), std::numeric_limits<double>::min());
         for (int i = 0; i < 20000; ++i) {
             Reaction z = reaction - rho * (constant + delassus * reaction);
-            set.project(detail::span_of(z), detail::span_of(z));
+            inclusion.project(t, w, z, z);
             const double moved = (z - reaction).template lpNorm<Eigen::Infinity>();
             reaction = z;
             if (moved <= 1e-15 * (1 + reaction.template lpNorm<Eigen::Infinity>())) break;
         }
-        if (!reaction.allFinite() || !detail::opposes(set, reaction, y, rate, mean)) {
+        if (!reaction.allFinite() || !detail::opposes(inclusion, t, w, reaction, y, rate, mean)) {
             detail::refuse_inclusion("the initial state needs an infinite reaction");
         }
     }

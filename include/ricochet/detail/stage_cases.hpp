@@ -10,25 +10,24 @@
 
 namespace ricochet::detail {
 
-template <class System>
-using BranchesOf = typename LinearInequality<reaction_size<System>>::Branches;
+template <int M>
+using BranchesOf = typename LinearInequality<M>::Branches;
 
 /// The residual on frozen branches: the equation, and the bounds where they were taken
 /// from an earlier iterate.
-template <class System, class Set>
-[[nodiscard]] StageReport without_law(StageScratch<System>& scratch,
-                                      const detail::Stage<System>& stage, const Set& set,
-                                      const BranchesOf<System>& branches)
+template <int N, int M>
+[[nodiscard]] StageReport without_law(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
+                                      const BranchesOf<M>& branches)
 {
     const double scale = std::max({(stage.c * (scratch.m.mass() * scratch.trial)).template lpNorm<Eigen::Infinity>(),
                                    stage.q.template lpNorm<Eigen::Infinity>(),
                                    stage.kappa * scratch.f_trial.template lpNorm<Eigen::Infinity>()});
     double worst = scratch.defect.template lpNorm<Eigen::Infinity>();
-    if (confines<System>() == Confines::reaction) {
+    if (scratch.traits.of_reactions()) {
+        scratch.inclusion.bounds(stage.t, scratch.trial, scratch.lower, scratch.upper);
         for (Eigen::Index i = 0; i < branches.size(); ++i) {
-            const auto k = static_cast<std::size_t>(i);
-            const double bound = branches[i] == Branch::lower   ? set.lower(k)
-                                 : branches[i] == Branch::upper ? set.upper(k)
+            const double bound = branches[i] == Branch::lower   ? scratch.lower[i]
+                                 : branches[i] == Branch::upper ? scratch.upper[i]
                                                                 : scratch.reaction[i];
             worst = std::max(worst, stage.sigma * std::abs(scratch.reaction[i] - bound) *
                                         scratch.m.act().col(i).template lpNorm<Eigen::Infinity>());
@@ -42,28 +41,22 @@ template <class System, class Set>
 ///
 /// Starts from (w, reaction) and overwrites them; on failure they are what was reached.
 /// `frozen`: stay on these branches, whether the solution lies on them or not.
-template <class System>
-[[nodiscard]] StageReport solve_cases(StageScratch<System>& scratch,
-                                      const detail::Stage<System>& stage,
-                                      const StageOptions& options, StateOf<System>& w,
-                                      ReactionOf<System>& reaction, BranchesOf<System>& branches,
-                                      bool frozen = false) requires BoxSet<SetOf<System>>
+template <int N, int M>
+[[nodiscard]] StageReport solve_cases(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
+                                      const StageOptions& options,
+                                      typename AnyMatrices<N, M>::State& w,
+                                      typename AnyMatrices<N, M>::Reaction& reaction,
+                                      BranchesOf<M>& branches, bool frozen = false)
 {
     const auto& m = scratch.m;
     auto& inequality = scratch.inequality;
-    inequality.confines = confines<System>();
     m.offset(stage.t, scratch.s);
     m.smooth(stage.t, w, scratch.f);
     StageReport best;
     for (int iteration = 1; iteration <= options.max_iterations; ++iteration) {
         const auto& factor = scratch.factor(stage, w);
-        const auto set = m.system().reaction_set(stage.t, w);
-        if (!fault_of(set).empty()) {
-            return {.iterations = iteration, .set = std::max(0, faulty_interval(set))};
-        }
-        for (Eigen::Index i = 0; i < reaction.size(); ++i) {
-            inequality.lower[i] = set.lower(static_cast<std::size_t>(i));
-            inequality.upper[i] = set.upper(static_cast<std::size_t>(i));
+        if (!scratch.inclusion.bounds(stage.t, w, inequality.lower, inequality.upper)) {
+            return {.iterations = iteration, .set = std::max(0, inequality.faulty())};
         }
         // w as a function of the reaction, f replaced by its tangent.
         scratch.base.noalias() = factor.jacobian * w;
@@ -91,16 +84,15 @@ template <class System>
                 scratch.trial = w + share * (scratch.trial - w);
                 scratch.reaction = reaction + share * (scratch.reaction - reaction);
             }
-            if constexpr (is_affine<System>()) {
+            if (scratch.traits.affine) {
                 scratch.f_trial.noalias() = factor.jacobian * (scratch.trial - w);
                 scratch.f_trial += scratch.f;
             } else {
                 m.smooth(stage.t, scratch.trial, scratch.f_trial);
             }
-            const auto set_there = m.system().reaction_set(stage.t, scratch.trial);
-            StageReport now = scratch.residual(stage, set_there, scratch.trial, scratch.f_trial,
-                                               scratch.reaction);
-            if (frozen) now = without_law(scratch, stage, set_there, branches);
+            StageReport now =
+                scratch.residual(stage, scratch.trial, scratch.f_trial, scratch.reaction);
+            if (frozen) now = without_law(scratch, stage, branches);
             now.iterations = iteration;
             if (now.residual < best.residual || halving == 6 || iteration == 1) {
                 best = now;

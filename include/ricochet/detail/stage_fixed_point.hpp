@@ -19,11 +19,11 @@ namespace ricochet::detail {
 ///
 /// (The Bathe / variational-inequality solver of D. M. Riley and others, Reinforcement
 /// Learning-based adaptive time-integration for nonsmooth dynamics, and its code.)
-template <class System>
-[[nodiscard]] StageReport solve_fixed_point(StageScratch<System>& scratch,
-                                            const detail::Stage<System>& stage,
-                                            const StageOptions& options, StateOf<System>& w,
-                                            ReactionOf<System>& reaction)
+template <int N, int M>
+[[nodiscard]] StageReport solve_fixed_point(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
+                                            const StageOptions& options,
+                                            typename AnyMatrices<N, M>::State& w,
+                                            typename AnyMatrices<N, M>::Reaction& reaction)
 {
     const auto& m = scratch.m;
     m.offset(stage.t, scratch.s);
@@ -37,7 +37,7 @@ template <class System>
     double rho = largest > 0 ? 1 / largest : 1;
     auto& force = scratch.f_trial;  // F
     auto& before = scratch.w0;
-    const auto defect = [&](const StateOf<System>& at, StateOf<System>& out) {
+    const auto defect = [&](const auto& at, auto& out) {
         m.smooth(stage.t, at, scratch.f);
         out.noalias() = stage.c * (m.mass() * at);
         out -= stage.kappa * scratch.f + stage.q;
@@ -49,21 +49,21 @@ template <class System>
         before = w;
         scratch.trial = force;
         w -= rho * force;
-        const auto set = m.system().reaction_set(stage.t, before);
-        if (!fault_of(set).empty()) return {.iterations = iteration, .set = 0};
         scratch.argument.noalias() = m.observe() * w;
         scratch.argument -= scratch.s;
-        if constexpr (confines<System>() == Confines::reaction) {
-            scratch.argument /= -rho * stage.sigma;
-            set.project(span_of(scratch.argument), span_of(reaction));
+        const bool of_reactions = scratch.traits.of_reactions();
+        if (of_reactions) scratch.argument /= -rho * stage.sigma;
+        if (!scratch.inclusion.project(stage.t, before, scratch.argument, scratch.image)) {
+            return {.iterations = iteration, .set = 0};
+        }
+        if (of_reactions) {
+            reaction = scratch.image;
         } else {
-            set.project(span_of(scratch.argument), span_of(scratch.image));
             reaction = (scratch.image - scratch.argument) / (rho * stage.sigma);
         }
         w.noalias() += (rho * stage.sigma) * (m.act() * reaction);
         defect(w, force);
-        report =
-            scratch.residual(stage, m.system().reaction_set(stage.t, w), w, scratch.f, reaction);
+        report = scratch.residual(stage, w, scratch.f, reaction);
         report.iterations = iteration;
         report.converged = report.residual <= options.tolerance;
         if (report.converged || !std::isfinite(report.residual)) return report;

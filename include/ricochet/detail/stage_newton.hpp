@@ -15,17 +15,17 @@ namespace ricochet::detail {
 ///
 /// with the derivative of a bound by the state where the system declares it, and without
 /// it as if the bound were constant: the iteration then converges linearly.
-template <class System>
-class StageNewton {
+template <int N, int M>
+class RICOCHET_ALIGNED StageNewton {
 public:
-    static constexpr int N = state_size<System>;
-    static constexpr int M = reaction_size<System>;
     static constexpr int size =
         N == Eigen::Dynamic || M == Eigen::Dynamic ? Eigen::Dynamic : N + M;
+    using State = typename AnyMatrices<N, M>::State;
+    using Reaction = typename AnyMatrices<N, M>::Reaction;
     using Vector = Eigen::Matrix<double, size, 1>;
     using Matrix = Eigen::Matrix<double, size, size>;
 
-    explicit StageNewton(const InclusionMatrices<System>& m)
+    explicit StageNewton(const AnyMatrices<N, M>& m)
     {
         const Eigen::Index n = m.size();
         const Eigen::Index k = m.reactions();
@@ -38,9 +38,8 @@ public:
         reaction_.setZero(k);
     }
 
-    [[nodiscard]] StageReport solve(StageScratch<System>& scratch,
-                                    const detail::Stage<System>& stage, const StageOptions& options,
-                                    StateOf<System>& w, ReactionOf<System>& reaction)
+    [[nodiscard]] StageReport solve(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
+                                    const StageOptions& options, State& w, Reaction& reaction)
     {
         scratch_of_stage_ = &scratch;
         stage_ = &stage;
@@ -65,8 +64,7 @@ public:
         w = x_.head(w.size());
         reaction = x_.tail(reaction.size());
         m.smooth(stage.t, w, scratch.f);
-        StageReport report = scratch.residual(stage, m.system().reaction_set(stage.t, w), w,
-                                              scratch.f, reaction);
+        StageReport report = scratch.residual(stage, w, scratch.f, reaction);
         report.iterations = newton.iterations;
         report.converged = report.residual <= options.tolerance;
         return report;
@@ -77,8 +75,7 @@ public:
         auto& s = *scratch_of_stage_;
         take_apart(x);
         s.m.smooth(stage_->t, w_, s.f_trial);
-        (void)s.residual(*stage_, s.m.system().reaction_set(stage_->t, w_), w_, s.f_trial,
-                         reaction_);
+        (void)s.residual(*stage_, w_, s.f_trial, reaction_);
         f.head(w_.size()) = s.defect / scale_;
         f.tail(reaction_.size()) = (stage_->sigma / scale_) * s.image;
     }
@@ -89,39 +86,32 @@ public:
         take_apart(x);
         const Eigen::Index n = w_.size();
         const Eigen::Index k = reaction_.size();
-        const auto set = s.m.system().reaction_set(stage_->t, w_);
-        if (!fault_of(set).empty()) return false;
-        // A box's law has one slope per row; `argument` is where the projection was taken.
-        s.m.smooth(stage_->t, w_, s.f_trial);
-        (void)s.residual(*stage_, set, w_, s.f_trial, reaction_);
-        set.derivative(span_of(s.argument), {slope_.data(), static_cast<std::size_t>(k * k)});
+        // A box's law has one slope per row.
+        s.law_argument(w_, reaction_);
+        if (!s.inclusion.derivative(stage_->t, w_, s.argument, slope_.data())) return false;
         auto& jacobian = s.factors[0].jacobian;
         s.m.jacobian(stage_->t, w_, jacobian);
         v_.topLeftCorner(n, n) = stage_->c * s.m.mass() - stage_->kappa * jacobian;
         v_.topRightCorner(n, k) = -stage_->sigma * s.m.act();
-        constexpr bool of_reactions = confines<System>() == Confines::reaction;
-        const auto by_y = of_reactions ? Confines::reaction : Confines::state;
+        const bool of_reactions = s.traits.of_reactions();
         for (Eigen::Index i = 0; i < k; ++i) {
             for (Eigen::Index j = 0; j < k; ++j) {
                 const double unit = i == j ? 1 : 0;
                 // Row-major in memory, hence slope_(j, i).
                 const double p = slope_(j, i);
-                v_(n + i, n + j) =
-                    by_y == Confines::reaction ? unit - p : -s.rho[i] * p / s.rho[j];
+                v_(n + i, n + j) = of_reactions ? unit - p : -s.rho[i] * p / s.rho[j];
             }
             v_.row(n + i).head(n).setZero();
             for (Eigen::Index j = 0; j < k; ++j) {
                 const double unit = i == j ? 1 : 0;
                 const double p = slope_(j, i);
-                const double factor = by_y == Confines::reaction ? p * s.rho[j] : s.rho[i] * (p - unit);
+                const double factor = of_reactions ? p * s.rho[j] : s.rho[i] * (p - unit);
                 v_.row(n + i).head(n) += factor * s.m.observe().row(j);
             }
-            if constexpr (HasBoundGradient<System> && BoxSet<SetOf<System>>) {
-                add_bound_gradient(set, i, s);
-            }
+            if (s.traits.gives_bound_gradient && s.traits.box) add_bound_gradient(i, s);
             v_.row(n + i) *= stage_->sigma;
         }
-        if constexpr (is_affine<System>()) s.factors[0].valid = false;
+        s.factors[0].valid = false;
         // Undamped directions at kinks can be singular; the search would stall there.
         return dense_direction(v_, lu_, Vector(f * scale_), d);
     }
@@ -136,26 +126,25 @@ private:
         reaction_ = x.tail(reaction_.size());
     }
 
-    template <class Set>
-    void add_bound_gradient(const Set& set, Eigen::Index i, StageScratch<System>& s)
+    void add_bound_gradient(Eigen::Index i, StageScratch<N, M>& s)
     {
-        const auto k = static_cast<std::size_t>(i);
+        s.inclusion.bounds(stage_->t, w_, s.lower, s.upper);
         const double z = s.argument[i];
-        const double side = z > set.upper(k) ? 1 : z < set.lower(k) ? -1 : 0;
+        const double side = z > s.upper[i] ? 1 : z < s.lower[i] ? -1 : 0;
         if (side == 0) return;
-        s.m.system().bound_gradient(stage_->t, w_, static_cast<int>(i), gradient_);
+        s.inclusion.bound_gradient(stage_->t, w_, i, gradient_);
         v_.row(w_.size() + i).head(w_.size()) -= side * gradient_.transpose();
     }
 
-    StageScratch<System>* scratch_of_stage_ = nullptr;
-    const detail::Stage<System>* stage_ = nullptr;
+    StageScratch<N, M>* scratch_of_stage_ = nullptr;
+    const Stage<N, M>* stage_ = nullptr;
     double scale_ = 1;
     Vector x_;
     Matrix v_;
     Eigen::PartialPivLU<Matrix> lu_;
     Eigen::Matrix<double, M, M> slope_;
-    StateOf<System> w_, gradient_;
-    ReactionOf<System> reaction_;
+    State w_, gradient_;
+    Reaction reaction_;
     NewtonScratch<Vector> scratch_;
 };
 

@@ -10,7 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <memory>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
@@ -46,10 +46,11 @@ struct ContactStatistics {
     double contact_time = 0;  ///< [s] of the motion
 };
 
-/// Events are impacts in flight; `Event::guard` is the contact, and x = (q, v).
-template <Contacting System>
-struct ContactRun {
-    using X = typename FreeFlight<System>::State;
+namespace detail {
+
+template <int N>
+struct AnyContactRun {
+    using X = typename AnyFlight<N>::State;
 
     HandOverOutcome outcome = HandOverOutcome::reached_end;
     double t = 0;
@@ -61,35 +62,44 @@ struct ContactRun {
     ContactReport failure;  ///< with `not_converged`, and `non_finite` in contact
 };
 
-/// Of `HandOverOptions` those of the event-driven phases count, and `set_valued.step` as the
-/// step of time stepping.
-template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
-class ContactMotion {
+}  // namespace detail
+
+/// Events are impacts in flight; `Event::guard` is the contact, and x = (q, v).
+template <Contacting System>
+struct ContactRun : detail::AnyContactRun<System::coordinates> {
+};
+
+namespace detail {
+
+/// Makes simulations of free flight by one stepper.
+template <int N>
+struct FlightStepping {
+    std::unique_ptr<EventLoop<2 * N>> (*make)(const AnyFlight<N>& flight,
+                                              const typename EventLoop<2 * N>::X& x,
+                                              const Options& options) = nullptr;
+    bool error_controlled = true;
+};
+
+template <int N, class Stepping>
+std::unique_ptr<EventLoop<2 * N>> make_flight_loop(const AnyFlight<N>& flight,
+                                                   const typename EventLoop<2 * N>::X& x,
+                                                   const Options& options)
+{
+    return std::make_unique<EventLoopBy<2 * N, AnyFlight<N>, Stepping>>(flight, x, options);
+}
+
+/// `ContactMotion`, whatever the system.
+template <int N>
+class RICOCHET_ALIGNED AnyContactMotion {
 public:
-    using Flight = FreeFlight<System>;
+    using Flight = AnyFlight<N>;
     using X = typename Flight::State;
     using Vector = typename Flight::Vector;
 
-    /// @throws std::invalid_argument for what `TimeStepping` refuses, a start inside an obstacle
-    /// among it.
-    ContactMotion(const System& system, const Vector& q, const Vector& v,
-                  const HandOverOptions& options)
-        : options_(detail::completed(options, false)),
-          flight_(system),
-          steps_(system, q, v, stepping_options(options_))
-    {
-        run_.t = options_.t_start;
-        run_.x = Flight::state(q, v);
-    }
+    AnyContactMotion(const AnyMechanism<N>& system, const Vector& q, const Vector& v,
+                     const HandOverOptions& options, const FlightStepping<N>& stepping);
 
-    /// To the end; whatever the outcome, what was computed is there.
-    [[nodiscard]] ContactRun<System> take()
-    {
-        run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = PhaseCause::start});
-        while (!ended_) in_contact_ ? follow_contact() : follow_flight();
-        run_.statistics.time_stepping = steps_.statistics();
-        return std::move(run_);
-    }
+    [[nodiscard]] AnyContactRun<N> take();
 
 private:
     [[nodiscard]] static TimeSteppingOptions stepping_options(const HandOverOptions& options)
@@ -108,13 +118,13 @@ private:
 
     void follow_flight()
     {
-        std::optional<Simulation<Flight, X, Stepping>> simulation;
+        std::unique_ptr<EventLoop<2 * N>> simulation;
         try {
-            simulation.emplace(flight_, run_.x, flight_options());
+            simulation = stepping_.make(flight_, run_.x, flight_options());
         } catch (const std::invalid_argument&) {
             return touch_down(PhaseCause::stuck);  // behind a contact by more than rounding
         }
-        detail::ChatterWatch watch(run_.t, options_.set_valued.step / 100);
+        ChatterWatch watch(run_.t, options_.set_valued.step / 100);
         bool chatters = false;
         while (!chatters && simulation->step()) {
             chatters = watch(simulation->t(), simulation->run().statistics.events);
@@ -126,9 +136,7 @@ private:
     {
         Options options = detail::event_options(options_, run_.t, run_.trajectory.t.size(),
                                                 run_.statistics.event_driven.steps);
-        if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
-            options.step = options_.set_valued.step;
-        }
+        if (!stepping_.error_controlled) options.step = options_.set_valued.step;
         return options;
     }
 
@@ -141,10 +149,10 @@ private:
                                  done.trajectory.t.end());
         run_.trajectory.x.insert(run_.trajectory.x.end(), done.trajectory.x.begin(),
                                  done.trajectory.x.end());
-        detail::add(run_.statistics.event_driven, done.statistics);
+        add(run_.statistics.event_driven, done.statistics);
         if (chatters) return touch_down(PhaseCause::chattering);
-        if (const auto cause = detail::cause_after(done.outcome)) return touch_down(*cause);
-        end_with(detail::in_hand_over(done.outcome));
+        if (const auto cause = cause_after(done.outcome)) return touch_down(*cause);
+        end_with(in_hand_over(done.outcome));
     }
 
     // --- contact ---
@@ -166,12 +174,13 @@ private:
         const double from = run_.t;
         std::uint64_t open = 0;
         while (!ended_ && in_contact_) {
-            const auto before = steps_.state();
+            const double t_before = steps_.state().t;
+            const X before = Flight::state(steps_.state().q, steps_.state().v);
             const SetValuedOutcome outcome = steps_.advance();
             const auto& now = steps_.state();
             run_.t = now.t;
             run_.x = Flight::state(now.q, now.v);
-            emit_samples(before.t, Flight::state(before.q, before.v));
+            emit_samples(t_before, before);
             open = is_open() ? open + 1 : 0;
             if (outcome == SetValuedOutcome::not_converged) run_.failure = steps_.failure();
             if (outcome != SetValuedOutcome::running) {
@@ -195,14 +204,14 @@ private:
     {
         const bool failed = outcome == SetValuedOutcome::not_converged;
         if (failed && std::isinf(run_.failure.residual)) return HandOverOutcome::non_finite;
-        return detail::in_hand_over(outcome);
+        return in_hand_over(outcome);
     }
 
     /// Whether no contact pushed in the last step, and all are open after it.
     [[nodiscard]] bool is_open() const
     {
         if (!steps_.state().impulse.isZero(0)) return false;
-        for (std::size_t c = 0; c < Flight::guard_count; ++c) {
+        for (std::size_t c = 0; c < flight_.guard_count(); ++c) {
             if (!(flight_.guard(c, run_.t, run_.x) > 0)) return false;
         }
         return true;
@@ -227,12 +236,65 @@ private:
     }
 
     HandOverOptions options_;
+    FlightStepping<N> stepping_;
     Flight flight_;
-    TimeStepping<System> steps_;
-    ContactRun<System> run_;
+    AnyTimeStepping<N> steps_;
+    AnyContactRun<N> run_;
     std::uint64_t patience_ = 1;
     bool in_contact_ = false;
     bool ended_ = false;
+};
+
+template <int N>
+AnyContactMotion<N>::AnyContactMotion(const AnyMechanism<N>& system, const Vector& q,
+                                      const Vector& v, const HandOverOptions& options,
+                                      const FlightStepping<N>& stepping)
+    : options_(completed(options, false)),
+      stepping_(stepping),
+      flight_(system),
+      steps_(system, q, v, stepping_options(options_))
+{
+    run_.t = options_.t_start;
+    run_.x = Flight::state(q, v);
+}
+
+template <int N>
+AnyContactRun<N> AnyContactMotion<N>::take()
+{
+    run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = PhaseCause::start});
+    while (!ended_) in_contact_ ? follow_contact() : follow_flight();
+    run_.statistics.time_stepping = steps_.statistics();
+    return std::move(run_);
+}
+
+}  // namespace detail
+
+/// Of `HandOverOptions` those of the event-driven phases count, and `set_valued.step` as the
+/// step of time stepping.
+template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
+class ContactMotion {
+    static constexpr int N = System::coordinates;
+
+public:
+    using Flight = FreeFlight<System>;
+    using X = typename Flight::State;
+    using Vector = typename Flight::Vector;
+
+    /// @throws std::invalid_argument for what `TimeStepping` refuses, a start inside an obstacle
+    /// among it.
+    ContactMotion(const System& system, const Vector& q, const Vector& v,
+                  const HandOverOptions& options)
+        : by_(detail::TypedMechanism<System>(system), q, v, options,
+              {&detail::make_flight_loop<N, Stepping>,
+               std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>})
+    {
+    }
+
+    /// To the end; whatever the outcome, what was computed is there.
+    [[nodiscard]] ContactRun<System> take() { return {by_.take()}; }
+
+private:
+    detail::AnyContactMotion<N> by_;
 };
 
 /// A whole run in one call.
@@ -247,3 +309,8 @@ template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
 }
 
 }  // namespace ricochet
+
+#if RICOCHET_ALIGNED_AS_LIBRARY
+RICOCHET_CONTACT_MOTION_OF(2, Dopri5, extern)
+RICOCHET_CONTACT_MOTION_OF(3, Dopri5, extern)
+#endif

@@ -75,17 +75,6 @@ void clamp_derivative(const Box& box, std::span<const double> z, std::span<doubl
                          : "has a bound that is not a number";
 }
 
-/// The first component of a box whose interval is empty or has a bound that is not a number;
-/// -1 if none has.
-template <BoxSet Box>
-[[nodiscard]] constexpr int faulty_interval(const Box& box) noexcept
-{
-    for (std::size_t i = 0; i < static_cast<std::size_t>(box.dimension()); ++i) {
-        if (!(box.lower(i) <= box.upper(i))) return static_cast<int>(i);
-    }
-    return -1;
-}
-
 }  // namespace detail
 
 namespace sets {

@@ -11,17 +11,20 @@
 // includes nothing of this.
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "ricochet/integrate/simulation.hpp"
 #include "ricochet/detail/branch_modes.hpp"
 #include "ricochet/detail/held_reactions.hpp"
+#include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/law.hpp"
+#include "ricochet/integrate/simulation.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {
@@ -97,19 +100,27 @@ struct HandOverStatistics {
     double set_valued_time = 0;  ///< [s] of the motion
 };
 
-/// `Event::guard` is the reaction that changed; modes are those of `BranchModes`.
-template <Inclusion System>
-struct HandOverRun {
-    using Vector = StateOf<System>;
+namespace detail {
+
+template <int N, int M>
+struct RICOCHET_ALIGNED AnyHandOverRun {
+    using Vector = Eigen::Matrix<double, N, 1>;
 
     HandOverOutcome outcome = HandOverOutcome::reached_end;
-    SetValuedState<System> state;  ///< at the time reached, with its reaction
+    StateWithReaction<N, M> state;  ///< at the time reached, with its reaction
     Mode mode = 0;                 ///< in a set-valued phase `BranchModes::several`
     std::vector<Event<Vector>> events;
     std::vector<Phase> phases;
     Trajectory<Vector> trajectory;  ///< at the sample times
     HandOverStatistics statistics;
     StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
+};
+
+}  // namespace detail
+
+/// `Event::guard` is the reaction that changed; modes are those of `BranchModes`.
+template <Inclusion System>
+struct HandOverRun : detail::AnyHandOverRun<state_size<System>, reaction_size<System>> {
 };
 
 /// From the options of `integrate`.
@@ -185,82 +196,94 @@ void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
 [[nodiscard]] HandOverOutcome in_hand_over(Outcome outcome) noexcept;
 [[nodiscard]] HandOverOutcome in_hand_over(SetValuedOutcome outcome) noexcept;
 
-/// Of an inclusion without branches: nothing.
-template <class System>
-struct ModesOf {
-    struct type {
-        explicit type(const System& /*system*/) {}
-    };
-};
-template <Branching System>
-struct ModesOf<System> {
-    using type = BranchModes<System>;
-};
-
-template <class System>
-struct HeldOf {
-    struct type {};
-};
-template <Branching System>
-struct HeldOf<System> {
-    using type = HeldReactions<System>;
-};
-
-}  // namespace detail
-
-/// `Stepping` of the event-driven phases: `ErrorControlled<Method>`, or `FixedStep<Method>` with
-/// `set_valued.step`.
-template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
-class HandOver {
-    static constexpr bool branching = Branching<System>;
-
+/// A simulation with N components, whatever its system and stepper.
+template <int N>
+class EventLoop {
 public:
-    using Vector = StateOf<System>;
-    using Reaction = ReactionOf<System>;
-    using State = SetValuedState<System>;
+    using X = std::array<double, static_cast<std::size_t>(N)>;
 
-    /// @throws std::invalid_argument for options, systems and initial states that cannot be
-    /// right.
-    HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
-        : options_(detail::completed(options, branching)),
-          modes_(system),
-          motion_(system, w0, options_.set_valued),
-          sample_(motion_.state())
-    {
-        run_.state = motion_.state();
-    }
+    virtual ~EventLoop() = default;
+    virtual bool step() = 0;
+    [[nodiscard]] virtual double t() const = 0;
+    [[nodiscard]] virtual const X& x() const = 0;
+    [[nodiscard]] virtual Mode mode() const = 0;
+    [[nodiscard]] virtual const Run<X>& run() const = 0;
+    [[nodiscard]] virtual Run<X> finish() = 0;
+};
 
-    /// Goes on from the state of an earlier run, with its reaction.
-    /// @throws std::invalid_argument also where the reaction is outside the set.
-    HandOver(const System& system, const State& start, const HandOverOptions& options)
-        : HandOver(system, start.w, at_time(options, start.t))
-    {
-        motion_.restart(start);
-        run_.state = start;
-        keeps_reaction_ = true;
-    }
-    HandOver(const HandOver&) = delete;
-    HandOver& operator=(const HandOver&) = delete;
+template <int N, class System, class Stepping>
+class EventLoopBy final : public EventLoop<N> {
+public:
+    using X = typename EventLoop<N>::X;
 
-    /// To the end; whatever the outcome, what was computed is there.
-    [[nodiscard]] HandOverRun<System> take()
+    EventLoopBy(const System& system, const X& x, const Options& options)
+        : simulation_(system, x, options)
     {
-        begin();
-        while (!ended_) {
-            if constexpr (branching) {
-                if (!set_valued_) {
-                    follow_events();
-                    continue;
-                }
-            }
-            follow_inclusion();
-        }
-        run_.statistics.set_valued = motion_.statistics();
-        return std::move(run_);
     }
+    bool step() override { return simulation_.step(); }
+    [[nodiscard]] double t() const override { return simulation_.t(); }
+    [[nodiscard]] const X& x() const override { return simulation_.x(); }
+    [[nodiscard]] Mode mode() const override { return simulation_.mode(); }
+    [[nodiscard]] const Run<X>& run() const override { return simulation_.run(); }
+    [[nodiscard]] Run<X> finish() override { return simulation_.finish(); }
 
 private:
-    using Modes = typename detail::ModesOf<System>::type;
+    Simulation<System, X, Stepping> simulation_;
+};
+
+/// Makes loops of one stepper.
+template <int N, int M>
+struct EventStepping {
+    std::unique_ptr<EventLoop<N>> (*make)(const AnyModes<N, M>& modes,
+                                          const std::array<double, static_cast<std::size_t>(N)>& x,
+                                          const Options& options) = nullptr;
+    bool error_controlled = true;
+};
+
+template <int N, int M, class Stepping>
+std::unique_ptr<EventLoop<N>> make_event_loop(const AnyModes<N, M>& modes,
+                                              const typename EventLoop<N>::X& x,
+                                              const Options& options)
+{
+    return std::make_unique<EventLoopBy<N, AnyModes<N, M>, Stepping>>(modes, x, options);
+}
+
+/// Of an inclusion without branches: nothing.
+struct NoModes {
+    template <class Inclusion>
+    explicit NoModes(const Inclusion& /*inclusion*/)
+    {
+    }
+};
+struct NoneHeld {};
+
+/// `HandOver`, whatever the system.
+template <int N, int M>
+class RICOCHET_ALIGNED AnyHandOver {
+    static constexpr bool can_branch = has_modes<N, M>;
+
+public:
+    using Vector = Eigen::Matrix<double, N, 1>;
+    using Reaction = Eigen::Matrix<double, M, 1>;
+    using State = StateWithReaction<N, M>;
+
+    AnyHandOver(const AnyInclusion<N, M>& inclusion, const Vector& w0,
+                const HandOverOptions& options, const EventStepping<N, M>& stepping);
+    AnyHandOver(const AnyInclusion<N, M>& inclusion, const State& start,
+                const HandOverOptions& options, const EventStepping<N, M>& stepping);
+    AnyHandOver(const AnyHandOver&) = delete;
+    AnyHandOver& operator=(const AnyHandOver&) = delete;
+
+    [[nodiscard]] AnyHandOverRun<N, M> take();
+
+private:
+    using Modes = std::conditional_t<can_branch, AnyModes<N, M>, NoModes>;
+    using Held = std::conditional_t<can_branch, HeldReactions<N, M>, NoneHeld>;
+
+    [[nodiscard]] static bool branches(const InclusionTraits& traits) noexcept
+    {
+        return can_branch && traits.box && traits.of_reactions();
+    }
 
     [[nodiscard]] static HandOverOptions at_time(HandOverOptions options, double t)
     {
@@ -270,16 +293,17 @@ private:
 
     void begin()
     {
-        if constexpr (branching) {
-            const Mode mode = modes_.mode_at(run_.state.t, run_.state.w);
-            if (mode < Modes::branch_modes) return go_by_events(mode, PhaseCause::start);
-            return go_by_steps(cause_of(mode));
-        } else {
-            go_by_steps(PhaseCause::no_modes);
+        if constexpr (can_branch) {
+            if (branching_) {
+                const Mode mode = modes_.mode_at(run_.state.t, run_.state.w);
+                if (mode < Modes::branch_modes) return go_by_events(mode, PhaseCause::start);
+                return go_by_steps(cause_of(mode));
+            }
         }
+        go_by_steps(PhaseCause::no_modes);
     }
 
-    [[nodiscard]] static PhaseCause cause_of(Mode mode) noexcept requires branching
+    [[nodiscard]] static PhaseCause cause_of(Mode mode) noexcept requires can_branch
     {
         return mode == Modes::several ? PhaseCause::several : PhaseCause::no_flow;
     }
@@ -305,20 +329,19 @@ private:
         run_.phases.push_back({.from = run_.state.t, .set_valued = false, .cause = cause});
     }
 
-    void follow_events() requires branching
+    void follow_events() requires can_branch
     {
         if (steps_taken() >= options_.max_steps) return end_with(HandOverOutcome::step_limit);
-        using X = typename Modes::State;
-        X x;
+        typename Modes::State x;
         Eigen::Map<Vector>(x.data()) = run_.state.w;
-        std::optional<Simulation<Modes, X, Stepping>> simulation;
+        std::unique_ptr<EventLoop<N>> simulation;
         try {
-            simulation.emplace(modes_, x, event_options());
+            simulation = stepping_.make(modes_, x, event_options());
         } catch (const std::invalid_argument&) {
             return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
         }
-        detail::ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
-        detail::FlutterWatch unresolved;
+        ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
+        FlutterWatch unresolved;
         bool chatters = false;
         bool flutters = false;
         bool released = false;
@@ -461,7 +484,7 @@ private:
         Options options =
             detail::event_options(options_, run_.state.t, run_.trajectory.t.size(), steps_taken());
         options.mode = run_.mode;
-        if (!std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>) {
+        if (!stepping_.error_controlled) {
             options.step = std::min(options_.set_valued.step, longest_step_);
         } else if (longest_step_ < options_.h_max) {
             options.step = options.h_max = longest_step_;
@@ -491,7 +514,7 @@ private:
             accumulate(fluttering);
             return go_by_steps(PhaseCause::accumulation);
         }
-        if (const auto cause = detail::cause_after(done.outcome)) {
+        if (const auto cause = cause_after(done.outcome)) {
             if (*cause == PhaseCause::accumulation && done.guard != no_guard) {
                 accumulate(done.guard);
             }
@@ -499,7 +522,7 @@ private:
         }
         run_.mode = done.mode;
         if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
-        end_with(detail::in_hand_over(done.outcome));
+        end_with(in_hand_over(done.outcome));
     }
 
     /// What an event-driven phase recorded.
@@ -511,8 +534,8 @@ private:
         for (const Event<X>& event : done.events) {
             // A load that hardly passes the bound lets y rest on zero by rounding, and its guard
             // find it there again and again: the reaction stays at its bound.
-            const bool stays = event.mode_after == event.mode_before &&
-                               detail::same_state(event.after, event.before);
+            const bool stays =
+                event.mode_after == event.mode_before && same_state(event.after, event.before);
             idle += stays;
             if (!stays && event.mode_after != Modes::empty) {
                 run_.events.push_back(converted(event));
@@ -522,7 +545,7 @@ private:
             run_.trajectory.t.push_back(done.trajectory.t[i]);
             run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
         }
-        detail::add(run_.statistics.event_driven, done.statistics);
+        add(run_.statistics.event_driven, done.statistics);
         run_.statistics.event_driven.events -= idle;
     }
 
@@ -561,13 +584,13 @@ private:
 
     void go_by_steps(PhaseCause cause)
     {
-        if constexpr (branching) {
+        if (branching_) {
             // Who is back at once stays longer.
             const double lasted = run_.phases.empty() ? std::numeric_limits<double>::infinity()
                                                       : run_.state.t - run_.phases.back().from;
             const bool at_once = lasted < 10 * options_.set_valued.step;
             patience_ = at_once ? std::min(2 * patience_, most_patience) : 1;
-            run_.mode = Modes::several;
+            if constexpr (can_branch) run_.mode = Modes::several;
             chatters_ = cause == PhaseCause::chattering;
             motion_.locate_switches(!chatters_);
             if (chatters_) {
@@ -603,7 +626,7 @@ private:
                 end_with(HandOverOutcome::law_violated);
             } else if (outcome != SetValuedOutcome::running) {
                 if (outcome == SetValuedOutcome::not_converged) run_.failure = motion_.failure();
-                end_with(detail::in_hand_over(outcome));
+                end_with(in_hand_over(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
                 end_with(HandOverOutcome::cancelled);
             } else if (steps_taken() >= options_.max_steps) {
@@ -615,7 +638,8 @@ private:
                 steps = 0;
                 continue;
             }
-            if constexpr (branching) {
+            if constexpr (can_branch) {
+                if (!branching_) continue;
                 if (!ended_ && options_.until_released &&
                     is_released(motion_.branches(), motion_.state().t, motion_.state().w)) {
                     run_.mode = Modes::mode_of(motion_.branches());
@@ -638,7 +662,7 @@ private:
 
     /// Whether the branches are those of a mode that flows, and no y so near to zero that its
     /// sign is an accident.
-    [[nodiscard]] bool is_plain(bool switched) requires branching
+    [[nodiscard]] bool is_plain(bool switched) requires can_branch
     {
         auto branches = motion_.branches();
         if (!modes_.flows(Modes::mode_of(branches))) return false;
@@ -652,7 +676,7 @@ private:
     /// Whether every y of a reaction at a bound is farther from zero than errors reach.
     template <class Branches>
     [[nodiscard]] bool are_clear(const Branches& branches, double t,
-                                 const Vector& w) const requires branching
+                                 const Vector& w) const requires can_branch
     {
         const Reaction y = modes_.observed(t, w);
         const double size = w.template lpNorm<Eigen::Infinity>();
@@ -665,13 +689,13 @@ private:
 
     template <class Branches>
     [[nodiscard]] bool is_released(const Branches& branches, double t,
-                                   const Vector& w) const requires branching
+                                   const Vector& w) const requires can_branch
     {
         return !(branches.array() == Branch::inside).any() && are_clear(branches, t, w);
     }
 
     /// Hands back to events, unless rates and reactions do not tell how the motion goes on.
-    [[nodiscard]] bool release() requires branching
+    [[nodiscard]] bool release() requires can_branch
     {
         auto branches = motion_.branches();
         double t = motion_.state().t;
@@ -706,11 +730,13 @@ private:
         event.before = event.after = now.w;
         event.bracket = {now.t, now.t};
         event.slope = std::numeric_limits<double>::quiet_NaN();
-        if constexpr (branching) {
-            event.mode_after = Modes::mode_of(motion_.branches());
-            auto before = motion_.branches();
-            before[static_cast<Eigen::Index>(change.reaction)] = change.before;
-            event.mode_before = Modes::mode_of(before);
+        if constexpr (can_branch) {
+            if (branching_) {
+                event.mode_after = Modes::mode_of(motion_.branches());
+                auto before = motion_.branches();
+                before[static_cast<Eigen::Index>(change.reaction)] = change.before;
+                event.mode_before = Modes::mode_of(before);
+            }
         }
         run_.events.push_back(std::move(event));
     }
@@ -733,12 +759,13 @@ private:
     }
 
     HandOverOptions options_;
+    EventStepping<N, M> stepping_;
+    bool branching_;
     Modes modes_;
-    SetValuedMotion<System> motion_;
+    AnyMotion<N, M> motion_;
     State sample_;
-    HandOverRun<System> run_;
+    AnyHandOverRun<N, M> run_;
     static constexpr std::uint64_t most_patience = std::uint64_t{1} << 20;
-    using Held = typename detail::HeldOf<System>::type;
     [[no_unique_address]] Held held_;
     double longest_step_ = std::numeric_limits<double>::infinity();  // of the event-driven kind
     int easy_steps_ = 0;
@@ -748,6 +775,91 @@ private:
     bool set_valued_ = false;
     bool keeps_reaction_ = false;
     bool ended_ = false;
+};
+
+template <int N, int M>
+AnyHandOver<N, M>::AnyHandOver(const AnyInclusion<N, M>& inclusion, const Vector& w0,
+                               const HandOverOptions& options, const EventStepping<N, M>& stepping)
+    : options_(completed(options, branches(inclusion.traits))),
+      stepping_(stepping),
+      branching_(branches(inclusion.traits)),
+      modes_(inclusion),
+      motion_(inclusion, w0, options_.set_valued),
+      sample_(motion_.state())
+{
+    run_.state = motion_.state();
+}
+
+template <int N, int M>
+AnyHandOver<N, M>::AnyHandOver(const AnyInclusion<N, M>& inclusion, const State& start,
+                               const HandOverOptions& options, const EventStepping<N, M>& stepping)
+    : AnyHandOver(inclusion, start.w, at_time(options, start.t), stepping)
+{
+    motion_.restart(start);
+    run_.state = start;
+    keeps_reaction_ = true;
+}
+
+template <int N, int M>
+AnyHandOverRun<N, M> AnyHandOver<N, M>::take()
+{
+    begin();
+    while (!ended_) {
+        if constexpr (can_branch) {
+            if (!set_valued_) {
+                follow_events();
+                continue;
+            }
+        }
+        follow_inclusion();
+    }
+    run_.statistics.set_valued = motion_.statistics();
+    return std::move(run_);
+}
+
+}  // namespace detail
+
+/// `Stepping` of the event-driven phases: `ErrorControlled<Method>`, or `FixedStep<Method>` with
+/// `set_valued.step`.
+template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
+class HandOver {
+    static constexpr int N = state_size<System>;
+    static constexpr int M = reaction_size<System>;
+
+public:
+    using Vector = StateOf<System>;
+    using Reaction = ReactionOf<System>;
+    using State = SetValuedState<System>;
+
+    /// @throws std::invalid_argument for options, systems and initial states that cannot be
+    /// right.
+    HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
+        : by_(detail::TypedInclusion<System>(system), w0, options, stepping())
+    {
+    }
+
+    /// Goes on from the state of an earlier run, with its reaction.
+    /// @throws std::invalid_argument also where the reaction is outside the set.
+    HandOver(const System& system, const State& start, const HandOverOptions& options)
+        : by_(detail::TypedInclusion<System>(system), start, options, stepping())
+    {
+    }
+
+    /// To the end; whatever the outcome, what was computed is there.
+    [[nodiscard]] HandOverRun<System> take() { return {by_.take()}; }
+
+private:
+    [[nodiscard]] static detail::EventStepping<N, M> stepping()
+    {
+        if constexpr (Branching<System>) {
+            return {&detail::make_event_loop<N, M, Stepping>,
+                    std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>};
+        } else {
+            return {};
+        }
+    }
+
+    detail::AnyHandOver<N, M> by_;
 };
 
 /// A whole run in one call.
@@ -760,3 +872,11 @@ template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
 }
 
 }  // namespace ricochet
+
+#if RICOCHET_ALIGNED_AS_LIBRARY
+RICOCHET_COMPILED_SIZES(RICOCHET_HAND_OVER_OF, extern)
+RICOCHET_COMPILED_SIZES(RICOCHET_MODES_OF, extern)
+RICOCHET_COMPILED_SIZES(RICOCHET_EVENTS_OF, Dopri5, extern)
+RICOCHET_EVENTS_OF(1, 1, Fehlberg78, extern)
+RICOCHET_EVENTS_OF(3, 1, Fehlberg78, extern)
+#endif

@@ -13,9 +13,10 @@
 #include <vector>
 
 #include "ricochet/detail/debug_checks.hpp"
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
 #include "ricochet/detail/step_layout.hpp"
+#include "ricochet/integrate/step_controllers.hpp"
 
 namespace ricochet {
 
@@ -91,77 +92,27 @@ void validate_fields(const std::vector<ErrorField>& fields, Eigen::Index size);
 /// @throws std::invalid_argument if a learned controller's policy is not for this layout, or if
 /// there is none, null.
 void validate_policy(const SetValuedOptions& options, const StepLayout* layout);
-}  // namespace detail
 
-template <Inclusion System>
-class SetValuedMotion {
+/// `SetValuedMotion`, whatever the system.
+template <int N, int M>
+class RICOCHET_ALIGNED AnyMotion {
 public:
-    using Vector = StateOf<System>;
-    using Reaction = ReactionOf<System>;
-    using State = SetValuedState<System>;
-    using Branches = detail::BranchesOf<System>;
-    static constexpr bool declares_inputs = DeclaresStepInputs<System, Vector, Reaction>;
+    using Matrices = AnyMatrices<N, M>;
+    using Vector = typename Matrices::State;
+    using Reaction = typename Matrices::Reaction;
+    using State = StateWithReaction<N, M>;
+    using Branches = BranchesOf<M>;
 
-    /// Starts with the minimal selection. Debug builds sample the projection of the first set.
-    /// @throws std::invalid_argument for options, systems and initial states that cannot be
-    /// right.
-    SetValuedMotion(const System& system, const Vector& w0, const SetValuedOptions& options)
-        : options_(options), step_(system, options.scheme)
-    {
-        validate(options);
-        validate(options.controller);
-        if (options.estimate == ErrorEstimate::embedded &&
-            (options.scheme.scheme != Scheme::bathe ||
-             options.scheme.first_stage == FirstStage::at_end)) {
-            detail::refuse_inclusion("the embedded estimate needs Bathe's scheme with the reaction averaged");
-        }
-        if (options.switches == Switches::located && !step_.box) {
-            detail::refuse_inclusion("only the branches of a box can be located");
-        }
-        if (w0.size() != step_.matrices().size()) {
-            detail::refuse_inclusion("the initial state must have as many components as the system, not",
-                                     static_cast<double>(w0.size()));
-        }
-        detail::validate_fields(options.fields, w0.size());
-        if constexpr (declares_inputs) {
-            detail::validate_policy(options, &System::step_layout());
-        } else {
-            detail::validate_policy(options, nullptr);
-        }
-        rate_ = w0;
-        branches_before_.setConstant(step_.matrices().reactions(), Branch::inside);
-        branches_after_ = branches_before_;
-        h_ = options.step;
-        h_min_ = options.h_min > 0 ? options.h_min : 1e-12 * (options.t_end - options.t_start);
-        now_.w = error_ = w0;
-        now_.reaction.setZero(step_.matrices().reactions());
-        before_ = trial_ = half_ = now_;
-        start_branches_.setConstant(now_.reaction.size(), Branch::inside);
-        restart(options.t_start, w0);
-        before_ = now_;
-        if (detail::is_debug_build()) {
-            check_projection(system.reaction_set(options.t_start, w0));
-        }
-    }
+    AnyMotion(const AnyInclusion<N, M>& inclusion, const Vector& w0,
+              const SetValuedOptions& options);
 
     /// Goes on from (t, w) as from a start: after a jump, or when an event-driven
     /// integrator hands over.
-    void restart(double t, const Vector& w)
-    {
-        now_.reaction = minimal_selection(step_.matrices(), t, w);
-        now_.t = t;
-        now_.w = w;
-        begin();
-    }
+    void restart(double t, const Vector& w);
 
     /// Goes on from a state with a known reaction.
     /// @throws std::invalid_argument where the reaction is outside the set.
-    void restart(const State& state)
-    {
-        check_reaction(state);
-        now_ = state;
-        begin();
-    }
+    void restart(const State& state);
 
     [[nodiscard]] const State& state() const noexcept { return now_; }
     /// Where the last accepted step began, and its middle stage.
@@ -179,11 +130,8 @@ public:
     [[nodiscard]] double error() const noexcept { return scaled_error_; }
     /// With the counts of a `LearnedStep`.
     [[nodiscard]] const StepController& controller() const noexcept { return options_.controller; }
-    [[nodiscard]] CompositeStep<System>& stepper() noexcept { return step_; }
-    [[nodiscard]] const InclusionMatrices<System>& matrices() const noexcept
-    {
-        return step_.matrices();
-    }
+    [[nodiscard]] AnyStep<N, M>& stepper() noexcept { return step_; }
+    [[nodiscard]] const Matrices& matrices() const noexcept { return step_.matrices(); }
     /// The branches of the state, kept where switches are located.
     [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
     /// Whether changes are located from now on, where the options ask for it.
@@ -197,52 +145,7 @@ public:
     [[nodiscard]] const Switch& last_switch() const noexcept { return last_switch_; }
 
     /// The next accepted step. `running`, or how the run ended.
-    SetValuedOutcome advance()
-    {
-        if (outcome_ != SetValuedOutcome::running) return outcome_;
-        int failures = 0;
-        bool solved = true;
-        for (;;) {
-            if (statistics_.attempted == options_.max_attempts) {
-                return end_with(SetValuedOutcome::step_limit);
-            }
-            const double left = options_.t_end - now_.t;
-            if (left <= 4 * std::numeric_limits<double>::epsilon() * std::abs(options_.t_end)) {
-                // A change was located at the end up to rounding.
-                now_.t = options_.t_end;
-                return end_with(SetValuedOutcome::reached_end);
-            }
-            double h = std::min(h_, options_.h_max);
-            // No sliver is left for the last step: a step within a part in 1e9 takes it all.
-            const bool last = left <= h * (1 + 1e-9);
-            if (last) h = left;
-            ++statistics_.attempted;
-            const StageReport report = attempt(h);
-            if (!report.converged) {
-                ++statistics_.unsolved;
-                failure_ = report;
-                solved = false;
-                h_ = h * std::visit([](auto& c) { return c.failed(); }, options_.controller);
-                ++failures;
-            } else {
-                const StepVerdict verdict =
-                    judge(options_.controller, scaled_error_, h, [&] { return view(h); });
-                if (verdict.accepted) {
-                    if (!holds_length_) h_ = h * verdict.factor;
-                    else if (failures == 0 && !last) h_ = std::min(options_.step, 2 * h_);
-                    accept(last);
-                    return outcome_;
-                }
-                ++statistics_.rejected;
-                h_ = h * verdict.factor;
-                solved = true;
-            }
-            if (!(h_ >= h_min_)) {
-                return end_with(solved ? SetValuedOutcome::step_underflow
-                                       : SetValuedOutcome::not_converged);
-            }
-        }
-    }
+    SetValuedOutcome advance();
 
     /// To the end. `observer(state)` sees the start and every accepted step.
     template <class Observer>
@@ -278,11 +181,20 @@ public:
     }
 
 private:
+    [[nodiscard]] const InclusionTraits& traits() const noexcept
+    {
+        return step_.matrices().traits();
+    }
+    [[nodiscard]] const AnyInclusion<N, M>& inclusion() const noexcept
+    {
+        return step_.matrices().inclusion();
+    }
+
     void begin()
     {
         std::visit([](auto& c) { c.reset(); }, options_.controller);
         holds_length_ = std::holds_alternative<ConstantStep>(options_.controller);
-        if constexpr (CompositeStep<System>::box) step_.branches_of(now_, start_branches_);
+        if (traits().box) step_.branches_of(now_, start_branches_);
         remainder_ = 0;
         outcome_ = now_.t < options_.t_end ? SetValuedOutcome::running
                                            : SetValuedOutcome::reached_end;
@@ -290,15 +202,13 @@ private:
 
     void check_reaction(const State& state) const
     {
-        const auto set = step_.system().reaction_set(state.t, state.w);
-        if constexpr (detail::confines<System>() == Confines::reaction) {
-            Reaction nearest = state.reaction;
-            set.project(detail::span_of(state.reaction), detail::span_of(nearest));
-            const double off = (nearest - state.reaction).template lpNorm<Eigen::Infinity>();
-            // States of earlier steps are in the set to the solver's tolerance.
-            if (!(off <= 1e-9 * (1 + nearest.template lpNorm<Eigen::Infinity>()))) {
-                detail::refuse_inclusion("the reaction at the start is outside its set by", off);
-            }
+        if (!traits().of_reactions()) return;
+        Reaction nearest = state.reaction;
+        inclusion().project(state.t, state.w, state.reaction, nearest);
+        const double off = (nearest - state.reaction).template lpNorm<Eigen::Infinity>();
+        // States of earlier steps are in the set to the solver's tolerance.
+        if (!(off <= 1e-9 * (1 + nearest.template lpNorm<Eigen::Infinity>()))) {
+            refuse_inclusion("the reaction at the start is outside its set by", off);
         }
     }
 
@@ -330,11 +240,9 @@ private:
             scaled_error_ = scaled(error_, coarse, trial_.w);
         }
         if (!std::isfinite(scaled_error_)) report.converged = false;
-        if constexpr (CompositeStep<System>::box) {
-            if (options_.switches == Switches::located && locates_ &&
-                short_switches_ <= 4 + 2 * now_.reaction.size()) {
-                return end_at_switch(h, report);
-            }
+        if (traits().box && options_.switches == Switches::located && locates_ &&
+            short_switches_ <= 4 + 2 * now_.reaction.size()) {
+            return end_at_switch(h, report);
         }
         return report;
     }
@@ -350,13 +258,12 @@ private:
     [[nodiscard]] StepView view(double h)
     {
         StepView out{.step = h};
-        if constexpr (declares_inputs) {
-            const System& system = step_.system();
+        if (traits().layout != nullptr) {
             out.tolerance = options_.fields.empty() ? options_.rtol : options_.fields.front().rtol;
-            out.step = h / system.step_unit();
+            out.step = h / inclusion().step_unit();
             rate_ = (3 * trial_.w - 4 * step_.middle().w + now_.w) / h;
-            system.step_inputs(trial_.t, trial_.w, rate_, trial_.reaction, out.state);
-            if constexpr (CompositeStep<System>::box) {
+            inclusion().step_inputs(trial_.t, trial_.w, rate_, trial_.reaction, out.state);
+            if (traits().box) {
                 step_.branches_of(now_, branches_before_);
                 step_.branches_of(trial_, branches_after_);
                 const auto n = branches_before_.size();
@@ -400,7 +307,6 @@ private:
     /// Where the step as taken leaves the branches of its start: trial_ becomes the end
     /// of the shorter step that stays on them.
     StageReport end_at_switch(double h, const StageReport& whole)
-        requires(CompositeStep<System>::box)
     {
         const auto slack_after = [&](double width) {
             const StageReport report = counted(step_.take(now_, width, half_, &start_branches_));
@@ -479,23 +385,20 @@ private:
             remainder_ = increment - (now_.t - t);
         }
         ++statistics_.accepted;
-        if constexpr (CompositeStep<System>::box) {
-            if (options_.switches == Switches::located) {
-                // Reactions that depend on one another can change places without end.
-                if (!switched_) {
-                    short_switches_ = 0;
-                } else if (now_.t - t < 0.1 * options_.step) {
-                    ++short_switches_;
-                }
-                enter_next_branches();
+        if (options_.switches == Switches::located) {
+            // Reactions that depend on one another can change places without end.
+            if (!switched_) {
+                short_switches_ = 0;
+            } else if (now_.t - t < 0.1 * options_.step) {
+                ++short_switches_;
             }
+            enter_next_branches();
         }
     }
 
     /// After a switch the reaction is that of the branch now entered; a bound that has
     /// just been reached is left for good, whatever rounding says of it.
     void enter_next_branches()
-        requires(CompositeStep<System>::box)
     {
         if (!switched_) {
             step_.branches_of(now_, start_branches_);
@@ -505,16 +408,14 @@ private:
         Eigen::Index which = 0;
         (void)step_.slack(now_, start_branches_, &which);
         const Branch from = start_branches_[which];
-        constexpr bool of_reactions = detail::confines<System>() == Confines::reaction;
-        constexpr bool bounded_held = !of_reactions;
-        const bool held_before = (from == Branch::inside) != bounded_held;
-        if (held_before && of_reactions) {
-            const auto set = step_.system().reaction_set(now_.t, now_.w);
-            const auto k = static_cast<std::size_t>(which);
-            const bool up = now_.reaction[which] - set.lower(k) > set.upper(k) - now_.reaction[which];
+        if (traits().of_reactions() && from == Branch::inside) {
+            Reaction lower = now_.reaction, upper = now_.reaction;
+            inclusion().bounds(now_.t, now_.w, lower, upper);
+            double& r = now_.reaction[which];
+            const bool up = r - lower[which] > upper[which] - r;
             start_branches_[which] = up ? Branch::upper : Branch::lower;
-            now_.reaction[which] = up ? set.upper(k) : set.lower(k);
-            last_switch_ = {k, from, start_branches_[which]};
+            r = up ? upper[which] : lower[which];
+            last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
             return;
         }
         // Sliding has come to a stop: it sticks, or goes on across.
@@ -531,20 +432,19 @@ private:
     /// Of reaction `which`, and of those whose y is zero up to rounding.
     void zero_observed(Eigen::Index which)
     {
-        if constexpr (detail::confines<System>() == Confines::reaction) {
-            const auto& m = step_.matrices();
-            Reaction s, y;
-            m.offset(now_.t, s);
-            m.observed(now_.t, now_.w, y);
-            const double rounding = 1e-14 * now_.w.template lpNorm<Eigen::Infinity>();
-            for (Eigen::Index i = 0; i < y.size(); ++i) {
-                if (i == which || std::abs(y[i]) <= rounding) m.hold(i, 0, s[i], now_.w);
-            }
+        if (!traits().of_reactions()) return;
+        const auto& m = step_.matrices();
+        Reaction s, y;
+        m.offset(now_.t, s);
+        m.observed(now_.t, now_.w, y);
+        const double rounding = 1e-14 * now_.w.template lpNorm<Eigen::Infinity>();
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            if (i == which || std::abs(y[i]) <= rounding) m.hold(i, 0, s[i], now_.w);
         }
     }
 
     SetValuedOptions options_;
-    CompositeStep<System> step_;
+    AnyStep<N, M> step_;
     State now_, before_, trial_, half_;
     Vector error_;
     Vector rate_;
@@ -563,4 +463,128 @@ private:
     Eigen::Index short_switches_ = 0;  // in a row
 };
 
+template <int N, int M>
+AnyMotion<N, M>::AnyMotion(const AnyInclusion<N, M>& inclusion, const Vector& w0,
+                           const SetValuedOptions& options)
+    : options_(options), step_(inclusion, options.scheme)
+{
+    validate(options);
+    validate(options.controller);
+    if (options.estimate == ErrorEstimate::embedded &&
+        (options.scheme.scheme != Scheme::bathe ||
+         options.scheme.first_stage == FirstStage::at_end)) {
+        refuse_inclusion("the embedded estimate needs Bathe's scheme with the reaction averaged");
+    }
+    if (options.switches == Switches::located && !traits().box) {
+        refuse_inclusion("only the branches of a box can be located");
+    }
+    if (w0.size() != step_.matrices().size()) {
+        refuse_inclusion("the initial state must have as many components as the system, not",
+                         static_cast<double>(w0.size()));
+    }
+    validate_fields(options.fields, w0.size());
+    validate_policy(options, traits().layout);
+    rate_ = w0;
+    branches_before_.setConstant(step_.matrices().reactions(), Branch::inside);
+    branches_after_ = branches_before_;
+    h_ = options.step;
+    h_min_ = options.h_min > 0 ? options.h_min : 1e-12 * (options.t_end - options.t_start);
+    now_.w = error_ = w0;
+    now_.reaction.setZero(step_.matrices().reactions());
+    before_ = trial_ = half_ = now_;
+    start_branches_.setConstant(now_.reaction.size(), Branch::inside);
+    restart(options.t_start, w0);
+    before_ = now_;
+    if (is_debug_build()) {
+        inclusion.check_projection(options.t_start, w0);
+    }
+}
+
+template <int N, int M>
+void AnyMotion<N, M>::restart(double t, const Vector& w)
+{
+    now_.reaction = minimal_selection(step_.matrices(), t, w);
+    now_.t = t;
+    now_.w = w;
+    begin();
+}
+
+template <int N, int M>
+void AnyMotion<N, M>::restart(const State& state)
+{
+    check_reaction(state);
+    now_ = state;
+    begin();
+}
+
+template <int N, int M>
+SetValuedOutcome AnyMotion<N, M>::advance()
+{
+    if (outcome_ != SetValuedOutcome::running) return outcome_;
+    int failures = 0;
+    bool solved = true;
+    for (;;) {
+        if (statistics_.attempted == options_.max_attempts) {
+            return end_with(SetValuedOutcome::step_limit);
+        }
+        const double left = options_.t_end - now_.t;
+        if (left <= 4 * std::numeric_limits<double>::epsilon() * std::abs(options_.t_end)) {
+            // A change was located at the end up to rounding.
+            now_.t = options_.t_end;
+            return end_with(SetValuedOutcome::reached_end);
+        }
+        double h = std::min(h_, options_.h_max);
+        // No sliver is left for the last step: a step within a part in 1e9 takes it all.
+        const bool last = left <= h * (1 + 1e-9);
+        if (last) h = left;
+        ++statistics_.attempted;
+        const StageReport report = attempt(h);
+        if (!report.converged) {
+            ++statistics_.unsolved;
+            failure_ = report;
+            solved = false;
+            h_ = h * std::visit([](auto& c) { return c.failed(); }, options_.controller);
+            ++failures;
+        } else {
+            const StepVerdict verdict =
+                judge(options_.controller, scaled_error_, h, [&] { return view(h); });
+            if (verdict.accepted) {
+                if (!holds_length_)
+                    h_ = h * verdict.factor;
+                else if (failures == 0 && !last)
+                    h_ = std::min(options_.step, 2 * h_);
+                accept(last);
+                return outcome_;
+            }
+            ++statistics_.rejected;
+            h_ = h * verdict.factor;
+            solved = true;
+        }
+        if (!(h_ >= h_min_)) {
+            return end_with(solved ? SetValuedOutcome::step_underflow
+                                   : SetValuedOutcome::not_converged);
+        }
+    }
+}
+
+}  // namespace detail
+
+template <Inclusion System>
+class SetValuedMotion : public detail::AnyMotion<state_size<System>, reaction_size<System>> {
+public:
+    /// Starts with the minimal selection. Debug builds sample the projection of the first set.
+    /// @throws std::invalid_argument for options, systems and initial states that cannot be
+    /// right.
+    SetValuedMotion(const System& system, const StateOf<System>& w0,
+                    const SetValuedOptions& options)
+        : SetValuedMotion::AnyMotion(detail::TypedInclusion<System>(system), w0, options)
+    {
+    }
+};
+
 }  // namespace ricochet
+
+#if RICOCHET_ALIGNED_AS_LIBRARY
+RICOCHET_COMPILED_SIZES(RICOCHET_SET_VALUED_OF, extern)
+RICOCHET_SET_VALUED_OF(Eigen::Dynamic, Eigen::Dynamic, extern)
+#endif

@@ -29,7 +29,9 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detail/any_mechanism.hpp"
 #include "ricochet/detail/contact_problem.hpp"
+#include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {
@@ -62,66 +64,26 @@ struct TimeSteppingStatistics {
     std::uint64_t unsolved = 0;  ///< steps that were tried again at half the length
 };
 
-/// Moreau's midpoint rule:
-///
-///     q_m = q + h/2 v,   contacts closed: g(q_m) <= 0
-///     v+ = v + M^-1 (h F(t_m, q_m, v) + H' p)
-///     0 <= p_n,  u_n+ + e u_n- >= 0, complementary;  friction on u_t+
-///     q+ = q_m + h/2 v+
-///
-/// (J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988;
-/// M. Jean, The non-smooth contact dynamics method, Computer Methods in Applied
-/// Mechanics and Engineering 177, 1999.)
-///
-/// Memory is allocated where the number of closed contacts changes.
-template <class System>
-class TimeStepping {
+namespace detail {
+
+/// `TimeStepping`, whatever the system.
+template <int N>
+class RICOCHET_ALIGNED AnyTimeStepping {
 public:
-    static constexpr int N = System::coordinates;
-    static constexpr int C = System::contacts;
-    static constexpr int D = 1 + System::tangents;
     using Vector = Eigen::Matrix<double, N, 1>;
     using Square = Eigen::Matrix<double, N, N>;
-    using Gaps = Eigen::Matrix<double, C, 1>;
-    using Directions = Eigen::Matrix<double, C * D, N>;
-    using Impulses = Eigen::Matrix<double, C * D, 1>;
 
     struct State {
-        double t;
+        double t = 0;
         Vector q, v;
-        Impulses impulse;  ///< of the last step [N s], normal first; zero where open
+        Eigen::VectorXd impulse;  ///< of the last step [N s], normal first; zero where open
     };
 
-    /// @throws std::invalid_argument for options, a matrix that is not positive definite,
-    /// coefficients out of range, a start that is not finite or inside an obstacle by more than
-    /// rounding.
-    TimeStepping(const System& system, const Vector& q, const Vector& v,
-                 const TimeSteppingOptions& options)
-        : system_(system), options_(options), solver_(options.contacts)
-    {
-        validate(options);
-        if (!q.allFinite()) detail::refuse_inclusion("the initial position is not finite");
-        if (!v.allFinite()) detail::refuse_inclusion("the initial velocity is not finite");
-        system_.gaps(q, gaps_);
-        for (int c = 0; c < C; ++c) {
-            detail::check_contact(c, system_.restitution(c), system_.friction(c), gaps_[c],
-                                  1e-12 * (1 + q.norm()));
-        }
-        system_.mass(q, mass_);
-        if (!mass_.allFinite() || Eigen::LLT<Square>(mass_).info() != Eigen::Success) {
-            detail::refuse_inclusion("the mass matrix is not positive definite");
-        }
-        friction_.reserve(C);
-        closed_.reserve(C);
-        restart(options.t_start, q, v);
-    }
+    AnyTimeStepping(const AnyMechanism<N>& system, const Vector& q, const Vector& v,
+                    const TimeSteppingOptions& options);
 
     /// Goes on from (t, q, v), where an integrator of free flight hands over.
-    void restart(double t, const Vector& q, const Vector& v)
-    {
-        state_ = {t, q, v, Impulses::Zero()};
-        outcome_ = t < options_.t_end ? SetValuedOutcome::running : SetValuedOutcome::reached_end;
-    }
+    void restart(double t, const Vector& q, const Vector& v);
 
     [[nodiscard]] const State& state() const noexcept { return state_; }
     [[nodiscard]] const TimeSteppingStatistics& statistics() const noexcept { return statistics_; }
@@ -130,27 +92,7 @@ public:
     /// its contact -1 where a force, a gap, a direction or the velocity was not finite.
     [[nodiscard]] const ContactReport& failure() const noexcept { return failure_; }
 
-    SetValuedOutcome advance()
-    {
-        if (outcome_ != SetValuedOutcome::running) return outcome_;
-        const double left = options_.t_end - state_.t;
-        double h = options_.step;
-        bool last = left <= h * (1 + 1e-9);
-        if (last) h = left;
-        // Another length is another problem, which may be easier.
-        for (int attempt = 0; !take(h); ++attempt) {
-            if (attempt == 10) return outcome_ = SetValuedOutcome::not_converged;
-            ++statistics_.unsolved;
-            h /= 2;
-            last = false;
-        }
-        ++statistics_.steps;
-        if (last) {
-            state_.t = options_.t_end;
-            outcome_ = SetValuedOutcome::reached_end;
-        }
-        return outcome_;
-    }
+    SetValuedOutcome advance();
 
     template <class Observer>
     SetValuedOutcome run(const Observer& observer)
@@ -170,16 +112,16 @@ private:
     bool take(double h)
     {
         middle_ = state_.q + (h / 2) * state_.v;
-        system_.mass(middle_, mass_);
-        system_.force(state_.t + h / 2, middle_, state_.v, force_);
-        system_.gaps(middle_, gaps_);
+        system_->mass(middle_, mass_);
+        system_->force(state_.t + h / 2, middle_, state_.v, force_);
+        system_->gaps(middle_, gaps_);
         factor_.compute(mass_);
         velocity_ = state_.v + h * factor_.solve(force_);
         if (factor_.info() != Eigen::Success || !velocity_.allFinite() || gaps_.hasNaN()) {
             return fail_finite();
         }
         closed_.clear();
-        for (int c = 0; c < C; ++c) {
+        for (int c = 0; c < system_->contacts; ++c) {
             if (gaps_[c] <= 0) closed_.push_back(c);
         }
         impulse_.setZero();
@@ -201,14 +143,15 @@ private:
     bool collide()
     {
         ++statistics_.problems;
-        system_.directions(middle_, directions_);
+        system_->directions(middle_, directions_);
+        const int D = system_->components;
         const auto n = static_cast<Eigen::Index>(closed_.size()) * D;
         h_.resize(n, N);
         friction_.clear();
         for (std::size_t k = 0; k < closed_.size(); ++k) {
             const int c = closed_[k];
             h_.middleRows(static_cast<Eigen::Index>(k) * D, D) = directions_.middleRows(c * D, D);
-            friction_.push_back(system_.friction(c));
+            friction_.push_back(system_->friction(c));
         }
         inverse_ = factor_.solve(h_.transpose());
         w_.noalias() = h_ * inverse_;
@@ -216,7 +159,7 @@ private:
         p_.setZero(n);
         for (std::size_t k = 0; k < closed_.size(); ++k) {
             const auto row = static_cast<Eigen::Index>(k) * D;
-            q_[row] += system_.restitution(closed_[k]) * h_.row(row).dot(state_.v);
+            q_[row] += system_->restitution(closed_[k]) * h_.row(row).dot(state_.v);
             p_.segment(row, D) = state_.impulse.segment(closed_[k] * D, D);
         }
         if (!w_.allFinite() || !q_.allFinite()) return fail_finite();
@@ -236,16 +179,15 @@ private:
         return true;
     }
 
-    System system_;
+    Owned<AnyMechanism<N>> system_;
     TimeSteppingOptions options_;
     ContactSolver solver_;
     State state_;
     Vector middle_, force_, velocity_;
     Square mass_;
     Eigen::LLT<Square> factor_;
-    Gaps gaps_;
-    Directions directions_;
-    Impulses impulse_;
+    Eigen::VectorXd gaps_, impulse_;
+    typename AnyMechanism<N>::Directions directions_;
     Eigen::Matrix<double, Eigen::Dynamic, N> h_;
     Eigen::Matrix<double, N, Eigen::Dynamic> inverse_;
     Eigen::MatrixXd w_;
@@ -257,4 +199,97 @@ private:
     SetValuedOutcome outcome_ = SetValuedOutcome::running;
 };
 
+template <int N>
+AnyTimeStepping<N>::AnyTimeStepping(const AnyMechanism<N>& system, const Vector& q, const Vector& v,
+                                    const TimeSteppingOptions& options)
+    : system_(system), options_(options), solver_(options.contacts)
+{
+    validate(options);
+    if (!q.allFinite()) refuse_inclusion("the initial position is not finite");
+    if (!v.allFinite()) refuse_inclusion("the initial velocity is not finite");
+    system_->gaps(q, gaps_);
+    for (int c = 0; c < system_->contacts; ++c) {
+        check_contact(c, system_->restitution(c), system_->friction(c), gaps_[c],
+                      1e-12 * (1 + q.norm()));
+    }
+    system_->mass(q, mass_);
+    if (!mass_.allFinite() || Eigen::LLT<Square>(mass_).info() != Eigen::Success) {
+        refuse_inclusion("the mass matrix is not positive definite");
+    }
+    friction_.reserve(static_cast<std::size_t>(system.contacts));
+    closed_.reserve(static_cast<std::size_t>(system.contacts));
+    restart(options.t_start, q, v);
+}
+
+template <int N>
+void AnyTimeStepping<N>::restart(double t, const Vector& q, const Vector& v)
+{
+    impulse_.setZero(system_->contacts * system_->components);
+    state_ = {t, q, v, impulse_};
+    outcome_ = t < options_.t_end ? SetValuedOutcome::running : SetValuedOutcome::reached_end;
+}
+
+template <int N>
+SetValuedOutcome AnyTimeStepping<N>::advance()
+{
+    if (outcome_ != SetValuedOutcome::running) return outcome_;
+    const double left = options_.t_end - state_.t;
+    double h = options_.step;
+    bool last = left <= h * (1 + 1e-9);
+    if (last) h = left;
+    // Another length is another problem, which may be easier.
+    for (int attempt = 0; !take(h); ++attempt) {
+        if (attempt == 10) return outcome_ = SetValuedOutcome::not_converged;
+        ++statistics_.unsolved;
+        h /= 2;
+        last = false;
+    }
+    ++statistics_.steps;
+    if (last) {
+        state_.t = options_.t_end;
+        outcome_ = SetValuedOutcome::reached_end;
+    }
+    return outcome_;
+}
+
+}  // namespace detail
+
+/// Moreau's midpoint rule:
+///
+///     q_m = q + h/2 v,   contacts closed: g(q_m) <= 0
+///     v+ = v + M^-1 (h F(t_m, q_m, v) + H' p)
+///     0 <= p_n,  u_n+ + e u_n- >= 0, complementary;  friction on u_t+
+///     q+ = q_m + h/2 v+
+///
+/// (J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988;
+/// M. Jean, The non-smooth contact dynamics method, Computer Methods in Applied
+/// Mechanics and Engineering 177, 1999.)
+///
+/// Memory is allocated where the number of closed contacts changes.
+template <class System>
+class TimeStepping : public detail::AnyTimeStepping<System::coordinates> {
+public:
+    static constexpr int N = System::coordinates;
+    static constexpr int C = System::contacts;
+    static constexpr int D = 1 + System::tangents;
+    using Vector = Eigen::Matrix<double, N, 1>;
+    using Gaps = Eigen::Matrix<double, C, 1>;
+    using Directions = Eigen::Matrix<double, C * D, N>;
+    using Impulses = Eigen::Matrix<double, C * D, 1>;
+
+    /// @throws std::invalid_argument for options, a matrix that is not positive definite,
+    /// coefficients out of range, a start that is not finite or inside an obstacle by more than
+    /// rounding.
+    TimeStepping(const System& system, const Vector& q, const Vector& v,
+                 const TimeSteppingOptions& options)
+        : TimeStepping::AnyTimeStepping(detail::TypedMechanism<System>(system), q, v, options)
+    {
+    }
+};
+
 }  // namespace ricochet
+
+#if RICOCHET_ALIGNED_AS_LIBRARY
+RICOCHET_TIME_STEPPING_OF(2, extern)
+RICOCHET_TIME_STEPPING_OF(3, extern)
+#endif

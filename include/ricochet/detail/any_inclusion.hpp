@@ -1,0 +1,419 @@
+// Internal: what it declares may change without notice.
+//
+// An inclusion of which only the sizes are known.
+//
+// What solves inclusions is compiled for N components and M reactions, once for all systems of
+// these sizes: it sees a system through `AnyInclusion`, which `TypedInclusion` makes of the
+// user's. Vectors and matrices are the same on both sides, so nothing is converted.
+#pragma once
+
+#include <Eigen/LU>
+
+#include <array>
+#include <memory>
+#include <string>
+
+#include "ricochet/detail/linear_cases.hpp"
+#include "ricochet/detail/owned.hpp"
+#include "ricochet/detail/step_layout.hpp"
+#include "ricochet/nonsmooth/inclusion.hpp"
+
+namespace ricochet {
+
+namespace detail {
+
+/// What a system declares beside its functions.
+struct InclusionTraits {
+    Confines confines = Confines::reaction;
+    bool affine = false;
+    bool box = false;             ///< its sets are boxes
+    bool gives_jacobian = false;  ///< the functions of these names
+    bool moves = false;           ///< `offset`
+    bool gives_offset_rate = false;
+    bool continues_bounds = false;  ///< `branch_bound`
+    bool gives_bound_gradient = false;
+    const StepLayout* layout = nullptr;  ///< of its inputs for policies, if it has any
+
+    [[nodiscard]] bool of_reactions() const noexcept { return confines == Confines::reaction; }
+};
+
+/// The functions of inclusion.hpp. Those of a set are asked of the set at (t, w). What a system
+/// does not have does nothing, or is as the default.
+template <int N, int M>
+class RICOCHET_ALIGNED AnyInclusion {
+public:
+    using State = Eigen::Matrix<double, N, 1>;
+    using Reaction = Eigen::Matrix<double, M, 1>;
+    using Square = Eigen::Matrix<double, N, N>;
+    using Observation =
+        Eigen::Matrix<double, M, N, M == 1 && N != 1 ? Eigen::RowMajor : Eigen::ColMajor>;
+    using Action =
+        Eigen::Matrix<double, N, M, N == 1 && M != 1 ? Eigen::RowMajor : Eigen::ColMajor>;
+    using Delassus = Eigen::Matrix<double, M, M>;
+    using StepInputs = std::array<double, StepView::state_inputs>;
+
+    explicit AnyInclusion(const InclusionTraits& of) : traits(of) {}
+    virtual ~AnyInclusion() = default;
+
+    const InclusionTraits traits;
+
+    [[nodiscard]] virtual std::unique_ptr<const AnyInclusion> clone() const = 0;
+    [[nodiscard]] virtual Eigen::Index size() const = 0;
+    [[nodiscard]] virtual Eigen::Index reactions() const = 0;
+
+    virtual void smooth(double t, const State& w, State& f) const = 0;
+    virtual void smooth_jacobian(double t, const State& w, Square& j) const = 0;
+    virtual void mass(Square& a) const = 0;
+    virtual void observe(Observation& e) const = 0;
+    virtual void act(Action& g) const = 0;
+    virtual void offset(double t, Reaction& s) const = 0;
+    virtual void offset_rate(double t, Reaction& s) const = 0;
+
+    // False where the set is at fault.
+    virtual bool project(double t, const State& w, const Reaction& z, Reaction& p) const = 0;
+    virtual bool derivative(double t, const State& w, const Reaction& z, double* d) const = 0;
+    /// Of a box.
+    virtual bool bounds(double t, const State& w, Reaction& lower, Reaction& upper) const = 0;
+    /// Those, or one of them, smooth beyond y = 0 where the system gives such.
+    virtual void branch_bounds(double t, const State& w, Reaction& lower,
+                               Reaction& upper) const = 0;
+    [[nodiscard]] virtual double bound(double t, const State& w, Eigen::Index i,
+                                       Branch side) const = 0;
+    virtual void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const = 0;
+    [[nodiscard]] virtual std::string fault(double t, const State& w) const = 0;
+    [[nodiscard]] virtual std::size_t set_dimension(double t, const State& w) const = 0;
+    virtual void check_projection(double t, const State& w) const = 0;
+
+    [[nodiscard]] virtual double step_unit() const = 0;
+    virtual void step_inputs(double t, const State& w, const State& rate, const Reaction& reaction,
+                             StepInputs& out) const = 0;
+};
+
+template <class System>
+using AnyOf = AnyInclusion<state_size<System>, reaction_size<System>>;
+
+template <class System>
+class RICOCHET_ALIGNED TypedInclusion final : public AnyOf<System> {
+    using Any = AnyOf<System>;
+    using Set = SetOf<System>;
+    using State = typename Any::State;
+    using Reaction = typename Any::Reaction;
+    static constexpr bool box = BoxSet<Set>;
+    static constexpr bool gives_jacobian =
+        requires(const System& s, const State& w, typename Any::Square& j)
+    {
+        s.smooth_jacobian(0.0, w, j);
+    };
+    static constexpr bool moves = requires(const System& s, Reaction& r) { s.offset(0.0, r); };
+    static constexpr bool gives_offset_rate = requires(const System& s, Reaction& r)
+    {
+        s.offset_rate(0.0, r);
+    };
+    static constexpr bool continues_bounds = requires(const System& s, const State& w, int i)
+    {
+        {
+            s.branch_bound(0.0, w, i, Branch::upper)
+            } -> std::convertible_to<double>;
+    };
+    static constexpr bool gives_bound_gradient =
+        requires(const System& s, const State& w, int i, State& g)
+    {
+        s.bound_gradient(0.0, w, i, g);
+    };
+    static constexpr bool declares_inputs = DeclaresStepInputs<System, State, Reaction>;
+
+    [[nodiscard]] static InclusionTraits traits_of() noexcept
+    {
+        InclusionTraits traits;
+        if constexpr (requires { System::confines; }) traits.confines = System::confines;
+        if constexpr (requires { System::affine; }) traits.affine = System::affine;
+        traits.box = box;
+        traits.gives_jacobian = gives_jacobian;
+        traits.moves = moves;
+        traits.gives_offset_rate = gives_offset_rate;
+        traits.continues_bounds = continues_bounds;
+        traits.gives_bound_gradient = gives_bound_gradient;
+        if constexpr (declares_inputs) {
+            const StepLayout& layout = System::step_layout();
+            traits.layout = &layout;
+        }
+        return traits;
+    }
+
+public:
+    explicit TypedInclusion(const System& system) : Any(traits_of()), system(system) {}
+
+    System system;
+
+    [[nodiscard]] std::unique_ptr<const Any> clone() const override
+    {
+        return std::make_unique<TypedInclusion>(system);
+    }
+    [[nodiscard]] Eigen::Index size() const override
+    {
+        if constexpr (state_size<System> == Eigen::Dynamic) {
+            return static_cast<Eigen::Index>(system.size());
+        } else {
+            return state_size<System>;
+        }
+    }
+    [[nodiscard]] Eigen::Index reactions() const override
+    {
+        if constexpr (reaction_size<System> == Eigen::Dynamic) {
+            return static_cast<Eigen::Index>(system.reactions());
+        } else {
+            return reaction_size<System>;
+        }
+    }
+
+    void smooth(double t, const State& w, State& f) const override { system.smooth(t, w, f); }
+    void smooth_jacobian(double t, const State& w, typename Any::Square& j) const override
+    {
+        if constexpr (gives_jacobian) system.smooth_jacobian(t, w, j);
+    }
+    void mass(typename Any::Square& a) const override
+    {
+        if constexpr (requires { system.mass(a); }) system.mass(a);
+    }
+    void observe(typename Any::Observation& e) const override
+    {
+        if constexpr (requires { system.observe(e); }) {
+            system.observe(e);
+        } else {
+            e.leftCols(reactions()).setIdentity();
+        }
+    }
+    void act(typename Any::Action& g) const override
+    {
+        if constexpr (requires { system.act(g); }) system.act(g);
+    }
+    void offset(double t, Reaction& s) const override
+    {
+        if constexpr (moves) system.offset(t, s);
+    }
+    void offset_rate(double t, Reaction& s) const override
+    {
+        if constexpr (gives_offset_rate) system.offset_rate(t, s);
+    }
+
+    bool project(double t, const State& w, const Reaction& z, Reaction& p) const override
+    {
+        const Set set = system.reaction_set(t, w);
+        set.project(span_of(z), span_of(p));
+        return fault_of(set).empty();
+    }
+    bool derivative(double t, const State& w, const Reaction& z, double* d) const override
+    {
+        const Set set = system.reaction_set(t, w);
+        const auto k = static_cast<std::size_t>(z.size());
+        set.derivative(span_of(z), {d, k * k});
+        return fault_of(set).empty();
+    }
+    bool bounds(double t, const State& w, Reaction& lower, Reaction& upper) const override
+    {
+        if constexpr (box) {
+            const Set set = system.reaction_set(t, w);
+            for (Eigen::Index i = 0; i < lower.size(); ++i) {
+                lower[i] = set.lower(static_cast<std::size_t>(i));
+                upper[i] = set.upper(static_cast<std::size_t>(i));
+            }
+            return fault_of(set).empty();
+        } else {
+            return false;
+        }
+    }
+    void branch_bounds(double t, const State& w, Reaction& lower, Reaction& upper) const override
+    {
+        if constexpr (!continues_bounds) {
+            bounds(t, w, lower, upper);
+        } else {
+            for (Eigen::Index i = 0; i < lower.size(); ++i) {
+                lower[i] = bound(t, w, i, Branch::lower);
+                upper[i] = bound(t, w, i, Branch::upper);
+            }
+        }
+    }
+    [[nodiscard]] double bound(double t, const State& w, Eigen::Index i, Branch side) const override
+    {
+        if constexpr (continues_bounds) {
+            return system.branch_bound(t, w, static_cast<int>(i), side);
+        } else if constexpr (box) {
+            const Set set = system.reaction_set(t, w);
+            const auto k = static_cast<std::size_t>(i);
+            return side == Branch::lower ? set.lower(k) : set.upper(k);
+        } else {
+            return 0;
+        }
+    }
+    void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const override
+    {
+        if constexpr (gives_bound_gradient) system.bound_gradient(t, w, static_cast<int>(i), g);
+    }
+    [[nodiscard]] std::string fault(double t, const State& w) const override
+    {
+        const Set set = system.reaction_set(t, w);
+        return std::string(fault_of(set));
+    }
+    [[nodiscard]] std::size_t set_dimension(double t, const State& w) const override
+    {
+        return system.reaction_set(t, w).dimension();
+    }
+    void check_projection(double t, const State& w) const override
+    {
+        ricochet::check_projection(system.reaction_set(t, w));
+    }
+
+    [[nodiscard]] double step_unit() const override
+    {
+        if constexpr (declares_inputs) return system.step_unit();
+        return 1;
+    }
+    void step_inputs(double t, const State& w, const State& rate, const Reaction& reaction,
+                     typename Any::StepInputs& out) const override
+    {
+        if constexpr (declares_inputs) system.step_inputs(t, w, rate, reaction, out);
+    }
+};
+
+/// Rank of a square matrix to working precision. Writes its inverse if it has one.
+[[nodiscard]] Eigen::Index invert(const Eigen::MatrixXd& a, Eigen::MatrixXd& inverse);
+
+/// An inclusion with its constant matrices at hand, checked.
+template <int N, int M>
+class RICOCHET_ALIGNED AnyMatrices {
+public:
+    using Any = AnyInclusion<N, M>;
+    using State = typename Any::State;
+    using Reaction = typename Any::Reaction;
+    using Square = typename Any::Square;
+    using Observation = typename Any::Observation;
+    using Action = typename Any::Action;
+    using Delassus = typename Any::Delassus;
+
+    /// @throws std::invalid_argument for a singular or non-finite A, or E or G that are not
+    /// finite.
+    explicit AnyMatrices(const Any& inclusion);
+
+    [[nodiscard]] const Any& inclusion() const noexcept { return *inclusion_; }
+    [[nodiscard]] const InclusionTraits& traits() const noexcept { return inclusion_->traits; }
+    [[nodiscard]] Eigen::Index size() const noexcept { return mass_.rows(); }
+    [[nodiscard]] Eigen::Index reactions() const noexcept { return observe_.rows(); }
+
+    [[nodiscard]] const Square& mass() const noexcept { return mass_; }                  // A
+    [[nodiscard]] const Square& inverse_mass() const noexcept { return inverse_mass_; }  // 1/A
+    [[nodiscard]] const Observation& observe() const noexcept { return observe_; }       // E
+    [[nodiscard]] const Action& act() const noexcept { return act_; }                    // G
+
+    void smooth(double t, const State& w, State& f) const { inclusion_->smooth(t, w, f); }
+
+    /// Without the system's own by central differences of relative step 6e-6, the cube root of
+    /// the rounding unit.
+    void jacobian(double t, const State& w, Square& j) const
+    {
+        if (traits().gives_jacobian) return inclusion_->smooth_jacobian(t, w, j);
+        State moved = w;
+        State ahead = w;
+        State behind = w;
+        for (Eigen::Index i = 0; i < w.size(); ++i) {
+            const double step = 6e-6 * std::max(1.0, std::abs(w[i]));
+            moved[i] = w[i] + step;
+            smooth(t, moved, ahead);
+            moved[i] = w[i] - step;
+            smooth(t, moved, behind);
+            moved[i] = w[i];
+            j.col(i) = (ahead - behind) / (2 * step);
+        }
+    }
+
+    /// s(t).
+    void offset(double t, Reaction& s) const
+    {
+        s.setZero(reactions());
+        if (traits().moves) inclusion_->offset(t, s);
+    }
+
+    /// y = E w - s(t).
+    void observed(double t, const State& w, Reaction& y) const
+    {
+        offset(t, y);
+        y = observe_ * w - y;
+    }
+
+    /// The component that row i of E selects, or -1 where it is not just one.
+    [[nodiscard]] Eigen::Index selected(Eigen::Index i) const { return selected_[i]; }
+
+    /// Writes y_i exactly into w where row i of E selects one component.
+    void hold(Eigen::Index i, double y, double s, State& w) const
+    {
+        const Eigen::Index component = selected_[i];
+        if (component >= 0) w[component] = s + y;
+    }
+
+private:
+    void find_selected()
+    {
+        selected_.setConstant(reactions(), -1);
+        for (Eigen::Index i = 0; i < reactions(); ++i) {
+            Eigen::Index where = -1;
+            int entries = 0;
+            for (Eigen::Index j = 0; j < size(); ++j) {
+                if (observe_(i, j) != 0) ++entries, where = j;
+            }
+            if (entries == 1 && observe_(i, where) == 1) selected_[i] = where;
+        }
+    }
+
+    Owned<Any> inclusion_;
+    Square mass_, inverse_mass_;
+    Observation observe_;
+    Action act_;
+    Eigen::Matrix<Eigen::Index, M, 1> selected_;
+};
+
+template <int N, int M>
+AnyMatrices<N, M>::AnyMatrices(const Any& inclusion) : inclusion_(inclusion)
+{
+    const Eigen::Index n = inclusion.size();
+    const Eigen::Index m = inclusion.reactions();
+    mass_.setIdentity(n, n);
+    inclusion.mass(mass_);
+    if (!mass_.allFinite()) refuse_inclusion("the matrix A is not finite");
+    Eigen::MatrixXd inverse = mass_;
+    if (const Eigen::Index rank = invert(inverse, inverse); rank < n) {
+        refuse_inclusion("the matrix A is singular; its rank is", static_cast<double>(rank));
+    }
+    inverse_mass_ = inverse;
+
+    observe_.setZero(m, n);
+    inclusion.observe(observe_);
+    act_ = observe_.transpose();
+    inclusion.act(act_);
+    if (!observe_.allFinite() || !act_.allFinite()) {
+        refuse_inclusion("the matrices E and G must be finite");
+    }
+    find_selected();
+}
+
+}  // namespace detail
+
+/// A system with its constant matrices at hand, checked.
+template <Inclusion System>
+class InclusionMatrices : public detail::AnyMatrices<state_size<System>, reaction_size<System>> {
+public:
+    static constexpr int N = state_size<System>;
+    static constexpr int M = reaction_size<System>;
+
+    /// @throws std::invalid_argument for a singular or non-finite A, or E or G that are not
+    /// finite.
+    explicit InclusionMatrices(const System& system)
+        : InclusionMatrices::AnyMatrices(detail::TypedInclusion<System>(system))
+    {
+    }
+
+    [[nodiscard]] const System& system() const noexcept
+    {
+        return static_cast<const detail::TypedInclusion<System>&>(this->inclusion()).system;
+    }
+};
+
+}  // namespace ricochet

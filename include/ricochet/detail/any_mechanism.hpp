@@ -1,0 +1,100 @@
+// Internal: what it declares may change without notice.
+//
+// A mechanical system with contacts of which only the number of coordinates is known.
+//
+// What integrates such systems is compiled for N coordinates, and sees a system through
+// `AnyMechanism`, which `TypedMechanism` makes of the user's.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <memory>
+
+#include "ricochet/detail/alignment.hpp"
+#include "ricochet/detail/owned.hpp"
+
+namespace ricochet::detail {
+
+/// The functions of time_stepping.hpp.
+template <int N>
+class RICOCHET_ALIGNED AnyMechanism {
+public:
+    using Vector = Eigen::Matrix<double, N, 1>;
+    using Square = Eigen::Matrix<double, N, N>;
+    using Gaps = Eigen::VectorXd;
+    using Directions = Eigen::Matrix<double, Eigen::Dynamic, N>;
+
+    AnyMechanism(int of_contacts, int of_components)
+        : contacts(of_contacts), components(of_components)
+    {
+    }
+    virtual ~AnyMechanism() = default;
+
+    const int contacts;
+    const int components;  ///< of a contact: its normal and its tangents
+
+    [[nodiscard]] virtual std::unique_ptr<const AnyMechanism> clone() const = 0;
+    virtual void mass(const Vector& q, Square& m) const = 0;
+    virtual void force(double t, const Vector& q, const Vector& v, Vector& f) const = 0;
+    virtual void gaps(const Vector& q, Gaps& g) const = 0;
+    virtual void directions(const Vector& q, Directions& h) const = 0;
+    [[nodiscard]] virtual double gap(int contact, const Vector& q) const = 0;
+    [[nodiscard]] virtual double gap_rate(int contact, const Vector& q, const Vector& v) const = 0;
+    [[nodiscard]] virtual double restitution(int contact) const = 0;
+    [[nodiscard]] virtual double friction(int contact) const = 0;
+};
+
+template <class System>
+class RICOCHET_ALIGNED TypedMechanism final : public AnyMechanism<System::coordinates> {
+    using Any = AnyMechanism<System::coordinates>;
+    using Vector = typename Any::Vector;
+    static constexpr int C = System::contacts;
+    static constexpr int D = 1 + System::tangents;
+
+public:
+    explicit TypedMechanism(const System& system) : Any(C, D), system_(system) {}
+
+    [[nodiscard]] std::unique_ptr<const Any> clone() const override
+    {
+        return std::make_unique<TypedMechanism>(system_);
+    }
+    void mass(const Vector& q, typename Any::Square& m) const override { system_.mass(q, m); }
+    void force(double t, const Vector& q, const Vector& v, Vector& f) const override
+    {
+        system_.force(t, q, v, f);
+    }
+    void gaps(const Vector& q, typename Any::Gaps& g) const override
+    {
+        Eigen::Matrix<double, C, 1> all;
+        system_.gaps(q, all);
+        g = all;
+    }
+    void directions(const Vector& q, typename Any::Directions& h) const override
+    {
+        Eigen::Matrix<double, C * D, System::coordinates> all;
+        system_.directions(q, all);
+        h = all;
+    }
+    [[nodiscard]] double gap(int contact, const Vector& q) const override
+    {
+        Eigen::Matrix<double, C, 1> all;
+        system_.gaps(q, all);
+        return all[contact];
+    }
+    [[nodiscard]] double gap_rate(int contact, const Vector& q, const Vector& v) const override
+    {
+        Eigen::Matrix<double, C * D, System::coordinates> all;
+        system_.directions(q, all);
+        return all.row(contact * D).dot(v);
+    }
+    [[nodiscard]] double restitution(int contact) const override
+    {
+        return system_.restitution(contact);
+    }
+    [[nodiscard]] double friction(int contact) const override { return system_.friction(contact); }
+
+private:
+    System system_;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,31 @@
+// Internal: what it declares may change without notice.
+//
+// A value of a class that is known by its base only.
+#pragma once
+
+#include <memory>
+
+namespace ricochet::detail {
+
+/// Owns what `clone` makes of a `Base`; a copy owns one of its own.
+template <class Base>
+class Owned {
+public:
+    explicit Owned(const Base& value) : value_(value.clone()) {}
+    Owned(const Owned& other) : Owned(*other) {}
+    Owned(Owned&&) noexcept = default;
+    Owned& operator=(Owned other) noexcept
+    {
+        value_.swap(other.value_);
+        return *this;
+    }
+    ~Owned() = default;
+
+    [[nodiscard]] const Base& operator*() const noexcept { return *value_; }
+    [[nodiscard]] const Base* operator->() const noexcept { return value_.get(); }
+
+private:
+    std::unique_ptr<const Base> value_;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,3 @@
+#include "ricochet/nonsmooth/hand_over.hpp"
+
+RICOCHET_INCLUSIONS_OF(1, 1, )
