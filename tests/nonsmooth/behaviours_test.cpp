@@ -27,12 +27,14 @@ struct Everything {
 };
 
 struct Relaxation {
-    static constexpr int state_size = 5;
-    static constexpr int reaction_size = 5;
+    static constexpr int state_size = Eigen::Dynamic;
+    static constexpr int reaction_size = Eigen::Dynamic;
     static constexpr Confines confines = Confines::state;
-    using Vector = Eigen::Matrix<double, 5, 1>;
-    using Square = Eigen::Matrix<double, 5, 5>;
+    using Vector = Eigen::VectorXd;
+    using Square = Eigen::MatrixXd;
     Square stiffness;
+    static int size() { return 5; }
+    static int reactions() { return 5; }
     void smooth(double /*t*/, const Vector& w, Vector& f) const { f = -stiffness * w; }
     [[nodiscard]] static Everything reaction_set(double, const Vector&) { return {}; }
 };
@@ -44,11 +46,11 @@ TEST(NonsmoothBehaviours, AFixedPointSolvesRandomDefiniteSystems)
     std::normal_distribution<double> normal;
     for (int trial = 0; trial < 20; ++trial) {
         Relaxation system;
-        Relaxation::Square m;
-        Relaxation::Vector w0;
+        Relaxation::Square m(5, 5);
+        Relaxation::Vector w0(5);
         for (double& entry : m.reshaped()) entry = normal(random);
         for (double& entry : w0) entry = normal(random);
-        system.stiffness = m * m.transpose() + Relaxation::Square::Identity();
+        system.stiffness = m * m.transpose() + Relaxation::Square::Identity(5, 5);
         const double h = 0.5;
         SetValuedMotion<Relaxation> motion(
             system, w0,
@@ -57,7 +59,7 @@ TEST(NonsmoothBehaviours, AFixedPointSolvesRandomDefiniteSystems)
              .scheme = {.scheme = Scheme::backward_euler,
                         .stage = {.method = StageMethod::fixed_point, .tolerance = 1e-11}}});
         ASSERT_EQ(motion.run(), SetValuedOutcome::reached_end);
-        const Relaxation::Square whole = Relaxation::Square::Identity() + h * system.stiffness;
+        const Relaxation::Square whole = Relaxation::Square::Identity(5, 5) + h * system.stiffness;
         const Relaxation::Vector exact = whole.llt().solve(w0);
         // The residual of 1e-11 over the least eigenvalue, which is at least 1 + h.
         EXPECT_LE((motion.state().w - exact).norm(), 1e-10) << trial;

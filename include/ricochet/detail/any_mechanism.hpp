@@ -6,7 +6,7 @@
 // `AnyMechanism`, which `TypedMechanism` makes of the user's.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 
 #include <memory>
 
@@ -36,6 +36,8 @@ public:
     [[nodiscard]] virtual std::unique_ptr<const AnyMechanism> clone() const = 0;
     virtual void mass(const Vector& q, Square& m) const = 0;
     virtual void force(double t, const Vector& q, const Vector& v, Vector& f) const = 0;
+    /// M^-1 F, where the compiler sees both.
+    virtual void acceleration(double t, const Vector& q, const Vector& v, Vector& a) const = 0;
     virtual void gaps(const Vector& q, Gaps& g) const = 0;
     virtual void directions(const Vector& q, Directions& h) const = 0;
     [[nodiscard]] virtual double gap(int contact, const Vector& q) const = 0;
@@ -62,6 +64,14 @@ public:
     void force(double t, const Vector& q, const Vector& v, Vector& f) const override
     {
         system_.force(t, q, v, f);
+    }
+    void acceleration(double t, const Vector& q, const Vector& v, Vector& a) const override
+    {
+        typename Any::Square m;
+        Vector f;
+        system_.mass(q, m);
+        system_.force(t, q, v, f);
+        a = m.llt().solve(f);
     }
     void gaps(const Vector& q, typename Any::Gaps& g) const override
     {

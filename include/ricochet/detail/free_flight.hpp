@@ -66,14 +66,11 @@ public:
 
     void flow(double t, const State& x, State& dxdt) const
     {
-        const Vector q = position(x);
         const Vector v = velocity(x);
-        Square mass;
-        Vector force;
-        system_->mass(q, mass);
-        system_->force(t, q, v, force);
+        Vector acceleration;
+        system_->acceleration(t, position(x), v, acceleration);
         Eigen::Map<Vector>(dxdt.data()) = v;
-        Eigen::Map<Vector>(dxdt.data() + N) = mass.llt().solve(force);
+        Eigen::Map<Vector>(dxdt.data() + N) = acceleration;
     }
 
     [[nodiscard]] double guard(std::size_t contact, double /*t*/, const State& x) const

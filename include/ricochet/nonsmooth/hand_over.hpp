@@ -452,7 +452,7 @@ private:
     }
 
     /// Whether so many steps in a row were shorter than need be that longer ones are tried.
-    [[nodiscard]] bool may_lengthen() noexcept
+    [[nodiscard]] bool may_lengthen() noexcept requires can_branch
     {
         if (std::isinf(longest_step_)) return false;
         easy_steps_ = held_.is_easy() ? easy_steps_ + 1 : 0;
@@ -549,7 +549,7 @@ private:
         run_.statistics.event_driven.events -= idle;
     }
 
-    void end_with_empty_set()
+    void end_with_empty_set() requires can_branch
     {
         run_.failure.set = modes_.faulty(run_.state.t, run_.state.w);
         end_with(HandOverOutcome::not_converged);
