@@ -26,7 +26,10 @@ StepVerdict ErrorStep::judge(double error, double /*h*/) const noexcept
 StepVerdict HeuristicStep::judge(double error, double /*h*/) const noexcept
 {
     const double factor = std::pow(positive(error), -1.0 / (order + 1));
-    return error <= 1 ? StepVerdict{true, std::min(up, factor)} : StepVerdict{false, factor};
+    // Just above 1 the power rounds to 1, and the same step would be rejected for ever.
+    constexpr double below_one = 1 - std::numeric_limits<double>::epsilon() / 2;
+    return error <= 1 ? StepVerdict{true, std::min(up, factor)}
+                      : StepVerdict{false, std::min(factor, below_one)};
 }
 
 StepVerdict ClassicStep::judge(double error, double /*h*/) noexcept
@@ -49,7 +52,10 @@ StepVerdict PrintedPiStep::judge(double error, double h) noexcept
     const double ratio = h_before > 0 ? h / h_before : 1;
     const double factor =
         std::pow(now, -q / gamma1) * std::pow(before, q / gamma2) * std::pow(ratio, -kappa);
-    if (!(factor >= c1)) return {false, std::min(factor, 0.6)};
+    if (!(factor >= c1)) {
+        // The power of a huge error is zero, and the step would be.
+        return {false, std::min(std::max(factor, std::numeric_limits<double>::min()), 0.6)};
+    }
     error_before = now;
     h_before = h;
     return {true, std::min(factor, c2)};
@@ -123,8 +129,9 @@ void validate(const StepController& controller)
             }
             if constexpr (std::is_same_v<C, PrescribedSteps>) {
                 require(c.lengths && !c.lengths->empty(), "steps must be prescribed", 0);
-                const double least = *std::min_element(c.lengths->begin(), c.lengths->end());
-                require(least > 0, "prescribed steps must be positive", least);
+                for (const double length : *c.lengths) {
+                    require(length > 0, "prescribed steps must be positive", length);
+                }
             }
             if constexpr (std::is_same_v<C, LearnedStep>) {
                 if (!c.policy) detail::Refuse{require.who}("no policy was given");
