@@ -1,4 +1,5 @@
-// Convex sets: projections, their derivatives, and the refusal of what is no projection.
+// Convex sets: values of projections and derivatives, and the refusal of what is no projection. What
+// all sets must do is in conformance/convex_sets.hpp.
 
 #include <gtest/gtest.h>
 
@@ -90,18 +91,6 @@ TEST(ConvexSets, AProductTreatsItsFactorsApart)
     EXPECT_EQ(box.upper(1), 3);
 }
 
-TEST(ConvexSets, AllPassTheirOwnCheck)
-{
-    EXPECT_NO_THROW(check_projection(IntervalSet(-0.5, 2)));
-    EXPECT_NO_THROW(check_projection(IntervalSet::half_line()));
-    EXPECT_NO_THROW(check_projection(Box<3>({-1, 0, 2}, {1, 0, 3})));
-    EXPECT_NO_THROW(check_projection(Orthant<4>()));
-    EXPECT_NO_THROW(check_projection(Ball<3>(0.7)));
-    EXPECT_NO_THROW(check_projection(FrictionCone<2>(0.3)));
-    EXPECT_NO_THROW(check_projection(FrictionCone<3>(2)));
-    EXPECT_NO_THROW(check_projection(Product(Ball<2>(1), FrictionCone<3>(0.5), IntervalSet(-1, 1))));
-}
-
 // The nearer of two points: idempotent, but no convex set.
 struct TwoPoints {
     static std::size_t dimension() { return 1; }
@@ -146,33 +135,9 @@ TEST(ConvexSets, WhatIsNoProjectionIsRefused)
     EXPECT_THROW(check_projection(WrongSlope{}), std::invalid_argument);
 }
 
-TEST(ConvexSets, EmptySetsSaySo)
+TEST(ConvexSets, ASetThatDoesNotSayHasNoFault)
 {
-    EXPECT_FALSE(IntervalSet(1, -1).fault().empty());
-    EXPECT_FALSE(IntervalSet::symmetric(-0.1).fault().empty());
-    EXPECT_FALSE(IntervalSet(std::nan(""), 1).fault().empty());
-    EXPECT_FALSE(Ball<2>(-1).fault().empty());
-    EXPECT_FALSE(FrictionCone<3>(-1).fault().empty());
-    EXPECT_FALSE(Product(IntervalSet(0, 1), Ball<2>(-1)).fault().empty());
-    EXPECT_TRUE(Product(IntervalSet(0, 1), Ball<2>(1)).fault().empty());
-    EXPECT_TRUE(fault_of(TwoPoints{}).empty());  // does not say
-}
-
-TEST(ConvexSets, AFaultTellsWhatIsEmptyFromWhatIsNoNumber)
-{
-    const double nan = std::nan("");
-    const auto says = [](std::string_view fault, std::string_view what) {
-        return fault.find(what) != std::string_view::npos;
-    };
-    EXPECT_TRUE(says(IntervalSet(1, -1).fault(), "empty"));
-    EXPECT_TRUE(says(IntervalSet(nan, 1).fault(), "not a number"));
-    EXPECT_TRUE(says(Box<2>({-1, 1}, {1, -1}).fault(), "empty"));
-    EXPECT_TRUE(says(Box<2>({-1, -1}, {1, nan}).fault(), "not a number"));
-    EXPECT_TRUE(says(Ball<2>(-1).fault(), "negative"));
-    EXPECT_TRUE(says(Ball<2>(nan).fault(), "not a number"));
-    EXPECT_TRUE(says(FrictionCone<2>(-1).fault(), "negative"));
-    EXPECT_TRUE(says(FrictionCone<2>(nan).fault(), "not a number"));
-    EXPECT_EQ(IntervalSet::half_line().fault(), "");
+    EXPECT_EQ(fault_of(TwoPoints{}), "");
 }
 
 }  // namespace
