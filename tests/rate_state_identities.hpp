@@ -28,8 +28,14 @@ struct QuadLaw {
         if (effect == DirectEffect::log) {
             return Quad(p.f_star) + Quad(p.a) * log(v / Quad(p.v_star)) + Quad(p.b) * xi;
         }
+        // The logarithm loses the digits of a small z, of which the series leaves out z^10.
         const Quad z = abs(v) / w(xi);
-        const Quad f = Quad(p.a) * log(z + sqrt(z * z + 1));
+        const Quad y = z * z;
+        const Quad asinh =
+            z < Quad("1e-3")
+                ? Quad(z * (1 - y / 6 * (1 - y * 9 / 20 * (1 - y * 25 / 42 * (1 - y * 49 / 72)))))
+                : log(z + sqrt(y + 1));
+        const Quad f = Quad(p.a) * asinh;
         return v < 0 ? Quad(-f) : f;
     }
     /// s, without the loss of sqrt(V^2 + w^2) - w.

@@ -69,6 +69,7 @@ double log_cosh(double z)
 template <class Function>
 double integral(const Function& f, double from, double to)
 {
+    if (std::isnan(to)) return to;
     return boost::math::quadrature::gauss_kronrod<double, 31>::integrate(f, from, to, 10, 1e-13);
 }
 
@@ -188,7 +189,7 @@ ScalarJet AdditivePair::primal(double rate, double /*xi*/) const
     double upper = unit;
     for (int i = 0; i < 200 && gap(lower) > 0; ++i) lower *= 2;
     for (int i = 0; i < 200 && gap(upper) < 0; ++i) upper *= 2;
-    if (gap(lower) > 0 || gap(upper) < 0) {
+    if (!(gap(lower) <= 0 && gap(upper) >= 0)) {
         throw std::invalid_argument(fmt::format("AdditivePair: no d gives the rate {} 1/s", rate));
     }
     double d = 0;

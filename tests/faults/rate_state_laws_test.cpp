@@ -14,72 +14,11 @@
 namespace ricochet {
 namespace {
 
-using test::check_identities;
-using test::IdentityErrors;
 using test::Quad;
-using test::QuadLaw;
 
 void expect_says(const std::string& sentence, const std::string& piece)
 {
     EXPECT_NE(sentence.find(piece), std::string::npos) << "no '" << piece << "' in: " << sentence;
-}
-
-template <class Pair, StateEvolution evolution, DirectEffect effect>
-IdentityErrors errors_of(const RateStateParameters& p, int points)
-{
-    return check_identities(Pair(p), QuadLaw{p, evolution, effect}, points, 17);
-}
-
-// Every term of the formulas is a few roundings of 1.1e-16 from its value; the exponent
-// (f* + b xi) / a of w, up to 90, multiplies its own by as much, squared in the tilt of
-// the friction: 1e-13 leaves a factor of two.
-constexpr double tolerance = 1e-13;
-
-TEST(RateStatePotentials, AgeingPairIsTheLaw)
-{
-    const RateStateParameters p;
-    const auto log =
-        errors_of<AgeingPotential<DirectEffect::log>, StateEvolution::ageing, DirectEffect::log>(
-            p, 1000);
-    const auto asinh =
-        errors_of<AgeingPotential<>, StateEvolution::ageing, DirectEffect::asinh>(p, 1000);
-    EXPECT_LE(log.worst(), tolerance);
-    EXPECT_LE(asinh.worst(), tolerance);
-}
-
-TEST(RateStatePotentials, AgeingPairIsTheLawWhereTheDirectEffectIsLinear)
-{
-    // With f* = 0.05 the speed w is of the order of V, and every term of it counts.
-    const RateStateParameters weak{.a = 0.03, .f_star = 0.05};
-    const auto e =
-        errors_of<AgeingPotential<>, StateEvolution::ageing, DirectEffect::asinh>(weak, 1000);
-    EXPECT_LE(e.worst(), tolerance);
-}
-
-TEST(RateStatePotentials, StateDependentPairsAreTheirLaws)
-{
-    const RateStateParameters p;
-    EXPECT_LE((errors_of<SlipPotential<DirectEffect::log>, StateEvolution::slip, DirectEffect::log>(
-                   p, 300)
-                   .worst()),
-              tolerance);
-    EXPECT_LE(
-        (errors_of<SlipPotential<>, StateEvolution::slip, DirectEffect::asinh>(p, 300).worst()),
-        tolerance);
-    EXPECT_LE((errors_of<PrzPotential<>, StateEvolution::prz, DirectEffect::asinh>(p, 300).worst()),
-              tolerance);
-}
-
-TEST(RateStatePotentials, DualOfTheSlipLawIsConvexExactlyAboveOneOverE)
-{
-    const SlipPotential<DirectEffect::log> pair;
-    const RateStateParameters& p = pair.law().parameters();
-    for (const double xi : {-3.0, 0.0, 4.0}) {
-        for (const double omega : {0.99 / std::exp(1.0), 1.01 / std::exp(1.0)}) {
-            const double v = omega * p.v_star * std::exp(-xi);
-            EXPECT_EQ(pair.dual(-p.b * v, xi).second > 0, omega > std::exp(-1.0));
-        }
-    }
 }
 
 TEST(RateStatePotentials, AgeingPairIsConvexWhereVThetaOverLIsBelowAOverB)

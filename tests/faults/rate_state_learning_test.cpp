@@ -69,48 +69,6 @@ TEST(AdditivePair, OfLinearNetsIsTheAgeingLaw)
     }
 }
 
-TEST(AdditivePair, PotentialsGiveFrictionAndRate)
-{
-    // Differences of order four with relative steps of 1e-3: 1e-12 of the value.
-    const AdditivePair pair(crooked_parameters());
-    for (const double v : {1e-6, 2e-4}) {
-        for (const double xi : {-1.0, 3.0}) {
-            const FrictionAndRateGradient g = pair.gradient(v, xi);
-            const RateStateJet j = pair.rate_potential(v, xi);
-            const auto by_v = [&](double x) { return pair.rate_potential(x, xi).value; };
-            const auto by_xi = [&](double x) { return pair.rate_potential(v, x).value; };
-            const double scale = std::abs(j.value);
-            EXPECT_NEAR(central(by_v, v, 1e-3 * v) * v, j.v * v, 1e-9 * scale);
-            EXPECT_NEAR(central(by_xi, xi, 1e-3), j.xi, 1e-9 * scale);
-            EXPECT_NEAR(j.v, g.friction, 1e-15);
-            EXPECT_NEAR(pair.dual(-j.xi).first, g.rate, 1e-12 * std::abs(g.rate));
-            EXPECT_NEAR(
-                central([&](double x) { return pair.rate_potential(x, xi).v; }, v, 1e-3 * v), j.vv,
-                1e-9 * std::abs(j.vv));
-            EXPECT_NEAR(central([&](double x) { return pair.rate_potential(v, x).xi; }, xi, 1e-3),
-                        j.xixi, 1e-9 * std::abs(j.xixi));
-            EXPECT_NEAR(central([&](double x) { return pair.evaluate(x, xi).rate; }, v, 1e-3 * v),
-                        g.rate_v, 1e-9 * std::abs(g.rate_v));
-            EXPECT_NEAR(central([&](double x) { return pair.evaluate(v, x).rate; }, xi, 1e-3),
-                        g.rate_xi, 1e-9 * std::abs(g.rate_xi));
-            const double d = -j.xi;
-            const ScalarJet dual = pair.dual(d);
-            EXPECT_NEAR(
-                central([&](double x) { return pair.dual(x).value; }, d, 1e-3 * std::abs(d)),
-                dual.first, 1e-9 * std::abs(dual.first));
-            const ScalarJet primal = pair.primal(dual.first);
-            EXPECT_NEAR(primal.first / d, 1, 1e-12);
-            EXPECT_NEAR(primal.value, d * dual.first - dual.value,
-                        1e-12 * std::abs(d * dual.first));
-            EXPECT_NEAR(primal.second * dual.second, 1, 1e-10);
-            // Convex in each argument.
-            EXPECT_GT(j.vv, 0);
-            EXPECT_GT(j.xixi, 0);
-            EXPECT_GT(dual.second, 0);
-        }
-    }
-}
-
 TEST(AdditivePair, RefusesWhatIsNotConvex)
 {
     const auto refusal = [](auto change) -> std::string {
