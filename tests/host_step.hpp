@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/detail/guard_view.hpp"
+#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/step.hpp"
 
 namespace ricochet::test {
@@ -28,11 +28,12 @@ struct HostSystem {
     }
 };
 
-/// The step from time 100 over [0, h] along g, with rate g'.
+/// The step from time 100 over [0, h] along g, with rate g'; with direction -1 backward in time.
 class HostStep {
 public:
-    HostStep(double h, std::function<double(double)> g, std::function<double(double)> rate)
-        : h_(h), g_(std::move(g)), rate_(std::move(rate))
+    HostStep(double h, std::function<double(double)> g, std::function<double(double)> rate,
+             int direction = 1)
+        : h_(h), direction_(direction), g_(std::move(g)), rate_(std::move(rate))
     {
         x0_ = at(0);
         x1_ = at(h);
@@ -40,7 +41,8 @@ public:
         rate1_ = {1, rate_(h)};
     }
 
-    [[nodiscard]] double time(double s) const { return 100 + s; }
+    [[nodiscard]] double time(double s) const { return 100 + direction_ * s; }
+    [[nodiscard]] bool backward() const { return direction_ < 0; }
     [[nodiscard]] double h() const { return h_; }
     [[nodiscard]] const HostState& x0() const { return x0_; }
     [[nodiscard]] const HostState& x1() const { return x1_; }
@@ -67,25 +69,34 @@ private:
     [[nodiscard]] HostState at(double s) const { return {s, g_(s)}; }
 
     double h_;
+    int direction_;
     std::function<double(double)> g_, rate_;
     HostState x0_, x1_, rate0_, rate1_;
 };
 
 static_assert(MethodStep<HostStep, HostState>);
 
+/// One look of a detector at a step with a watch whose side is set.
+template <class Detector>
+[[nodiscard]] Finding look(const Detector& detector, const HostStep& step, Watch& watch,
+                           Crossing crossing, std::uint64_t* guard_calls = nullptr)
+{
+    std::uint64_t calls = 0;
+    const HostSystem system{crossing};
+    const GuardView<HostSystem, HostState> guard(system, calls, 0, 0, crossing, step.backward());
+    watch.start = {.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]};
+    const Finding finding = look_at(detector, guard, step, watch);
+    if (guard_calls) *guard_calls = calls;
+    return finding;
+}
+
 /// One look of a detector at a step of a guard armed on `side`.
 template <class Detector>
 [[nodiscard]] Finding look(const Detector& detector, const HostStep& step, Side side,
                            Crossing crossing, std::uint64_t* guard_calls = nullptr)
 {
-    std::uint64_t calls = 0;
-    const HostSystem system{crossing};
-    const GuardView<HostSystem, HostState> guard(system, calls);
-    Watch watch{
-        .side = side, .start = {.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]}, .end = {}};
-    const Finding finding = look_at(detector, guard, step, watch);
-    if (guard_calls) *guard_calls = calls;
-    return finding;
+    Watch watch{.side = side, .start = {}, .end = {}};
+    return look(detector, step, watch, crossing, guard_calls);
 }
 
 }  // namespace ricochet::test

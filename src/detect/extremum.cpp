@@ -48,6 +48,12 @@ constexpr int most_samples = 80;
 /// Of a step, below which a rate that is a difference over 1e-5 of it rounds a kink off.
 constexpr double coarse_part = 1e-3;
 
+/// Clear, as far as could be seen: what is not a number is no evidence.
+Finding clear_if(bool known) noexcept
+{
+    return Finding::clear(known ? Evidence::checked : Evidence::assumed);
+}
+
 /// Whether a sample cannot be told from zero: by the rounding of the guard's values, or
 /// of the terms that it is made of.
 [[nodiscard]] bool is_on_surface(GuardPath& path, const Watch& watch,
@@ -136,7 +142,7 @@ constexpr double coarse_part = 1e-3;
         return Finding::leaving(side, watch.start, pair ? lowest : watch.end);
     }
     if (pair) return Finding::leaving(opposite(side), lowest, highest);
-    return Finding::clear(Evidence::checked);
+    return clear_if(!std::isnan(lowest.value) && !std::isnan(highest.value));
 }
 
 /// Both ends are on the armed side: is the extremum between them, too?
@@ -165,13 +171,14 @@ constexpr double coarse_part = 1e-3;
                        ? Finding::clear(Evidence::checked)
                        : Finding::touching(watch.side, dip);
         }
-        if (!has_left(watch.side, dip.value)) return Finding::clear(Evidence::checked);
+        if (!has_left(watch.side, dip.value)) return clear_if(!std::isnan(dip.value));
         return pair(path, watch, dip);
     }
     const double sign = watch.side == Side::above ? 1 : -1;
     // A kink has its extremum in a point, which only the polynomial gives exactly.
     const double resolution = path.on_polynomial() ? path.finest(hi.s) : 1e-9 * (hi.s - lo.s);
     GuardSample lowest = hi;
+    bool known = true;
     for (int i = 0; i < most_samples && hi.s - lo.s > resolution; ++i) {
         const double width = hi.s - lo.s;
         double s = lo.s + turn(sign, lo, hi, i) * width;
@@ -183,7 +190,8 @@ constexpr double coarse_part = 1e-3;
         if (value <= 0 && !is_on_surface(path, watch, sample)) {
             return pair(path, watch, sample);
         }
-        if (!std::isfinite(value) || !std::isfinite(rate)) break;
+        known = std::isfinite(value) && std::isfinite(rate);
+        if (!known) break;
         if (sign * lowest.value >= value) lowest = sample;
         // What is still to come: a parabola falls by rate^2 / (2 curvature).
         const double bend = std::min(rate - sign * lo.rate, sign * hi.rate - rate) / width;
@@ -199,8 +207,7 @@ constexpr double coarse_part = 1e-3;
         (rate <= 0 ? lo : hi) = sample;
     }
     if (!is_on_surface(path, watch, lowest)) {
-        return has_left(watch.side, lowest.value) ? pair(path, watch, lowest)
-                                                  : Finding::clear(Evidence::checked);
+        return has_left(watch.side, lowest.value) ? pair(path, watch, lowest) : clear_if(known);
     }
     // One that falls from its surface to its surface has not been away.
     const bool stays = watch.departs && is_on_surface(path, watch, watch.start);
@@ -238,10 +245,12 @@ Finding Extremum::examine(GuardPath& path, Watch& watch) const
         if (counts(side, path.crossing())) {
             return Finding::leaving(side, watch.start, watch.end);
         }
-        return Finding::clear(Evidence::checked);
+        return clear_if(known);
     }
-    if (!known) return Finding::clear(Evidence::checked);
-    return look_for_pair(path, watch, cubic);
+    if (!known) return clear_if(false);
+    Finding finding = look_for_pair(path, watch, cubic);
+    if (std::isnan(cubic.v1)) finding.evidence = Evidence::assumed;
+    return finding;
 }
 
 }  // namespace ricochet

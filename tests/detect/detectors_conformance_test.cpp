@@ -1,0 +1,51 @@
+// Every detector by the suite of all.
+#include "conformance/detectors.hpp"
+
+#include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/verified.hpp"
+
+namespace ricochet::test {
+namespace {
+
+Network network()
+{
+    Model model;
+    model.system = "host";
+    model.recipe = "state";
+    model.offset = {0, 0};
+    model.scale = {1, 1};
+    model.layers = {{.inputs = 2, .outputs = 1, .weight = {0, 0}, .bias = {1}}};
+    return Network(model);
+}
+
+template <class Detector>
+DetectorCase with(const std::string& name, const Detector& detector, Evidence claims,
+                  std::uint64_t most_calls)
+{
+    DetectorCase out = any_detector(name, detector);
+    out.claims = claims;
+    out.sees_pairs = claims != Evidence::assumed;
+    out.most_calls = most_calls;
+    return out;
+}
+
+std::vector<DetectorCase> all()
+{
+    // Of a host's step, which has no polynomial, nothing can be proved.
+    return {with("Ends", Ends{}, Evidence::assumed, 1),
+            with("Extremum", Extremum{}, Evidence::checked, 61),
+            with("Bernstein", Bernstein{}, Evidence::checked, 100'000),
+            // Which steps it clears is another matter; this is what it does with the others.
+            with("Network", network(), Evidence::assumed, 2),
+            with("VerifiedExtremum", Verified<Extremum>(network()), Evidence::checked, 61),
+            with("VerifiedEnds", Verified<Ends>(network(), Ends{}), Evidence::assumed, 1)};
+}
+
+INSTANTIATE_TEST_SUITE_P(All, DetectorSuite, testing::ValuesIn(all()),
+                         [](const auto& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace ricochet::test
