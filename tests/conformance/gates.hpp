@@ -122,6 +122,7 @@ struct GateCase {
     const ShuttleRun* exact;  ///< of the detector that the gate leaves the other steps to
     Model truth;
     bool keeps_events = false;             ///< of the exact detector, with any weights
+    bool returns = false;                  ///< where it finds the guard on its other side
     bool saves = true;                     ///< exact calls, with a network that tells the truth
     bool plans = false;                    ///< by bounds on top of what the network clears
     bool refuses_other_weights = false;    ///< since its proof is of these
@@ -244,6 +245,13 @@ TEST_P(GateSuite, AnyWeightsKeepTheEventsWhereThatIsPromised)
 {
     if (!GetParam().keeps_events) return;
     for_hostile([](const ShuttleRun& run) { EXPECT_TRUE(same_events(run, exact())); });
+}
+
+TEST_P(GateSuite, AGuardThatStaysBeyondItsSurfaceIsReturnedToWhereThatIsPromised)
+{
+    if (!GetParam().returns) return;
+    // Nothing turns the point back at a wall that is not noticed.
+    EXPECT_TRUE(same_events(GetParam().run(constant(-1e9)), exact()));
 }
 
 TEST_P(GateSuite, AMissedEventIsNeverHiddenBehindEvidence)

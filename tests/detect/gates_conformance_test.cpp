@@ -26,7 +26,7 @@ Model certified_levels()
 
 GateCase keeping(GateCase gate, Evidence put_off)
 {
-    gate.keeps_events = true;
+    gate.keeps_events = gate.returns = true;
     gate.put_off = put_off;
     gate.saves = gate.plans = put_off == Evidence::proved;
     return gate;
@@ -52,6 +52,7 @@ std::vector<GateCase> keeping_gates()
                          [=](const Model& model) { return Metered(foreseen(model), counted); }),
                 Evidence::proved)};
     gates[2].refuses_other_weights = true;
+    gates[2].returns = false;
     return gates;
 }
 
@@ -70,6 +71,7 @@ std::vector<GateCase> trusted_gates()
         trusted(any_gate<Ends>("Network", true_prediction(), network), Evidence::assumed),
         trusted(any_gate("Calibrated", true_horizons(), calibrated), Evidence::gated),
         trusted(any_gate("CalibratedBounds", true_levels(), bounds), Evidence::gated)};
+    gates[1].returns = true;
     gates[2].plans = true;
     return gates;
 }
@@ -130,6 +132,31 @@ TEST(Gate, OutsideOfItsBoxOrOfWhatIsNoNumberNothingIsCleared)
         Model weights = model;
         weights.layers[0].weight[0] = nan;
         EXPECT_EQ(gates::Gate(weights).ask(Shuttle{}, 0, 0, std::array{0.1, 0.0}).cleared, 0);
+    }
+}
+
+TEST(CertifiedGate, NeverClearsMoreThanIsProved)
+{
+    const Certified<> gate(certified_levels());
+    const Shuttle shuttle;
+    int cleared = 0;
+    for (double x = -1; x <= 1; x += 1.0 / 1024) {
+        for (const double v : {-2.0, 0.3, 2.0}) {
+            const std::array<double, 2> at{x, v};
+            const gates::Gate::Answer answer = gate.level(shuttle, 0, 0, 0, at);
+            EXPECT_FALSE(answer.outside);
+            EXPECT_LE(answer.cleared, std::max(shuttle.guard(0, at), 0.0)) << x;
+            cleared += answer.cleared > 0;
+            // It speaks of the first guard in the first mode.
+            EXPECT_EQ(gate.level(shuttle, 1, 0, 0, at).cleared, 0);
+            EXPECT_EQ(gate.level(shuttle, 0, 1, 0, at).cleared, 0);
+        }
+    }
+    EXPECT_GT(cleared, 3 * 1024);
+    for (const std::array<double, 2>& at :
+         {std::array{1.1, 0.0}, std::array{0.0, 2.1}, std::array{std::nan(""), 0.0}}) {
+        EXPECT_TRUE(gate.level(shuttle, 0, 0, 0, at).outside);
+        EXPECT_EQ(gate.level(shuttle, 0, 0, 0, at).cleared, 0);
     }
 }
 
