@@ -48,4 +48,6 @@ grep -q learn "$work/log"
 [ ! -e "$work/core/include/ricochet/learn" ] && [ ! -e "$work/core/include/ricochet/faults" ]
 echo "the core alone: no other component is installed or found"
 "$work/whole/bin/ricochet" simulate bouncing-ball --step 0.01 --detector network --json >/dev/null
-echo "installed command line: finds its models"
+"$work/whole/bin/ricochet" simulate fault --json >/dev/null
+"$work/whole/bin/ricochet" train --help >/dev/null
+echo "installed command line: finds its models and its further programs"
