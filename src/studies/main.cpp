@@ -1,5 +1,7 @@
-// `ricochet-studies`: the comparisons that take a minute and more.
+// `ricochet-studies`: the comparisons that take a minute and more, and the papers' tables and
+// figures.
 #include "input.hpp"
+#include "papers.hpp"
 #include "program.hpp"
 #include "studies.hpp"
 
@@ -23,6 +25,9 @@ int main(int count, char** arguments)
 {
     using namespace ricochet::app;
     return run_program(
-        [](CLI::App& app, int& status) { add_compare(app, status, compare_study); }, count,
-        arguments);
+        [](CLI::App& app, int& status) {
+            add_compare(app, status, compare_study);
+            add_exhibits(app, status);
+        },
+        count, arguments);
 }

@@ -5,35 +5,22 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "compare.hpp"
+#include "friction_tables.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
 #include "report.hpp"
-#include "ricochet/detail/friction_study.hpp"
 #include "ricochet/detail/identify_friction.hpp"
 #include "run_watch.hpp"
 
 namespace ricochet::app {
 
 namespace {
-
-using learn::study_steps;
-constexpr std::size_t columns = std::size(study_steps);
-constexpr std::array<std::string_view, columns> column_names{"2^-13.5", "2^-13",   "2^-12.5",
-                                                             "2^-12",   "2^-11.5", "2^-11"};
-
-/// A row of tables 3 and 4.
-struct Row6 {
-    std::string name;
-    std::array<double, columns> value{};
-    bool published = false;
-};
 
 constexpr double study_noise = 5e-3;
 
@@ -42,50 +29,9 @@ struct Study {
     std::vector<learn::InternalVariables> internal;
     learn::Transfer transfer;
     bool transferred = false;
-    std::vector<Row6> unstable, mean_error;
+    StabilityTables tables;
     double seconds = 0;
 };
-
-double mean_of(const std::vector<double>& x)
-{
-    double sum = 0;
-    for (const double value : x) sum += value;
-    return x.empty() ? std::nan("") : sum / static_cast<double>(x.size());
-}
-
-/// Shares of unstable runs and errors against order 4 at 2^-14, of one method.
-template <class Velocities>
-void add_method(Study& study, const std::string& name, const std::vector<SliderCase>& cases,
-                const std::vector<std::vector<double>>& reference, const Velocities& velocities)
-{
-    Row6 share{.name = name};
-    std::vector<std::vector<double>> errors(columns);
-    std::vector<bool> always(cases.size(), true);
-    std::vector<std::array<double, columns>> error(cases.size());
-    for (std::size_t i = 0; i < cases.size(); ++i) {
-        for (std::size_t k = 0; k < columns; ++k) {
-            if (Interrupts::any()) return;
-            const learn::SliderVelocities run = velocities(cases[i], study_steps[k]);
-            if (!run.stable) {
-                share.value[k] += 1.0 / static_cast<double>(cases.size());
-                always[i] = false;
-                continue;
-            }
-            error[i][k] = relative_error(run.velocity, reference[i]);
-        }
-    }
-    // As the source: of runs that are stable at every step.
-    Row6 mean{.name = name};
-    for (std::size_t k = 0; k < columns; ++k) {
-        std::vector<double> of_step;
-        for (std::size_t i = 0; i < cases.size(); ++i) {
-            if (always[i]) of_step.push_back(error[i][k]);
-        }
-        mean.value[k] = mean_of(of_step);
-    }
-    study.unstable.push_back(share);
-    study.mean_error.push_back(mean);
-}
 
 Study make_study()
 {
@@ -119,49 +65,23 @@ Study make_study()
     if (!goes_on()) return study;
 
     study.transferred = true;
-    const std::vector<SliderCase> cases = slider_cases(1);
-    std::vector<std::vector<double>> reference;
-    for (const SliderCase& c : cases) {
-        if (!goes_on()) return study;
-        reference.push_back(learn::slider_velocities(c, 4, 512).velocity);
-    }
-    study.unstable.push_back({"paper: NN, implicit and explicit", {}, true});
-    study.unstable.push_back({"paper: RS, implicit", {.506, .571, .623, .623, .675, .727}, true});
-    study.unstable.push_back({"paper: RS, explicit", {.455, .455, .455, .455, .455, .455}, true});
-    study.mean_error.push_back({"paper: NN, implicit",
-                                {5.993e-06, 3.636e-06, 4.807e-06, 4.716e-06, 6.282e-06, 8.508e-06},
-                                true});
-    study.mean_error.push_back({"paper: RS, explicit",
-                                {7.321e-06, 4.447e-06, 5.267e-06, 4.426e-06, 6.464e-06, 8.069e-06},
-                                true});
-    for (const int order : {1, 2, 4}) {
-        if (!goes_on()) return study;
-        add_method(study, fmt::format("variational, order {}", order), cases, reference,
-                   [order](const SliderCase& c, int steps) {
-                       return learn::slider_velocities(c, order, steps);
-                   });
-    }
-    const auto baseline = [&](const std::string& name, const BaselineOptions& options) {
-        if (!goes_on()) return;
-        add_method(study, name, cases, reference, [&](const SliderCase& c, int steps) {
-            return learn::slider_velocities(c, options, steps);
-        });
-    };
-    baseline("RK4, theta form", {.method = Baseline::rk4});
-    baseline("RK4, exact potential form", {.method = Baseline::rk4, .form = StateForm::potential});
-    baseline("Adams <= 12, functional iteration", {.method = Baseline::adams});
-    baseline("backward Euler, plain Newton", {.method = Baseline::backward_euler});
+    study.tables = stability_tables();
     study.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return study;
 }
 
-std::string rows_text(const std::vector<Row6>& rows, std::string_view format)
+std::string label(const StudyRow& row)
+{
+    return (row.published ? "paper: " : "") + row.name;
+}
+
+std::string rows_text(const std::vector<StudyRow>& rows, std::string_view format)
 {
     std::string out = fmt::format("{:<36}", "step [s]");
-    for (const std::string_view column : column_names) out += fmt::format("{:>10}", column);
+    for (const std::string_view column : study_step_names) out += fmt::format("{:>10}", column);
     out += '\n';
-    for (const Row6& row : rows) {
-        out += fmt::format("{:<36}", row.name);
+    for (const StudyRow& row : rows) {
+        out += fmt::format("{:<36}", label(row));
         for (const double value : row.value) out += fmt::format(fmt::runtime(format), value);
         out += '\n';
     }
@@ -198,9 +118,9 @@ std::string to_text(const Study& study)
     if (study.transferred)
         out += line("further trained", study.transfer.further_trained, "5.4e-6, 1.6e-4, 0.016");
     out += "\nTable 3. Share of 77 sliders that become unstable\n";
-    out += rows_text(study.unstable, "{:>10.3f}");
+    out += rows_text(study.tables.unstable, "{:>10.3f}");
     out += "\nTable 4. Mean relative L2 error in V, of the sliders stable at every step\n";
-    out += rows_text(study.mean_error, "{:>10.1e}");
+    out += rows_text(study.tables.mean_error, "{:>10.1e}");
     return out +
            fmt::format(
                "\nThe exact potential form fails under RK4 as the theta form does: what helps is "
@@ -211,11 +131,11 @@ std::string to_text(const Study& study)
                study.seconds);
 }
 
-Json json(const std::vector<Row6>& rows)
+Json json(const std::vector<StudyRow>& rows)
 {
     Json out = Json::array();
-    for (const Row6& row : rows) {
-        out.push_back({{"name", row.name}, {"published", row.published}, {"values", row.value}});
+    for (const StudyRow& row : rows) {
+        out.push_back({{"name", label(row)}, {"published", row.published}, {"values", row.value}});
     }
     return out;
 }
@@ -239,8 +159,8 @@ std::string to_json(const Study& study)
     Json out{{"identified", identified},
              {"table1", internal},
              {"table2", Json()},
-             {"table3", json(study.unstable)},
-             {"table4", json(study.mean_error)}};
+             {"table3", json(study.tables.unstable)},
+             {"table4", json(study.tables.mean_error)}};
     if (study.transferred) {
         out["table2"] = {{"as_trained", errors(study.transfer.as_trained)},
                          {"further_trained", errors(study.transfer.further_trained)}};
@@ -263,7 +183,7 @@ int compare_rate_and_state(const CompareRequest& request)
     }();
     print(request.json ? to_json(study) : to_text(study));
     if (Interrupts::any()) return ended_early("within the study");
-    for (const Row6& row : study.unstable) {
+    for (const StudyRow& row : study.tables.unstable) {
         if (!row.name.starts_with("variational")) continue;
         for (const double share : row.value) {
             if (share > 0) return 1;

@@ -1,0 +1,27 @@
+// What the two files of the paper on step control have in common.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "exhibit.hpp"
+#include "ricochet/detail/step_environment.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet::app {
+
+/// [s] The shortest of a few repetitions.
+[[nodiscard]] double seconds_of(const std::function<void()>& work);
+
+/// [s] The steps that an actor takes in a world, without those that had no solution; empty if it
+/// does not come to the end.
+[[nodiscard]] std::vector<double> lengths_of(const learn::StepWorld& world, const Model& actor);
+
+[[nodiscard]] Exhibit fault_figure_5(const ExhibitSize& size);
+[[nodiscard]] Exhibit fault_figure_6(const ExhibitSize& size);
+[[nodiscard]] Exhibit fault_figure_7(const ExhibitSize& size);
+[[nodiscard]] Exhibit fault_figure_8(const ExhibitSize& size);
+[[nodiscard]] Exhibit fault_figure_9(const ExhibitSize& size);
+[[nodiscard]] Exhibit fault_figure_10(const ExhibitSize& size);
+
+}  // namespace ricochet::app
