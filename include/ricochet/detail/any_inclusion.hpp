@@ -16,6 +16,7 @@
 #include "ricochet/detail/linear_cases.hpp"
 #include "ricochet/detail/owned.hpp"
 #include "ricochet/detail/step_layout.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
 
 namespace ricochet {
@@ -79,6 +80,9 @@ public:
                                Reaction& upper) const = 0;
     [[nodiscard]] virtual double bound(double t, const State& w, Eigen::Index i,
                                        Branch side) const = 0;
+    /// `smooth`, and every reaction that a mode of branches has at a bound, the others 0: all that
+    /// the flow of the mode asks, in one call. Digit i of the mode to base 3: see AnyModes.
+    virtual void branch_terms(Mode mode, double t, const State& w, State& f, Reaction& r) const = 0;
     virtual void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const = 0;
     [[nodiscard]] virtual std::string fault(double t, const State& w) const = 0;
     [[nodiscard]] virtual std::size_t set_dimension(double t, const State& w) const = 0;
@@ -243,6 +247,14 @@ public:
             return side == Branch::lower ? set.lower(k) : set.upper(k);
         } else {
             return 0;
+        }
+    }
+    void branch_terms(Mode mode, double t, const State& w, State& f, Reaction& r) const override
+    {
+        system.smooth(t, w, f);
+        for (Eigen::Index i = 0; i < r.size(); ++i, mode /= 3) {
+            const auto at = static_cast<Branch>(static_cast<int>(mode % 3) - 1);
+            r[i] = at == Branch::inside ? 0 : bound(t, w, i, at);
         }
     }
     void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const override

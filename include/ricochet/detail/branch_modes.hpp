@@ -22,6 +22,7 @@
 #include <array>
 #include <span>
 
+#include "ricochet/detail/components.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
@@ -203,9 +204,12 @@ public:
         return inequality.faulty();
     }
 
+    /// A component at a time, as steps have written it: see components.hpp.
     [[nodiscard]] static Vector vector(const State& x)
     {
-        return Eigen::Map<const Vector>(x.data());
+        Vector w;
+        for_each_component(x, [&](auto i) { w[static_cast<Eigen::Index>(i)] = x[i]; });
+        return w;
     }
 
 private:
@@ -284,36 +288,26 @@ private:
     void reactions(Mode mode, double t, const Vector& w, Vector& free, Reaction& r) const
     {
         Vector f;
-        matrices_.smooth(t, w, f);
+        matrices_.inclusion().branch_terms(mode, t, w, f, r);
         if (diagonal_) {
-            free = inverse_diagonal_.cwiseProduct(f);
+            for_each_component(f, [&](auto i) { free[i] = inverse_diagonal_[i] * f[i]; });
         } else {
             free = matrices_.inverse_mass().lazyProduct(f);
         }
         if constexpr (M == 1) {
-            const Branch at = branch(0, mode);
-            if (at != Branch::inside) {
-                r[0] = bound(t, w, 0, at);
-                return;
-            }
+            if (branch(0, mode) != Branch::inside) return;
             const Eigen::Index k = matrices_.selected(0);
             double rate = k >= 0 ? free[k] : matrices_.observe().row(0).dot(free);
             if (moves()) rate -= offset_rate(t)[0];
             r[0] = -holds_[1].inverse(0, 0) * rate;
             return;
         }
-        bool any_held = false;
-        Mode rest = mode;
-        for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
-            const Branch at = static_cast<Branch>(static_cast<int>(rest % 3) - 1);
-            any_held = any_held || at == Branch::inside;
-            r[i] = at == Branch::inside ? 0 : bound(t, w, i, at);
-        }
-        if (!any_held) return;
+        const std::size_t held = mask_of(mode);
+        if (held == 0) return;
         Reaction rate = matrices_.observe().lazyProduct(free);
         rate += delassus_.lazyProduct(r);
         if (moves()) rate -= offset_rate(t);
-        r -= holds_[mask_of(mode)].inverse.lazyProduct(rate);
+        r -= holds_[held].inverse.lazyProduct(rate);
     }
 
     /// How far a reaction is above its lower bound and below its upper one; 1 or -1 where
@@ -494,7 +488,11 @@ void AnyModes<N, M>::flow(Mode mode, double t, const State& x, State& dxdt) cons
     Vector free;
     Reaction reaction;
     reactions(mode, t, w, free, reaction);
-    rate = free + lever_.lazyProduct(reaction);
+    if constexpr (M == 1) {
+        for_each_component(free, [&](auto i) { rate[i] = free[i] + lever_(i, 0) * reaction[0]; });
+    } else {
+        rate = free + lever_.lazyProduct(reaction);
+    }
     // To the last bit where y is a component.
     for (Eigen::Index i = 0; i < M; ++i) {
         if (!is_held(i, mode)) continue;
