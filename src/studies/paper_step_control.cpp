@@ -23,6 +23,7 @@
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
+#include "studies.hpp"
 
 namespace ricochet::app {
 
@@ -147,7 +148,7 @@ Trace<System> trace(std::string name, const System& system, const StateOf<System
         out.counts = motion.statistics();
     };
     run(true);
-    out.seconds = seconds_of([&] { run(false); });
+    out.seconds = seconds_of([&] { run(false); }, 0.3);
     return out;
 }
 
@@ -390,20 +391,6 @@ Exhibit figure_3(const ExhibitSize& size)
 }
 
 }  // namespace
-
-double seconds_of(const std::function<void()>& work)
-{
-    double best = std::numeric_limits<double>::infinity();
-    double all = 0;
-    for (int i = 0; i < 5 && all < 0.3; ++i) {
-        const auto start = std::chrono::steady_clock::now();
-        work();
-        const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-        best = std::min(best, taken.count());
-        all += taken.count();
-    }
-    return best;
-}
 
 std::vector<double> lengths_of(const learn::StepWorld& world, const Model& actor)
 {

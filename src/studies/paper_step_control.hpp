@@ -1,7 +1,6 @@
 // What the two files of the paper on step control have in common.
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "exhibit.hpp"
@@ -9,9 +8,6 @@
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::app {
-
-/// [s] The shortest of a few repetitions.
-[[nodiscard]] double seconds_of(const std::function<void()>& work);
 
 /// [s] The steps that an actor takes in a world, without those that had no solution; empty if it
 /// does not come to the end.

@@ -19,6 +19,7 @@
 #include "paper_step_control.hpp"
 #include "policy_lookup.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
+#include "studies.hpp"
 
 namespace ricochet::app {
 
@@ -92,7 +93,7 @@ FaultRun run_rule(std::string name, const StrikeSlipFault& fault, BatheOptions b
     if (out.seconds > 0.5) return out;
     options.snapshot_times.clear();
     BatheRuns runs(fault);
-    out.seconds = seconds_of([&] { (void)runs.simulate(options, plain); });
+    out.seconds = seconds_of([&] { (void)runs.simulate(options, plain); }, 0.3);
     check_exhibit();
     return out;
 }

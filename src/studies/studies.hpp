@@ -2,9 +2,14 @@
 // ricochet-studies.
 #pragma once
 
+#include <functional>
+
 #include "compare.hpp"
 
 namespace ricochet::app {
+
+/// [s] The shortest of at most five repetitions, which take `enough` [s] together or more.
+[[nodiscard]] double seconds_of(const std::function<void()>& work, double enough);
 
 /// `compare step-control`: rules that choose steps, at equal true error. Prints for every rule the
 /// coarsest setting from which on its error stays below the target, and what that takes.

@@ -157,6 +157,15 @@ protected:
 
     static const Model& truth() { return GetParam().truth; }
 
+    static void expect_nothing_cleared(const ShuttleRun& run)
+    {
+        EXPECT_TRUE(same_events(run, exact()));
+        EXPECT_EQ(run.statistics.missed_events, 0U);
+        if (GetParam().plans) return;
+        EXPECT_EQ(run.statistics.evidence.gated, 0U);
+        EXPECT_EQ(run.statistics.checks_put_off, 0U);
+    }
+
     /// The truth's model with every weight from `next`.
     template <class Next>
     [[nodiscard]] static Model with_weights(std::size_t hidden, Next&& next)
@@ -292,24 +301,14 @@ TEST_P(GateSuite, OutsideItsBoxNothingIsCleared)
     Model elsewhere = constant(-1e9);
     elsewhere.domain = {{5, 6}, {-2, 2}};
     const ShuttleRun run = GetParam().run(elsewhere);
-    EXPECT_TRUE(same_events(run, exact()));
-    EXPECT_EQ(run.statistics.missed_events, 0U);
-    if (!GetParam().plans) {
-        EXPECT_EQ(run.statistics.evidence.gated, 0U);
-        EXPECT_EQ(run.statistics.checks_put_off, 0U);
-    }
+    expect_nothing_cleared(run);
 }
 
 TEST_P(GateSuite, ANetworkThatIsNoNumberClearsNothing)
 {
     if (GetParam().refuses_other_weights) return;
     const ShuttleRun run = GetParam().run(with_weights(4, [] { return std::nan(""); }));
-    EXPECT_TRUE(same_events(run, exact()));
-    EXPECT_EQ(run.statistics.missed_events, 0U);
-    if (!GetParam().plans) {
-        EXPECT_EQ(run.statistics.evidence.gated, 0U);
-        EXPECT_EQ(run.statistics.checks_put_off, 0U);
-    }
+    expect_nothing_cleared(run);
 }
 
 TEST_P(GateSuite, ANetworkThatNeverClearsOnlyCostsTime)

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "additive_pairs.hpp"
 #include "rate_state_identities.hpp"
 #include "ricochet/detail/affine_law.hpp"
 #include "ricochet/faults/additive_pair.hpp"
@@ -47,33 +48,6 @@ PairCase exact(const std::string& name, const RateStateParameters& p)
         out.convex = [=](double d, double xi) { return std::log(-d / (p.b * p.v_star)) + xi > -1; };
     }
     return out;
-}
-
-/// The ageing law as a learned pair: A, C and G linear, xi = log(V* theta / D_RS) b / beta.
-AdditivePair::Parameters linear_nets()
-{
-    const RateStateParameters p;
-    const double beta = 0.01;
-    return {.v_star = p.v_star,
-            .beta = beta,
-            .direct = {.offset = p.f_star, .slope = p.a},
-            .state = {.slope = beta / p.b},
-            .rate = {.slope = p.b / beta * p.v_star / p.d_rs}};
-}
-
-AdditivePair::Parameters crooked_nets()
-{
-    AdditivePair::Parameters p = linear_nets();
-    const auto bend = [](MonotoneNet& net, double size) {
-        net.units = 3;
-        net.weight = {size, 0.5 * size, -0.3 * size};
-        net.scale = {0.4, 1.1, -0.7};
-        net.shift = {-0.5, 1, 0.2};
-    };
-    bend(p.direct, 0.01);
-    bend(p.state, 0.4);
-    bend(p.rate, 40);
-    return p;
 }
 
 PairCase additive(const std::string& name, const AdditivePair::Parameters& p)

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "additive_pairs.hpp"
 #include "learn/friction_models.hpp"
 #include "ricochet/detail/along_history.hpp"
 #include "ricochet/detail/friction_study.hpp"
@@ -16,33 +17,22 @@
 namespace ricochet {
 namespace {
 
-/// The exact ageing law as a pair: A, C and G linear, xi = log(V* theta / D_RS) b / beta.
+AdditivePair::Parameters in_domain(AdditivePair::Parameters p)
+{
+    p.domain = {.v_min = 1e-7, .v_max = 1e-3, .xi_min = -4, .xi_max = 12};
+    return p;
+}
+
+/// The exact ageing law as a pair.
 AdditivePair::Parameters exact_parameters()
 {
-    const RateStateParameters p;
-    const double beta = 0.01;
-    return {.v_star = p.v_star,
-            .beta = beta,
-            .direct = {.offset = p.f_star, .slope = p.a},
-            .state = {.slope = beta / p.b},
-            .rate = {.slope = p.b / beta * p.v_star / p.d_rs},
-            .domain = {.v_min = 1e-7, .v_max = 1e-3, .xi_min = -4, .xi_max = 12}};
+    return in_domain(test::linear_nets());
 }
 
 /// Units with something to them.
 AdditivePair::Parameters crooked_parameters()
 {
-    AdditivePair::Parameters p = exact_parameters();
-    const auto bend = [](MonotoneNet& net, double size) {
-        net.units = 3;
-        net.weight = {size, 0.5 * size, -0.3 * size};
-        net.scale = {0.4, 1.1, -0.7};
-        net.shift = {-0.5, 1, 0.2};
-    };
-    bend(p.direct, 0.01);
-    bend(p.state, 0.4);
-    bend(p.rate, 40);
-    return p;
+    return in_domain(test::crooked_nets());
 }
 
 double central(const std::function<double(double)>& f, double x, double h)
