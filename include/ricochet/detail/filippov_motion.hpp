@@ -71,19 +71,21 @@ using Exits = std::array<double, 4>;
 /// central difference. The displacement is fitted to a largest change by 1e-6 to 1e-3 of
 /// that size, which loses about 1e-10 to truncation and to rounding each. It is sought
 /// from a hundred-thousandth of the shortest time upward, to a hundredth of the longest.
-template <class Function>
-[[nodiscard]] Exits fitted_rates(const Function& g, const Exits& here, double size,
-                                 const TimeScales& times)
+template <class Function, std::size_t count>
+[[nodiscard]] std::array<double, count> fitted_rates(const Function& g,
+                                                     const std::array<double, count>& here,
+                                                     double size, const TimeScales& times)
 {
+    using Values = std::array<double, count>;
     const double most = 1e-2 * times.longest;
     double s = 1e-5 * std::max(times.shortest, 1e-6 * times.longest);
-    Exits rates;
+    Values rates;
     rates.fill(std::numeric_limits<double>::quiet_NaN());
     for (int round = 0; round < 20; ++round) {
-        const Exits ahead = g(s);
-        const Exits behind = g(-s);
+        const Values ahead = g(s);
+        const Values behind = g(-s);
         double change = 0;
-        for (std::size_t k = 0; k < 4; ++k) {
+        for (std::size_t k = 0; k < count; ++k) {
             change = std::max(change, std::fabs(ahead[k] - here[k]) / size);
             change = std::max(change, std::fabs(here[k] - behind[k]) / size);
         }
@@ -92,7 +94,7 @@ template <class Function>
         } else if (change < 1e-6 && s < most) {
             s = std::min(s * std::min(1e-5 / change, 1e4), most);
         } else {
-            for (std::size_t k = 0; k < 4; ++k) rates[k] = (ahead[k] - behind[k]) / (2 * s);
+            for (std::size_t k = 0; k < count; ++k) rates[k] = (ahead[k] - behind[k]) / (2 * s);
             break;
         }
     }
