@@ -14,8 +14,25 @@ void refuse_inclusion(std::string_view what, double given)
     throw std::invalid_argument(fmt::format("inclusion: {} {}", what, given));
 }
 
+namespace {
+
+/// Positive entries on the diagonal, of comparable size, and zeros elsewhere.
+bool is_plainly_diagonal(const Eigen::MatrixXd& a)
+{
+    if (a.size() == 0 || !a.allFinite() || !a.isDiagonal(0)) return false;
+    return a.diagonal().minCoeff() > 1e-12 * a.diagonal().maxCoeff();
+}
+
+}  // namespace
+
 Eigen::Index invert(const Eigen::MatrixXd& a, Eigen::MatrixXd& inverse)
 {
+    if (is_plainly_diagonal(a)) {
+        // The same bits as by elimination, without its allocations.
+        inverse = a;
+        inverse.diagonal() = a.diagonal().cwiseInverse();
+        return a.cols();
+    }
     const Eigen::FullPivLU<Eigen::MatrixXd> lu(a);
     const Eigen::Index rank = lu.rank();
     if (rank == a.cols()) inverse = lu.inverse();

@@ -4,7 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+
 #include <random>
+
+#include "ricochet/detail/any_inclusion.hpp"
 
 namespace ricochet {
 namespace {
@@ -47,6 +51,24 @@ TEST(LinearInequality, CasesSolveRandomOnes)
         check_random_inequalities<3>(confines);
         check_random_inequalities<4>(confines);
     }
+}
+
+TEST(Invert, GivesDiagonalMatricesTheBitsOfElimination)
+{
+    const Eigen::MatrixXd a = Eigen::Vector4d(1.0 / 9, 1, 1.0 / 7, 1e6).asDiagonal();
+    Eigen::MatrixXd inverse;
+    EXPECT_EQ(detail::invert(a, inverse), 4);
+    EXPECT_EQ(inverse, Eigen::MatrixXd(a.fullPivLu().inverse()));
+}
+
+TEST(Invert, FindsTheRankOfDiagonalMatricesAsOfOthers)
+{
+    Eigen::MatrixXd inverse;
+    const Eigen::MatrixXd singular = Eigen::Vector3d(2, 0, 1).asDiagonal();
+    EXPECT_EQ(detail::invert(singular, inverse), 2);
+    const Eigen::MatrixXd negative = Eigen::Vector3d(2, -4, 1).asDiagonal();
+    EXPECT_EQ(detail::invert(negative, inverse), 3);
+    EXPECT_EQ(inverse, Eigen::MatrixXd(Eigen::Vector3d(0.5, -0.25, 1).asDiagonal()));
 }
 
 }  // namespace
