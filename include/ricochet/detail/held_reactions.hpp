@@ -80,7 +80,7 @@ private:
         end.mode = mode;
         modes.rooms(mode, t, w, end.rate, reaction_, end.rooms);
         const double step = nudge * ahead;
-        inside_ = w + step * end.rate;
+        move(inside_, w, step, end.rate);
         modes.rooms(mode, t + step, inside_, rate_, reaction_, end.change);
         for (std::size_t k = 0; k < end.rooms.size(); ++k) {
             const double change = (end.change[k] - end.rooms[k]) / step;
@@ -92,8 +92,12 @@ private:
     void compare(const Modes& modes, Mode mode, double t0, const Vector& w0, double h,
                  const Vector& w1, double s, double event_tolerance)
     {
-        const auto [a, b, c, d] = hermite(s);
-        inside_ = a * w0 + b * w1 + h * (c * start_.rate + d * end_.rate);
+        const std::array<double, 4> at = hermite(s);
+        // A component at a time, as they were written: see components.hpp.
+        for_each_component(inside_, [&](auto i) {
+            inside_[i] =
+                at[0] * w0[i] + at[1] * w1[i] + h * (at[2] * start_.rate[i] + at[3] * end_.rate[i]);
+        });
         modes.rooms(mode, t0 + s * h, inside_, rate_, reaction_, rooms_);
         double rounding = -1;
         for (std::size_t k = 0; k < rooms_.size(); ++k) {
