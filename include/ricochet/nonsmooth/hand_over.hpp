@@ -204,11 +204,19 @@ public:
 
     virtual ~EventLoop() = default;
     virtual bool step() = 0;
-    [[nodiscard]] virtual double t() const = 0;
-    [[nodiscard]] virtual const X& x() const = 0;
-    [[nodiscard]] virtual Mode mode() const = 0;
-    [[nodiscard]] virtual const Run<X>& run() const = 0;
     [[nodiscard]] virtual Run<X> finish() = 0;
+
+    // After the last step, at hand.
+    [[nodiscard]] double t() const noexcept { return t_; }
+    [[nodiscard]] const X& x() const noexcept { return *x_; }
+    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] const Run<X>& run() const noexcept { return *run_; }
+
+protected:
+    double t_ = 0;
+    const X* x_ = nullptr;
+    Mode mode_ = 0;
+    const Run<X>* run_ = nullptr;
 };
 
 template <int N, class System, class Stepping>
@@ -219,15 +227,25 @@ public:
     EventLoopBy(const System& system, const X& x, const Options& options)
         : simulation_(system, x, options)
     {
+        this->run_ = &simulation_.run();
+        refresh();
     }
-    bool step() override { return simulation_.step(); }
-    [[nodiscard]] double t() const override { return simulation_.t(); }
-    [[nodiscard]] const X& x() const override { return simulation_.x(); }
-    [[nodiscard]] Mode mode() const override { return simulation_.mode(); }
-    [[nodiscard]] const Run<X>& run() const override { return simulation_.run(); }
+    bool step() override
+    {
+        const bool going = simulation_.step();
+        refresh();
+        return going;
+    }
     [[nodiscard]] Run<X> finish() override { return simulation_.finish(); }
 
 private:
+    void refresh()
+    {
+        this->t_ = simulation_.t();
+        this->x_ = &simulation_.x();
+        this->mode_ = simulation_.mode();
+    }
+
     Simulation<System, X, Stepping> simulation_;
 };
 
@@ -432,7 +450,7 @@ private:
     template <class X>
     [[nodiscard]] double resolution(const X& x) const
     {
-        return options_.atol + options_.rtol * Modes::vector(x).template lpNorm<Eigen::Infinity>();
+        return options_.atol + options_.rtol * largest_component(x);
     }
 
     /// Whether a y is on the wrong side of its reaction, which is at a bound, by more than the
