@@ -35,6 +35,53 @@ Branch branch_after(const Event<StateOf<System>>& event)
     return BranchModes<System>::branch(event.guard, event.mode_after);
 }
 
+// --- modes ---
+
+/// A is full, and y is no component of the state.
+struct Coupled {
+    static constexpr int state_size = 3;
+    static constexpr int reaction_size = 1;
+    using Vector = Eigen::Vector3d;
+
+    static Eigen::Matrix3d a() { return Eigen::Matrix3d{{2, 0.5, 0}, {0.5, 3, -1}, {0, -1, 4}}; }
+    static Eigen::RowVector3d e() { return {1, -0.5, 2}; }
+    static Vector f(double t, const Vector& w) { return {w[1] - t, w[2] * w[0], 1 - w[1]}; }
+
+    void smooth(double t, const Vector& w, Vector& out) const { out = f(t, w); }
+    void mass(Eigen::Matrix3d& out) const { out = a(); }
+    void observe(Eigen::RowVector3d& out) const { out = e(); }
+    [[nodiscard]] IntervalSet reaction_set(double /*t*/, const Vector& /*w*/) const
+    {
+        return {-0.75, 0.5};
+    }
+};
+
+TEST(BranchModes, FlowIsThatOfTheMatricesOfAMode)
+{
+    // Sums of a dozen terms of the order of 1, in different orders.
+    const double rounding = 1e-14;
+    const BranchModes<Coupled> modes{Coupled{}};
+    const double t = 0.3;
+    const Coupled::Vector w(0.4, -1.25, 2);
+    const auto flow_of = [&](Mode mode) {
+        std::array<double, 3> rate{};
+        modes.flow(mode, t, {w[0], w[1], w[2]}, rate);
+        return Coupled::Vector(rate[0], rate[1], rate[2]);
+    };
+    const Eigen::Matrix3d inverse = Coupled::a().inverse();
+    const auto with = [&](double reaction) -> Coupled::Vector {
+        return inverse * (Coupled::f(t, w) + reaction * Coupled::e().transpose());
+    };
+
+    EXPECT_LT((flow_of(0) - with(-0.75)).norm(), rounding);
+    EXPECT_LT((flow_of(2) - with(0.5)).norm(), rounding);
+    const double lever = Coupled::e() * inverse * Coupled::e().transpose();
+    const double held = -(Coupled::e() * inverse * Coupled::f(t, w)).value() / lever;
+    EXPECT_LT((flow_of(1) - with(held)).norm(), rounding);
+    EXPECT_LT(std::abs(Coupled::e() * flow_of(1)), rounding);
+    EXPECT_EQ(flow_of(BranchModes<Coupled>::several), Coupled::Vector::Zero());
+}
+
 // --- sliding mode ---
 
 void reach_zero(const SlidingMode& system, double from, double exact_time)

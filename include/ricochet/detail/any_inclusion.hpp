@@ -13,6 +13,8 @@
 #include <memory>
 #include <string>
 
+#include "ricochet/detail/branch_terms.hpp"
+#include "ricochet/detail/components.hpp"
 #include "ricochet/detail/linear_cases.hpp"
 #include "ricochet/detail/owned.hpp"
 #include "ricochet/detail/step_layout.hpp"
@@ -51,6 +53,9 @@ public:
     using Action =
         Eigen::Matrix<double, N, M, N == 1 && M != 1 ? Eigen::RowMajor : Eigen::ColMajor>;
     using Delassus = Eigen::Matrix<double, M, M>;
+    using Terms = BranchTerms<N, M>;
+    using Flow = BranchFlow<AnyInclusion, Terms,
+                            std::make_index_sequence<static_cast<std::size_t>(N > 0 ? N : 0)>>;
     using StepInputs = std::array<double, StepView::state_inputs>;
 
     explicit AnyInclusion(const InclusionTraits& of) : traits(of) {}
@@ -80,9 +85,14 @@ public:
                                Reaction& upper) const = 0;
     [[nodiscard]] virtual double bound(double t, const State& w, Eigen::Index i,
                                        Branch side) const = 0;
-    /// `smooth`, and every reaction that a mode of branches has at a bound, the others 0: all that
-    /// the flow of the mode asks, in one call. Digit i of the mode to base 3: see AnyModes.
-    virtual void branch_terms(Mode mode, double t, const State& w, State& f, Reaction& r) const = 0;
+    // Of the modes of branches (branch_terms.hpp), each in one call: nothing goes through memory
+    // between the functions of a system and the arithmetic around them.
+    /// The flow, in which every held y that is a component is at rest to the last bit; null for
+    /// systems without such modes. `diagonal`: A is.
+    [[nodiscard]] virtual typename Flow::Function branch_flow(bool diagonal) const = 0;
+    /// The rate of the motion, what acts, and `branch_bounds`.
+    virtual void branch_state(const Terms& terms, Mode mode, double t, const State& w, State& rate,
+                              Reaction& r, Reaction& lower, Reaction& upper) const = 0;
     virtual void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const = 0;
     [[nodiscard]] virtual std::string fault(double t, const State& w) const = 0;
     [[nodiscard]] virtual std::size_t set_dimension(double t, const State& w) const = 0;
@@ -102,6 +112,7 @@ class RICOCHET_ALIGNED TypedInclusion final : public AnyOf<System> {
     using Set = SetOf<System>;
     using State = typename Any::State;
     using Reaction = typename Any::Reaction;
+    using Terms = typename Any::Terms;
     static constexpr bool box = BoxSet<Set>;
     static constexpr bool gives_jacobian =
         requires(const System& s, const State& w, typename Any::Square& j)
@@ -124,6 +135,8 @@ class RICOCHET_ALIGNED TypedInclusion final : public AnyOf<System> {
     {
         s.bound_gradient(0.0, w, i, g);
     };
+    static constexpr bool branching =
+        has_modes<state_size<System>, reaction_size<System>> && (box || continues_bounds);
     static constexpr bool declares_inputs = DeclaresStepInputs<System, State, Reaction>;
 
     [[nodiscard]] static InclusionTraits traits_of() noexcept
@@ -249,12 +262,42 @@ public:
             return 0;
         }
     }
-    void branch_terms(Mode mode, double t, const State& w, State& f, Reaction& r) const override
+    [[nodiscard]] typename Any::Flow::Function branch_flow(bool diagonal) const override
     {
-        system.smooth(t, w, f);
+        if constexpr (branching) {
+            return diagonal ? &Any::Flow::template call<TypedInclusion, true>
+                            : &Any::Flow::template call<TypedInclusion, false>;
+        } else {
+            return nullptr;
+        }
+    }
+    template <bool diagonal>
+    [[gnu::always_inline]] void flow(const Terms& terms, Mode mode, double t, const State& w,
+                                     State& rate) const
+    {
+        Reaction r;
+        reactions(terms, mode, t, w, rate, r, diagonal);
+        add_reactions(terms, r, rate);
         for (Eigen::Index i = 0; i < r.size(); ++i, mode /= 3) {
-            const auto at = static_cast<Branch>(static_cast<int>(mode % 3) - 1);
-            r[i] = at == Branch::inside ? 0 : bound(t, w, i, at);
+            if (branch_of_first(mode) != Branch::inside || terms.selected[i] < 0) continue;
+            const double still = rate_of_offset(t)[i];
+            for_each_component(rate,
+                               [&](auto k) { set_where(k == terms.selected[i], still, rate[k]); });
+        }
+    }
+    void branch_state(const Terms& terms, Mode mode, double t, const State& w, State& rate,
+                      Reaction& r, Reaction& lower, Reaction& upper) const override
+    {
+        if constexpr (branching) {
+            // On copies: what is written here could be what is read.
+            const State at = by_components(w.data());
+            State motion;
+            Reaction acting;
+            reactions(terms, mode, t, at, motion, acting, terms.diagonal);
+            add_reactions(terms, acting, motion);
+            for_each_component(motion, [&](auto i) { rate[i] = motion[i]; });
+            r = acting;
+            branch_bounds(t, at, lower, upper);
         }
     }
     void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const override
@@ -284,6 +327,115 @@ public:
                      typename Any::StepInputs& out) const override
     {
         if constexpr (declares_inputs) system.step_inputs(t, w, rate, reaction, out);
+    }
+
+private:
+    /// A state as it was written, a component at a time: see components.hpp. Volatile, since
+    /// compilers that are left the choice read pairs.
+    [[nodiscard, gnu::always_inline]] static State by_components(const double* x)
+    {
+        State w;
+        for_each_component(w, [&](auto i) { w[i] = *static_cast<const volatile double*>(x + i); });
+        return w;
+    }
+
+    /// For Eigen's products, whose operands are in memory; the original stays in registers.
+    [[nodiscard, gnu::always_inline]] static State copied(const State& from)
+    {
+        State to;
+        for_each_component(from, [&](auto i) { to[i] = from[i]; });
+        return to;
+    }
+
+    static void set_where(bool here, double value, double& out) noexcept
+    {
+        if (here) out = value;
+    }
+
+    /// The branch of the first reaction, or of the only one.
+    [[nodiscard]] static constexpr Branch branch_of_first(Mode mode) noexcept
+    {
+        if constexpr (reaction_size < System >> 1) mode %= 3;
+        return static_cast<Branch>(static_cast<int>(mode) - 1);
+    }
+
+    /// s'(t), by a central difference where the system does not give it.
+    [[nodiscard]] Reaction rate_of_offset(double t) const
+    {
+        Reaction rate;
+        if constexpr (gives_offset_rate) {
+            system.offset_rate(t, rate);
+        } else if constexpr (moves) {
+            const double step = 1e-5 * std::max(1.0, std::abs(t));
+            Reaction ahead, behind;
+            ahead.setZero();
+            behind.setZero();
+            system.offset(t + step, ahead);
+            system.offset(t - step, behind);
+            rate = (ahead - behind) / (2 * step);
+        } else {
+            rate.setZero();
+        }
+        return rate;
+    }
+
+    /// A^-1 f, and what acts in a mode.
+    [[gnu::always_inline]] void reactions(const Terms& terms, const Mode mode, double t,
+                                          const State& w, State& free, Reaction& r,
+                                          bool diagonal) const
+    {
+        State f;
+        system.smooth(t, w, f);
+        if (diagonal) {
+            for_each_component(f, [&](auto i) { free[i] = terms.inverse_diagonal[i] * f[i]; });
+        } else {
+            const State force = copied(f);
+            const State out = terms.inverse_mass.lazyProduct(force);
+            free = by_components(out.data());
+        }
+        std::size_t held = 0;
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < r.size(); ++i, rest /= 3) {
+            const Branch at = branch_of_first(rest);
+            if (at == Branch::inside) held |= std::size_t{1} << i;
+            r[i] = at == Branch::inside ? 0 : TypedInclusion::bound(t, w, i, at);
+        }
+        if (held == 0) return;
+        if constexpr (reaction_size<System> == 1) {
+            const Eigen::Index k = terms.selected[0];
+            double rate = 0;
+            if (k < 0) {
+                if constexpr (Terms::in_order) {
+                    rate = terms.observed(0, free);
+                } else {
+                    rate = terms.observed(0, copied(free));
+                }
+            } else {
+                // Not free[k]: what is indexed at run time is kept in memory.
+                for_each_component(free, [&](auto i) { set_where(i == k, free[i], rate); });
+            }
+            if constexpr (moves) rate -= rate_of_offset(t)[0];
+            r[0] = -terms.holds[1].inverse(0, 0) * rate;
+        } else {
+            const State all = copied(free);
+            Reaction rate = terms.observe.lazyProduct(all);
+            rate += terms.delassus.lazyProduct(r);
+            if constexpr (moves) rate -= rate_of_offset(t);
+            r -= terms.holds[held].inverse.lazyProduct(rate);
+        }
+    }
+
+    /// A^-1 (f + G r) from A^-1 f.
+    [[gnu::always_inline]] static void add_reactions(const Terms& terms, const Reaction& r,
+                                                     State& free)
+    {
+        if constexpr (reaction_size<System> == 1) {
+            for_each_component(free, [&](auto i) { free[i] = free[i] + terms.lever(i, 0) * r[0]; });
+        } else {
+            const Reaction acting = r;
+            const State more = terms.lever.lazyProduct(acting);
+            for_each_component(free, [&](auto i) { free[i] += more[i]; });
+        }
     }
 };
 

@@ -29,15 +29,6 @@
 
 namespace ricochet {
 
-namespace detail {
-
-/// Whether inclusions of these sizes have branches that are modes, if their sets are boxes of
-/// reactions.
-template <int N, int M>
-inline constexpr bool has_modes = N != Eigen::Dynamic&& M != Eigen::Dynamic&& M <= most_cases;
-
-}  // namespace detail
-
 /// Inclusions whose branches are modes.
 template <class System>
 concept Branching = Inclusion<System> &&
@@ -65,6 +56,7 @@ template <int N, int M>
 class RICOCHET_ALIGNED AnyModes {
 public:
     using State = std::array<double, static_cast<std::size_t>(N)>;
+    using Inclusion = AnyInclusion<N, M>;
     using Matrices = AnyMatrices<N, M>;
     using Vector = typename Matrices::State;
     using Reaction = typename Matrices::Reaction;
@@ -112,7 +104,7 @@ public:
     /// Whether the reactions that a mode holds are determined.
     [[nodiscard]] bool flows(Mode mode) const noexcept
     {
-        return mode < branch_modes && holds_[mask_of(mode)].determined;
+        return mode < branch_modes && terms_.holds[mask_of(mode)].determined;
     }
 
     /// Whether a mode of branches holds any reaction.
@@ -142,10 +134,20 @@ public:
 
     // --- the contract of a system ---
 
-    void flow(Mode mode, double t, const State& x, State& dxdt) const;
+    void flow(Mode mode, double t, const State& x, State& dxdt) const
+    {
+        if (mode >= branch_modes) {
+            for_each_component(dxdt, [&](auto i) { dxdt[i] = 0; });
+            return;
+        }
+        Inclusion::Flow::apply(flow_, matrices_.inclusion(), terms_, mode, t, x, dxdt);
+    }
 
     /// What acts in a mode at (t, w).
-    [[nodiscard]] Reaction reaction(Mode mode, double t, const Vector& w) const;
+    [[nodiscard]] Reaction reaction(Mode mode, double t, const Vector& w) const
+    {
+        return motion(mode, t, w).reaction;
+    }
 
     /// How far every held reaction is from its bounds; infinite where there is no bound, and for
     /// reactions that are not held. Writes the rate of the motion and the reactions, too.
@@ -154,9 +156,9 @@ public:
     /// What rounding of the terms may make of the held reactions.
     [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
     {
-        const double free = (rate - lever_.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
+        const double free = (rate - terms_.lever.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
         return negligible *
-               (holds_[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
+               (terms_.holds[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
     }
 
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const;
@@ -191,7 +193,11 @@ public:
     [[nodiscard]] Reaction observed(double t, const Vector& w) const
     {
         Reaction y;
-        y = matrices_.observe().lazyProduct(w);
+        if constexpr (BranchTerms<N, M>::in_order) {
+            y[0] = terms_.observed(0, w);
+        } else {
+            y = matrices_.observe().lazyProduct(w);
+        }
         if (moves()) y -= offset(t);
         return y;
     }
@@ -216,16 +222,9 @@ private:
     static constexpr std::size_t masks = std::size_t{1} << M;
     [[nodiscard]] bool moves() const noexcept { return matrices_.traits().moves; }
 
-    /// The inverse of the block of D = E A^-1 G of the held reactions, zero elsewhere.
-    struct Hold {
-        typename Matrices::Delassus inverse;
-        double largest = 0;
-        bool determined = true;
-    };
-
     void prepare(std::size_t mask)
     {
-        Hold& hold = holds_[mask];
+        auto& hold = terms_.holds[mask];
         hold.inverse.setZero();
         std::array<Eigen::Index, static_cast<std::size_t>(M)> held{};
         Eigen::Index count = 0;
@@ -236,7 +235,7 @@ private:
         Eigen::MatrixXd block(count, count);
         const auto at = [&](Eigen::Index k) { return held[static_cast<std::size_t>(k)]; };
         for (Eigen::Index i = 0; i < count; ++i) {
-            for (Eigen::Index j = 0; j < count; ++j) block(i, j) = delassus_(at(i), at(j));
+            for (Eigen::Index j = 0; j < count; ++j) block(i, j) = terms_.delassus(at(i), at(j));
         }
         hold.determined = invert(block, block) == count;
         if (!hold.determined) return;
@@ -284,30 +283,18 @@ private:
         return matrices_.inclusion().bound(t, w, i, side);
     }
 
-    /// The reactions of a mode, and A^-1 f.
-    void reactions(Mode mode, double t, const Vector& w, Vector& free, Reaction& r) const
+    /// What a motion does in a mode.
+    struct Motion {
+        Vector rate;
+        Reaction reaction, lower, upper;
+    };
+
+    [[nodiscard]] Motion motion(Mode mode, double t, const Vector& w) const
     {
-        Vector f;
-        matrices_.inclusion().branch_terms(mode, t, w, f, r);
-        if (diagonal_) {
-            for_each_component(f, [&](auto i) { free[i] = inverse_diagonal_[i] * f[i]; });
-        } else {
-            free = matrices_.inverse_mass().lazyProduct(f);
-        }
-        if constexpr (M == 1) {
-            if (branch(0, mode) != Branch::inside) return;
-            const Eigen::Index k = matrices_.selected(0);
-            double rate = k >= 0 ? free[k] : matrices_.observe().row(0).dot(free);
-            if (moves()) rate -= offset_rate(t)[0];
-            r[0] = -holds_[1].inverse(0, 0) * rate;
-            return;
-        }
-        const std::size_t held = mask_of(mode);
-        if (held == 0) return;
-        Reaction rate = matrices_.observe().lazyProduct(free);
-        rate += delassus_.lazyProduct(r);
-        if (moves()) rate -= offset_rate(t);
-        r -= holds_[held].inverse.lazyProduct(rate);
+        Motion out;
+        matrices_.inclusion().branch_state(terms_, mode, t, w, out.rate, out.reaction, out.lower,
+                                           out.upper);
+        return out;
     }
 
     /// How far a reaction is above its lower bound and below its upper one; 1 or -1 where
@@ -318,11 +305,22 @@ private:
                 std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
     }
 
-    [[nodiscard]] Slacks slacks(Eigen::Index i, double t, const Vector& w, double r) const
+    /// As `motion`, but for the rate: a mode that holds nothing asks for the bounds alone.
+    [[nodiscard]] Motion bounded_motion(Mode mode, double t, const Vector& w) const
     {
-        Reaction lower, upper;
-        matrices_.inclusion().branch_bounds(t, w, lower, upper);
-        return slacks(lower[i], upper[i], r);
+        if (holds(mode)) return motion(mode, t, w);
+        Motion out;
+        matrices_.inclusion().branch_bounds(t, w, out.lower, out.upper);
+        for (Eigen::Index i = 0; i < M; ++i, mode /= 3) {
+            out.reaction[i] = mode % 3 == 0 ? out.lower[i] : out.upper[i];
+        }
+        return out;
+    }
+
+    [[nodiscard]] Slacks slacks(Eigen::Index i, Mode mode, double t, const Vector& w) const
+    {
+        const Motion here = motion(mode, t, w);
+        return slacks(here.lower[i], here.upper[i], here.reaction[i]);
     }
 
     /// 1 where the bounds of reaction i make an interval, else -1. Beyond y = 0, where the
@@ -340,14 +338,14 @@ private:
     [[nodiscard]] double observed_rate(Eigen::Index i, Mode mode, double t, const Vector& w,
                                        const Vector& dwdt) const
     {
-        double rate = matrices_.observe().row(i) * dwdt;
+        double rate = terms_.observed(i, dwdt);
         if (moves()) rate -= offset_rate(t)[i];
         double size = 0;
         Mode rest = mode;
         for (Eigen::Index j = 0; j < M; ++j, rest /= 3) {
-            if (delassus_(i, j) == 0 || rest % 3 == 1) continue;
+            if (terms_.delassus(i, j) == 0 || rest % 3 == 1) continue;
             const Branch at = static_cast<Branch>(static_cast<int>(rest % 3) - 1);
-            size += std::abs(delassus_(i, j) * bound(t, w, j, at));
+            size += std::abs(terms_.delassus(i, j) * bound(t, w, j, at));
         }
         return std::abs(rate) <= 64 * std::numeric_limits<double>::epsilon() * size ? 0 : rate;
     }
@@ -355,24 +353,22 @@ private:
     [[nodiscard]] Slacks slack_rates(Eigen::Index i, Mode mode, double t, const Vector& w,
                                      const Vector& dwdt) const
     {
-        Reaction lower, upper;
-        matrices_.inclusion().branch_bounds(t, w, lower, upper);
-        if (std::isinf(lower[i]) && std::isinf(upper[i])) return {0, 0};
-        const double width = upper[i] - lower[i];
-        const auto at = [&](double s, const Vector& there) {
-            const Slacks slack = slacks(i, t + s, there, reaction(mode, t + s, there)[i]);
-            return Exits{slack[0], slack[1], 0, 0};
-        };
-        const Slacks slack = slacks(lower[i], upper[i], reaction(mode, t, w)[i]);
-        const Exits here{slack[0], slack[1], 0, 0};
+        const Motion now = motion(mode, t, w);
+        const double lower = now.lower[i];
+        const double upper = now.upper[i];
+        if (std::isinf(lower) && std::isinf(upper)) return {0, 0};
+        const double width = upper - lower;
+        const Slacks here = slacks(lower, upper, now.reaction[i]);
         const double size =
             std::isfinite(width) ? width : std::max({std::abs(here[0]), std::abs(here[1]), 1.0});
         if (!(size > 0)) return {0, 0};
-        const TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
-                               dwdt.template lpNorm<Eigen::Infinity>());
-        const auto later = [&](double s) { return at(s, w + s * dwdt); };
-        const Exits rates = fitted_rates(later, here, size, times);
-        return {rates[0], rates[1]};
+        const TimeScales times(t, largest_component(w), largest_component(dwdt));
+        Vector there;
+        const auto later = [&](double s) {
+            move(there, w, s, dwdt);
+            return slacks(i, mode, t + s, there);
+        };
+        return fitted_rates(later, here, size, times);
     }
 
     [[nodiscard]] Mode checked(Mode mode) const noexcept { return flows(mode) ? mode : no_flow; }
@@ -386,7 +382,7 @@ private:
         Vector f;
         matrices_.smooth(t, w, f);
         LinearInequality<M> inequality;
-        inequality.w = delassus_;
+        inequality.w = terms_.delassus;
         inequality.y0.noalias() = matrices_.observe() * (matrices_.inverse_mass() * f);
         if (moves()) inequality.y0 -= offset_rate(t);
         matrices_.inclusion().branch_bounds(t, w, inequality.lower, inequality.upper);
@@ -394,7 +390,7 @@ private:
             if (at[i] == Branch::lower) inequality.upper[i] = inequality.lower[i];
             if (at[i] == Branch::upper) inequality.lower[i] = inequality.upper[i];
             // A reaction without influence on y' is all or nothing.
-            if (delassus_(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
+            if (terms_.delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
         }
         Branches next = at;
         Reaction r = inequality.lower;
@@ -408,9 +404,9 @@ private:
                 next[i] = at[i];
                 continue;
             }
-            if (delassus_(i, i) == 0 && rate[i] == 0) return no_flow;
+            if (terms_.delassus(i, i) == 0 && rate[i] == 0) return no_flow;
             const double terms =
-                std::abs(inequality.y0[i]) + delassus_.row(i).cwiseAbs().dot(r.cwiseAbs());
+                std::abs(inequality.y0[i]) + terms_.delassus.row(i).cwiseAbs().dot(r.cwiseAbs());
             const double room = std::min(r[i] - inequality.lower[i], inequality.upper[i] - r[i]);
             const bool clear = next[i] == Branch::inside ? room > negligible * std::abs(r[i])
                                                          : std::abs(rate[i]) > negligible * terms;
@@ -438,8 +434,7 @@ private:
         Eigen::Map<Vector>(x.data()) = w;
         flow(leaving, t, x, dxdt);
         const Vector rate = vector(dxdt);
-        const TimeScales times(t, w.template lpNorm<Eigen::Infinity>(),
-                               rate.template lpNorm<Eigen::Infinity>());
+        const TimeScales times(t, largest_component(w), largest_component(rate));
         const double step = 1e-5 * times.shortest;
         const auto rate_of_y = [&](double s) {
             Eigen::Map<Vector>(x.data()) = w + s * rate;
@@ -459,54 +454,22 @@ private:
     static constexpr double negligible = 64 * std::numeric_limits<double>::epsilon();
 
     Matrices matrices_;
-    typename Matrices::Action lever_;       // A^-1 G
-    typename Matrices::Delassus delassus_;  // E A^-1 G
-    Vector inverse_diagonal_;               // of A^-1, most often all there is
-    bool diagonal_ = false;
-    std::array<Hold, masks> holds_;
+    BranchTerms<N, M> terms_;
+    typename Inclusion::Flow::Function flow_ = nullptr;
 };
 
 template <int N, int M>
 AnyModes<N, M>::AnyModes(const AnyInclusion<N, M>& inclusion) : matrices_(inclusion)
 {
-    lever_ = matrices_.inverse_mass() * matrices_.act();
-    delassus_ = matrices_.observe() * lever_;
-    inverse_diagonal_ = matrices_.inverse_mass().diagonal();
-    diagonal_ = matrices_.inverse_mass().isDiagonal(0);
+    terms_.observe = matrices_.observe();
+    terms_.inverse_mass = matrices_.inverse_mass();
+    terms_.inverse_diagonal = terms_.inverse_mass.diagonal();
+    terms_.diagonal = terms_.inverse_mass.isDiagonal(0);
+    flow_ = inclusion.branch_flow(terms_.diagonal);
+    terms_.lever = matrices_.inverse_mass() * matrices_.act();
+    terms_.delassus = matrices_.observe() * terms_.lever;
+    for (Eigen::Index i = 0; i < M; ++i) terms_.selected[i] = matrices_.selected(i);
     for (std::size_t mask = 0; mask < masks; ++mask) prepare(mask);
-}
-
-template <int N, int M>
-void AnyModes<N, M>::flow(Mode mode, double t, const State& x, State& dxdt) const
-{
-    Eigen::Map<Vector> rate(dxdt.data());
-    if (mode >= branch_modes) {
-        rate.setZero();
-        return;
-    }
-    const Vector w = vector(x);
-    Vector free;
-    Reaction reaction;
-    reactions(mode, t, w, free, reaction);
-    if constexpr (M == 1) {
-        for_each_component(free, [&](auto i) { rate[i] = free[i] + lever_(i, 0) * reaction[0]; });
-    } else {
-        rate = free + lever_.lazyProduct(reaction);
-    }
-    // To the last bit where y is a component.
-    for (Eigen::Index i = 0; i < M; ++i) {
-        if (!is_held(i, mode)) continue;
-        if (const Eigen::Index k = matrices_.selected(i); k >= 0) rate[k] = offset_rate(t)[i];
-    }
-}
-
-template <int N, int M>
-auto AnyModes<N, M>::reaction(Mode mode, double t, const Vector& w) const -> Reaction
-{
-    Vector free;
-    Reaction r;
-    reactions(mode, t, w, free, r);
-    return r;
 }
 
 template <int N, int M>
@@ -514,10 +477,8 @@ void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Vector& rate, R
                            Rooms& rooms) const
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    reactions(mode, t, w, rate, r);
-    rate += lever_.lazyProduct(r);
     Reaction lower, upper;
-    matrices_.inclusion().branch_bounds(t, w, lower, upper);
+    matrices_.inclusion().branch_state(terms_, mode, t, w, rate, r, lower, upper);
     Mode rest = mode;
     for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
         const auto k = static_cast<std::size_t>(i);
@@ -543,7 +504,7 @@ double AnyModes<N, M>::guard(std::size_t which, Mode mode, double t, const State
         const double y = observed(t, w)[i];
         return which % 4 == 0 ? y : -y;
     }
-    return slacks(i, t, w, reaction(mode, t, w)[i])[which % 4 - 2];
+    return slacks(i, mode, t, w)[which % 4 - 2];
 }
 
 template <int N, int M>
@@ -551,16 +512,12 @@ void AnyModes<N, M>::guards(Mode mode, double t, const State& x, std::span<doubl
 {
     const Vector w = vector(x);
     const Reaction y = observed(t, w);
-    const Reaction r = reaction(mode < branch_modes ? mode : 0, t, w);
-    Reaction lower, upper;
-    matrices_.inclusion().bounds(t, w, lower, upper);
-    Reaction lower_here = lower, upper_here = upper;
-    if (matrices_.traits().continues_bounds) {
-        matrices_.inclusion().branch_bounds(t, w, lower_here, upper_here);
-    }
+    const Motion here = bounded_motion(mode < branch_modes ? mode : 0, t, w);
+    Reaction lower = here.lower, upper = here.upper;
+    if (matrices_.traits().continues_bounds) matrices_.inclusion().bounds(t, w, lower, upper);
     for (Eigen::Index i = 0; i < M; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        const Slacks slack = slacks(lower_here[i], upper_here[i], r[i]);
+        const Slacks slack = slacks(here.lower[i], here.upper[i], here.reaction[i]);
         g[4 * k] = y[i];
         g[4 * k + 1] = -y[i];
         g[4 * k + 2] = slack[0];
@@ -666,14 +623,14 @@ auto AnyModes<N, M>::zero_branches(double t, const Vector& w) const -> Branches
 template <int N, int M>
 void AnyModes<N, M>::hold(const Branches& branches, double t, Vector& w) const
 {
-    const Hold& mine = holds_[mask_of(mode_of(branches))];
+    const auto& mine = terms_.holds[mask_of(mode_of(branches))];
     Reaction y = observed(t, w);
     bool any = false;
     for (Eigen::Index i = 0; i < M; ++i) {
         if (branches[i] != Branch::inside) y[i] = 0;
         any = any || (branches[i] == Branch::inside && matrices_.selected(i) < 0);
     }
-    if (any && mine.determined) w -= lever_ * (mine.inverse * y);
+    if (any && mine.determined) w -= terms_.lever * (mine.inverse * y);
     const Reaction s = offset(t);
     for (Eigen::Index i = 0; i < M; ++i) {
         if (branches[i] == Branch::inside) matrices_.hold(i, 0, s[i], w);
