@@ -14,7 +14,7 @@
 #include <random>
 #include <vector>
 
-#include "ricochet/detail/explicit_step.hpp"
+#include "step_of.hpp"
 #include "walled_oscillator.hpp"
 
 namespace ricochet {
@@ -25,7 +25,7 @@ using X = std::array<double, 2>;
 using test::WalledOscillator;
 
 template <class Method>
-using StepOf = detail::ExplicitStep<Method, WalledOscillator, X>;
+using StepOf = test::StepOf<Method, WalledOscillator, X>;
 
 /// Three components that depend on one another and on the time.
 struct Tangle {
@@ -58,8 +58,8 @@ void expect_bits_of_odeint(State x)
         for (std::size_t i = 0; i < 3; ++i) x[i] = 10 * uniform(random);
         const double t = 5 * uniform(random);
         const double h = std::exp(5 * uniform(random) - 4);
-        detail::ExplicitStep<Ours, Tangle, State> ours(system, t, x, 0, k % 2 == 1);
-        detail::ExplicitStep<Odeint<Theirs>, Tangle, State> theirs(system, t, x, 0, k % 2 == 1);
+        test::StepOf<Ours, Tangle, State> ours(system, t, x, 0, k % 2 == 1);
+        test::StepOf<Odeint<Theirs>, Tangle, State> theirs(system, t, x, 0, k % 2 == 1);
         if constexpr (detail::has_error_estimate<typename Ours::template Stepper<State>>) {
             const double error = ours.attempt(h, 1e-8, 1e-8);
             const double their_error = theirs.attempt(h, 1e-8, 1e-8);

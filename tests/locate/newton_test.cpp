@@ -1,3 +1,4 @@
+#include "ricochet/detect/ends.hpp"
 #include "ricochet/locate/newton.hpp"
 
 #include <array>

@@ -17,6 +17,7 @@ namespace ricochet {
 /// rounding for a falling guard of constant negative curvature.
 struct BallisticLine {
     static constexpr bool uses_rates = false;
+    static constexpr Screening screening = Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
     static constexpr bool checks_every_step = false;
 

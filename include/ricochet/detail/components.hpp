@@ -14,6 +14,13 @@
 
 #include "ricochet/detail/arithmetic.hpp"
 
+/// Before a loop of which no pass depends on another one.
+#ifdef __clang__
+#define RICOCHET_NO_DEPENDENCE _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define RICOCHET_NO_DEPENDENCE _Pragma("GCC ivdep")
+#endif
+
 namespace ricochet::detail {
 
 /// Number of components where the type fixes it, else 0.
@@ -32,6 +39,16 @@ template <class X>
 template <class X>
 inline constexpr bool is_small = fixed_size<X>() > 0 && fixed_size<X>() <= 8;
 
+/// x, in a register of its own: the compiler does not load or compute it together with its
+/// neighbour. Two numbers that have just been stored one by one would be late as a pair.
+[[nodiscard, gnu::always_inline]] inline double alone(double x) noexcept
+{
+#if defined(__GNUC__) && defined(__x86_64__)
+    __asm__("" : "+x"(x));
+#endif
+    return x;
+}
+
 /// Calls `function(i)` for every component of x, with i of the state's own index
 /// type.
 template <class X, class Function>
@@ -44,6 +61,8 @@ template <class X, class Function>
         }(std::make_index_sequence<fixed_size<X>()>{});
     } else {
         const Index n = x.size();
+        // No component depends on another one: what is written to does not overlap by a shift.
+        RICOCHET_NO_DEPENDENCE
         for (Index i = 0; i < n; ++i) {
             function(i);
         }
@@ -75,6 +94,16 @@ template <class X>
     double sum = 0;  // 0 * x is NaN where x is not finite
     for_each_component(x, [&](auto i) { sum += 0 * x[i]; });
     return sum == 0;
+}
+
+/// Whether two states are equal, component by component.
+template <class X>
+[[nodiscard]] bool same_state(const X& a, const X& b)
+{
+    if (a.size() != b.size()) return false;
+    bool equal = true;
+    for_each_component(a, [&](auto c) { equal = equal && a[c] == b[c]; });
+    return equal;
 }
 
 }  // namespace ricochet::detail

@@ -17,6 +17,23 @@ concept LooksInside = requires
     requires Detector::looks_inside;
 };
 
+/// How steps are screened for guards that deserve a look, as a detector declares it; without a
+/// word, by a function of its own.
+enum class Screening : std::uint8_t {
+    ends,      ///< as `Ends`
+    extremum,  ///< as `Extremum`
+    every,     ///< every step of an armed guard
+    own,
+};
+
+template <class Detector>
+inline constexpr Screening screening_of = []
+{
+    if constexpr (requires { Detector::screening; }) return Detector::screening;
+    return Screening::own;
+}
+();
+
 /// The guard over a step or the rest of one: the side on which it is armed, and its
 /// samples at both ends. A detector fills in `side_after`.
 struct Watch {

@@ -137,11 +137,14 @@ struct Fehlberg78Tableau {
                                   0,           0, 0, -41.0 / 840, 41.0 / 840, 41.0 / 840};
 };
 
-/// One explicit method for states of type X; keeps its stages for the dense output.
+/// One explicit method for states of type X. The rates of its stages from the second on lie with
+/// the caller, `k[0]` to `k[kept_stages - 1]`.
 template <class Tableau, class X>
 class RungeKutta {
 public:
+    using Coefficients = Tableau;
     static constexpr int order_value = Tableau::order;
+    static constexpr std::size_t kept_stages = Tableau::stages - 1;
     /// Whether the tableau has an embedded error estimate.
     static constexpr bool estimates_error = requires { Tableau::error; };
     /// Whether the estimate uses the rate at the end of the step (first same as last).
@@ -165,31 +168,33 @@ public:
     /// FSAL, also the rate at the end; `with_error`, also the error estimate. `like` gives the
     /// size of a state that is sized at run time.
     template <bool with_error, class Flow>
-    [[gnu::always_inline]] void depart(const Flow& flow, const X& like, double h, X& w, X& rate,
-                                       X& error)
+    [[gnu::always_inline]] static void depart(const Flow& flow, const X& like, double h, X* k, X& w,
+                                              X& rate, X& error)
     {
         if constexpr (fixed_size<X>() == 0) {
-            for (X& k : k_) {
-                if (k.size() != like.size()) k = like;
+            for (std::size_t i = 0; i < kept_stages; ++i) {
+                if (k[i].size() != like.size()) k[i] = like;
             }
         }
-        inner_stages(flow, h, w, std::make_index_sequence<Tableau::stages - 1>{});
-        combine<Weights>(h, rate, w);
+        inner_stages(flow, h, k, std::make_index_sequence<kept_stages>{});
+        combine<Weights>(h, k, rate, w);
         if constexpr (fsal) flow(w, rate, h);
-        if constexpr (with_error) combine<Errors>(h, rate, error);
-    }
-
-    /// w(s) on the dense output of the step of length h that was taken last; `rate` is its
-    /// departures' rate at the end.
-    void dense(double s, double h, const X& rate, X& w) const requires has_dense_output
-    {
-        auto weights = Tableau::dense(s / h);
-        for (double& weight : weights) weight *= h;
-        for_each_component(w, [&](auto c) { w[c] = dense(weights, rate, c); });
+        if constexpr (with_error) combine<Errors>(h, k, rate, error);
     }
 
     /// Weights of the rates in w on the dense output: so many.
     static constexpr std::size_t dense_weights_count = Tableau::stages + 1;
+    using DenseArray = std::array<double, dense_weights_count>;
+
+    /// w(s) on the dense output of the step of length h; `rate` is its departures' rate at the
+    /// end.
+    static void dense(double s, double h, const X* k, const X& rate,
+                      X& w) requires has_dense_output
+    {
+        auto weights = Tableau::dense(s / h);
+        for (double& weight : weights) weight *= h;
+        for_each_component(w, [&](auto c) { w[c] = dense(weights, k, rate, c); });
+    }
 
     /// Weights of the rates in w at the part `Part::u` of a step of length h.
     template <class Part>
@@ -204,16 +209,16 @@ public:
 
     /// One component of w on the dense output, from the weights of the rates.
     template <class Array, class Index>
-    [[nodiscard, gnu::always_inline]] double dense(const Array& weights, const X& rate,
-                                                   Index c) const
+    [[nodiscard, gnu::always_inline]] static double dense(const Array& weights, const X* k,
+                                                          const X& rate, Index c)
     {
         return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-            return (... + (weights[used<Weights>.at[I]] * stage<used<Weights>.at[I]>(rate)[c])) +
+            return (... +
+                    (weights[used<Weights>.at[I]] * stage<used<Weights>.at[I]>(k, rate)[c])) +
                    weights[Tableau::stages] * rate[c];
         }(std::make_index_sequence<used<Weights>.count>{});
     }
 
-private:
     template <std::size_t i>
     struct Stage {
         static constexpr auto coefficients = Tableau::a[i];
@@ -247,45 +252,94 @@ private:
     }
     ();
 
-    template <class Flow, std::size_t... I>
-    [[gnu::always_inline]] void inner_stages(const Flow& flow, [[maybe_unused]] double h, X& w,
-                                             std::index_sequence<I...>)
-    {
-        ((combine<Stage<I + 1>>(h, w, w), flow(w, k_[I], h * Tableau::c[I + 1])), ...);
-    }
-
     template <class Row>
-    [[gnu::always_inline]] void combine(double h, const X& rate, X& w) const
+    static constexpr std::size_t terms = used<Row>.count;
+
+    /// What a row's rates are multiplied by in a step of length h.
+    template <class Row>
+    [[nodiscard, gnu::always_inline]] static auto weights_of(double h) noexcept
     {
-        combine<Row>(h, rate, w, std::make_index_sequence<used<Row>.count>{});
+        constexpr std::size_t terms = used<Row>.count;
+        std::array<double, terms + 1> weights{};
+        for (std::size_t j = 0; j < terms; ++j) weights[j] = Row::times(h, used<Row>.at[j]);
+        return weights;
     }
 
-    template <class Row, std::size_t... I>
-    [[gnu::always_inline]] void combine(double h, [[maybe_unused]] const X& rate, X& w,
-                                        std::index_sequence<I...>) const
+    /// The sum of a row; `rate(j)` is that of stage j, as an integral constant.
+    template <class Row, class Array, class Rate>
+    [[nodiscard, gnu::always_inline]] static auto sum_of(const Array& weights, const Rate& rate)
     {
-        if constexpr (sizeof...(I) == 0) {
-            for_each_component(w, [&](auto c) __attribute__((always_inline)) { w[c] = 0; });
+        return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+            return (... + (weights[I] *
+                           rate(std::integral_constant<std::size_t, used<Row>.at[I]>{})));
+        }(std::make_index_sequence<used<Row>.count>{});
+    }
+
+    /// The same of the rates in `k`, and of `rate` at the end, for one component; 0 of no rates.
+    template <class Row, class Array, class Index>
+    [[nodiscard, gnu::always_inline]] static double sum(const Array& weights,
+                                                        [[maybe_unused]] const X* k,
+                                                        [[maybe_unused]] const X& rate, Index c)
+    {
+        if constexpr (used<Row>.count == 0) {
+            return 0;
         } else {
-            const std::array<double, sizeof...(I)> weights = {Row::times(h, used<Row>.at[I])...};
-            for_each_component(
-                w, [&](auto c) __attribute__((always_inline)) {
-                    w[c] = (... + (weights[I] * stage<used<Row>.at[I]>(rate)[c]));
-                });
+            return sum_of<Row>(weights, [&](auto j) __attribute__((always_inline)) {
+                return stage<j>(k, rate)[c];
+            });
         }
     }
 
-    template <std::size_t j>
-    [[nodiscard]] const X& stage(const X& rate) const noexcept
+private:
+    /// The departure of a stage, a component at a time.
+    template <std::size_t i>
+    class StageView {
+    public:
+        [[gnu::always_inline]] StageView(double h, const X* k) noexcept
+            : k_(k), weights_(weights_of<Stage<i>>(h))
+        {
+        }
+        template <class Index>
+        [[nodiscard, gnu::always_inline]] double operator[](Index c) const
+        {
+            return sum<Stage<i>>(weights_, k_, k_[0], c);
+        }
+
+    private:
+        const X* k_;
+        decltype(weights_of<Stage<i>>(0.0)) weights_;
+    };
+
+    template <class Flow, std::size_t... I>
+    [[gnu::always_inline]] static void inner_stages(const Flow& flow, [[maybe_unused]] double h,
+                                                    [[maybe_unused]] X* k,
+                                                    std::index_sequence<I...>)
     {
-        if constexpr (j < Tableau::stages) {
-            return k_[j - 1];
+        (flow(StageView<I + 1>(h, k), k[I], h * Tableau::c[I + 1]), ...);
+    }
+
+    template <class Row>
+    [[gnu::always_inline]] static void combine(double h, const X* k, const X& rate, X& w)
+    {
+        const auto weights = weights_of<Row>(h);
+        for_each_component(
+            w, [&](auto c) __attribute__((always_inline)) { w[c] = sum<Row>(weights, k, rate, c); });
+    }
+
+
+    template <std::size_t j>
+    [[nodiscard]] static const X& stage([[maybe_unused]] const X* k,
+                                        [[maybe_unused]] const X& rate) noexcept
+    {
+        if constexpr (j <= kept_stages) {
+            return k[j - 1];
         } else {
             return rate;
         }
     }
-
-    std::array<X, Tableau::stages - 1> k_{};  ///< rates of the stages from the second on
 };
+
+/// Stages that the largest of the methods keeps.
+inline constexpr std::size_t most_kept_stages = Fehlberg78Tableau::stages - 1;
 
 }  // namespace ricochet::detail

@@ -72,6 +72,7 @@ struct BernsteinTask {
 /// the system declares. Dense output that a method lacks costs it further steps.
 struct Bernstein {
     static constexpr bool uses_rates = true;
+    static constexpr Screening screening = Screening::every;
     static constexpr Evidence evidence = Evidence::proved;  ///< of a step without armed guards
 
     /// Every step deserves a look.

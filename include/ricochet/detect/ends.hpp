@@ -10,6 +10,7 @@ namespace ricochet {
 
 struct Ends {
     static constexpr bool uses_rates = false;
+    static constexpr Screening screening = Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
 
     /// Whether a step deserves a look, in the guard times `sign`, positive on its

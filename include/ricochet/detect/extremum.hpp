@@ -16,6 +16,7 @@ namespace ricochet {
 
 struct Extremum {
     static constexpr bool uses_rates = true;
+    static constexpr Screening screening = Screening::extremum;
     static constexpr bool looks_inside = true;  ///< compares each step with the cubic of its ends
     static constexpr Evidence evidence = Evidence::checked;  ///< of a step not suspected
 

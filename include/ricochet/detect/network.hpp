@@ -53,6 +53,7 @@ void check_model_step(const Model& model, double smallest, double largest);
 class Network {
 public:
     static constexpr bool uses_rates = false;
+    static constexpr Screening screening = Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
     static constexpr bool checks_every_step = false;
     static constexpr std::size_t max_features = 16;

@@ -97,16 +97,22 @@ public:
     /// The guard at the start of the step.
     [[nodiscard]] virtual double start_value() = 0;
     /// The guard at offset s.
-    [[nodiscard]] virtual GuardSample value(double s) = 0;
+    [[nodiscard]] GuardSample value(double s) { return {.s = s, .value = value_at(s)}; }
     /// The guard and its rate at offset s.
-    [[nodiscard]] virtual GuardSample value_and_rate(double s) = 0;
+    [[nodiscard]] GuardSample value_and_rate(double s) { return sample(s, point_at(s)); }
     /// The guard at offset s on the step's polynomial, whatever the path.
-    [[nodiscard]] virtual GuardSample dense_value(double s) = 0;
+    [[nodiscard]] GuardSample dense_value(double s) { return {.s = s, .value = dense_value_at(s)}; }
     /// The guard and its rate at offset s on the step's polynomial, whatever the path.
-    [[nodiscard]] virtual GuardSample dense_value_and_rate(double s) = 0;
+    [[nodiscard]] GuardSample dense_value_and_rate(double s)
+    {
+        return sample(s, dense_point_at(s));
+    }
     /// The guard at offset s, on the straight line through `sample`, the last that
     /// `value_and_rate` took, or on the polynomial.
-    [[nodiscard]] virtual GuardSample along_the_flow(const GuardSample& sample, double s) = 0;
+    [[nodiscard]] GuardSample along_the_flow(const GuardSample& from, double s)
+    {
+        return {.s = s, .value = value_along_the_flow(from.s, s), .rate = from.rate};
+    }
     /// The root lies `correction` after `sample`, the last that `value_and_rate` took,
     /// and the motion is straight until there.
     virtual void settle(double correction) = 0;
@@ -122,16 +128,34 @@ public:
     [[nodiscard]] virtual int degree() const = 0;
 
 protected:
+    /// Two numbers, which are returned in registers.
+    struct Point {
+        double value;
+        double rate;
+    };
+
     GuardPath(const PathProperties& properties, Path path) noexcept
         : properties_(properties), path_(path)
     {
     }
     ~GuardPath() = default;
 
+    [[nodiscard]] virtual double value_at(double s) = 0;
+    [[nodiscard]] virtual Point point_at(double s) = 0;
+    [[nodiscard]] virtual double dense_value_at(double s) = 0;
+    [[nodiscard]] virtual Point dense_point_at(double s) = 0;
+    [[nodiscard]] virtual double value_along_the_flow(double from, double s) = 0;
+
     PathProperties properties_;
     Path path_;
     Side side_ = Side::plateau;
     bool settled_ = false;
+
+private:
+    [[nodiscard]] static GuardSample sample(double s, const Point& at) noexcept
+    {
+        return {.s = s, .value = at.value, .rate = at.rate};
+    }
 };
 
 template <class Guard, class Step>
@@ -144,7 +168,7 @@ public:
               Path path = Path::restep) noexcept
         : GuardPath({.h = step.h(),
                      .crossing = guard.crossing(),
-                     .is_rated = rated(),
+                     .is_rated = is_rated(guard),
                      .is_polynomial = DenseStep<Step, State>},
                     path),
           guard_(&guard),
@@ -161,87 +185,6 @@ public:
     [[nodiscard]] double start_value() override
     {
         return guard_->value(step_->time(0), step_->x0());
-    }
-
-    [[nodiscard]] GuardSample value(double s) override
-    {
-        if constexpr (by_component) {
-            if (path_ == Path::dense) {
-                return {.s = s, .value = guard_->value(step_->time(s), view(s))};
-            }
-        }
-        place(s);
-        return {.s = s, .value = guard_->value(step_->time(s), space_->x)};
-    }
-
-    [[nodiscard]] GuardSample dense_value(double s) override
-    {
-        const double t = step_->time(s);
-        if constexpr (by_component) {
-            return {.s = s, .value = guard_->value(t, view(s))};
-        } else {
-            step_->interpolate(s, space_->x);
-            placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
-            return {.s = s, .value = guard_->value(t, space_->x)};
-        }
-    }
-
-    [[nodiscard]] GuardSample dense_value_and_rate(double s) override
-    {
-        const double t = step_->time(s);
-        if constexpr (by_component) {
-            GuardSample sample{.s = s, .value = guard_->value(t, view(s))};
-            if constexpr (Guard::template sees_rate<View, RateView>) {
-                sample.rate = guard_->rate(t, view(s), component_view<true>(*step_, s), step_->h());
-            } else {
-                const double delta = 1e-5 * step_->h();
-                sample.rate =
-                    (dense_value(s + delta).value - dense_value(s - delta).value) / (2 * delta);
-            }
-            return sample;
-        } else {
-            step_->interpolate(s, space_->x);
-            if constexpr (DenseStep<Step, State>) {
-                // The polynomial's own: a flow that jumps does not agree with it.
-                const DenseView<State, true> rate(step_->dense(), s);
-                detail::for_each_component(space_->x, [&](auto i) { space_->dxdt[i] = rate[i]; });
-            } else {
-                step_->flow(s, space_->x, space_->dxdt);
-            }
-            placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
-            return {.s = s,
-                    .value = guard_->value(t, space_->x),
-                    .rate = guard_->rate(t, space_->x, space_->dxdt, step_->h())};
-        }
-    }
-
-    [[nodiscard]] GuardSample value_and_rate(double s) override
-    {
-        if constexpr (by_component) {
-            if (path_ == Path::dense) return dense_value_and_rate(s);
-        }
-        if (path_ == Path::dense) {
-            place(s);
-            step_->flow(s, space_->x, space_->dxdt);
-        } else {
-            step_->restep(s, space_->x, space_->dxdt);
-            placed_ = s;
-        }
-        const double t = step_->time(s);
-        return {.s = s,
-                .value = guard_->value(t, space_->x),
-                .rate = guard_->rate(t, space_->x, space_->dxdt, step_->h())};
-    }
-
-    [[nodiscard]] GuardSample along_the_flow(const GuardSample& sample, double s) override
-    {
-        if (path_ == Path::dense) {
-            GuardSample at = value(s);
-            at.rate = sample.rate;
-            return at;
-        }
-        detail::move(space_->root, space_->x, s - sample.s, space_->dxdt);
-        return {.s = s, .value = guard_->value(step_->time(s), space_->root), .rate = sample.rate};
     }
 
     void settle(double correction) override
@@ -306,6 +249,74 @@ public:
     }
 
 private:
+    [[nodiscard]] double value_at(double s) override
+    {
+        if constexpr (may_see) {
+            if (path_ == Path::dense && sees()) return guard_->value(step_->time(s), view(s));
+        }
+        place(s);
+        return guard_->value(step_->time(s), space_->x);
+    }
+
+    [[nodiscard]] double dense_value_at(double s) override
+    {
+        const double t = step_->time(s);
+        if constexpr (may_see) {
+            if (sees()) return guard_->value(t, view(s));
+        }
+        step_->interpolate(s, space_->x);
+        placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
+        return guard_->value(t, space_->x);
+    }
+
+    [[nodiscard]] Point dense_point_at(double s) override
+    {
+        const double t = step_->time(s);
+        if constexpr (may_see) {
+            if (sees()) return point_of_view(s, t);
+        }
+        step_->interpolate(s, space_->x);
+        if constexpr (DenseStep<Step, State>) {
+            // The polynomial's own: a flow that jumps does not agree with it.
+            const DenseView<State, true> rate(step_->dense(), s);
+            detail::for_each_component(space_->x, [&](auto i) { space_->dxdt[i] = rate[i]; });
+        } else {
+            step_->flow(s, space_->x, space_->dxdt);
+        }
+        placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
+        return {guard_->value(t, space_->x),
+                guard_->rate(t, space_->x, space_->dxdt, step_->h())};
+    }
+
+    [[nodiscard]] Point point_at(double s) override
+    {
+        if constexpr (may_see) {
+            if (path_ == Path::dense && sees()) return dense_point_at(s);
+        }
+        if (path_ == Path::dense) {
+            place(s);
+            step_->flow(s, space_->x, space_->dxdt);
+        } else {
+            step_->restep(s, space_->x, space_->dxdt);
+            placed_ = s;
+        }
+        const double t = step_->time(s);
+        if constexpr (requires { guard_->point(t, space_->x, space_->dxdt, 1.0); }) {
+            const auto at = guard_->point(t, space_->x, space_->dxdt, step_->h());
+            return {at.value, at.rate};
+        } else {
+            return {guard_->value(t, space_->x),
+                    guard_->rate(t, space_->x, space_->dxdt, step_->h())};
+        }
+    }
+
+    [[nodiscard]] double value_along_the_flow(double from, double s) override
+    {
+        if (path_ == Path::dense) return value_at(s);
+        detail::move(space_->root, space_->x, s - from, space_->dxdt);
+        return guard_->value(step_->time(s), space_->root);
+    }
+
     template <bool derivative>
     [[nodiscard]] static auto component_view(const Step& step, double s)
     {
@@ -319,11 +330,44 @@ private:
     }
     using View = decltype(component_view<false>(std::declval<const Step&>(), 0.0));
     using RateView = decltype(component_view<true>(std::declval<const Step&>(), 0.0));
-    static constexpr bool by_component = DenseStep<Step, State> && Guard::template sees<View>;
+    static constexpr bool may_see = DenseStep<Step, State> && Guard::template sees<View>;
 
-    [[nodiscard]] static constexpr bool rated() noexcept
+    /// Whether the guard can be had from the polynomial a component at a time.
+    [[nodiscard]] bool sees() const noexcept
     {
-        if constexpr (requires { Guard::is_rated; }) {
+        if constexpr (requires { guard_->sees_views(); }) {
+            return guard_->sees_views();
+        } else {
+            return may_see;
+        }
+    }
+    [[nodiscard]] bool sees_rate() const noexcept
+    {
+        if constexpr (requires { guard_->sees_rate_views(); }) {
+            return guard_->sees_rate_views();
+        } else {
+            return Guard::template sees_rate<View, RateView>;
+        }
+    }
+
+    [[nodiscard]] Point point_of_view(double s, double t)
+    {
+        const double value = guard_->value(t, view(s));
+        if constexpr (Guard::template sees_rate<View, RateView>) {
+            if (sees_rate()) {
+                return {value, guard_->rate(t, view(s), component_view<true>(*step_, s),
+                                            step_->h())};
+            }
+        }
+        const double delta = 1e-5 * step_->h();
+        return {value, (dense_value_at(s + delta) - dense_value_at(s - delta)) / (2 * delta)};
+    }
+
+    [[nodiscard]] static bool is_rated(const Guard& guard) noexcept
+    {
+        if constexpr (requires { { guard.is_rated() } -> std::same_as<bool>; }) {
+            return guard.is_rated();
+        } else if constexpr (requires { Guard::is_rated; }) {
             return Guard::is_rated;
         } else {
             return true;

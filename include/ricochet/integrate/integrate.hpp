@@ -39,9 +39,10 @@ requires Flowing<System, X> && StateVector<X>
     static_assert(!detail::WantsHandOver<System>,
                   "ricochet: found a system with set_valued(); expected that "
                   "ricochet/nonsmooth/event_hand_over.hpp is included, which hands it over");
-    return Simulation<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
-                                                              detector, locator)
-        .take();
+    detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
+                                                                   locator);
+    return detail::as_callers<X>(
+        detail::run_whole(parts.setup(), detail::core_state(x0), options), x0);
 }
 
 /// What has no flow for such a state.

@@ -1,9 +1,9 @@
 // The one-step methods, named as types.
 #pragma once
 
+#include <cstdint>
 #include <type_traits>
 
-#include "ricochet/detail/named_runge_kutta.hpp"
 #include "ricochet/detail/runge_kutta.hpp"
 
 namespace boost::numeric::odeint {
@@ -59,12 +59,11 @@ struct Fehlberg78 {
     using Stepper = detail::RungeKutta<detail::Fehlberg78Tableau, State>;
 };
 
-/// One of the five above, chosen at run time: the same bits from one compiled loop, for programs
-/// that offer all of them. Each step costs a branch more, and small states leave the registers.
-struct MethodByName {
-    template <class State>
-    using Stepper = detail::NamedRungeKutta<State>;
+enum class MethodName : std::uint8_t { euler, rk4, cash_karp54, dopri5, fehlberg78 };
 
+/// One of the five above, chosen at run time, with the same bits: for programs that offer all of
+/// them. The flow is called through a pointer, which costs small states a few nanoseconds a call.
+struct MethodByName {
     MethodName name = MethodName::dopri5;
 };
 
@@ -117,6 +116,32 @@ inline constexpr bool has_interpolant = requires(const Stepper& stepper, X& x)
 };
 template <Departing Stepper, class X>
 inline constexpr bool has_interpolant<Stepper, X> = Stepper::has_dense_output;
+
+/// One of our own methods, which the library has compiled, too.
+template <class Method>
+struct NameOf {
+    static constexpr bool known = false;
+};
+template <MethodName value>
+struct KnownName {
+    static constexpr bool known = true;
+    static constexpr MethodName name = value;
+};
+template <>
+struct NameOf<Euler> : KnownName<MethodName::euler> {
+};
+template <>
+struct NameOf<Rk4> : KnownName<MethodName::rk4> {
+};
+template <>
+struct NameOf<CashKarp54> : KnownName<MethodName::cash_karp54> {
+};
+template <>
+struct NameOf<Dopri5> : KnownName<MethodName::dopri5> {
+};
+template <>
+struct NameOf<Fehlberg78> : KnownName<MethodName::fehlberg78> {
+};
 
 template <class Stepper>
 concept Multistep = requires

@@ -55,6 +55,31 @@ public:
         pieces_.push_back(std::move(piece));
     }
 
+    /// Adds the steps of `from`, with states of another type, beyond as many as there are already.
+    template <class Other, class Convert>
+    void add_from(const Solution<Other>& from, const Convert& convert)
+    {
+        const auto all = [&](const std::vector<Other>& states) {
+            std::vector<State> out;
+            for (const Other& state : states) out.push_back(convert(state));
+            return out;
+        };
+        for (std::size_t i = pieces_.size(); i < from.pieces_.size(); ++i) {
+            const auto& piece = from.pieces_[i];
+            pieces_.push_back({.t = piece.t,
+                                  .length = piece.length,
+                                  .h = piece.h,
+                                  .backward = piece.backward,
+                                  .mode = piece.mode,
+                                  .nodes = piece.nodes,
+                                  .x0 = convert(piece.x0),
+                                  .remainder = convert(piece.remainder),
+                                  .rate0 = convert(piece.rate0),
+                                  .w = all(piece.w),
+                                  .slope = all(piece.slope)});
+        }
+    }
+
     /// Keeps the first `size` steps.
     void shrink(std::size_t size)
     {
@@ -62,6 +87,9 @@ public:
     }
 
 private:
+    template <class>
+    friend class Solution;
+
     struct Piece {
         double t, length, h;
         bool backward;

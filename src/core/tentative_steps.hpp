@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // Starts of the steps that have been taken, but not yet been closed by a look.
 #pragma once
 
@@ -7,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ricochet/detail/explicit_step.hpp"
+#include "ricochet/detail/step_state.hpp"
 
 namespace ricochet::detail {
 

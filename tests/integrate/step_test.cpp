@@ -1,4 +1,4 @@
-#include "ricochet/detail/explicit_step.hpp"
+#include "step_of.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,20 +15,20 @@ using X = std::array<double, 2>;
 using test::WalledOscillator;
 
 template <class Method>
-using StepOf = detail::ExplicitStep<Method, WalledOscillator, X>;
+using StepOf = test::StepOf<Method, WalledOscillator, X>;
 
 static_assert(MethodStep<StepOf<Rk4>, X>);
 static_assert(MethodStep<StepOf<Dopri5>, X>);
 static_assert(MethodStep<StepOf<Fehlberg78>, X>);
 
 template <class Method>
-class ExplicitStepTest : public testing::Test {
+class StepTest : public testing::Test {
 };
 
 using Methods = testing::Types<Euler, Rk4, CashKarp54, Dopri5, Fehlberg78>;
-TYPED_TEST_SUITE(ExplicitStepTest, Methods);
+TYPED_TEST_SUITE(StepTest, Methods);
 
-TYPED_TEST(ExplicitStepTest, RestepToTheEndIsTheStep)
+TYPED_TEST(StepTest, RestepToTheEndIsTheStep)
 {
     const WalledOscillator oscillator;
     StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
@@ -40,7 +40,7 @@ TYPED_TEST(ExplicitStepTest, RestepToTheEndIsTheStep)
     EXPECT_EQ(rate, step.rate1());
 }
 
-TYPED_TEST(ExplicitStepTest, AskingDoesNotDisturbTheStep)
+TYPED_TEST(StepTest, AskingDoesNotDisturbTheStep)
 {
     const WalledOscillator oscillator;
     StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
@@ -54,7 +54,7 @@ TYPED_TEST(ExplicitStepTest, AskingDoesNotDisturbTheStep)
     EXPECT_EQ(before, after);
 }
 
-TYPED_TEST(ExplicitStepTest, DenseOutputMeetsBothEnds)
+TYPED_TEST(StepTest, DenseOutputMeetsBothEnds)
 {
     const WalledOscillator oscillator;
     StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
@@ -68,7 +68,7 @@ TYPED_TEST(ExplicitStepTest, DenseOutputMeetsBothEnds)
     EXPECT_NEAR(x[1], step.x1()[1], 1e-15);
 }
 
-TEST(ExplicitStep, DenseOutputOfDopri5IsOfFourthOrder)
+TEST(Step, DenseOutputOfDopri5IsOfFourthOrder)
 {
     const auto error = [](double h) {
         const WalledOscillator oscillator;
@@ -82,7 +82,7 @@ TEST(ExplicitStep, DenseOutputOfDopri5IsOfFourthOrder)
     EXPECT_GT(std::log2(error(0.4) / error(0.2)), 4.8);
 }
 
-TEST(ExplicitStep, RoundingDoesNotGrowWithTheNumberOfSteps)
+TEST(Step, RoundingDoesNotGrowWithTheNumberOfSteps)
 {
     // A million steps of free motion x' = v: exact but for rounding, which by plain
     // addition reaches 1e-11 here.
@@ -90,7 +90,7 @@ TEST(ExplicitStep, RoundingDoesNotGrowWithTheNumberOfSteps)
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], 0}; }
     };
     const Drift drift;
-    detail::ExplicitStep<Rk4, Drift, X> step(drift, 0, {0.0, 0.1});
+    test::StepOf<Rk4, Drift, X> step(drift, 0, {0.0, 0.1});
     for (int i = 0; i < 1'000'000; ++i) {
         step.attempt(0.1);
         step.accept();

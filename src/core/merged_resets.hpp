@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // The resets of guards that fired together, applied to one state.
 //
 // A reset of a single guard changes the state in place. Of several, each reads the state
@@ -12,23 +10,14 @@
 #include <utility>
 #include <vector>
 
+#include "core/guard_bank.hpp"
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/system_table.hpp"
 #include "ricochet/hybrid/event.hpp"
-#include "ricochet/hybrid/system.hpp"
 
 namespace ricochet::detail {
 
-/// Whether two states are equal, component by component.
 template <class X>
-[[nodiscard]] bool same_state(const X& a, const X& b)
-{
-    if (a.size() != b.size()) return false;
-    bool equal = true;
-    for_each_component(a, [&](auto c) { equal = equal && a[c] == b[c]; });
-    return equal;
-}
-
-template <class System, class X>
 class MergedResets {
 public:
     explicit MergedResets(const X& like) : after_(like), single_(like) {}
@@ -36,8 +25,9 @@ public:
     /// Computes what the resets of `members`, all from the state `before`, make of it; with
     /// that of a time event if the set happens on time. `bank` says which of them reset.
     template <class Bank>
-    void apply(const System& system, const Bank& bank, std::span<const std::size_t> members,
-               bool on_time, Mode mode, double t, const X& before)
+    void apply(const SystemAt<X>& system, const Bank& bank,
+               std::span<const std::size_t> members, bool on_time, Mode mode, double t,
+               const X& before)
     {
         assign(after_, before);
         mode_ = mode;
@@ -46,33 +36,32 @@ public:
             mode_writer_ = resizer_ = no_guard;
             writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
         }
-        if constexpr (ResetsTogether<System, X>) {
+        if (system->reset_set) {
             std::size_t resetting = 0;
             for (const std::size_t i : members) resetting += bank[i].info.resets;
             if (resetting > 0) {
-                mode_ = call_reset_set(system, FiredGuards(members, on_time), mode, t, after_);
+                mode_ = system->reset_set(system.door(), members, on_time, mode, t, after_);
                 return;
             }
-        } else if constexpr (Resetting<System, X>) {
+        } else if (system->reset) {
             if (members.size() == 1 && !on_time) {
                 const std::size_t i = members[0];
-                if (bank[i].info.resets) mode_ = call_reset(system, i, mode, t, after_);
+                if (bank[i].info.resets) mode_ = system->reset(system.door(), i, mode, t, after_);
                 return;
             }
             for (const std::size_t i : members) {
                 if (!bank[i].info.resets) continue;
                 assign(single_, before);
-                merge(i, call_reset(system, i, mode, t, single_), mode, before);
+                merge(i, system->reset(system.door(), i, mode, t, single_), mode, before);
             }
         }
-        if constexpr (Timed<System>) {
-            if (!on_time) return;
-            if (members.empty()) {
-                mode_ = call_time_reset(system, mode, t, after_);
-            } else {
-                assign(single_, before);
-                merge(time_event_reset, call_time_reset(system, mode, t, single_), mode, before);
-            }
+        if (!on_time || !system->timed()) return;
+        if (members.empty()) {
+            mode_ = system->time_reset(system.door(), mode, t, after_);
+        } else {
+            assign(single_, before);
+            merge(time_event_reset, system->time_reset(system.door(), mode, t, single_), mode,
+                  before);
         }
     }
 

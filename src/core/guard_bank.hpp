@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // All guards of a system at the ends of a step.
 //
 // What every step needs of every guard lies in plain arrays, so that a hundred guards
@@ -8,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/container/small_vector.hpp>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,32 +14,42 @@
 #include <span>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
+#include "core/step.hpp"
 #include "ricochet/detail/cubic_look.hpp"
+#include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/finding.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/hybrid/bounds.hpp"
-#include "ricochet/hybrid/event.hpp"
 #include "ricochet/detail/guard_view.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/shrinking_intervals.hpp"
+#include "ricochet/detail/system_table.hpp"
+#include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/hybrid/event.hpp"
 
 namespace ricochet::detail {
 
-/// A T for every guard; on the stack where the system fixes their number.
-template <class T, std::size_t fixed>
-using PerGuard = std::conditional_t<fixed == counted_at_run_time, std::vector<T>,
-                                    std::array<T, fixed == counted_at_run_time ? 1 : fixed>>;
+/// A T for the one guard of a system that has one.
+template <class T>
+class ForTheGuard : public std::array<T, 1> {
+public:
+    explicit ForTheGuard(std::size_t /*guards*/ = 1) : std::array<T, 1>{} {}
+    void resize(std::size_t /*guards*/) noexcept {}
+    void swap(ForTheGuard& other) noexcept { std::swap((*this)[0], other[0]); }
+};
+
+/// A T for every guard; of a few guards without an allocation. Most systems have one guard, and
+/// for them the loop is compiled with that known.
+template <class T, bool single>
+using PerGuard =
+    std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, 8>>;
 
 /// As many elements as there are guards, at most.
-template <class T, std::size_t fixed>
+template <class T, bool single>
 class GuardList {
 public:
-    explicit GuardList(std::size_t guards)
-    {
-        if constexpr (fixed == counted_at_run_time) items_.resize(guards);
-    }
+    explicit GuardList(std::size_t guards) : items_(guards) {}
     void clear() noexcept { size_ = 0; }
     void shrink(std::size_t size) noexcept { size_ = size; }
     void push_back(const T& item) noexcept { items_[size_++] = item; }
@@ -56,7 +65,7 @@ public:
     [[nodiscard]] std::span<const T> span() const noexcept { return {items_.data(), size_}; }
 
 private:
-    PerGuard<T, fixed> items_{};
+    PerGuard<T, single> items_;
     std::size_t size_ = 0;
 };
 
@@ -92,55 +101,67 @@ struct GuardRecord {
     return side == Side::above ? 1 : side == Side::below ? -1 : 0;
 }
 
-template <class System, class X, class Detector>
-class GuardBank {
-    static constexpr std::size_t fixed = fixed_guard_count<System, X>();
-    static constexpr bool puts_off = puts_off_checks<Detector, System, X>();
-
-public:
+/// What a detector asks of all guards, of a system with bounds or without.
+struct BankRules {
+    Screening screening = Screening::ends;
+    bool uses_rates = false;
+    bool puts_off = false;
     /// Whether the scale of a guard is that of its largest value so far: for detectors that do
     /// not ask for the rounding of the state, so that neighbouring steps agree on what a touch
     /// is.
-    static constexpr bool remembers =
-        Detector::uses_rates && !LooksInside<Detector> && !Bounded<System, X>;
-
+    bool remembers = false;
     /// Whether brackets are not narrowed below the rounding of the sizes that smooth phases
     /// started with: those of guards with declared bounds, which may be expensive.
-    static constexpr bool coarse = Detector::uses_rates && Bounded<System, X>;
+    bool coarse = false;
+    /// Whether guards can be looked at inside a step.
+    bool looks = false;
+    bool (*suspects)(double, double, double, double, double, double) = nullptr;
 
     /// Whether sizes are kept from step to step.
-    static constexpr bool keeps_sizes = remembers || coarse;
+    [[nodiscard]] bool keeps_sizes() const noexcept { return remembers || coarse; }
 
-    /// Whether guards can be looked at inside a step.
-    static constexpr bool looks = LooksInside<Detector> && !Bounded<System, X>;
-
-    GuardBank(const System& system, bool backward)
-        : system_(&system),
-          backward_(backward),
-          count_(guard_count_of<X>(system)),
-          suspects_(count_),
-          marks_(count_)
+    template <class X>
+    [[nodiscard]] static BankRules of(const DetectorTable<X>& detector, const SystemAt<X>& system)
     {
-        if constexpr (fixed == counted_at_run_time) {
-            if constexpr (looks) inside_.resize(count_);
-            if constexpr (looks) further_.resize(count_);
-            if constexpr (looks) worst_.resize(count_);
-            if constexpr (keeps_sizes) sizes_.resize(count_);
-            for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_})
-                numbers->resize(count_);
-            records_.resize(count_);
+        const bool bounded = system->bounded;
+        return {.screening = detector.screening,
+                .uses_rates = detector.uses_rates,
+                .puts_off = detector.puts_off,
+                .remembers = detector.uses_rates && !detector.looks_inside && !bounded,
+                .coarse = detector.uses_rates && bounded,
+                .looks = detector.looks_inside && !bounded,
+                .suspects = detector.suspects};
+    }
+};
+
+template <class X, bool single>
+class GuardBank {
+public:
+    GuardBank(const SystemAt<X>& system, const BankRules& rules, bool backward)
+        : system_(system),
+          rules_(rules),
+          backward_(backward),
+          suspects_(system->guard_count(system.door())),
+          marks_(system->guard_count(system.door()))
+    {
+        const std::size_t count = system->guard_count(system.door());
+        if (rules.looks) {
+            for (auto* numbers : {&inside_, &further_, &worst_}) numbers->resize(count);
         }
-        for (std::size_t i = 0; i < count_; ++i) {
-            records_[i].info = guard_info_of<X>(system, i);
+        if (rules.keeps_sizes()) sizes_.resize(count);
+        for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_, &behind_}) {
+            numbers->resize(count);
+        }
+        records_.resize(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            records_[i].info = system->info(system.door(), i);
             bands_ = bands_ || records_[i].info.touch > 0;
         }
         heed_enabled();
     }
 
-    [[nodiscard]] std::size_t size() const noexcept
-    {
-        return fixed == counted_at_run_time ? count_ : fixed;
-    }
+    [[nodiscard]] std::size_t size() const noexcept { return single ? 1 : records_.size(); }
+    [[nodiscard]] bool looks() const noexcept { return rules_.looks; }
     [[nodiscard]] GuardRecord& operator[](std::size_t i) noexcept { return records_[i]; }
     [[nodiscard]] const GuardRecord& operator[](std::size_t i) const noexcept
     {
@@ -148,19 +169,16 @@ public:
     }
     [[nodiscard]] bool backward() const noexcept { return backward_; }
 
-    [[nodiscard]] GuardView<System, X> view(std::size_t i, Mode mode,
-                                            std::uint64_t& calls) const noexcept
+    [[nodiscard]] CoreGuard<X> view(std::size_t i, Mode mode, std::uint64_t& calls) const noexcept
     {
-        return {*system_, calls, i, mode, records_[i].info.crossing, backward_};
+        return {system_, calls, i, mode, records_[i].info, backward_};
     }
 
     /// Samples all guards at the start of a step.
-    template <class Step>
-    void sample_start(const Step& step, std::uint64_t& calls, double scale)
+    void sample_start(const Step<X>& step, std::uint64_t& calls, double scale)
     {
-        if constexpr (puts_off) {
-            call_guards(*system_, step.mode(), step.time(0), step.x0(), all(g0_));
-            calls += size();
+        if (rules_.puts_off) {
+            sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
             for (std::size_t i = 0; i < size(); ++i) {
                 rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until somebody asks
                 records_[i].asleep = false;
@@ -168,7 +186,7 @@ public:
         } else {
             sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
         }
-        if constexpr (keeps_sizes) {
+        if (rules_.keeps_sizes()) {
             for (std::size_t i = 0; i < size(); ++i) {
                 // Beside a pole that it has just passed, a guard has no size of its own.
                 if (records_[i].fired && records_[i].jumped) continue;
@@ -178,8 +196,7 @@ public:
     }
 
     /// All guards take part in the steps from here on. `sampled`: their values are known.
-    template <class Step>
-    void wake_all(const Step& step, double scale, std::uint64_t& calls, bool sampled)
+    void wake_all(const Step<X>& step, double scale, std::uint64_t& calls, bool sampled)
     {
         if (!sampled) sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
         sample_rates(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, rate0_);
@@ -190,8 +207,7 @@ public:
     }
 
     /// Samples all guards at the end of a step.
-    template <class Step>
-    void sample_end(const Step& step, std::uint64_t& calls)
+    void sample_end(const Step<X>& step, std::uint64_t& calls)
     {
         sample(step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h(), calls, g1_,
                rate1_);
@@ -199,54 +215,72 @@ public:
     }
 
     /// Evaluates all guards inside a step, at its state `x` there.
-    template <class Step>
-    void sample_inside(const Step& step, const X& x, std::uint64_t& calls)
+    void sample_inside(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
-        if constexpr (looks) {
-            sample_values(step.mode(), step.time(CubicLook::inside * step.h()), x, calls, inside_);
-            looked_ = Looked::inside;
-            marked_ = false;
-        }
+        sample_values(step.mode(), step.time(CubicLook::inside * step.h()), x, calls, inside_);
+        looked_ = Looked::inside;
+        marked_ = false;
     }
 
     /// And once more, at the part `CubicLook::further` of the step where the state is `x`.
-    template <class Step>
-    void sample_further(const Step& step, const X& x, std::uint64_t& calls)
+    void sample_further(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
-        if constexpr (looks) {
-            const double s = CubicLook::further * step.h();
-            sample_values(step.mode(), step.time(s), x, calls, further_);
-            looked_ = Looked::further;
-        }
+        const double s = CubicLook::further * step.h();
+        sample_values(step.mode(), step.time(s), x, calls, further_);
+        looked_ = Looked::further;
     }
 
     /// And once more, at the part `u` of the step, one of `CubicLook::places`.
-    template <class Step>
-    void sample_place(const Step& step, double u, const X& x, std::uint64_t& calls)
+    void sample_place(const Step<X>& step, double u, const X& x, std::uint64_t& calls)
     {
-        if constexpr (looks) {
-            sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
-            const double h = step.h();
-            const bool first = looked_ != Looked::everywhere;
-            for (std::size_t i = 0; i < size(); ++i) {
-                const double e = cubic(i, h).deviation(u, further_[i]);
-                worst_[i] = !first && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
-            }
-            looked_ = Looked::everywhere;
+        sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
+        const double h = step.h();
+        const bool first = looked_ != Looked::everywhere;
+        for (std::size_t i = 0; i < size(); ++i) {
+            const double e = cubic(i, h).deviation(u, further_[i]);
+            worst_[i] = !first && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
         }
+        looked_ = Looked::everywhere;
     }
 
     [[nodiscard]] bool looked_everywhere() const noexcept { return looked_ == Looked::everywhere; }
 
+    /// Whether nothing but the values and rates of the guard decides whether a step holds events.
+    [[nodiscard]] bool is_steady() const noexcept
+    {
+        if (size() == 0) return true;
+        return single && sign_[0] != 0 && !waiting_ && !bands_ && !selective_;
+    }
+    void lend(QuietRun& run) const noexcept
+    {
+        if (size() == 0) return;
+        run.sign = sign_[0];
+        run.g0 = g0_[0];
+        run.rate0 = rate0_[0];
+    }
+    /// What a quiet run has left: the guard at the start of the step in hand, at its end and inside.
+    void take_back(const QuietRun& run) noexcept
+    {
+        if (size() == 0) return;
+        g0_[0] = run.g0;
+        rate0_[0] = run.rate0;
+        g1_[0] = run.g1;
+        rate1_[0] = run.rate1;
+        forget_screening();
+        if (!run.looks) return;
+        inside_[0] = run.inside;
+        looked_ = Looked::inside;
+    }
+
     /// Whether any guard deserves a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
     {
-        if constexpr (looks) {
-            if (looked() && !waiting_ && !bands_) {
-                if (are_few()) return any_of(in_doubt(h));
-                mark(h);
-                return !marks_.empty();
+        if (looked() && !waiting_ && !bands_) {
+            if (are_few()) {
+                return with_screen([&](auto screen) { return any_of(in_doubt(screen, h)); });
             }
+            mark(h);
+            return !marks_.empty();
         }
         return suspicious(h);
     }
@@ -255,12 +289,10 @@ public:
     /// where the first met the cubic to nine digits, which is no coincidence.
     [[nodiscard]] bool needs_second_look(double h) const noexcept
     {
-        if constexpr (looks) {
-            for (std::size_t i = 0; i < size(); ++i) {
-                const CubicLook look = cubic(i, h);
-                const double e = look.deviation(CubicLook::inside, inside_[i]);
-                if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
-            }
+        for (std::size_t i = 0; i < size(); ++i) {
+            const CubicLook look = cubic(i, h);
+            const double e = look.deviation(CubicLook::inside, inside_[i]);
+            if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
         }
         return false;
     }
@@ -282,37 +314,30 @@ public:
     /// Whether guard i may leave its side inside the step without its ends telling.
     [[nodiscard]] bool hides(std::size_t i, double h) const noexcept
     {
-        if constexpr (looks) {
-            const CubicLook look = cubic(i, h);
-            return !(look.lowest(sign_[i]) > CubicLook::most * deviation(look, i));
-        } else {
-            return false;
-        }
+        const CubicLook look = cubic(i, h);
+        return !(look.lowest(sign_[i]) > CubicLook::most * deviation(look, i));
     }
 
     /// Whether guard i is in the step what the cubic through its ends says, as far as it has
     /// been evaluated.
     [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
     {
-        if constexpr (looks) {
-            if (!looked()) return true;
-            const CubicLook look = cubic(i, h);
-            return 0x1p16 * deviation(look, i) <= look.size();
-        } else {
-            return true;
-        }
+        if (!looked()) return true;
+        const CubicLook look = cubic(i, h);
+        return 0x1p16 * deviation(look, i) <= look.size();
     }
 
     /// Whether the guards have been evaluated inside the step.
-    [[nodiscard]] bool looked() const noexcept { return looks && looked_ != Looked::not_at_all; }
+    [[nodiscard]] bool looked() const noexcept { return looked_ != Looked::not_at_all; }
 
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
         if (sign_[i] == 0) return false;
         const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
-        return Detector::suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i],
-                                  h) ||
-               !is_finite(g1_[i]) || (looked() && hides(i, h));
+        const bool suspected = with_screen([&](auto screen) {
+            return screen.suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
+        });
+        return suspected || !is_finite(g1_[i]) || (looked() && hides(i, h));
     }
 
     /// The first guard that is not finite at the end of the step, or `no_guard`.
@@ -333,8 +358,7 @@ public:
     void begin_phase(double t) noexcept { armed_at_ = t; }
 
     /// What is left to look at of guard i in the step, of which `end` is the end.
-    template <class Step>
-    [[nodiscard]] Watch watch(std::size_t i, const Step& step, const GuardSample& end) const
+    [[nodiscard]] Watch watch(std::size_t i, const Step<X>& step, const GuardSample& end) const
     {
         const GuardRecord& record = records_[i];
         return {.side = record.side,
@@ -357,13 +381,9 @@ public:
     /// Half the width of the band around the surface that counts as being on it where the
     /// rate is zero, as far as the rounding of the guard's values in the step goes. What the
     /// rounding of the state adds to that is asked for where it matters (`StepProbe::rounding`).
-    [[nodiscard]] double touch(std::size_t i, [[maybe_unused]] double h) const noexcept
+    [[nodiscard]] double touch(std::size_t i, double h) const noexcept
     {
-        if constexpr (remembers) {
-            return touch_of(i, sizes_[i]);
-        } else {
-            return touch_of(i, scale(i, h));
-        }
+        return touch_of(i, rules_.remembers ? sizes_[i] : scale(i, h));
     }
 
     /// As `touch`, in a stretch in which |g| reaches `largest`.
@@ -377,7 +397,7 @@ public:
     [[nodiscard]] double scale(std::size_t i, double h) const noexcept
     {
         const double ends = std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i]));
-        if (!Detector::uses_rates) return ends;
+        if (!rules_.uses_rates) return ends;
         return std::fmax(ends, std::fmax(std::fabs(g0_[i] + rate0_[i] * (h / 3)),
                                          std::fabs(g1_[i] - rate1_[i] * (h / 3))));
     }
@@ -392,15 +412,11 @@ public:
     /// rounding, where it is not narrowed further; else 0.
     [[nodiscard]] double unresolved(std::size_t i, double h) const noexcept
     {
-        if constexpr (coarse) {
-            const double size =
-                std::fmax(sizes_[i], std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
-            const double rate = std::fmin(std::fabs(rate0_[i]), std::fabs(rate1_[i]));
-            const double width = 4 * std::numeric_limits<double>::epsilon() * size / rate;
-            return width <= 1e-10 * h ? width : 1e-10 * h;
-        } else {
-            return 0;
-        }
+        if (!rules_.coarse) return 0;
+        const double size = std::fmax(sizes_[i], std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
+        const double rate = std::fmin(std::fabs(rate0_[i]), std::fabs(rate1_[i]));
+        const double width = 4 * std::numeric_limits<double>::epsilon() * size / rate;
+        return width <= 1e-10 * h ? width : 1e-10 * h;
     }
 
     /// Guard i is not looked at until it is woken.
@@ -426,13 +442,10 @@ public:
     [[nodiscard]] double rate_of(std::size_t i, Mode mode, double t, const X& x, const X& dxdt,
                                  double scale, std::uint64_t& calls)
     {
-        if (records_[i].info.boolean || !Detector::uses_rates) return 0;
-        if constexpr (RatesTogether<System, X>) {
-            rates_together(mode, t, x, dxdt, behind_);
-            return behind_[i];
-        } else {
-            return view(i, mode, calls).rate(t, x, dxdt, scale);
-        }
+        if (records_[i].info.boolean || !rules_.uses_rates) return 0;
+        if (!system_->rates) return view(i, mode, calls).rate(t, x, dxdt, scale);
+        rates_together(mode, t, x, dxdt, behind_);
+        return behind_[i];
     }
 
     /// Nothing inside the step has been looked at. What a search changes belongs to `suspects`;
@@ -440,7 +453,7 @@ public:
     void begin_search(double h) noexcept
     {
         // A guard that wakes or leaves its plateau is another than the one that was screened.
-        if (puts_off || waiting_) forget_screening();
+        if (rules_.puts_off || waiting_) forget_screening();
         if (!screened_) screen(h);
         for (const std::size_t i : suspects_) records_[i].next = records_[i].side;
     }
@@ -458,7 +471,7 @@ public:
     /// The end of a clear step becomes the start of the next.
     void pass_on() noexcept
     {
-        if constexpr (remembers) {
+        if (rules_.remembers) {
             for (std::size_t i = 0; i < size(); ++i) {
                 sizes_[i] = std::fmax(std::fabs(g1_[i]), sizes_[i]);
             }
@@ -469,7 +482,7 @@ public:
         };
         const bool plateaus = any_of(on_plateau);
         hand_over(g1_, g0_);
-        if constexpr (Detector::uses_rates) hand_over(rate1_, rate0_);
+        if (rules_.uses_rates) hand_over(rate1_, rate0_);
         if (!plateaus) return;
         for (std::size_t i = 0; i < size(); ++i) leave_plateau(i, g0_[i]);
     }
@@ -488,8 +501,7 @@ public:
     }
 
     /// The rate of a guard at the start of a step.
-    template <class Step>
-    [[nodiscard]] double complete_rate0(std::size_t i, const Step& step, double scale,
+    [[nodiscard]] double complete_rate0(std::size_t i, const Step<X>& step, double scale,
                                         std::uint64_t& calls)
     {
         if (records_[i].info.boolean) return rate0_[i] = 0;
@@ -509,7 +521,7 @@ public:
         for (std::size_t i = 0; i < size(); ++i) {
             GuardRecord& record = records_[i];
             visit(sign_[i]);
-            if constexpr (keeps_sizes) visit(sizes_[i]);
+            if (rules_.keeps_sizes()) visit(sizes_[i]);
             visit(g0_[i]);
             visit(rate0_[i]);
             visit(record.enabled);
@@ -521,7 +533,7 @@ public:
             visit(record.turned);
             visit(record.departs);
             visit(record.awaited);
-            if constexpr (puts_off) visit(record.asleep);
+            if (rules_.puts_off) visit(record.asleep);
             record.intervals.visit(visit);
         }
         visit(waiting_);
@@ -566,7 +578,24 @@ private:
         return false;
     }
 
-    using Doubles = PerGuard<double, fixed>;
+    using Doubles = PerGuard<double, single>;
+
+    struct OwnScreen {
+        bool (*suspects)(double, double, double, double, double, double);
+    };
+
+    /// Calls `use` with the detector's own way of screening, inlined.
+    template <class Use>
+    [[gnu::always_inline]] auto with_screen(const Use& use) const
+    {
+        switch (rules_.screening) {
+            case Screening::ends: return use(Ends{});
+            case Screening::extremum: return use(Extremum{});
+            case Screening::every: return use(Bernstein{});
+            case Screening::own: break;
+        }
+        return use(OwnScreen{rules_.suspects});
+    }
 
     /// Guards that are screened together: where one of them is suspected, each is looked at.
     static constexpr std::size_t block = 16;
@@ -611,12 +640,13 @@ private:
     }
 
     /// Whether the ends of the step tell of guard i that it deserves a search.
-    [[nodiscard, gnu::always_inline]] auto shows(double h) const noexcept
+    template <class Screen>
+    [[nodiscard, gnu::always_inline]] auto shows(const Screen& screen, double h) const noexcept
     {
-        return [ this, h ](std::size_t i) __attribute__((always_inline))
+        return [ this, screen, h ](std::size_t i) __attribute__((always_inline))
         {
             const bool suspected =
-                Detector::suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+                screen.suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
             const bool armed = sign_[i] != 0;
             return suspected & armed;
         };
@@ -637,10 +667,11 @@ private:
     }
 
     /// Whether guard i deserves a second evaluation inside the step, or a search.
-    [[nodiscard, gnu::always_inline]] auto in_doubt(double h) const noexcept
+    template <class Screen>
+    [[nodiscard, gnu::always_inline]] auto in_doubt(const Screen& screen, double h) const noexcept
     {
         return [
-            shows = shows(h), strays = strays(h, CubicLook::inside, CubicLook::doubt, inside_)
+            shows = shows(screen, h), strays = strays(h, CubicLook::inside, CubicLook::doubt, inside_)
         ](std::size_t i) __attribute__((always_inline))
         {
             const bool shown = shows(i);
@@ -657,7 +688,9 @@ private:
     {
         marks_.clear();
         marked_ = true;
-        for_each_that(in_doubt(h), [this](std::size_t i) { marks_.push_back(i); });
+        with_screen([&](auto screen) {
+            for_each_that(in_doubt(screen, h), [this](std::size_t i) { marks_.push_back(i); });
+        });
     }
 
     /// Finds the guards that deserve a search.
@@ -669,35 +702,33 @@ private:
             for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
             return;
         }
-        if constexpr (looks) {
-            if (looked()) {
-                // One that deserves a search is in doubt, or deviates elsewhere.
-                if (!marked_) mark(h);
-                if (looked_ == Looked::inside)
-                    return screen_marked(h, [](std::size_t) { return false; });
-                if (looked_ == Looked::further) {
-                    return screen_marked(h,
-                                         strays(h, CubicLook::further, CubicLook::most, further_));
-                }
-                return screen_marked(
-                    h, [ this, h ](std::size_t i) __attribute__((always_inline)) {
-                        const bool clear =
-                            cubic(i, h).lowest(sign_[i]) > CubicLook::most * worst_[i];
-                        const bool armed = sign_[i] != 0;
-                        return !clear & armed;
-                    });
+        if (looked()) {
+            // One that deserves a search is in doubt, or deviates elsewhere.
+            if (!marked_) mark(h);
+            if (looked_ == Looked::inside)
+                return screen_marked(h, [](std::size_t) { return false; });
+            if (looked_ == Looked::further) {
+                return screen_marked(h, strays(h, CubicLook::further, CubicLook::most, further_));
             }
+            return screen_marked(
+                h, [ this, h ](std::size_t i) __attribute__((always_inline)) {
+                    const bool clear = cubic(i, h).lowest(sign_[i]) > CubicLook::most * worst_[i];
+                    const bool armed = sign_[i] != 0;
+                    return !clear & armed;
+                });
         }
         marks_.clear();
-        const auto condition =
-            [ this, shows = shows(h) ](std::size_t i) __attribute__((always_inline))
-        {
-            const bool shown = shows(i);
-            const bool armed = sign_[i] != 0;
-            const bool lost = !is_finite(g1_[i]);
-            return shown | (lost & armed);
-        };
-        if (any_of(condition)) screen_marked(h, condition);
+        with_screen([&](auto screen) {
+            const auto condition =
+                [ this, shows = shows(screen, h) ](std::size_t i) __attribute__((always_inline))
+            {
+                const bool shown = shows(i);
+                const bool armed = sign_[i] != 0;
+                const bool lost = !is_finite(g1_[i]);
+                return shown | (lost & armed);
+            };
+            if (any_of(condition)) screen_marked(h, condition);
+        });
     }
 
     /// Looks at each guard that is marked, or for which `condition` holds.
@@ -721,12 +752,12 @@ private:
     }
 
     /// What belongs to the end of a step belongs to the start of the next.
-    static void hand_over(Doubles& from, Doubles& to) noexcept
+    void hand_over(Doubles& from, Doubles& to) const noexcept
     {
-        if constexpr (fixed == counted_at_run_time && !puts_off) {
-            std::swap(from, to);
+        if (size() > 4 && !rules_.puts_off) {
+            from.swap(to);
         } else {
-            to = from;
+            for (std::size_t i = 0; i < size(); ++i) to[i] = from[i];
         }
     }
 
@@ -750,9 +781,9 @@ private:
         return other <= e ? e : other;  // NaN stays
     }
 
-    [[nodiscard]] static double known(double rate) noexcept
+    [[nodiscard]] double known(double rate) const noexcept
     {
-        return Detector::uses_rates ? rate : std::numeric_limits<double>::quiet_NaN();
+        return rules_.uses_rates ? rate : std::numeric_limits<double>::quiet_NaN();
     }
 
     [[nodiscard]] std::span<double> all(Doubles& numbers) const noexcept
@@ -763,51 +794,48 @@ private:
     void sample(Mode mode, double t, const X& x, const X& dxdt, double scale, std::uint64_t& calls,
                 Doubles& g, Doubles& rates)
     {
+        if (single && system_->point && rules_.uses_rates && !selective_) {
+            const GuardPoint at = view(0, mode, calls).point(t, x, dxdt, scale);
+            g[0] = at.value;
+            rates[0] = at.rate;
+            return;
+        }
         sample_values(mode, t, x, calls, g);
         sample_rates(mode, t, x, dxdt, scale, calls, rates);
     }
 
     void sample_values(Mode mode, double t, const X& x, std::uint64_t& calls, Doubles& g)
     {
-        call_guards(*system_, mode, t, x, all(g));
+        if (size() == 0) return;
+        system_->guards(system_.door(), mode, t, x, all(g));
         calls += size();
     }
 
-    void sample_rates([[maybe_unused]] Mode mode, [[maybe_unused]] double t,
-                      [[maybe_unused]] const X& x, [[maybe_unused]] const X& dxdt,
-                      [[maybe_unused]] double scale, [[maybe_unused]] std::uint64_t& calls,
-                      [[maybe_unused]] Doubles& rates)
+    void sample_rates(Mode mode, double t, const X& x, const X& dxdt, double scale,
+                      std::uint64_t& calls, Doubles& rates)
     {
-        if constexpr (Detector::uses_rates) {
-            if constexpr (RatesTogether<System, X>) {
-                rates_together(mode, t, x, dxdt, rates);
-            } else if constexpr (RateAlone<System, X> || GuardAlone<System, X>) {
-                if constexpr (RateAlone<System, X>) {
-                    if (!selective_ && !backward_) {
-                        double* to = rates.data();
-                        for (std::size_t i = 0; i < size(); ++i) {
-                            to[i] = call_rate(*system_, i, mode, t, x, dxdt);
-                        }
-                        return;
-                    }
-                }
-                for (std::size_t i = 0; i < size(); ++i) {
-                    rates[i] = records_[i].info.boolean || !records_[i].enabled
-                                   ? 0
-                                   : view(i, mode, calls).rate(t, x, dxdt, scale);
-                }
-            } else {
-                difference(mode, t, x, dxdt, scale, rates);
-                calls += 2 * size();
-            }
+        if (!rules_.uses_rates || size() == 0) return;
+        if (system_->rates) return rates_together(mode, t, x, dxdt, rates);
+        if (system_->each_rate && !selective_ && !backward_) {
+            return system_->each_rate(system_.door(), mode, t, x, dxdt, all(rates));
+        }
+        if (!system_->each_rate && !system_->guard_alone) {
+            difference(mode, t, x, dxdt, scale, rates);
+            calls += 2 * size();
+            return;
+        }
+        for (std::size_t i = 0; i < size(); ++i) {
+            rates[i] = records_[i].info.boolean || !records_[i].enabled
+                           ? 0
+                           : view(i, mode, calls).rate(t, x, dxdt, scale);
         }
     }
 
     /// Rates of all guards at once from the system.
     void rates_together(Mode mode, double t, const X& x, const X& dxdt, Doubles& rates)
     {
-        if (!backward_) return call_rates(*system_, mode, t, x, dxdt, all(rates));
-        call_rates(*system_, mode, t, x, negated(dxdt), all(rates));
+        if (!backward_) return system_->rates(system_.door(), mode, t, x, dxdt, all(rates));
+        system_->rates(system_.door(), mode, t, x, negated(dxdt), all(rates));
         for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
     }
 
@@ -818,17 +846,17 @@ private:
         const double ahead = backward_ ? -delta : delta;
         if (there_.size() != x.size()) there_ = x;
         detail::move(there_, x, delta, dxdt);
-        call_guards(*system_, mode, t + ahead, there_, all(rates));
+        system_->guards(system_.door(), mode, t + ahead, there_, all(rates));
         detail::move(there_, x, -delta, dxdt);
-        call_guards(*system_, mode, t - ahead, there_, all(behind_));
+        system_->guards(system_.door(), mode, t - ahead, there_, all(behind_));
         for (std::size_t i = 0; i < size(); ++i) {
             rates[i] = records_[i].info.boolean ? 0 : (rates[i] - behind_[i]) / (2 * delta);
         }
     }
 
-    const System* system_;
+    SystemAt<X> system_;
+    BankRules rules_;
     bool backward_;
-    std::size_t count_;
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     bool waiting_ = false;    ///< whether any guard may be on a plateau
     bool bands_ = false;      ///< whether any guard declares one
@@ -839,14 +867,13 @@ private:
     enum class Looked : std::uint8_t { not_at_all, inside, further, everywhere };
     Looked looked_ = Looked::not_at_all;
     bool marked_ = false;  ///< whether `marks_` is of the step in hand
-    struct None {};
-    [[no_unique_address]] std::conditional_t<looks, Doubles, None> inside_{}, further_{};
-    [[no_unique_address]] std::conditional_t<looks, Doubles, None> worst_{};  ///< of further looks
-    [[no_unique_address]] std::conditional_t<keeps_sizes, Doubles, None> sizes_{};
+    Doubles inside_{}, further_{};
+    Doubles worst_{};  ///< of further looks
+    Doubles sizes_{};
     X there_{};
-    GuardList<std::size_t, fixed> suspects_;
-    GuardList<std::size_t, fixed> marks_;  ///< guards in doubt
-    PerGuard<GuardRecord, fixed> records_{};
+    GuardList<std::size_t, single> suspects_;
+    GuardList<std::size_t, single> marks_;  ///< guards in doubt
+    PerGuard<GuardRecord, single> records_{};
 };
 
 }  // namespace ricochet::detail

@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // Which guards need a look, and when.
 //
 // After a look at it every guard sleeps until its bound no longer covers it. The earliest
@@ -21,14 +19,13 @@
 #include <optional>
 #include <span>
 
+#include "core/event_search.hpp"
+#include "core/guard_bank.hpp"
+#include "core/metering.hpp"
+#include "core/tentative_steps.hpp"
 #include "ricochet/detect/cover.hpp"
-#include "ricochet/detail/meter.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/statistics.hpp"
-#include "ricochet/detail/guard_bank.hpp"
 #include "ricochet/integrate/run.hpp"
-#include "ricochet/detail/tentative_steps.hpp"
 
 namespace ricochet::detail {
 
@@ -64,32 +61,26 @@ struct LastLook {
     }
 };
 
-template <class System, class X, class Detector>
+template <class X, bool single>
 class Planner {
-    static constexpr std::size_t fixed = fixed_guard_count<System, X>();
-    static constexpr bool bounded = Detector::needs_bounds;
     static constexpr double infinity = std::numeric_limits<double>::infinity();
-    /// Puts off nothing but what a gate clears.
-    static constexpr bool gated = !bounded && requires(const Detector& d, const System& s,
-                                                       const X& x) { d.horizon(s, Mode{}, 0.0, x); };
-    /// Has lower bounds from a gate.
-    static constexpr bool levelled = requires(const Detector& d, const System& s, const X& x)
-    {
-        d.level(s, std::size_t{}, Mode{}, 0.0, x);
-    };
-    using Bank = GuardBank<System, X, Detector>;
+    using Bank = GuardBank<X, single>;
     using Steps = TentativeSteps<X>;
 
 public:
     static constexpr std::size_t none = static_cast<std::size_t>(-1);
 
-    Planner(const System& system, const Detector& detector, const X& like, bool backward,
+    /// Keeps a reference to the finders.
+    Planner(const SystemAt<X>& system, const Finders<X>& finders, const X& like, bool backward,
             std::size_t guards)
-        : system_(&system),
-          detector_(detector),
-          meter_(MeterOf<Detector>::make(detector, guards)),
+        : system_(system),
+          detector_(&finders.detector),
+          self_(finders.detecting),
+          bounded_(detector_->needs_bounds),
+          gated_(!bounded_ && detector_->horizon),
+          meter_(detector_->metering, guards),
           backward_(backward),
-          steps_(detector.longest(), like),
+          steps_(detector_->longest, like),
           looks_(guards),
           calendar_(guards),
           owing_(guards),
@@ -110,8 +101,7 @@ public:
     void look_back(const Statistics& counts) { meter_.look_back(counts); }
 
     /// Every guard has just been armed at the start of the step, and sampled there.
-    template <class Step>
-    void begin(const Step& step, Bank& bank)
+    void begin(const Step<X>& step, Bank& bank)
     {
         steps_.clear();
         calendar_.clear();
@@ -156,8 +146,7 @@ public:
     /// Looks at every guard that owes one, at the end of the step in hand and wherever that
     /// leaves a doubt. Returns the first step that could not be closed, or `none`; whoever
     /// is to be judged in it if it is the step in hand is in `judged`.
-    template <class Step>
-    [[nodiscard]] std::size_t close(const Step& step, Bank& bank, Statistics& counts, double h_next)
+    [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts, double h_next)
     {
         meter_.look_back(counts);
         const std::size_t last = steps_.size() - 1;
@@ -196,8 +185,7 @@ public:
 
     /// Hands the judged guards over to the bank, with their samples at both ends of the step.
     /// `last_h`: the step before it [s].
-    template <class Step>
-    void wake(const Step& step, Bank& bank, Statistics& counts, double last_h)
+    void wake(const Step<X>& step, Bank& bank, Statistics& counts, double last_h)
     {
         for (const std::size_t i : judged()) {
             LastLook& look = looks_[i];
@@ -225,8 +213,7 @@ public:
 
     /// The exact detector has found nothing that cuts the step short: the judged guards sleep
     /// from its end on.
-    template <class Step>
-    void settle(const Step& step, Bank& bank)
+    void settle(const Step<X>& step, Bank& bank)
     {
         const double t = step.time(step.h());
         for (const std::size_t i : judged()) {
@@ -247,26 +234,22 @@ public:
 
     /// One of the sleeping guards, each in its turn, at the end of the step in hand: of every
     /// 64th step without a look, and only if bounds are checked.
-    template <class Step>
-    void sample_sleeper(const Step& step, Bank& bank, Statistics& counts)
+    void sample_sleeper(const Step<X>& step, Bank& bank, Statistics& counts)
     {
-        if constexpr (bounded) {
-            if (!detector_.checks_bounds() || ++covered_ % 64 != 0 || bank.size() == 0) return;
-            const std::size_t i = covered_ / 64 % bank.size();
-            const double t = step.time(step.h());
-            watch_sleeper(i, t, step.x1(), step.mode(), bank, counts);
-        }
+        if (!bounded_ || !detector_->checks_bounds) return;
+        if (++covered_ % 64 != 0 || bank.size() == 0) return;
+        const std::size_t i = covered_ / 64 % bank.size();
+        const double t = step.time(step.h());
+        watch_sleeper(i, t, step.x1(), step.mode(), bank, counts);
     }
 
     /// A last look at the guards that sleep when the run ends, at the start of the step: one
     /// that is beyond its surface was covered by a wrong bound.
-    template <class Step>
-    void look_last(const Step& step, Bank& bank, Statistics& counts)
+    void look_last(const Step<X>& step, Bank& bank, Statistics& counts)
     {
-        if constexpr (bounded) {
-            for (std::size_t i = 0; i < bank.size(); ++i) {
-                watch_sleeper(i, step.time(0), step.x0(), step.mode(), bank, counts);
-            }
+        if (!bounded_) return;
+        for (std::size_t i = 0; i < bank.size(); ++i) {
+            watch_sleeper(i, step.time(0), step.x0(), step.mode(), bank, counts);
         }
     }
 
@@ -359,14 +342,12 @@ private:
     [[nodiscard]] GuardBound bound(std::size_t i, const Look& look, Mode mode, Side side)
     {
         GuardBound at{.distance = sign_of(side) * look.value, .speed = 0, .acceleration = 0};
-        if constexpr (bounded) {
-            const double l = call_lipschitz(*system_, i);
-            at.speed = l * call_speed_bound(*system_, i, mode, look.t, *look.x);
-            at.acceleration = l * call_acceleration_bound(*system_, i, mode, look.t, *look.x);
-            if (detector_.checks_bounds() && !(at.speed >= 0 && at.acceleration >= 0) && !wrong_) {
-                blame(i, look, look,
-                      at.speed >= 0 ? at.acceleration : at.speed);
-            }
+        if (!bounded_) return at;
+        const double l = system_->lipschitz(system_.door(), i);
+        at.speed = l * system_->speed_bound(system_.door(), i, mode, look.t, *look.x);
+        at.acceleration = l * system_->acceleration_bound(system_.door(), i, mode, look.t, *look.x);
+        if (detector_->checks_bounds && !(at.speed >= 0 && at.acceleration >= 0) && !wrong_) {
+            blame(i, look, look, at.speed >= 0 ? at.acceleration : at.speed);
         }
         return at;
     }
@@ -388,20 +369,16 @@ private:
     }
 
     /// Time [s] without a look that a gate gives from here; 0 without a gate.
-    [[nodiscard]] double horizon([[maybe_unused]] const Look& at, [[maybe_unused]] Mode mode)
+    [[nodiscard]] double horizon(const Look& at, Mode mode)
     {
-        if constexpr (requires { detector_.horizon(*system_, mode, at.t, *at.x); }) {
-            // Gates have learned what comes, not what was.
-            if (backward_ || !meter_.asks()) return 0;
-            const auto answer =
-                meter_.time_network([&] { return detector_.horizon(*system_, mode, at.t, *at.x); });
-            ++asked_;
-            outside_ += answer.outside ? 1 : 0;
-            if (answer.cleared > 0) meter_.note_cleared();
-            return answer.cleared;
-        } else {
-            return 0;
-        }
+        // Gates have learned what comes, not what was.
+        if (!detector_->horizon || backward_ || !meter_.asks()) return 0;
+        const GateAnswer answer = meter_.time_network(
+            [&] { return detector_->horizon(self_, system_.door(), mode, at.t, *at.x); });
+        ++asked_;
+        outside_ += answer.outside ? 1 : 0;
+        if (answer.cleared > 0) meter_.note_cleared();
+        return answer.cleared;
     }
 
     void note(std::size_t i, LastLook& look, const Look& at, Mode mode, const Bank& bank)
@@ -424,39 +401,35 @@ private:
         const double reach = band(bank, i, at.value, at.value);
         // Rounding of the time must not lengthen what is covered.
         const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(at.time);
-        look.sure = at.time + detector_.sure(at.bound, reach) - ulps;
+        look.sure = at.time + detector_->sure(self_, at.bound, reach) - ulps;
         const double cleared = horizon(at, mode);
-        look.unclear = gated && !(cleared > 0);
+        look.unclear = gated_ && !(cleared > 0);
         if (look.unclear) look.judge = true;
         // What would just close is left open by rounding.
-        const double hoped = (1 - 1e-12) * detector_.hoped(at.bound, look.slope, reach);
+        const double hoped = (1 - 1e-12) * detector_->hoped(self_, at.bound, look.slope, reach);
         const double ahead = std::max(hoped, cleared);
         look.hoped = std::max(look.sure, at.time + (expects_level(look, bank[i].side) ? 0 : ahead));
     }
 
     /// Whether a gate is likely to have a lower bound where the cover of this look ends: any will
     /// do there, so that it is asked at once.
-    [[nodiscard]] bool expects_level([[maybe_unused]] const LastLook& look,
-                                     [[maybe_unused]] Side side) const noexcept
+    [[nodiscard]] bool expects_level(const LastLook& look, Side side) const noexcept
     {
-        if constexpr (levelled) {
-            if (side != Side::above) return false;
-            const double slope = std::isfinite(look.slope) ? look.slope : 0;
-            const double then = look.bound.distance + slope * (look.sure - look.time);
-            return meter_.asks() && !look.refused && then > detector_.lowest_level();
-        } else {
-            return false;
-        }
+        if (!detector_->level || side != Side::above) return false;
+        const double slope = std::isfinite(look.slope) ? look.slope : 0;
+        const double then = look.bound.distance + slope * (look.sure - look.time);
+        return meter_.asks() && !look.refused && then > detector_->lowest_level;
     }
 
-    [[nodiscard]] static bool never_sleeps(const GuardRecord& record) noexcept
+    [[nodiscard]] bool never_sleeps(const GuardRecord& record) const noexcept
     {
-        return record.side == Side::plateau || (bounded && record.info.boolean);
+        return record.side == Side::plateau || (bounded_ && record.info.boolean);
     }
 
     [[nodiscard]] bool closes(const Bank& bank, std::size_t i, const Look& a, const Look& b) const
     {
-        return detector_.closes(a.bound, b.bound, b.time - a.time, band(bank, i, a.value, b.value));
+        return detector_->closes(self_, a.bound, b.bound, b.time - a.time,
+                                 band(bank, i, a.value, b.value));
     }
 
     // --- looking ---
@@ -480,19 +453,17 @@ private:
 
     /// An exact look at the start of tentative step k; past the last, at the end of the step
     /// in hand.
-    template <class Step>
-    [[nodiscard]] Look look_at(std::size_t i, std::size_t k, const Step& step, const Bank& bank,
+    [[nodiscard]] Look look_at(std::size_t i, std::size_t k, const Step<X>& step, const Bank& bank,
                                Statistics& counts)
     {
         Look look = place(k, step);
         look.value = value_at(i, look.time, look.t, *look.x, step.mode(), bank, counts);
         look.bound = bound(i, look, step.mode(), bank[i].side);
-        if (detector_.checks_bounds()) check_bound(i, look, step.mode(), bank);
+        if (detector_->checks_bounds) check_bound(i, look, step.mode(), bank);
         return look;
     }
 
-    template <class Step>
-    [[nodiscard]] Look place(std::size_t k, const Step& step) const
+    [[nodiscard]] Look place(std::size_t k, const Step<X>& step) const
     {
         if (k == steps_.size()) {
             const double t = step.time(step.h());
@@ -503,46 +474,39 @@ private:
     }
 
     /// What a lower bound says there, or below the surface an upper one; false: nothing.
-    template <class Step>
-    [[nodiscard]] bool bound_at(std::size_t i, std::size_t k, const Step& step, const Bank& bank,
+    [[nodiscard]] bool bound_at(std::size_t i, std::size_t k, const Step<X>& step, const Bank& bank,
                                 Statistics& counts, Look& look)
     {
-        if constexpr (bounded && HasUpperBound<System, X>) {
-            if (bank[i].side == Side::below) {
-                look = place(k, step);
-                look.exact = false;
-                ++counts.bound_calls;
-                look.value = call_upper_bound(*system_, i, step.mode(), look.t, *look.x);
-                look.bound = bound(i, look, step.mode(), Side::below);
-                return look.value < 0;
-            }
-        }
-        if constexpr (bounded && (HasLowerBound<System, X> || levelled)) {
-            if (bank[i].side != Side::above) return false;
+        if (!bounded_) return false;
+        if (system_->upper_bound && bank[i].side == Side::below) {
             look = place(k, step);
             look.exact = false;
-            look.value = 0;
-            if constexpr (HasLowerBound<System, X>) {
-                ++counts.bound_calls;
-                look.value = call_lower_bound(*system_, i, step.mode(), look.t, *look.x);
-            }
-            if constexpr (levelled) {
-                if (meter_.asks()) {
-                    look.value = std::max(look.value, ask_level(i, look, step.mode()));
-                }
-            }
-            look.bound = bound(i, look, step.mode(), Side::above);
-            return look.value > 0;
-        } else {
-            return false;
+            ++counts.bound_calls;
+            look.value = system_->upper_bound(system_.door(), i, step.mode(), look.t, *look.x);
+            look.bound = bound(i, look, step.mode(), Side::below);
+            return look.value < 0;
         }
+        if (!system_->lower_bound && !detector_->level) return false;
+        if (bank[i].side != Side::above) return false;
+        look = place(k, step);
+        look.exact = false;
+        look.value = 0;
+        if (system_->lower_bound) {
+            ++counts.bound_calls;
+            look.value = system_->lower_bound(system_.door(), i, step.mode(), look.t, *look.x);
+        }
+        if (detector_->level && meter_.asks()) {
+            look.value = std::max(look.value, ask_level(i, look, step.mode()));
+        }
+        look.bound = bound(i, look, step.mode(), Side::above);
+        return look.value > 0;
     }
 
     /// A lower bound of guard i by a gate; 0: none.
     [[nodiscard]] double ask_level(std::size_t i, const Look& at, Mode mode)
     {
-        const auto answer =
-            meter_.time_network([&] { return detector_.level(*system_, i, mode, at.t, *at.x); });
+        const GateAnswer answer = meter_.time_network(
+            [&] { return detector_->level(self_, system_.door(), i, mode, at.t, *at.x); });
         ++asked_;
         outside_ += answer.outside ? 1 : 0;
         looks_[i].refused = !(answer.cleared > 0);
@@ -558,8 +522,7 @@ private:
     }
 
     /// Closes what guard i owes; returns the first step that could not be, or `none`.
-    template <class Step>
-    [[nodiscard]] std::size_t close_one(std::size_t i, const Step& step, Bank& bank,
+    [[nodiscard]] std::size_t close_one(std::size_t i, const Step<X>& step, Bank& bank,
                                         Statistics& counts, double h_next)
     {
         LastLook& known = looks_[i];
@@ -567,8 +530,8 @@ private:
         Look from = last_look(i);
         Look end;
         if (bound_at(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
-            detector_.sure(end.bound, band(bank, i, end.value, end.value)) >= h_next) {
-            if (detector_.checks_bounds() && ++lower_bounds_used_ % 8 == 0) {
+            detector_->sure(self_, end.bound, band(bank, i, end.value, end.value)) >= h_next) {
+            if (detector_->checks_bounds && ++lower_bounds_used_ % 8 == 0) {
                 (void)look_at(i, steps_.size(), step, bank, counts);
             }
             note(i, known, end, step.mode(), bank);
@@ -588,9 +551,8 @@ private:
     /// Whether guard i stays clear between a look `from`, whose cover reaches the start of
     /// tentative step `lo`, and the look `end` at the start of step `hi`. If not, returns the
     /// first step that is in doubt, with `from` moved to its start.
-    template <class Step>
     [[nodiscard]] std::size_t narrow(std::size_t i, Look& from, std::size_t lo, std::size_t hi,
-                                     const Look& end, const Step& step, const Bank& bank,
+                                     const Look& end, const Step<X>& step, const Bank& bank,
                                      Statistics& counts)
     {
         if (closes(bank, i, from, end)) {
@@ -624,7 +586,7 @@ private:
 
     void check_change(std::size_t i, const Look& from, const Look& to, const Bank& bank)
     {
-        if (!bounded || !detector_.checks_bounds() || !from.exact || !to.exact) return;
+        if (!bounded_ || !detector_->checks_bounds || !from.exact || !to.exact) return;
         if (bank[i].info.boolean) return;  // its values are those of a sign
         blame_change(i, from, to, bank);
     }
@@ -633,17 +595,16 @@ private:
     /// surface is seen without asking for it.
     void check_covered(std::size_t i, const Look& from, const Look& to, const Bank& bank)
     {
-        if constexpr (bounded) {
-            if (to.bound.distance <= 0 && from.time < to.time) blame_change(i, from, to, bank);
-            check_change(i, from, to, bank);
-        }
+        if (!bounded_) return;
+        if (to.bound.distance <= 0 && from.time < to.time) blame_change(i, from, to, bank);
+        check_change(i, from, to, bank);
     }
 
     void blame_change(std::size_t i, const Look& from, const Look& to, const Bank& bank)
     {
         const double tau = to.time - from.time;
         const double allowed =
-            (1 + detector_.margin()) * largest_change(from.bound, to.bound, tau) +
+            (1 + detector_->margin) * largest_change(from.bound, to.bound, tau) +
             2 * band(bank, i, from.value, to.value);
         const double change = to.value - from.value;
         const bool wrong = from.exact ? std::fabs(change) > allowed : change < -allowed;
@@ -674,7 +635,7 @@ private:
         now.value = value_at(i, now.time, t, x, mode, bank, counts);
         now.bound = bound(i, now, mode, bank[i].side);
         const double tau = now.time - from.time;
-        if (detector_.checks_bounds()) check_bound(i, now, mode, bank);
+        if (detector_->checks_bounds) check_bound(i, now, mode, bank);
         if (wrong_) return;
         if (now.bound.distance < -band(bank, i, from.value, now.value)) {
             blame(i, from, now, (from.bound.speed + 0.5 * from.bound.acceleration * tau) * tau);
@@ -685,18 +646,15 @@ private:
 
     /// Whether an exact value contradicts the bound that would have stood in for it. Beyond the
     /// surface a bound may well have ended at 0.
-    void check_bound([[maybe_unused]] std::size_t i, [[maybe_unused]] const Look& look,
-                     [[maybe_unused]] Mode mode, [[maybe_unused]] const Bank& bank)
+    void check_bound(std::size_t i, const Look& look, Mode mode, const Bank& bank)
     {
-        if constexpr (bounded && HasLowerBound<System, X>) {
-            if (bank[i].side == Side::above) {
-                check_against(call_lower_bound(*system_, i, mode, look.t, *look.x), i, look, bank);
-            }
+        if (!bounded_) return;
+        void* const door = system_.door();
+        if (system_->lower_bound && bank[i].side == Side::above) {
+            check_against(system_->lower_bound(door, i, mode, look.t, *look.x), i, look, bank);
         }
-        if constexpr (bounded && HasUpperBound<System, X>) {
-            if (bank[i].side == Side::below) {
-                check_against(call_upper_bound(*system_, i, mode, look.t, *look.x), i, look, bank);
-            }
+        if (system_->upper_bound && bank[i].side == Side::below) {
+            check_against(system_->upper_bound(door, i, mode, look.t, *look.x), i, look, bank);
         }
     }
 
@@ -717,15 +675,18 @@ private:
                   .allowed = bound};
     }
 
-    const System* system_;
-    Detector detector_;
-    [[no_unique_address]] typename MeterOf<Detector>::type meter_;
+    SystemAt<X> system_;
+    const DetectorTable<X>* detector_;
+    const void* self_;
+    bool bounded_;  ///< puts off by declared bounds
+    bool gated_;    ///< puts off nothing but what a gate clears
+    Metering meter_;
     bool backward_;
     Steps steps_;
-    GuardList<LastLook, fixed> looks_;
-    GuardList<Deadline, fixed> calendar_;
-    GuardList<std::size_t, fixed> owing_;
-    GuardList<std::size_t, fixed> judged_;
+    GuardList<LastLook, single> looks_;
+    GuardList<Deadline, single> calendar_;
+    GuardList<std::size_t, single> owing_;
+    GuardList<std::size_t, single> judged_;
     double limit_ = -infinity;
     double hoped_ = infinity;
     double failing_value_ = 0;

@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // How long may the first step be?
 #pragma once
 

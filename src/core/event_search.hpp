@@ -1,5 +1,3 @@
-// Internal: what it declares may change without notice.
-//
 // Which events does a step hold, and which of them comes first?
 //
 // Guards that act, by a reset or by ending the run, cut the step short at the first
@@ -16,12 +14,14 @@
 #include <limits>
 #include <vector>
 
+#include "core/guard_bank.hpp"
+#include "core/step.hpp"
+#include "ricochet/detail/detector_table.hpp"
+#include "ricochet/detail/resolved_parts.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/event.hpp"
-#include "ricochet/detail/guard_bank.hpp"
 #include "ricochet/integrate/options.hpp"
-#include "ricochet/detail/resolved_parts.hpp"
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/newton.hpp"
 
@@ -86,19 +86,49 @@ struct Hit {
     Location where;
 };
 
-template <class System, class X, class CurrentStep, class Detector, class Locator>
+/// The detector and the locator of a run.
+template <class X>
+struct Finders {
+    DetectorTable<X> detector;
+    const void* detecting = nullptr;
+    LocatorTable locator;
+    const void* locating = nullptr;
+
+    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const
+    {
+        return detector.examine(detecting, path, watch);
+    }
+    [[nodiscard]] Location locate(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
+                                  double tolerance) const
+    {
+        return locator.locate(locating, path, lo.s, lo.value, lo.rate, hi.s, hi.value, hi.rate,
+                              tolerance);
+    }
+    [[nodiscard]] bool leaves_plainly(double sign, const GuardSample& start,
+                                      const GuardSample& end, double touch) const
+    {
+        return detector.leaves_plainly(sign, start.s, start.value, start.rate, end.s, end.value,
+                                       end.rate, touch);
+    }
+};
+
+template <class X, bool single>
 class EventSearch {
-    static constexpr std::size_t fixed = fixed_guard_count<System, X>();
-    using Bank = GuardBank<System, X, Detector>;
-    using Probe = StepProbe<GuardView<System, X>, CurrentStep>;
+    using CurrentStep = Step<X>;
+    using Bank = GuardBank<X, single>;
+    using Probe = StepProbe<CoreGuard<X>, Step<X>>;
 
 public:
-    EventSearch(const X& like, std::size_t guards, const EventResolution& resolution)
-        : space_(like),
+    /// Keeps a reference to the finders.
+    EventSearch(const X& like, std::size_t guards, const Finders<X>& finders,
+                const EventResolution& resolution)
+        : finders_(&finders),
+          space_(like),
           before_(like),
           hits_(guards),
           members_(guards),
-          finest_(resolution.is_finest())
+          finest_(resolution.is_finest()),
+          evidence_(finders.detector.evidence)
     {
     }
 
@@ -118,7 +148,7 @@ public:
         return space_.x;
     }
 
-    [[nodiscard]] GuardList<std::size_t, fixed>& members() noexcept { return members_; }
+    [[nodiscard]] GuardList<std::size_t, single>& members() noexcept { return members_; }
     [[nodiscard]] std::vector<Note>& notes() noexcept { return notes_; }
     /// Crossings of guard i that are noted, but not yet recorded.
     [[nodiscard]] std::uint64_t noted(std::size_t i) const noexcept
@@ -153,13 +183,13 @@ public:
 
     /// Finds the first set of acting guards in the step; a time event that is due at
     /// its end belongs to it if it lies in the window. False: none.
-    [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank, const Detector& detector,
-                                const Locator& locator, const EventResolution& resolution,
-                                bool time_event_due, std::uint64_t& calls)
+    [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank,
+                                const EventResolution& resolution, bool time_event_due,
+                                std::uint64_t& calls)
     {
         hits_.clear();
         members_.clear();
-        evidence_ = Detector::evidence;
+        evidence_ = finders_->detector.evidence;
         late_ = false;
         std::size_t suspects = 0;
         std::size_t last = 0;
@@ -170,8 +200,8 @@ public:
         }
         if (suspects == 0) return false;
         if (suspects == 1) {
-            if (!find_only(step, bank, last, detector, locator, resolution, calls)) return false;
-        } else if (!find_among(step, bank, detector, locator, resolution, calls)) {
+            if (!find_only(step, bank, last, resolution, calls)) return false;
+        } else if (!find_among(step, bank, resolution, calls)) {
             return false;
         }
         settle_place(step, resolution, time_event_due);
@@ -180,7 +210,6 @@ public:
 
     /// Adds the crossings and touches of a notifying guard, up to the sample `end`.
     void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
-                        const Detector& detector, const Locator& locator,
                         const EventResolution& resolution, std::uint64_t& calls)
     {
         GuardRecord& record = bank[i];
@@ -189,16 +218,16 @@ public:
         int stalled = 0;
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch = bank.watch(i, step, end);
-            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            const Finding finding = next_finding(probe, watch, bank, i);
             if (finding.touch) continue;
             if (!finding.hit) return;
             probe.watch(finding.side);
-            const Location where = find(probe, finding, bank, i, locator, resolution);
+            const Location where = find(probe, finding, bank, i, resolution);
             const Side side = opposite(finding.side);
             bool counted = true;
-            if constexpr (has_predicate) {
-                counted = call_enabled_at(guard.system(), i, step.mode(), step.time(where.root),
-                                          probe.state_at(where));
+            if (guard.system()->enabled_at) {
+                counted = guard.system().enabled_at(i, step.mode(), step.time(where.root),
+                                                    probe.state_at(where));
                 if (!counted) ++disabled;
             }
             if (counted) {
@@ -303,16 +332,6 @@ public:
 
 private:
     static constexpr int most_rounds = 1'000'000;
-    static constexpr bool has_predicate =
-        requires(const System& system, std::size_t i, double t, const X& x)
-    {
-        system.enabled(i, t, x);
-    }
-    || requires(const System& system, std::size_t i, Mode mode, double t, const X& x)
-    {
-        system.enabled(i, mode, t, x);
-    }
-    || requires(const System& system, double t, const X& x) { system.enabled(t, x); };
 
     void fit(const X& like)
     {
@@ -335,18 +354,17 @@ private:
 
     /// What the guard does next in the stretch. A touch is noted, and a clear stretch
     /// decides on which side the guard is at its end.
-    [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i,
-                                       const Detector& detector)
+    [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i)
     {
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
         if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
-        if (!bank.looked()) return heed(bank, i, watch, detector.examine(probe, watch));
-        return heed(bank, i, watch, next_in_parts(probe, watch, bank, i, detector));
+        if (!bank.looked()) return heed(bank, i, watch, finders_->examine(probe, watch));
+        return heed(bank, i, watch, next_in_parts(probe, watch, bank, i));
     }
 
     /// The detector's answers on the parts of a stretch, up to the first that is not clear.
     [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank,
-                                        std::size_t i, const Detector& detector)
+                                        std::size_t i)
     {
         parts_.resolve(probe, i, watch, bank[i].info.touch, bank.looked_everywhere());
         refined_ = refined_ || parts_.divided();
@@ -358,7 +376,7 @@ private:
         while (const GuardSample* node = parts_.next(watch.start.s, end.s)) {
             watch.end = *node;
             judge_by_its_own_size(watch, bank, i);
-            Finding finding = detector.examine(probe, watch);
+            Finding finding = finders_->examine(probe, watch);
             if (plain && finding.hit && finding.hi.s == node->s && stays_beyond(whole, *node)) {
                 finding.lo = whole.start;
                 finding.hi = whole.end;
@@ -369,7 +387,7 @@ private:
         }
         watch.end = end;
         if (parts_.divided()) judge_by_its_own_size(watch, bank, i);
-        return detector.examine(probe, watch);
+        return finders_->examine(probe, watch);
     }
 
     /// What rounding leaves of a guard that decays within the step is that of the part.
@@ -403,22 +421,20 @@ private:
     /// the stretch, which then is a bracket as good as any part of it.
     [[nodiscard]] bool stays_beyond(const Watch& whole, GuardSample node) const noexcept
     {
-        if constexpr (!LooksInside<Detector>) {
-            return false;
-        } else {
-            const double sign = sign_of(whole.side);
-            if (std::fabs(whole.start.value) <= whole.touch) return false;
-            if (!Detector::leaves_plainly(sign, whole.start, whole.end, whole.touch)) return false;
-            for (;;) {
-                const GuardSample* next = parts_.next(node.s, whole.end.s);
-                const GuardSample to = next ? *next : whole.end;
-                if (Detector::suspects(-sign, node.value, node.rate, to.value, to.rate,
-                                       to.s - node.s)) {
-                    return false;
-                }
-                if (!next) return true;
-                node = *next;
+        const DetectorTable<X>& detector = finders_->detector;
+        if (!detector.looks_inside) return false;
+        const double sign = sign_of(whole.side);
+        if (std::fabs(whole.start.value) <= whole.touch) return false;
+        if (!finders_->leaves_plainly(sign, whole.start, whole.end, whole.touch)) return false;
+        for (;;) {
+            const GuardSample* next = parts_.next(node.s, whole.end.s);
+            const GuardSample to = next ? *next : whole.end;
+            if (detector.suspects(-sign, node.value, node.rate, to.value, to.rate,
+                                  to.s - node.s)) {
+                return false;
             }
+            if (!next) return true;
+            node = *next;
         }
     }
 
@@ -434,15 +450,14 @@ private:
         return finding;
     }
 
-    [[nodiscard]] static Location find(Probe& probe, Finding finding, const Bank& bank,
-                                       std::size_t i, const Locator& locator,
-                                       const EventResolution& resolution)
+    [[nodiscard]] Location find(Probe& probe, Finding finding, const Bank& bank,
+                                       std::size_t i, const EventResolution& resolution)
     {
         if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
         probe.agree_on(finding.lo, finding.hi, bank.start(i));
         const double tolerance = std::max(resolution.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
-        if (!bank[i].info.boolean) return locator.locate(probe, finding.lo, finding.hi, tolerance);
+        if (!bank[i].info.boolean) return finders_->locate(probe, finding.lo, finding.hi, tolerance);
         // A guard of which only the sign means anything jumps by its nature.
         Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
         where.jump = false;
@@ -468,7 +483,7 @@ private:
     void pass(Bank& bank, std::size_t i, Side side, const Location& where, Probe& probe)
     {
         GuardSample start = away(side, where.root);
-        if (Detector::uses_rates && !bank[i].info.boolean) {
+        if (finders_->detector.uses_rates && !bank[i].info.boolean) {
             start.rate =
                 std::isfinite(where.slope) ? where.slope : probe.value_and_rate(where.root).rate;
             if (start.rate == 0) start.rate = start.value;
@@ -477,14 +492,13 @@ private:
     }
 
     /// Adds a hit of a guard that acts, and notes its touches before it.
-    void examine(const CurrentStep& step, Bank& bank, std::size_t i, const Detector& detector,
-                 std::uint64_t& calls)
+    void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch = bank.watch(i, step, bank.end(i, step.h()));
-            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            const Finding finding = next_finding(probe, watch, bank, i);
             if (finding.touch) continue;
             if (!finding.hit) return;
             late_ = late_ || finding.late;
@@ -510,13 +524,12 @@ private:
         return std::isfinite(root) ? root : finding.hi.s;
     }
 
-    void locate(const CurrentStep& step, Bank& bank, Hit& hit, const Locator& locator,
-                const EventResolution& resolution, std::uint64_t& calls)
+    void locate(const CurrentStep& step, Bank& bank, Hit& hit, const EventResolution& resolution, std::uint64_t& calls)
     {
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
         probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank, hit.guard, locator, resolution);
+        hit.where = find(probe, hit.finding, bank, hit.guard, resolution);
         hit.located = true;
     }
 
@@ -524,7 +537,6 @@ private:
     /// every event needs is inlined here: handing samples from one function to another
     /// through memory takes as long as the location itself.
     [[gnu::flatten]] bool find_only(const CurrentStep& step, Bank& bank, std::size_t i,
-                                    const Detector& detector, const Locator& locator,
                                     const EventResolution& resolution, std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
@@ -532,21 +544,20 @@ private:
         const Side side = bank[i].side;
         if (bank[i].from == 0 && !bank[i].info.boolean && counts(side, guard.crossing()) &&
             bank.is_plain(i, step.h()) &&
-            Detector::leaves_plainly(sign_of(side), bank.start(i), bank.end(i, step.h()),
+            finders_->leaves_plainly(sign_of(side), bank.start(i), bank.end(i, step.h()),
                                      bank.touch(i, step.h()))) {
             probe.watch(side);
             const double tolerance =
                 std::max(resolution.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
             const Location where =
-                locator.locate(probe, bank.start(i), bank.end(i, step.h()), tolerance);
+                finders_->locate(probe, bank.start(i), bank.end(i, step.h()), tolerance);
             keep_only(i, side, where, probe.state_at(where));
             return true;
         }
-        return find_only_carefully(step, bank, i, detector, locator, resolution, calls);
+        return find_only_carefully(step, bank, i, resolution, calls);
     }
 
     [[gnu::noinline]] bool find_only_carefully(const CurrentStep& step, Bank& bank, std::size_t i,
-                                               const Detector& detector, const Locator& locator,
                                                const EventResolution& resolution,
                                                std::uint64_t& calls)
     {
@@ -554,12 +565,12 @@ private:
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch = bank.watch(i, step, bank.end(i, step.h()));
-            const Finding finding = next_finding(probe, watch, bank, i, detector);
+            const Finding finding = next_finding(probe, watch, bank, i);
             if (finding.touch) continue;
             if (!finding.hit) return false;
             late_ = finding.late;
             probe.watch(finding.side);
-            const Location where = find(probe, finding, bank, i, locator, resolution);
+            const Location where = find(probe, finding, bank, i, resolution);
             keep_only(i, finding.side, where, finding.late ? step.x0() : probe.state_at(where));
             return true;
         }
@@ -579,23 +590,21 @@ private:
     }
 
     /// The first set among several candidates.
-    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, const Detector& detector,
-                                  const Locator& locator, const EventResolution& resolution,
+    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
                                   std::uint64_t& calls)
     {
         for (const std::size_t i : bank.suspects()) {
             if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
-            examine(step, bank, i, detector, calls);
+            examine(step, bank, i, calls);
         }
         if (hits_.empty()) return false;
-        close_set(step, bank, locator, resolution, calls);
-        if (members_.size() == 1) locate_alone(step, bank, locator, resolution, calls);
+        close_set(step, bank, resolution, calls);
+        if (members_.size() == 1) locate_alone(step, bank, resolution, calls);
         return true;
     }
 
     /// Locates the only member of the set, and keeps the state at its root.
-    void locate_alone(const CurrentStep& step, Bank& bank, const Locator& locator,
-                      const EventResolution& resolution, std::uint64_t& calls)
+    void locate_alone(const CurrentStep& step, Bank& bank, const EventResolution& resolution, std::uint64_t& calls)
     {
         Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
             return candidate.guard == members_[0];
@@ -603,7 +612,7 @@ private:
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
         probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank, hit.guard, locator, resolution);
+        hit.where = find(probe, hit.finding, bank, hit.guard, resolution);
         at_ = hit.where.root;
         at_remainder_ = hit.where.root_remainder;
         assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
@@ -611,8 +620,7 @@ private:
 
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is whoever lies in the window.
-    void close_set(const CurrentStep& step, Bank& bank, const Locator& locator,
-                   const EventResolution& resolution, std::uint64_t& calls)
+    void close_set(const CurrentStep& step, Bank& bank, const EventResolution& resolution, std::uint64_t& calls)
     {
         double first = std::numeric_limits<double>::infinity();
         for (Hit& hit : hits_) {
@@ -620,7 +628,7 @@ private:
             first = std::min(first, hit.guess);
         }
         for (Hit& hit : hits_) {
-            if (hit.guess == first) locate(step, bank, hit, locator, resolution, calls);
+            if (hit.guess == first) locate(step, bank, hit, resolution, calls);
         }
         double limit = window_end(step, resolution);
         for (bool changed = true; changed;) {
@@ -635,7 +643,7 @@ private:
                     const auto guard = bank.view(hit.guard, step.mode(), calls);
                     if (!has_left(hit.side, guard.value(step.time(at), before_))) continue;
                 }
-                locate(step, bank, hit, locator, resolution, calls);
+                locate(step, bank, hit, resolution, calls);
                 changed = true;
             }
             limit = window_end(step, resolution);
@@ -681,16 +689,17 @@ private:
         }
     }
 
+    const Finders<X>* finders_;
     ProbeSpace<X> space_;
     X before_;
-    GuardList<Hit, fixed> hits_;
-    GuardList<std::size_t, fixed> members_;
+    GuardList<Hit, single> hits_;
+    GuardList<std::size_t, single> members_;
     std::vector<Note> notes_;
     bool finest_;
     ResolvedParts parts_;
     bool refined_ = false;
     bool unresolved_ = false;
-    Evidence evidence_ = Detector::evidence;
+    Evidence evidence_;
     bool late_ = false;
     double at_ = 0;
     double at_remainder_ = 0;

@@ -1,4 +1,4 @@
-#include "ricochet/detail/event_search.hpp"
+#include "core/event_search.hpp"
 
 #include <algorithm>
 

@@ -1,0 +1,76 @@
+// Internal: what it declares may change without notice.
+//
+// A detector and a locator as the loop knows them: values with functions.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "ricochet/detail/finding.hpp"
+#include "ricochet/detail/step_state.hpp"
+#include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/step_probe.hpp"
+
+namespace ricochet {
+
+struct MeterOptions;
+
+}  // namespace ricochet
+
+namespace ricochet::detail {
+
+/// What a gate says of a state, see `gates::Gate::Answer`.
+struct GateAnswer {
+    double cleared = 0;
+    bool outside = false;
+};
+
+template <class X>
+struct DetectorTable {
+    using Self = const void*;
+
+    const char* type = "";  ///< as the compiler writes it
+    Screening screening = Screening::ends;
+    bool uses_rates = false;
+    bool looks_inside = false;
+    Evidence evidence = Evidence::assumed;  ///< of a step not suspected
+    bool (*suspects)(double sign, double g0, double rate0, double g1, double rate1,
+                     double h) = nullptr;
+    /// Samples of the guard are handed over as numbers, which stay in registers.
+    bool (*leaves_plainly)(double sign, double s0, double g0, double rate0, double s1, double g1,
+                           double rate1, double touch) = nullptr;
+    Finding (*examine)(Self, GuardPath& path, Watch& watch) = nullptr;
+    /// Whether it fits the system, in steps between `smallest` and `largest` [s].
+    /// @throws std::invalid_argument
+    void (*check)(Self, void* door, const X& x, double smallest, double largest) = nullptr;
+
+    // --- predictions of one guard ---
+    bool (*clears)(Self, void* door, const StepState<X>& step, std::uint64_t& calls) = nullptr;
+    bool checks_every_step = true;
+
+    // --- checks that are put off ---
+    bool puts_off = false;
+    bool needs_bounds = false;
+    Evidence put_off = Evidence::assumed;  ///< of a step without a look
+    std::size_t longest = 1;
+    bool checks_bounds = false;
+    double margin = 0;
+    double (*sure)(Self, const GuardBound& at, double band) = nullptr;
+    double (*hoped)(Self, const GuardBound& at, double slope, double band) = nullptr;
+    bool (*closes)(Self, const GuardBound& from, const GuardBound& to, double tau,
+                   double band) = nullptr;
+    GateAnswer (*horizon)(Self, void* door, Mode mode, double t, const X& x) = nullptr;
+    GateAnswer (*level)(Self, void* door, std::size_t which, Mode mode, double t,
+                        const X& x) = nullptr;
+    double lowest_level = 0;
+    const MeterOptions* metering = nullptr;
+};
+
+struct LocatorTable {
+    const char* type = "";
+    Location (*locate)(const void* self, GuardPath& path, double lo, double lo_value,
+                       double lo_rate, double hi, double hi_value, double hi_rate,
+                       double tolerance) = nullptr;
+};
+
+}  // namespace ricochet::detail

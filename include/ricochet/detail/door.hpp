@@ -1,0 +1,331 @@
+// Internal: what it declares may change without notice.
+//
+// From a system of the user's, with whatever spellings it has and states of whatever type, to the
+// table that the loop knows (detail/system_table.hpp).
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <type_traits>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/guard_view.hpp"
+#include "ricochet/detail/system_table.hpp"
+#include "ricochet/hybrid/bounds.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/snapshot.hpp"
+
+namespace ricochet::detail {
+
+/// Arrays that lie in a vector as they are.
+template <class X>
+inline constexpr bool is_array = false;
+template <std::size_t n>
+inline constexpr bool is_array<std::array<double, n>> = true;
+
+/// to = from, component by component.
+template <class To, class From>
+void copy_state(const From& from, To& to)
+{
+    if constexpr (requires { to.resize(0); }) {
+        if (static_cast<std::size_t>(to.size()) != static_cast<std::size_t>(from.size())) {
+            to.resize(static_cast<decltype(to.size())>(from.size()));
+        }
+    }
+    for (std::size_t i = 0; i < static_cast<std::size_t>(to.size()); ++i) {
+        to[own(i, to)] = from[own(i, from)];
+    }
+}
+
+/// The caller's state as one of the loop's.
+template <class X>
+[[nodiscard]] CoreState<X> core_state(const X& x)
+{
+    if constexpr (std::is_same_v<X, CoreState<X>>) {
+        return x;
+    } else {
+        CoreState<X> out{};
+        if constexpr (fixed_size<X>() == 0 || fixed_size<X>() > 4) {
+            out.resize(static_cast<std::size_t>(x.size()));
+        }
+        copy_state(x, out);
+        return out;
+    }
+}
+
+/// What the functions of the table take: the system, and room for states of its own type.
+template <class System, class UserState>
+class Door {
+public:
+    using X = UserState;
+    using Core = CoreState<X>;
+    static constexpr bool same = std::is_same_v<X, Core>;
+    static constexpr bool overlaid = !same && is_array<X>;
+    static constexpr bool copied = !same && !overlaid;
+
+    Door(const System& system, [[maybe_unused]] const X& like) : system_(&system)
+    {
+        if constexpr (copied) scratch_.assign(3, like);
+    }
+
+    [[nodiscard]] const System& system() const noexcept { return *system_; }
+
+    /// A state of the loop's as one of the system's.
+    [[nodiscard]] const X& read(const Core& x, [[maybe_unused]] std::size_t room)
+    {
+        if constexpr (same) {
+            return x;
+        } else if constexpr (overlaid) {
+            return *reinterpret_cast<const X*>(x.data());
+        } else {
+            copy_state(x, scratch_[room]);
+            return scratch_[room];
+        }
+    }
+
+    /// Calls `change` with the same to be changed, also in its dimension.
+    template <class Change>
+    auto edit(Core& x, const Change& change)
+    {
+        if constexpr (same) {
+            return change(x);
+        } else if constexpr (overlaid) {
+            return change(*reinterpret_cast<X*>(x.data()));
+        } else {
+            copy_state(x, scratch_[2]);
+            const auto result = change(scratch_[2]);
+            copy_state(scratch_[2], x);
+            return result;
+        }
+    }
+
+    bool flow(Mode mode, double t, const Core& x, Core& dxdt)
+    {
+        if constexpr (same) {
+            return call_flow(*system_, mode, t, x, dxdt);
+        } else if constexpr (overlaid) {
+            return call_flow(*system_, mode, t, read(x, 0), *reinterpret_cast<X*>(dxdt.data()));
+        } else {
+            const X& at = read(x, 0);
+            copy_state(dxdt, scratch_[1]);
+            const bool fits = call_flow(*system_, mode, t, at, scratch_[1]);
+            copy_state(scratch_[1], dxdt);
+            return fits;
+        }
+    }
+
+private:
+    struct None {};
+    const System* system_;
+    [[no_unique_address]] std::conditional_t<copied, std::vector<X>, None> scratch_{};
+};
+
+/// The table of `System` for states X.
+template <class System, class X>
+class TableOf {
+    using D = Door<System, X>;
+    using C = typename D::Core;
+    using View = PolynomialView<C, false>;
+    using RateView = PolynomialView<C, true>;
+    using Guard = GuardView<System, X>;
+
+    [[nodiscard]] static D& at(void* door) noexcept { return *static_cast<D*>(door); }
+    [[nodiscard]] static const System& system(void* door) noexcept { return at(door).system(); }
+    /// Evaluations are counted by the loop.
+    template <class Use>
+    [[gnu::always_inline]] static double with_guard(void* door, std::size_t which, Mode mode,
+                                                    bool backward, const Use& use)
+    {
+        std::uint64_t calls = 0;
+        return use(Guard(system(door), calls, which, mode, Crossing::falling, backward));
+    }
+
+    // --- guards ---
+
+    static void guards(void* door, Mode mode, double t, const C& x, std::span<double> g)
+    {
+        call_guards(system(door), mode, t, at(door).read(x, 0), g);
+    }
+    static double guard(void* door, std::size_t which, Mode mode, double t, const C& x)
+    {
+        return with_guard(door, which, mode, false, [&](const Guard& guard) {
+            return guard.value(t, at(door).read(x, 0));
+        });
+    }
+    static double guard_on(void* door, std::size_t which, Mode mode, double t, const View& x)
+    {
+        return with_guard(door, which, mode, false,
+                          [&](const Guard& guard) { return guard.value(t, x); });
+    }
+    static double rate(void* door, std::size_t which, Mode mode, bool backward, double t,
+                       const C& x, const C& dxdt, double scale)
+    {
+        return with_guard(door, which, mode, backward, [&](const Guard& guard) {
+            return guard.rate(t, at(door).read(x, 0), at(door).read(dxdt, 1), scale);
+        });
+    }
+    static GuardPoint point(void* door, std::size_t which, Mode mode, bool backward, double t,
+                            const C& x, const C& dxdt, double scale)
+    {
+        std::uint64_t calls = 0;
+        const Guard guard(system(door), calls, which, mode, Crossing::falling, backward);
+        const X& state = at(door).read(x, 0);
+        return {guard.value(t, state), guard.rate(t, state, at(door).read(dxdt, 1), scale)};
+    }
+    static double rate_on(void* door, std::size_t which, Mode mode, bool backward, double t,
+                          const View& x, const RateView& dxdt, double scale)
+    {
+        return with_guard(door, which, mode, backward,
+                          [&](const Guard& guard) { return guard.rate(t, x, dxdt, scale); });
+    }
+    static void rates(void* door, Mode mode, double t, const C& x, const C& dxdt,
+                      std::span<double> rates)
+    {
+        call_rates(system(door), mode, t, at(door).read(x, 0), at(door).read(dxdt, 1), rates);
+    }
+    static void each_rate(void* door, Mode mode, double t, const C& x, const C& dxdt,
+                          std::span<double> rates)
+    {
+        const System& of = system(door);
+        const X& state = at(door).read(x, 0);
+        const X& rate = at(door).read(dxdt, 1);
+        for (std::size_t i = 0; i < rates.size(); ++i) {
+            rates[i] = call_rate(of, i, mode, t, state, rate);
+        }
+    }
+
+    // --- resets ---
+
+    static Mode reset(void* door, std::size_t which, Mode mode, double t, C& x)
+    {
+        return at(door).edit(
+            x, [&](X& state) { return call_reset(system(door), which, mode, t, state); });
+    }
+    static Mode reset_set(void* door, std::span<const std::size_t> fired, bool on_time, Mode mode,
+                          double t, C& x)
+    {
+        return at(door).edit(x, [&](X& state) {
+            return call_reset_set(system(door), FiredGuards(fired, on_time), mode, t, state);
+        });
+    }
+    static Mode rest(void* door, std::size_t which, Mode mode, double t, C& x)
+    {
+        return at(door).edit(
+            x, [&](X& state) { return call_rest(system(door), which, mode, t, state); });
+    }
+    static Mode time_reset(void* door, Mode mode, double t, C& x)
+    {
+        return at(door).edit(
+            x, [&](X& state) { return call_time_reset(system(door), mode, t, state); });
+    }
+
+    static constexpr void add_guards(SystemTable<C>& table)
+    {
+        table.guarded = true;
+        table.rated = RatedGuard<System, X>;
+        table.guard_alone = GuardAlone<System, X>;
+        table.guard_count = [](void* door) { return guard_count_of<X>(system(door)); };
+        table.info = [](void* door, std::size_t which) {
+            return guard_info_of<X>(system(door), which);
+        };
+        table.guards = &guards;
+        if constexpr (!GuardsTogether<System, X> && !RatesTogether<System, X>) {
+            table.point = &point;
+        }
+        table.calls_of_rate = RateAlone<System, X> ? 0 : 2;
+        table.guard = &guard;
+        table.rate = &rate;
+        if constexpr (Guard::template sees<View>) {
+            table.guard_on = &guard_on;
+            if constexpr (Guard::template sees_rate<View, RateView>) table.rate_on = &rate_on;
+        }
+        if constexpr (RatesTogether<System, X>) {
+            table.rates = &rates;
+        } else if constexpr (RateAlone<System, X>) {
+            table.each_rate = &each_rate;
+        }
+        if constexpr (EnabledIn<System>) {
+            table.enabled_in = [](void* door, std::size_t which, Mode mode) {
+                return call_enabled_in(system(door), which, mode);
+            };
+        }
+        if constexpr (EnabledAt<System, X>) {
+            table.enabled_at = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
+                return call_enabled_at(system(door), which, mode, t, at(door).read(x, 0));
+            };
+        }
+        if constexpr (ResetsTogether<System, X>) {
+            table.reset_set = &reset_set;
+        } else if constexpr (Resetting<System, X>) {
+            table.reset = &reset;
+        }
+        if constexpr (Resting<System, X>) table.rest = &rest;
+    }
+
+    static constexpr void add_times(SystemTable<C>& table)
+    {
+        table.next_time_event = [](void* door, double t) -> double {
+            return system(door).next_time_event(t);
+        };
+        if constexpr (requires(const System& s, double t) { s.previous_time_event(t); }) {
+            table.previous_time_event = [](void* door, double t) -> double {
+                return system(door).previous_time_event(t);
+            };
+        }
+        table.time_reset = &time_reset;
+    }
+
+    static constexpr void add_bounds(SystemTable<C>& table)
+    {
+        table.bounded = true;
+        table.lipschitz = [](void* door, std::size_t which) {
+            return call_lipschitz(system(door), which);
+        };
+        table.speed_bound = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
+            return call_speed_bound(system(door), which, mode, t, at(door).read(x, 0));
+        };
+        table.acceleration_bound = [](void* door, std::size_t which, Mode mode, double t,
+                                      const C& x) {
+            return call_acceleration_bound(system(door), which, mode, t, at(door).read(x, 0));
+        };
+        if constexpr (HasLowerBound<System, X>) {
+            table.lower_bound = [](void* door, std::size_t which, Mode mode, double t,
+                                   const C& x) {
+                return call_lower_bound(system(door), which, mode, t, at(door).read(x, 0));
+            };
+        }
+        if constexpr (HasUpperBound<System, X>) {
+            table.upper_bound = [](void* door, std::size_t which, Mode mode, double t,
+                                   const C& x) {
+                return call_upper_bound(system(door), which, mode, t, at(door).read(x, 0));
+            };
+        }
+    }
+
+public:
+    [[nodiscard]] static constexpr SystemTable<C> make()
+    {
+        SystemTable<C> table;
+        table.moded = Moded<System, X>;
+        table.fixed_dimension = fixed_size<X>() > 0;
+        table.changes_dimension = requires { requires System::changes_dimension; };
+        table.forward_only = requires { requires System::forward_only; };
+        table.flow = [](void* door, Mode mode, double t, const C& x, C& dxdt) {
+            return at(door).flow(mode, t, x, dxdt);
+        };
+        table.mode_count = [](void* door) { return mode_count_of(system(door)); };
+        table.guard_count = [](void*) { return std::size_t{0}; };
+        table.name = [](void* door) { return name_of_system(system(door)); };
+        if constexpr (Guarded<System, X>) add_guards(table);
+        if constexpr (Timed<System>) add_times(table);
+        if constexpr (Bounded<System, X>) add_bounds(table);
+        return table;
+    }
+};
+
+template <class System, class X>
+inline constexpr SystemTable<CoreState<X>> system_table = TableOf<System, X>::make();
+
+}  // namespace ricochet::detail

@@ -1,0 +1,149 @@
+// Internal: what it declares may change without notice.
+//
+// A detector and a locator of whatever type as the tables that the loop knows.
+#pragma once
+
+#include <cstdint>
+
+#include "ricochet/detail/detector_table.hpp"
+#include "ricochet/detail/door.hpp"
+#include "ricochet/detail/meter.hpp"
+#include "ricochet/detect/planned.hpp"
+
+namespace ricochet::detail {
+
+/// What a network that predicts the events of a step is shown of it.
+template <class System, class X>
+class StepToCome {
+    using D = Door<System, X>;
+
+public:
+    StepToCome(D& door, const StepState<CoreState<X>>& step)
+        : step_(&step), x0_(&door.read(step.x0, 0)), rate0_(&door.read(step.rate0, 1))
+    {
+    }
+
+    [[nodiscard]] double time(double s) const noexcept { return step_->time(s); }
+    [[nodiscard]] double h() const noexcept { return step_->h; }
+    [[nodiscard]] const X& x0() const noexcept { return *x0_; }
+    [[nodiscard]] const X& rate0() const noexcept { return *rate0_; }
+
+private:
+    const StepState<CoreState<X>>* step_;
+    const X* x0_;
+    const X* rate0_;
+};
+
+template <class Detector, class System, class X>
+class DetectorTableOf {
+    using D = Door<System, X>;
+    using C = CoreState<X>;
+    using Self = const void*;
+
+    [[nodiscard]] static const Detector& self(Self detector) noexcept
+    {
+        return *static_cast<const Detector*>(detector);
+    }
+    [[nodiscard]] static D& at(void* door) noexcept { return *static_cast<D*>(door); }
+
+    static void add_putting_off(DetectorTable<C>& table, const Detector& detector)
+    {
+        table.puts_off = true;
+        table.needs_bounds = Detector::needs_bounds;
+        table.put_off = Detector::put_off;
+        table.longest = detector.longest();
+        table.checks_bounds = detector.checks_bounds();
+        table.margin = detector.margin();
+        table.sure = [](Self d, const GuardBound& bound, double band) {
+            return self(d).sure(bound, band);
+        };
+        table.hoped = [](Self d, const GuardBound& bound, double slope, double band) {
+            return self(d).hoped(bound, slope, band);
+        };
+        table.closes = [](Self d, const GuardBound& from, const GuardBound& to, double tau,
+                          double band) { return self(d).closes(from, to, tau, band); };
+        if constexpr (requires(const System& s, const X& x) {
+                          detector.horizon(s, Mode{}, 0.0, x);
+                      }) {
+            table.horizon = [](Self d, void* door, Mode mode, double t, const C& x) {
+                const auto answer =
+                    self(d).horizon(at(door).system(), mode, t, at(door).read(x, 0));
+                return GateAnswer{answer.cleared, answer.outside};
+            };
+        }
+        if constexpr (requires(const System& s, const X& x) {
+                          detector.level(s, std::size_t{}, Mode{}, 0.0, x);
+                      }) {
+            table.lowest_level = detector.lowest_level();
+            table.level = [](Self d, void* door, std::size_t which, Mode mode, double t,
+                             const C& x) {
+                const auto answer =
+                    self(d).level(at(door).system(), which, mode, t, at(door).read(x, 0));
+                return GateAnswer{answer.cleared, answer.outside};
+            };
+        }
+    }
+
+    static bool clears(Self detector, void* door, const StepState<C>& step, std::uint64_t& calls)
+    {
+        const GuardView<System, X> guard(at(door).system(), calls, 0, step.mode,
+                                         Crossing::falling, step.backward);
+        return self(detector).clears(guard, StepToCome<System, X>(at(door), step));
+    }
+
+public:
+    static constexpr bool predicts =
+        requires(const Detector& detector, const StepToCome<System, X>& step,
+                 const GuardView<System, X>& guard)
+    {
+        detector.clears(guard, step);
+    };
+
+    [[nodiscard]] static DetectorTable<C> make(const Detector& detector)
+    {
+        DetectorTable<C> table;
+        table.type = written_type<Detector>();
+        table.screening = screening_of<Detector>;
+        table.uses_rates = Detector::uses_rates;
+        table.looks_inside = LooksInside<Detector>;
+        table.evidence = Detector::evidence;
+        table.suspects = [](double sign, double g0, double rate0, double g1, double rate1,
+                            double h) {
+            return Detector::suspects(sign, g0, rate0, g1, rate1, h);
+        };
+        table.leaves_plainly = [](double sign, double s0, double g0, double rate0, double s1,
+                                  double g1, double rate1, double touch) {
+            return Detector::leaves_plainly(sign, {s0, g0, rate0}, {s1, g1, rate1}, touch);
+        };
+        table.examine = [](Self d, GuardPath& path, Watch& watch) {
+            return self(d).examine(path, watch);
+        };
+        if constexpr (requires(const System& s, const X& x) { detector.check(s, x, 0.0, 0.0); }) {
+            table.check = [](Self d, void* door, const C& x, double smallest, double largest) {
+                self(d).check(at(door).system(), at(door).read(x, 0), smallest, largest);
+            };
+        }
+        if constexpr (predicts) {
+            table.clears = &clears;
+            table.checks_every_step = Detector::checks_every_step;
+        }
+        if constexpr (puts_off_checks<Detector, System, X>()) add_putting_off(table, detector);
+        if constexpr (Metering<Detector>) table.metering = &detector.metering();
+        return table;
+    }
+};
+
+template <class Locator>
+[[nodiscard]] LocatorTable locator_table() noexcept
+{
+    return {.type = written_type<Locator>(),
+            .locate = [](const void* self, GuardPath& path, double lo, double lo_value,
+                         double lo_rate, double hi, double hi_value, double hi_rate,
+                         double tolerance) -> Location {
+                return static_cast<const Locator*>(self)->locate(
+                    path, GuardSample{lo, lo_value, lo_rate}, GuardSample{hi, hi_value, hi_rate},
+                    tolerance);
+            }};
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,54 @@
+// Internal: what it declares may change without notice.
+//
+// Steps in a row in which nothing happens.
+//
+// Of a small state with at most one guard the loop enters a function of the system's own, with
+// flow and guard inlined, that goes on until a step deserves a look, or the end is near. Bits and
+// counts are those of the loop.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "ricochet/detail/step_state.hpp"
+
+namespace ricochet::detail {
+
+/// Why the loop is to go on.
+enum class QuietEnd : std::uint8_t {
+    due,     ///< the next step is not one of these
+    failed,  ///< the step in hand cannot be accepted, nor be repeated by its error alone
+    moving,  ///< the state hardly changes in the step in hand, which is to be looked at closely
+    doubt,   ///< the guard may have an event in the step in hand
+};
+
+struct QuietRun {
+    // --- orders ---
+    double end = 0;  ///< [s] of the run, or of the next time event: no step reaches it
+    double rtol = 0;
+    double atol = 0;
+    double h_min = 0;  ///< [s]
+    double h_max = 0;  ///< [s]
+    bool looks = false;  ///< inside each step, once
+    std::uint64_t most_steps = 0;
+    const std::atomic<bool>* cancelled = nullptr;
+
+    // --- the guard, and the next step; brought up to date ---
+    double sign = 0;
+    double g0 = 0, rate0 = 0, g1 = 0, rate1 = 0;
+    double inside = 0;  ///< at `CubicLook::inside`
+    double h_next = 0;  ///< [s]
+
+    // --- what was done ---
+    QuietEnd why = QuietEnd::due;
+    double error = 0;        ///< of a failed step
+    bool repeated = false;   ///< it is an attempt after a failed one
+    std::uint64_t steps = 0;
+    std::uint64_t rejected = 0;
+    std::uint64_t guard_calls = 0;
+};
+
+template <class X>
+using QuietKernel = void (*)(void* door, StepState<X>& step, QuietRun& run);
+
+}  // namespace ricochet::detail

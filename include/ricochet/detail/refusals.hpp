@@ -1,0 +1,38 @@
+// Internal: what it declares may change without notice.
+//
+// What `integrate` refuses, in sentences.
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+namespace ricochet::detail {
+
+/// @throws std::invalid_argument: the start has no components.
+[[noreturn]] void throw_start_empty();
+/// @throws std::invalid_argument: the start is not finite.
+[[noreturn]] void throw_start_not_finite(std::size_t component, double value);
+/// @throws std::invalid_argument: the start is behind a unilateral guard.
+[[noreturn]] void throw_start_outside_mode(std::size_t which, std::string_view name, double t,
+                                           double guard);
+/// @throws std::invalid_argument: a unilateral guard without a reset.
+[[noreturn]] void throw_no_reset(std::size_t which, std::string_view name);
+/// @throws std::invalid_argument: a unilateral guard that does not fall.
+[[noreturn]] void throw_unilateral_not_falling(std::size_t which, std::string_view name);
+/// @throws std::invalid_argument: a guard is not finite at the start.
+[[noreturn]] void throw_start_guard_not_finite(std::size_t which, std::string_view name, double t,
+                                               double guard);
+/// @throws std::invalid_argument: the flow gives its rate another dimension at the start.
+[[noreturn]] void throw_flow_does_not_fit(std::size_t components);
+/// @throws std::invalid_argument: the start mode is none of the system's.
+[[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
+/// @throws std::invalid_argument: error control by a method without an estimate.
+[[noreturn]] void throw_no_error_estimate();
+/// @throws std::invalid_argument: a run backward in time of a system that has none.
+[[noreturn]] void throw_forward_only();
+/// @throws std::invalid_argument: no previous_time_event for a run backward in time.
+[[noreturn]] void throw_no_previous_time_event();
+/// @throws std::invalid_argument: the first time event is not ahead of the start.
+[[noreturn]] void throw_time_event_not_ahead(bool backward, double t, double found);
+
+}  // namespace ricochet::detail

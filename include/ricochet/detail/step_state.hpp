@@ -1,0 +1,184 @@
+// Internal: what it declares may change without notice.
+//
+// A step in progress as plain data, and what takes it.
+//
+// The loop is compiled in the library for a few types of state; what it knows of a method and of a
+// flow is a `StepKernel`, made where the system is known, so that the flow is inlined into the
+// whole step and a small state stays in registers from stage to stage.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/dense_polynomial.hpp"
+#include "ricochet/detail/instant.hpp"
+#include "ricochet/detail/runge_kutta.hpp"
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet::detail {
+
+/// The state that the loop works with where the caller's is X.
+template <class X>
+using CoreState = std::conditional_t<(fixed_size<X>() >= 1 && fixed_size<X>() <= 4),
+                                     std::array<double, fixed_size<X>()>, std::vector<double>>;
+
+/// Where a step starts, to the last bit.
+template <class X>
+struct StepStart {
+    Instant t;
+    Mode mode = 0;
+    X x{};
+    X remainder{};  ///< what rounding left out of x
+    X rate{};       ///< dx/ds there
+};
+
+/// A vector like `x`, of zeros.
+template <class X>
+[[nodiscard]] X zeros_like(X x)
+{
+    for_each_component(x, [&](auto i) { x[i] = 0; });
+    return x;
+}
+
+/// One step from x0 at `start`, as a departure from the tangent: x(s) = x0 + s rate0 + w(s).
+template <class X>
+struct StepState {
+    explicit StepState(const X& x)
+        : x0(x),
+          remainder(zeros_like(x)),
+          zero(remainder),
+          rate0(remainder),
+          w(remainder),
+          w_rate1(remainder),
+          x1(x),
+          rate1(remainder),
+          error(remainder),
+          at(remainder),
+          middle(remainder)
+    {
+        if constexpr (!is_small<X>) large.remainder1 = remainder;
+    }
+
+    /// Of the system, for kernels that do not have it inlined; see `SystemTable::flow`.
+    bool (*flow)(void* door, Mode mode, double t, const X& x, X& dxdt) = nullptr;
+
+    Instant start;
+    Mode mode = 0;
+    bool backward = false;  ///< time runs backward, and offsets and rates with it
+    bool flow_fits = true;  ///< the flow has given its rate the dimension of the state, always
+    std::uint64_t flow_calls = 0;
+    double h = 0;
+
+    X x0, remainder, zero, rate0;
+    X w, w_rate1;  ///< at the end; the rate only where the method gives it
+    X x1, rate1;
+    X error, at;
+
+    /// Of the step in hand, and of the last step that was repeated to an inner time.
+    std::array<X, most_kept_stages> stages{};
+    struct None {};
+    struct Large {
+        X remainder1;  ///< of x1; small states leave it to the acceptance of the step
+        std::array<X, most_kept_stages> probed{};
+    };
+    [[no_unique_address]] std::conditional_t<is_small<X>, None, Large> large{};
+
+    X middle;  ///< w there, where `has_middle`
+    mutable bool has_middle = false;
+    mutable std::size_t asked_alone = 0;  ///< components of the middle, by views
+
+    [[nodiscard]] double in_time(double s) const noexcept { return backward ? -s : s; }
+    [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }
+};
+
+/// A method for one system.
+template <class X>
+struct StepKernel {
+    int order = 0;
+    int error_order = 0;     ///< of the error estimate; 0: there is none
+    bool end_rate = false;   ///< a step gives the rate at its end, too (first same as last)
+    bool is_dopri5 = false;  ///< the stages are those of Dormand and Prince, with their interpolant
+
+    /// Takes a step of length h: `w`, `x1`, `rate1`, and `stages` where they have an interpolant.
+    /// False: the end or the flow there is not finite.
+    bool (*take)(void* door, StepState<X>& step, double h) = nullptr;
+    /// As `take`. Returns its largest estimated error over atol + rtol max(|x0|, |x1|); NaN if
+    /// anything is not finite. Null without an estimate.
+    double (*attempt)(void* door, StepState<X>& step, double h, double rtol, double atol) = nullptr;
+    /// The departure after a step of length s, with its rate where the method gives it; the step
+    /// in hand stays as it is.
+    void (*depart)(void* door, StepState<X>& step, double s, X& w, X& rate) = nullptr;
+    /// w(s) on an interpolant of the method's own, or null.
+    void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
+    /// The state has another dimension. Null where nothing is kept.
+    void (*renew)(void* door) = nullptr;
+
+    [[nodiscard]] bool interpolates() const noexcept { return is_dopri5 || departure; }
+};
+
+/// The polynomial of a step at offset s, or its derivative, a component at a time. Where the middle
+/// of the step is not known yet it is computed for the components that are asked for alone.
+template <class X, bool derivative>
+class LargeStepView {
+    using Dopri5 = RungeKutta<Dopri5Tableau, X>;
+
+public:
+    LargeStepView(const DenseParts<X>& parts, double s) noexcept { all_.emplace(parts, s); }
+
+    /// Of a step by Dormand and Prince's method.
+    LargeStepView(const StepState<X>& step, double s) noexcept
+        : step_(&step), s_(s), weights_(quartic_weights(s / step.h, derivative))
+    {
+        const double unit = derivative ? 1 / step.h : 1;
+        for (std::size_t k = 0; k < 2; ++k) weights_.value[k] *= unit;
+        weights_.slope[1] *= unit * step.h;
+    }
+
+    template <class Index>
+    [[nodiscard]] double operator[](Index index) const noexcept
+    {
+        if (!step_) return (*all_)[index];
+        const auto i = static_cast<std::size_t>(index);
+        const double rate0 = step_->rate0[i];
+        double bent = 0;
+        bent += weights_.value[0] * middle(i);
+        bent += weights_.value[1] * step_->w[i];
+        bent += weights_.slope[1] * (step_->rate1[i] - rate0);
+        if constexpr (derivative) {
+            return rate0 + bent;
+        } else {
+            return step_->x0[i] + (s_ * rate0 + (bent + step_->remainder[i]));
+        }
+    }
+
+    [[nodiscard]] std::size_t size() const noexcept { return step_ ? step_->x0.size() : all_->size(); }
+
+private:
+    struct Middle {
+        static constexpr double u = 0.5;
+    };
+
+    [[nodiscard]] double middle(std::size_t i) const noexcept
+    {
+        if (step_->has_middle) return step_->middle[i];
+        ++step_->asked_alone;
+        return Dopri5::dense(Dopri5::template weights<Middle>(step_->h), step_->stages.data(),
+                             step_->w_rate1, i);
+    }
+
+    std::optional<DenseView<X, derivative>> all_;
+    const StepState<X>* step_ = nullptr;
+    double s_ = 0;
+    DenseWeights weights_;
+};
+
+template <class X, bool derivative>
+using PolynomialView =
+    std::conditional_t<is_small<X>, DenseView<X, derivative>, LargeStepView<X, derivative>>;
+
+}  // namespace ricochet::detail

@@ -1,0 +1,198 @@
+// Internal: what it declares may change without notice.
+//
+// A system at the door of the loop: its functions as pointers, whatever spelling they have.
+//
+// Functions that a system does not have are null. Each takes the door first, which holds the
+// system (detail/door.hpp). Rates are with respect to the offset in a step: of a run backward in
+// time they are negative.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "ricochet/detail/step_state.hpp"
+#include "ricochet/detect/cover.hpp"
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet::detail {
+
+/// A guard and its rate; two numbers, which are returned in registers.
+struct GuardPoint {
+    double value;
+    double rate;
+};
+
+template <class X>
+struct SystemTable {
+    using Door = void*;
+    using View = PolynomialView<X, false>;
+    using RateView = PolynomialView<X, true>;
+
+    std::size_t size = sizeof(SystemTable);
+
+    bool guarded = false;
+    bool moded = false;
+    bool rated = false;        ///< every guard's rate is known in closed form
+    bool guard_alone = false;  ///< one guard can be had without the others
+    bool fixed_dimension = false;
+    bool changes_dimension = false;  ///< in resets, whatever the mode
+    bool forward_only = false;
+    bool bounded = false;
+
+    /// False: the flow has given its rate another dimension, and it is NaN now.
+    bool (*flow)(Door, Mode, double t, const X& x, X& dxdt) = nullptr;
+    std::size_t (*mode_count)(Door) = nullptr;   ///< 0: not declared
+    std::size_t (*guard_count)(Door) = nullptr;  ///< 0 where it has none
+    std::string (*name)(Door) = nullptr;
+    GuardInfo (*info)(Door, std::size_t which) = nullptr;
+
+    /// All guards.
+    void (*guards)(Door, Mode, double t, const X& x, std::span<double> g) = nullptr;
+    /// One guard, at a state or a view of the step's polynomial.
+    double (*guard)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*guard_on)(Door, std::size_t which, Mode, double t, const View& x) = nullptr;
+    /// Its rate with x' = dxdt: in closed form, else the central difference over 1e-5 `scale`, at
+    /// the price of `calls_of_rate` evaluations of the guard.
+    double (*rate)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
+                   const X& dxdt, double scale) = nullptr;
+    double (*rate_on)(Door, std::size_t which, Mode, bool backward, double t, const View& x,
+                      const RateView& dxdt, double scale) = nullptr;
+    unsigned calls_of_rate = 0;
+    /// Both at once. Null where a system computes guards or rates all together.
+    GuardPoint (*point)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
+                        const X& dxdt, double scale) = nullptr;
+    /// All rates, from one call of the system, with respect to the time itself.
+    void (*rates)(Door, Mode, double t, const X& x, const X& dxdt,
+                  std::span<double> rates) = nullptr;
+    /// The same, from a call for each guard.
+    void (*each_rate)(Door, Mode, double t, const X& x, const X& dxdt,
+                      std::span<double> rates) = nullptr;
+
+    bool (*enabled_in)(Door, std::size_t which, Mode) = nullptr;
+    bool (*enabled_at)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+    Mode (*reset)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
+    Mode (*reset_set)(Door, std::span<const std::size_t> fired, bool on_time, Mode, double t,
+                      X& x) = nullptr;
+    Mode (*rest)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
+
+    double (*next_time_event)(Door, double t) = nullptr;
+    double (*previous_time_event)(Door, double t) = nullptr;
+    Mode (*time_reset)(Door, Mode, double t, X& x) = nullptr;
+
+    double (*lipschitz)(Door, std::size_t which) = nullptr;
+    double (*speed_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*acceleration_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*lower_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*upper_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+
+    [[nodiscard]] bool resets() const noexcept { return reset || reset_set; }
+    [[nodiscard]] bool timed() const noexcept { return next_time_event; }
+};
+
+/// A table and the door that its functions take.
+template <class X>
+class SystemAt {
+public:
+    SystemAt(const SystemTable<X>& table, void* door) noexcept : table_(&table), door_(door) {}
+
+    [[nodiscard]] const SystemTable<X>* operator->() const noexcept { return table_; }
+    [[nodiscard]] void* door() const noexcept { return door_; }
+
+    [[nodiscard]] std::size_t modes() const { return table_->mode_count(door_); }
+    [[nodiscard]] bool enabled_in(std::size_t which, Mode mode) const
+    {
+        return !table_->enabled_in || table_->enabled_in(door_, which, mode);
+    }
+    [[nodiscard]] bool enabled_at(std::size_t which, Mode mode, double t, const X& x) const
+    {
+        return !table_->enabled_at || table_->enabled_at(door_, which, mode, t, x);
+    }
+
+    /// Whether a reset may leave `after` where the state was `before`.
+    [[nodiscard]] bool fits_dimension(const X& before, const X& after, bool same_mode) const noexcept
+    {
+        if constexpr (fixed_size<X>() > 0) {
+            return true;
+        } else {
+            return table_->fixed_dimension || table_->changes_dimension ||
+                   after.size() >= before.size() || !same_mode;
+        }
+    }
+
+private:
+    const SystemTable<X>* table_;
+    void* door_;
+};
+
+/// One guard of a system in one mode, for probes: as `GuardView`, behind the door.
+template <class X>
+class CoreGuard {
+    using View = PolynomialView<X, false>;
+    using RateView = PolynomialView<X, true>;
+
+public:
+    using State = X;
+
+    CoreGuard(const SystemAt<X>& system, std::uint64_t& calls, std::size_t which, Mode mode,
+              const GuardInfo& info, bool backward) noexcept
+        : system_(system),
+          which_(which),
+          mode_(mode),
+          backward_(backward),
+          calls_(&calls),
+          info_(&info)
+    {
+    }
+
+    template <class V>
+    static constexpr bool sees = std::is_same_v<V, View>;
+    template <class V, class D>
+    static constexpr bool sees_rate = std::is_same_v<V, View>&& std::is_same_v<D, RateView>;
+    [[nodiscard]] bool sees_views() const noexcept { return system_->guard_on; }
+    [[nodiscard]] bool sees_rate_views() const noexcept { return system_->rate_on; }
+
+    [[nodiscard]] bool is_rated() const noexcept { return system_->rated; }
+    [[nodiscard]] std::size_t which() const noexcept { return which_; }
+    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] Crossing crossing() const noexcept { return info_->crossing; }
+    [[nodiscard]] int degree() const noexcept { return info_->degree; }
+    [[nodiscard]] const SystemAt<X>& system() const noexcept { return system_; }
+
+    [[nodiscard]] double value(double t, const X& x) const
+    {
+        ++*calls_;
+        return system_->guard(system_.door(), which_, mode_, t, x);
+    }
+    [[nodiscard]] double value(double t, const View& x) const
+    {
+        ++*calls_;
+        return system_->guard_on(system_.door(), which_, mode_, t, x);
+    }
+    [[nodiscard]] double rate(double t, const X& x, const X& dxdt, double scale) const
+    {
+        *calls_ += system_->calls_of_rate;
+        return system_->rate(system_.door(), which_, mode_, backward_, t, x, dxdt, scale);
+    }
+    [[nodiscard]] GuardPoint point(double t, const X& x, const X& dxdt, double scale) const
+    {
+        if (!system_->point) return {value(t, x), rate(t, x, dxdt, scale)};
+        *calls_ += 1 + system_->calls_of_rate;
+        return system_->point(system_.door(), which_, mode_, backward_, t, x, dxdt, scale);
+    }
+    [[nodiscard]] double rate(double t, const View& x, const RateView& dxdt, double scale) const
+    {
+        return system_->rate_on(system_.door(), which_, mode_, backward_, t, x, dxdt, scale);
+    }
+
+private:
+    SystemAt<X> system_;
+    std::size_t which_;
+    Mode mode_;
+    bool backward_;
+    std::uint64_t* calls_;
+    const GuardInfo* info_;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,235 @@
+// Whole steps of states that do not fit the registers.
+//
+// What bounds such a step is the traffic to and from memory: each stage is one pass over its
+// operands, in which the rate of the stage before becomes one of departures, too, and everything
+// that is computed at the end of a step is computed in one pass. The end and what rounding leaves
+// out of it lie in arrays of their own, which the acceptance of a step only exchanges.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detail/instant.hpp"
+#include "ricochet/detail/runge_kutta.hpp"
+#include "ricochet/detail/step_state.hpp"
+
+namespace ricochet::detail {
+
+template <class Tableau>
+class LargeKernel {
+    using X = std::vector<double>;
+    using State = StepState<X>;
+    using Method = RungeKutta<Tableau, X>;
+    static constexpr std::size_t last = Method::kept_stages;  ///< kept stage
+
+    /// Two doubles in a register, from anywhere.
+    typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
+
+    /// The flow at offset s and state `room`, as dx/ds.
+    static void flow(void* door, State& step, double s, X& rate)
+    {
+        ++step.flow_calls;
+        step.flow_fits &= step.flow(door, step.mode, step.time(s), step.at, rate);
+        if (step.backward) {
+            for (double& each : rate) each = -each;
+        }
+    }
+
+    /// Computes the w of a row and the state there, at offset s. The rate of stage `raw`, unless
+    /// that is 0, is still that of the flow.
+    template <class Row, std::size_t raw, bool keeps>
+    static void combine(State& step, double h, double s, X* kept, X& w)
+    {
+        const std::size_t n = step.x0.size();
+        const auto weights = Method::template weights_of<Row>(h);
+        const double* const x0 = step.x0.data();
+        const double* const rate0 = step.rate0.data();
+        double* const at = step.at.data();
+        double* const sum = w.data();
+        std::array<double*, last + 1> k{};
+        for (std::size_t j = 0; j < last; ++j) k[j + 1] = kept[j].data();
+        RICOCHET_NO_DEPENDENCE
+        for (std::size_t i = 0; i < n; ++i) {
+            double departing = 0;
+            if constexpr (raw > 0) {
+                departing = k[raw][i] - rate0[i];
+                k[raw][i] = departing;
+            }
+            double bent = 0;
+            if constexpr (Method::template terms<Row> > 0) {
+                bent = Method::template sum_of<Row>(
+                    weights, [&](auto j) __attribute__((always_inline)) {
+                        if constexpr (j == raw) {
+                            return departing;
+                        } else {
+                            return k[j][i];
+                        }
+                    });
+            }
+            if constexpr (keeps) sum[i] = bent;
+            at[i] = x0[i] + (s * rate0[i] + bent);
+        }
+    }
+
+    template <std::size_t... I>
+    static void take_stages([[maybe_unused]] void* door, [[maybe_unused]] State& step,
+                            [[maybe_unused]] double h, [[maybe_unused]] X* k,
+                            std::index_sequence<I...>)
+    {
+        ((combine<typename Method::template Stage<I + 1>, I, false>(
+              step, h, h * Tableau::c[I + 1], k, step.at),
+          flow(door, step, h * Tableau::c[I + 1], k[I])),
+         ...);
+    }
+
+    /// w after a step of length h, and the flow there if the method has it.
+    static void depart(void* door, State& step, double h, X* k, X& w, X& rate)
+    {
+        for (std::size_t i = 0; i < last; ++i) {
+            if (k[i].size() != step.x0.size()) k[i] = step.zero;
+        }
+        take_stages(door, step, h, k, std::make_index_sequence<last>{});
+        combine<typename Method::Weights, last, true>(step, h, h, k, w);
+        if constexpr (Method::fsal) flow(door, step, h, rate);
+    }
+
+    template <class V>
+    [[nodiscard, gnu::always_inline]] static V load(const double* from) noexcept
+    {
+        return *reinterpret_cast<const V*>(from);
+    }
+    template <class V>
+    [[gnu::always_inline]] static void store(double* to, const V& value) noexcept
+    {
+        *reinterpret_cast<V*>(to) = value;
+    }
+    [[nodiscard, gnu::always_inline]] static double magnitude(double x) noexcept
+    {
+        return std::fabs(x);
+    }
+    [[nodiscard, gnu::always_inline]] static Pair magnitude(const Pair& x) noexcept
+    {
+        typedef std::int64_t Bits __attribute__((vector_size(16), may_alias));
+        const Bits all_but_sign = Bits{} + std::numeric_limits<std::int64_t>::max();
+        return reinterpret_cast<Pair>(reinterpret_cast<const Bits&>(x) & all_but_sign);
+    }
+
+    /// Takes a step. The largest ratio of error, 0 without an estimate; NaN if it is not finite.
+    template <bool with_error>
+    static double go(void* door, State& step, double h, double rtol, double atol)
+    {
+        step.h = h;
+        step.has_middle = false;
+        step.asked_alone = 0;
+        depart(door, step, h, step.stages.data(), step.w, step.w_rate1);
+        const std::size_t n = step.x0.size();
+        if constexpr (!Method::fsal) {
+            for (std::size_t i = 0; i < n; ++i) {
+                step.at[i] =
+                    step.x0[i] + (h * step.rate0[i] + (step.w[i] + step.remainder[i]));
+            }
+            flow(door, step, h, step.rate1);
+        }
+        const auto weights = [&] {
+            if constexpr (with_error) return Method::template weights_of<typename Method::Errors>(h);
+            if constexpr (!with_error) return 0;
+        }();
+        const double* const x0 = step.x0.data();
+        const double* const rate0 = step.rate0.data();
+        const double* const w = step.w.data();
+        const double* const remainder = step.remainder.data();
+        double* const w_rate = step.w_rate1.data();
+        double* const x1 = step.x1.data();
+        double* const rate1 = step.rate1.data();
+        double* const remainder1 = step.large.remainder1.data();
+        std::array<const double*, last + 1> k{};
+        for (std::size_t j = 0; j < last; ++j) k[j] = step.stages[j].data();
+        const auto some = [&](std::size_t i, auto& worst, auto& lost)
+                              __attribute__((always_inline)) {
+            using V = std::remove_cvref_t<decltype(worst)>;
+            const V start = load<V>(x0 + i);
+            const V rate = load<V>(rate0 + i);
+            const V change = h * rate + (load<V>(w + i) + load<V>(remainder + i));
+            const V end = start + change;
+            const V moved = end - start;  // Knuth's two-sum
+            store<V>(x1 + i, end);
+            store<V>(remainder1 + i, (start - (end - moved)) + (change - moved));
+            V rate_there;
+            V departing{};
+            if constexpr (Method::fsal) {
+                departing = load<V>(w_rate + i) - rate;
+                store<V>(w_rate + i, departing);
+                rate_there = rate + departing;
+                store<V>(rate1 + i, rate_there);
+            } else {
+                rate_there = load<V>(rate1 + i);
+            }
+            lost += 0 * end + 0 * rate_there;  // NaN where one is not finite
+            if constexpr (with_error) {
+                const V error = magnitude(
+                    Method::template sum_of<typename Method::Errors>(weights, [&](auto j) {
+                        if constexpr (j <= last) {
+                            return load<V>(k[j - 1] + i);
+                        } else {
+                            return departing;
+                        }
+                    }));
+                const V size0 = magnitude(start);
+                const V size1 = magnitude(end);
+                V ratio = error / (atol + rtol * (size0 > size1 ? size0 : size1));
+                if (atol == 0) ratio = error == 0 ? V{} : ratio;
+                worst = ratio > worst ? ratio : worst;
+                lost += 0 * ratio;
+            }
+        };
+        Pair worst{};
+        Pair lost{};
+        std::size_t i = 0;
+        for (; i + 2 <= n; i += 2) some(i, worst, lost);
+        double last_worst = std::max(worst[0], worst[1]);
+        double last_lost = lost[0] + lost[1];
+        if (i < n) some(i, last_worst, last_lost);
+        return last_lost == 0 ? last_worst : std::numeric_limits<double>::quiet_NaN();
+    }
+
+    static bool take(void* door, State& step, double h)
+    {
+        const double ratio = go<false>(door, step, h, 0, 0);
+        return ratio == ratio;
+    }
+
+    static double attempt(void* door, State& step, double h, double rtol, double atol)
+    {
+        return go<true>(door, step, h, rtol, atol);
+    }
+
+    static void depart_only(void* door, State& step, double s, X& w, X& rate)
+    {
+        depart(door, step, s, step.large.probed.data(), w, rate);
+        if constexpr (Method::fsal) {
+            for (std::size_t i = 0; i < rate.size(); ++i) rate[i] -= step.rate0[i];
+        }
+    }
+
+public:
+    [[nodiscard]] static StepKernel<X> make()
+    {
+        StepKernel<X> kernel;
+        kernel.order = Method::order_value;
+        kernel.error_order = Method::error_order_value;
+        kernel.end_rate = Method::fsal;
+        kernel.is_dopri5 = Method::has_dense_output;
+        kernel.take = &take;
+        kernel.depart = &depart_only;
+        if constexpr (Method::estimates_error) kernel.attempt = &attempt;
+        return kernel;
+    }
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,382 @@
+// The step in progress.
+//
+// The steps that advance leave their stages in the state of the step, where the dense output finds
+// them; steps that are repeated to inner times leave them elsewhere, so that asking never disturbs
+// what is being asked about.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/dense_polynomial.hpp"
+#include "ricochet/detail/instant.hpp"
+#include "ricochet/detail/step_state.hpp"
+#include "ricochet/detail/system_table.hpp"
+
+namespace ricochet::detail {
+
+/// Fulfils `DenseStep`.
+template <class X>
+class Step {
+    using Dopri5 = RungeKutta<Dopri5Tableau, X>;
+
+public:
+    /// Places the step at (t, x) in `mode` and evaluates the flow there. `backward`:
+    /// time runs backward, and offsets and rates with it.
+    Step(const SystemAt<X>& system, const StepKernel<X>& kernel, double t, const X& x, Mode mode,
+         bool backward)
+        : system_(system),
+          kernel_(&kernel),
+          state_(x),
+          unused_rate_(state_.zero),
+          end_slope_(state_.zero),
+          inner_w_{state_.zero, state_.zero},
+          inner_rate_{state_.zero, state_.zero}
+    {
+        state_.flow = system->flow;
+        state_.start = {t, 0};
+        state_.mode = mode;
+        state_.backward = backward;
+        flow(0, state_.x0, state_.rate0);
+    }
+
+    [[nodiscard]] const StepState<X>& state() const noexcept { return state_; }
+    /// For a quiet run, which goes on from here and leaves the step in hand.
+    [[nodiscard]] StepState<X>& lend() noexcept { return state_; }
+    [[nodiscard]] double time(double s) const noexcept { return state_.time(s); }
+    [[nodiscard]] const Instant& start() const noexcept { return state_.start; }
+    [[nodiscard]] Mode mode() const noexcept { return state_.mode; }
+    [[nodiscard]] bool backward() const noexcept { return state_.backward; }
+
+    /// The time at offset s + `remainder`.
+    [[nodiscard]] Instant instant(double s, double remainder) const noexcept
+    {
+        const Instant at = state_.start.after(state_.in_time(s));
+        return remainder == 0 ? at : at.after(state_.in_time(remainder));
+    }
+
+    /// Seconds from the start to time t, positive if it lies ahead.
+    [[nodiscard]] double until(double t) const noexcept
+    {
+        const double ahead = state_.start.until(t);
+        return state_.backward ? -ahead : ahead;
+    }
+    [[nodiscard]] double h() const noexcept { return state_.h; }
+    [[nodiscard]] const X& x0() const noexcept { return state_.x0; }
+    [[nodiscard]] const X& x1() const noexcept { return state_.x1; }
+    [[nodiscard]] const X& rate0() const noexcept { return state_.rate0; }
+    [[nodiscard]] const X& rate1() const noexcept { return state_.rate1; }
+    [[nodiscard]] int order() const noexcept { return kernel_->order; }
+    /// Of the error estimate; 0: there is none.
+    [[nodiscard]] int error_order() const noexcept { return kernel_->error_order; }
+
+    /// x(t0 + s) on the dense output: the method's own where it has one, else the
+    /// polynomial of `dense`.
+    void interpolate(double s, X& x) const
+    {
+        if (kernel_->interpolates()) {
+            departure(s, x);
+            add_tangent(s, x);
+        } else {
+            const DenseView<X, false> view(dense(), s);
+            for_components([&](auto i) { x[i] = view[i]; });
+        }
+    }
+
+    /// As `interpolate`, without further evaluations of the flow: on the cubic through both
+    /// ends where the method has no dense output of its own.
+    void peek(double s, X& x) const
+    {
+        if (kernel_->interpolates()) {
+            departure(s, x);
+            add_tangent(s, x);
+        } else {
+            const double h = state_.h;
+            const double u = s / h;
+            const double value = u * u * (3 - 2 * u);
+            const double slope = h * u * u * (u - 1);
+            const StepState<X>& of = state_;
+            for_components([&](auto i) {
+                const double w = value * of.w[i] + slope * (of.rate1[i] - of.rate0[i]);
+                x[i] = of.x0[i] + (s * of.rate0[i] + (w + of.remainder[i]));
+            });
+        }
+    }
+
+    /// As `peek` at the part `Part::u` of the step, of which the dense output has its weights
+    /// from the compiler.
+    template <class Part>
+    [[gnu::always_inline]] void peek(X& x) const
+    {
+        const StepState<X>& of = state_;
+        const double s = Part::u * of.h;
+        if (kernel_->is_dopri5) {
+            const auto weights = Dopri5::template weights<Part>(of.h);
+            for_components([&](auto i) __attribute__((always_inline)) {
+                const double w = Dopri5::dense(weights, of.stages.data(), of.w_rate1, i);
+                x[i] = of.x0[i] + (s * of.rate0[i] + (w + of.remainder[i]));
+            });
+        } else {
+            peek(s, x);
+        }
+    }
+
+    /// The polynomial at offset s, or its derivative, a component at a time. Of a large state the
+    /// inner node is computed for the components that are asked for alone, until they are as many
+    /// as the state has.
+    template <bool derivative>
+    [[nodiscard]] PolynomialView<X, derivative> component_view(double s) const
+    {
+        if constexpr (!is_small<X>) {
+            if (kernel_->is_dopri5) {
+                if (!state_.has_middle && state_.asked_alone >= state_.x0.size()) prepare_dense();
+                return {state_, s};
+            }
+        }
+        return {dense(), s};
+    }
+
+    /// The step as a polynomial of the order that the method reaches over many steps.
+    /// Its inner nodes are computed when it is first asked for.
+    [[nodiscard]] DenseParts<X> dense() const
+    {
+        if (!state_.has_middle) prepare_dense();
+        DenseParts<X> parts{.nodes = dense_nodes(),
+                            .h = state_.h,
+                            .x0 = &state_.x0,
+                            .remainder = &state_.remainder,
+                            .rate0 = &state_.rate0};
+        const std::size_t inner = inner_nodes(parts.nodes);
+        for (std::size_t k = 0; k < inner; ++k) {
+            parts.w[k] = k == 0 ? &state_.middle : &inner_w_[k];
+            if (!kernel_->interpolates()) parts.slope[k] = &inner_rate_[k];
+        }
+        parts.w[inner] = &state_.w;
+        parts.slope[inner] = &end_slope_;
+        return parts;
+    }
+
+    /// x(t0 + s) by the method's own step of length s from the start.
+    void restep(double s, X& x) const
+    {
+        ++resteps_;
+        kernel_->depart(system_.door(), state_, s, x, unused_rate_);
+        add_tangent(s, x);
+    }
+
+    /// x(t0 + s) as precisely as is cheap: dense output of the method's own order,
+    /// or a step of its own.
+    void sample(double s, X& x) const
+    {
+        if (kernel_->interpolates()) {
+            interpolate(s, x);
+        } else {
+            restep(s, x);
+        }
+    }
+
+    /// x(t0 + s) by the method's own step, and the flow there.
+    void restep(double s, X& x, X& dxdt) const
+    {
+        ++resteps_;
+        kernel_->depart(system_.door(), state_, s, x, dxdt);
+        add_tangent(s, x);
+        if (kernel_->end_rate) {
+            for_components([&](auto i) { dxdt[i] += state_.rate0[i]; });
+        } else {
+            flow(s, x, dxdt);
+        }
+    }
+
+    /// x' = f(t0 + s, x).
+    void flow(double s, const X& x, X& dxdt) const
+    {
+        ++state_.flow_calls;
+        state_.flow_fits &= system_->flow(system_.door(), state_.mode, time(s), x, dxdt);
+        if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
+    }
+
+    /// Takes a step of length h, without a look at its error. False if the end of the step or the
+    /// flow there is not finite.
+    bool attempt(double h) { return kernel_->take(system_.door(), state_, h); }
+
+    /// Takes a step of length h and returns its largest estimated error over
+    /// atol + rtol max(|x0|, |x1|); NaN if anything is not finite.
+    [[nodiscard]] double attempt(double h, double rtol, double atol)
+    {
+        return kernel_->attempt(system_.door(), state_, h, rtol, atol);
+    }
+
+    /// The end of the step becomes the start of the next.
+    void accept() noexcept
+    {
+        StepState<X>& of = state_;
+        of.start = of.start.after(of.in_time(of.h));
+        if constexpr (is_small<X>) {
+            for_components([&](auto i) {
+                const TwoSum sum =
+                    two_sum(of.x0[i], of.h * of.rate0[i] + (of.w[i] + of.remainder[i]));
+                of.x0[i] = sum.value;
+                of.remainder[i] = sum.remainder;
+            });
+            assign(of.rate0, of.rate1);
+        } else {
+            std::swap(of.x0, of.x1);
+            std::swap(of.remainder, of.large.remainder1);
+            std::swap(of.rate0, of.rate1);
+        }
+    }
+
+    /// As `accept`, where the end is the time `t` by decree.
+    void accept_at(double t) noexcept
+    {
+        accept();
+        state_.start = {t, 0};
+    }
+
+    /// Moves the start of the step to offset s + `remainder`, state x and a mode, after
+    /// an event. The state may have another dimension.
+    void restart(double s, double remainder, const X& x, Mode mode)
+    {
+        state_.start = instant(s, remainder);
+        begin(x, mode);
+        flow(0, state_.x0, state_.rate0);
+    }
+
+    /// Moves the start of the step to where another one started.
+    void restart(const StepStart<X>& at)
+    {
+        state_.start = at.t;
+        begin(at.x, at.mode);
+        assign(state_.remainder, at.remainder);
+        assign(state_.rate0, at.rate);
+    }
+
+    /// Only time goes on, to t.
+    void hold(double t) noexcept { state_.start = {t, 0}; }
+
+    /// Evaluates the flow at the start anew.
+    void refresh() { flow(0, state_.x0, state_.rate0); }
+
+    [[nodiscard]] StepStart<X> place() const
+    {
+        return {state_.start, state_.mode, state_.x0, state_.remainder, state_.rate0};
+    }
+
+    /// As `place`, into what is there already.
+    void store(StepStart<X>& at) const
+    {
+        at.t = state_.start;
+        at.mode = state_.mode;
+        assign(at.x, state_.x0);
+        assign(at.remainder, state_.remainder);
+        assign(at.rate, state_.rate0);
+    }
+
+    /// Whether the flow has given its rate the dimension of the state, always.
+    [[nodiscard]] bool flow_fits() const noexcept { return state_.flow_fits; }
+    [[nodiscard]] std::uint64_t flow_calls() const noexcept { return state_.flow_calls; }
+    [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
+
+private:
+    [[nodiscard]] DenseNodes dense_nodes() const noexcept
+    {
+        const int order = kernel_->order;
+        return kernel_->interpolates() ? DenseNodes::middle_end
+               : order <= 4            ? DenseNodes::end
+               : order <= 6            ? DenseNodes::half_end
+                                       : DenseNodes::thirds_end;
+    }
+    [[nodiscard]] static constexpr std::size_t inner_nodes(DenseNodes nodes) noexcept
+    {
+        return nodes == DenseNodes::end ? 0 : nodes == DenseNodes::thirds_end ? 2 : 1;
+    }
+
+    template <class Function>
+    [[gnu::always_inline]] void for_components(const Function& function) const
+    {
+        for_each_component(state_.x0, function);
+    }
+
+    void begin(const X& x, Mode mode)
+    {
+        state_.mode = mode;
+        if (x.size() != state_.x0.size()) resize(x);
+        assign(state_.x0, x);
+        assign(state_.remainder, state_.zero);
+        state_.has_middle = false;
+        state_.asked_alone = 0;
+    }
+
+    void resize(const X& x)
+    {
+        StepState<X> state(x);
+        state.flow = state_.flow;
+        state.start = state_.start;
+        state.mode = state_.mode;
+        state.backward = state_.backward;
+        state.flow_fits = state_.flow_fits;
+        state.flow_calls = state_.flow_calls;
+        state_ = std::move(state);
+        unused_rate_ = end_slope_ = state_.zero;
+        inner_w_.fill(state_.zero);
+        inner_rate_.fill(state_.zero);
+        if (kernel_->renew) kernel_->renew(system_.door());
+    }
+
+    /// w(s) on the method's own interpolant.
+    void departure(double s, X& w) const
+    {
+        if (kernel_->is_dopri5) {
+            Dopri5::dense(s, state_.h, state_.stages.data(), state_.w_rate1, w);
+        } else {
+            kernel_->departure(system_.door(), state_, s, w);
+        }
+    }
+
+    [[gnu::noinline]] void prepare_dense() const
+    {
+        for_components([&](auto i) { end_slope_[i] = state_.rate1[i] - state_.rate0[i]; });
+        const double h = state_.h;
+        if (kernel_->interpolates()) {
+            departure(h / 2, state_.middle);
+        } else {
+            const std::size_t inner = inner_nodes(dense_nodes());
+            for (std::size_t k = 0; k < inner; ++k) {
+                prepare_node(h * static_cast<double>(k + 1) / static_cast<double>(inner + 1),
+                             k == 0 ? state_.middle : inner_w_[k], inner_rate_[k]);
+            }
+        }
+        state_.has_middle = true;
+    }
+
+    /// A node inside, from a step of its own.
+    void prepare_node(double s, X& w, X& slope) const
+    {
+        kernel_->depart(system_.door(), state_, s, w, unused_rate_);
+        X& at = state_.at;
+        assign(at, w);
+        add_tangent(s, at);
+        flow(s, at, slope);
+        for_components([&](auto i) { slope[i] -= state_.rate0[i]; });
+    }
+
+    /// From w to x at offset s.
+    void add_tangent(double s, X& w) const noexcept
+    {
+        for_components([&](auto i) {
+            w[i] = state_.x0[i] + (s * state_.rate0[i] + (w[i] + state_.remainder[i]));
+        });
+    }
+
+    SystemAt<X> system_;
+    const StepKernel<X>* kernel_;
+    mutable StepState<X> state_;
+    mutable X unused_rate_, end_slope_;
+    mutable std::array<X, 2> inner_w_, inner_rate_;  ///< `middle` stands for the first
+    mutable std::uint64_t resteps_ = 0;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,31 @@
+// A step of a method on a system, as the loop takes it.
+#pragma once
+
+#include "core/step.hpp"
+#include "ricochet/detail/door.hpp"
+#include "ricochet/detail/kernels.hpp"
+
+namespace ricochet::test {
+
+template <class Method, class System, class X>
+struct DoorOf {
+    detail::StepperDoor<System, X, Method> door;
+};
+
+/// Of states that the loop works with as they are.
+template <class Method, class System, class X>
+class StepOf : DoorOf<Method, System, X>, public detail::Step<X> {
+    static_assert(std::is_same_v<X, detail::CoreState<X>>);
+    using At = DoorOf<Method, System, X>;
+
+public:
+    StepOf(const System& system, double t, const X& x, Mode mode = 0, bool backward = false)
+        : At{{system, x}},
+          detail::Step<X>({detail::system_table<System, X>,
+                           static_cast<detail::Door<System, X>*>(&this->At::door)},
+                          detail::kernel_of<System, X, Method>, t, x, mode, backward)
+    {
+    }
+};
+
+}  // namespace ricochet::test
