@@ -23,7 +23,7 @@ public:
         : At{{system, x}},
           detail::Step<X>({detail::system_table<System, X>,
                            static_cast<detail::Door<System, X>*>(&this->At::door)},
-                          detail::kernel_of<System, X, Method>, t, x, mode, backward)
+                          detail::kernel_for<System, X>(Method{}), t, x, mode, backward)
     {
     }
 };

@@ -104,8 +104,8 @@ struct Finders {
         return locator.locate(locating, path, lo.s, lo.value, lo.rate, hi.s, hi.value, hi.rate,
                               tolerance);
     }
-    [[nodiscard]] bool leaves_plainly(double sign, const GuardSample& start,
-                                      const GuardSample& end, double touch) const
+    [[nodiscard]] bool leaves_plainly(double sign, const GuardSample& start, const GuardSample& end,
+                                      double touch) const
     {
         return detector.leaves_plainly(sign, start.s, start.value, start.rate, end.s, end.value,
                                        end.rate, touch);
@@ -194,7 +194,7 @@ public:
         std::size_t suspects = 0;
         std::size_t last = 0;
         for (const std::size_t i : bank.suspects()) {
-            if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
+            if (!bank[i].acting || !bank.still_suspicious(i, step.h())) continue;
             ++suspects;
             last = i;
         }
@@ -363,8 +363,7 @@ private:
     }
 
     /// The detector's answers on the parts of a stretch, up to the first that is not clear.
-    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank,
-                                        std::size_t i)
+    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank, std::size_t i)
     {
         parts_.resolve(probe, i, watch, bank[i].info.touch, bank.looked_everywhere());
         refined_ = refined_ || parts_.divided();
@@ -429,8 +428,7 @@ private:
         for (;;) {
             const GuardSample* next = parts_.next(node.s, whole.end.s);
             const GuardSample to = next ? *next : whole.end;
-            if (detector.suspects(-sign, node.value, node.rate, to.value, to.rate,
-                                  to.s - node.s)) {
+            if (detector.suspects(-sign, node.value, node.rate, to.value, to.rate, to.s - node.s)) {
                 return false;
             }
             if (!next) return true;
@@ -450,14 +448,15 @@ private:
         return finding;
     }
 
-    [[nodiscard]] Location find(Probe& probe, Finding finding, const Bank& bank,
-                                       std::size_t i, const EventResolution& resolution)
+    [[nodiscard]] Location find(Probe& probe, Finding finding, const Bank& bank, std::size_t i,
+                                const EventResolution& resolution)
     {
         if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
         probe.agree_on(finding.lo, finding.hi, bank.start(i));
         const double tolerance = std::max(resolution.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
-        if (!bank[i].info.boolean) return finders_->locate(probe, finding.lo, finding.hi, tolerance);
+        if (!bank[i].info.boolean)
+            return finders_->locate(probe, finding.lo, finding.hi, tolerance);
         // A guard of which only the sign means anything jumps by its nature.
         Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
         where.jump = false;
@@ -524,7 +523,8 @@ private:
         return std::isfinite(root) ? root : finding.hi.s;
     }
 
-    void locate(const CurrentStep& step, Bank& bank, Hit& hit, const EventResolution& resolution, std::uint64_t& calls)
+    void locate(const CurrentStep& step, Bank& bank, Hit& hit, const EventResolution& resolution,
+                std::uint64_t& calls)
     {
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
@@ -590,11 +590,11 @@ private:
     }
 
     /// The first set among several candidates.
-    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
-                                  std::uint64_t& calls)
+    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank,
+                                  const EventResolution& resolution, std::uint64_t& calls)
     {
         for (const std::size_t i : bank.suspects()) {
-            if (!bank[i].acting || !bank.suspicious(i, step.h())) continue;
+            if (!bank[i].acting || !bank.still_suspicious(i, step.h())) continue;
             examine(step, bank, i, calls);
         }
         if (hits_.empty()) return false;
@@ -604,7 +604,8 @@ private:
     }
 
     /// Locates the only member of the set, and keeps the state at its root.
-    void locate_alone(const CurrentStep& step, Bank& bank, const EventResolution& resolution, std::uint64_t& calls)
+    void locate_alone(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
+                      std::uint64_t& calls)
     {
         Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
             return candidate.guard == members_[0];
@@ -620,7 +621,8 @@ private:
 
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is whoever lies in the window.
-    void close_set(const CurrentStep& step, Bank& bank, const EventResolution& resolution, std::uint64_t& calls)
+    void close_set(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
+                   std::uint64_t& calls)
     {
         double first = std::numeric_limits<double>::infinity();
         for (Hit& hit : hits_) {

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "core/step.hpp"
+#include "core/wide.hpp"
 #include "ricochet/detail/cubic_look.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/finding.hpp"
@@ -42,8 +43,7 @@ public:
 /// A T for every guard; of a few guards without an allocation. Most systems have one guard, and
 /// for them the loop is compiled with that known.
 template <class T, bool single>
-using PerGuard =
-    std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, 8>>;
+using PerGuard = std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, 8>>;
 
 /// As many elements as there are guards, at most.
 template <class T, bool single>
@@ -258,7 +258,8 @@ public:
         run.g0 = g0_[0];
         run.rate0 = rate0_[0];
     }
-    /// What a quiet run has left: the guard at the start of the step in hand, at its end and inside.
+    /// What a quiet run has left: the guard at the start of the step in hand, at its end and
+    /// inside.
     void take_back(const QuietRun& run) noexcept
     {
         if (size() == 0) return;
@@ -277,7 +278,9 @@ public:
     {
         if (looked() && !waiting_ && !bands_) {
             if (are_few()) {
-                return with_screen([&](auto screen) { return any_of(in_doubt(screen, h)); });
+                return with_screen([&](auto screen) __attribute__((always_inline)) {
+                    return any_of(in_doubt(screen, h));
+                });
             }
             mark(h);
             return !marks_.empty();
@@ -330,11 +333,17 @@ public:
     /// Whether the guards have been evaluated inside the step.
     [[nodiscard]] bool looked() const noexcept { return looked_ != Looked::not_at_all; }
 
+    /// Of one of the `suspects`: it is one still, after what the search has found so far.
+    [[nodiscard]] bool still_suspicious(std::size_t i, double h) const noexcept
+    {
+        return as_screened_ || suspicious(i, h);
+    }
+
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
         if (sign_[i] == 0) return false;
         const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
-        const bool suspected = with_screen([&](auto screen) {
+        const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
             return screen.suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
         });
         return suspected || !is_finite(g1_[i]) || (looked() && hides(i, h));
@@ -406,6 +415,7 @@ public:
     {
         records_[i].side = side;
         sign_[i] = records_[i].enabled && !records_[i].asleep ? sign_of(side) : 0;
+        as_screened_ = false;
     }
 
     /// The width [s] below which a bracket in a step of length h is a matter of the guard's
@@ -671,7 +681,8 @@ private:
     [[nodiscard, gnu::always_inline]] auto in_doubt(const Screen& screen, double h) const noexcept
     {
         return [
-            shows = shows(screen, h), strays = strays(h, CubicLook::inside, CubicLook::doubt, inside_)
+            shows = shows(screen, h),
+            strays = strays(h, CubicLook::inside, CubicLook::doubt, inside_)
         ](std::size_t i) __attribute__((always_inline))
         {
             const bool shown = shows(i);
@@ -684,11 +695,11 @@ private:
     void forget_screening() noexcept { screened_ = marked_ = false; }
 
     /// Finds the guards in doubt.
-    void mark(double h) noexcept
+    RICOCHET_WIDE void mark(double h) noexcept
     {
         marks_.clear();
         marked_ = true;
-        with_screen([&](auto screen) {
+        with_screen([&](auto screen) __attribute__((always_inline)) {
             for_each_that(in_doubt(screen, h), [this](std::size_t i) { marks_.push_back(i); });
         });
     }
@@ -697,7 +708,7 @@ private:
     [[gnu::noinline]] void screen(double h) noexcept
     {
         suspects_.clear();
-        screened_ = true;
+        screened_ = as_screened_ = true;
         if (are_few() || bands_) {
             for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
             return;
@@ -718,7 +729,7 @@ private:
                 });
         }
         marks_.clear();
-        with_screen([&](auto screen) {
+        with_screen([&](auto screen) __attribute__((always_inline)) {
             const auto condition =
                 [ this, shows = shows(screen, h) ](std::size_t i) __attribute__((always_inline))
             {
@@ -858,10 +869,11 @@ private:
     BankRules rules_;
     bool backward_;
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
-    bool waiting_ = false;    ///< whether any guard may be on a plateau
-    bool bands_ = false;      ///< whether any guard declares one
-    bool selective_ = false;  ///< whether any guard is disabled or has no rate
-    bool screened_ = false;   ///< whether `suspects_` is of the step in hand
+    bool waiting_ = false;      ///< whether any guard may be on a plateau
+    bool bands_ = false;        ///< whether any guard declares one
+    bool selective_ = false;    ///< whether any guard is disabled or has no rate
+    bool screened_ = false;     ///< whether `suspects_` is of the step in hand
+    bool as_screened_ = false;  ///< and no guard has changed since
     Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{}, behind_{};
     /// Where in the step in hand the guards have been evaluated.
     enum class Looked : std::uint8_t { not_at_all, inside, further, everywhere };

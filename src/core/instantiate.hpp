@@ -2,7 +2,15 @@
 #pragma once
 
 #include "core/large_kernel.hpp"
-#include "core/loop.hpp"
+#include "core/loop_arming.hpp"
+#include "core/loop_events.hpp"
+#include "core/loop_output.hpp"
+#include "core/loop_planned.hpp"
+#include "core/loop_quiet.hpp"
+#include "core/loop_rest.hpp"
+#include "core/loop_saving.hpp"
+#include "core/loop_setup.hpp"
+#include "core/loop_steps.hpp"
 #include "ricochet/detail/kernels.hpp"
 
 namespace ricochet::detail {
@@ -134,11 +142,11 @@ const StepKernel<X>& kernel_by_name(MethodName name) noexcept
 
 }  // namespace ricochet::detail
 
-#define RICOCHET_CORE(...)                                                                 \
-    namespace ricochet::detail {                                                           \
-    using CoreStateHere = __VA_ARGS__;                                                     \
-    template class Core<CoreStateHere>;                                                    \
-    template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&,                   \
-                                           const CoreStateHere&, const Options&);          \
+#define RICOCHET_CORE(...)                                                                        \
+    namespace ricochet::detail {                                                                  \
+    using CoreStateHere = __VA_ARGS__;                                                            \
+    template class Core<CoreStateHere>;                                                           \
+    template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \
+                                          const Options&);                                        \
     template const StepKernel<CoreStateHere>& kernel_by_name<CoreStateHere>(MethodName) noexcept; \
     }

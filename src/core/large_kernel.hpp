@@ -11,10 +11,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <utility>
 #include <vector>
 
+#include "core/wide.hpp"
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/detail/runge_kutta.hpp"
 #include "ricochet/detail/step_state.hpp"
@@ -28,8 +30,8 @@ class LargeKernel {
     using Method = RungeKutta<Tableau, X>;
     static constexpr std::size_t last = Method::kept_stages;  ///< kept stage
 
-    /// Two doubles in a register, from anywhere.
-    typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
+    /// Four doubles, in one register or in two.
+    typedef double Four __attribute__((vector_size(32)));
 
     /// The flow at offset s and state `room`, as dx/ds.
     static void flow(void* door, State& step, double s, X& rate)
@@ -44,7 +46,7 @@ class LargeKernel {
     /// Computes the w of a row and the state there, at offset s. The rate of stage `raw`, unless
     /// that is 0, is still that of the flow.
     template <class Row, std::size_t raw, bool keeps>
-    static void combine(State& step, double h, double s, X* kept, X& w)
+    RICOCHET_WIDE static void combine(State& step, double h, double s, X* kept, X& w)
     {
         const std::size_t n = step.x0.size();
         const auto weights = Method::template weights_of<Row>(h);
@@ -62,7 +64,7 @@ class LargeKernel {
                 k[raw][i] = departing;
             }
             double bent = 0;
-            if constexpr (Method::template terms<Row> > 0) {
+            if constexpr (Method::template terms < Row >> 0) {
                 bent = Method::template sum_of<Row>(
                     weights, [&](auto j) __attribute__((always_inline)) {
                         if constexpr (j == raw) {
@@ -82,8 +84,8 @@ class LargeKernel {
                             [[maybe_unused]] double h, [[maybe_unused]] X* k,
                             std::index_sequence<I...>)
     {
-        ((combine<typename Method::template Stage<I + 1>, I, false>(
-              step, h, h * Tableau::c[I + 1], k, step.at),
+        ((combine<typename Method::template Stage<I + 1>, I, false>(step, h, h * Tableau::c[I + 1],
+                                                                    k, step.at),
           flow(door, step, h * Tableau::c[I + 1], k[I])),
          ...);
     }
@@ -102,27 +104,29 @@ class LargeKernel {
     template <class V>
     [[nodiscard, gnu::always_inline]] static V load(const double* from) noexcept
     {
-        return *reinterpret_cast<const V*>(from);
+        V value;
+        std::memcpy(&value, from, sizeof value);
+        return value;
     }
     template <class V>
     [[gnu::always_inline]] static void store(double* to, const V& value) noexcept
     {
-        *reinterpret_cast<V*>(to) = value;
+        std::memcpy(to, &value, sizeof value);
     }
     [[nodiscard, gnu::always_inline]] static double magnitude(double x) noexcept
     {
         return std::fabs(x);
     }
-    [[nodiscard, gnu::always_inline]] static Pair magnitude(const Pair& x) noexcept
+    [[nodiscard, gnu::always_inline]] static Four magnitude(const Four& x) noexcept
     {
-        typedef std::int64_t Bits __attribute__((vector_size(16), may_alias));
+        typedef std::int64_t Bits __attribute__((vector_size(32)));
         const Bits all_but_sign = Bits{} + std::numeric_limits<std::int64_t>::max();
-        return reinterpret_cast<Pair>(reinterpret_cast<const Bits&>(x) & all_but_sign);
+        return reinterpret_cast<Four>(reinterpret_cast<Bits>(x) & all_but_sign);
     }
 
     /// Takes a step. The largest ratio of error, 0 without an estimate; NaN if it is not finite.
     template <bool with_error>
-    static double go(void* door, State& step, double h, double rtol, double atol)
+    RICOCHET_WIDE static double go(void* door, State& step, double h, double rtol, double atol)
     {
         step.h = h;
         step.has_middle = false;
@@ -131,13 +135,13 @@ class LargeKernel {
         const std::size_t n = step.x0.size();
         if constexpr (!Method::fsal) {
             for (std::size_t i = 0; i < n; ++i) {
-                step.at[i] =
-                    step.x0[i] + (h * step.rate0[i] + (step.w[i] + step.remainder[i]));
+                step.at[i] = step.x0[i] + (h * step.rate0[i] + (step.w[i] + step.remainder[i]));
             }
             flow(door, step, h, step.rate1);
         }
         const auto weights = [&] {
-            if constexpr (with_error) return Method::template weights_of<typename Method::Errors>(h);
+            if constexpr (with_error)
+                return Method::template weights_of<typename Method::Errors>(h);
             if constexpr (!with_error) return 0;
         }();
         const double* const x0 = step.x0.data();
@@ -150,8 +154,8 @@ class LargeKernel {
         double* const remainder1 = step.large.remainder1.data();
         std::array<const double*, last + 1> k{};
         for (std::size_t j = 0; j < last; ++j) k[j] = step.stages[j].data();
-        const auto some = [&](std::size_t i, auto& worst, auto& lost)
-                              __attribute__((always_inline)) {
+        const auto some = [&](std::size_t i, auto& worst, auto& lost) __attribute__((always_inline))
+        {
             using V = std::remove_cvref_t<decltype(worst)>;
             const V start = load<V>(x0 + i);
             const V rate = load<V>(rate0 + i);
@@ -188,13 +192,13 @@ class LargeKernel {
                 lost += 0 * ratio;
             }
         };
-        Pair worst{};
-        Pair lost{};
+        Four worst{};
+        Four lost{};
         std::size_t i = 0;
-        for (; i + 2 <= n; i += 2) some(i, worst, lost);
-        double last_worst = std::max(worst[0], worst[1]);
-        double last_lost = lost[0] + lost[1];
-        if (i < n) some(i, last_worst, last_lost);
+        for (; i + 4 <= n; i += 4) some(i, worst, lost);
+        double last_worst = std::max(std::max(worst[0], worst[1]), std::max(worst[2], worst[3]));
+        double last_lost = (lost[0] + lost[1]) + (lost[2] + lost[3]);
+        for (; i < n; ++i) some(i, last_worst, last_lost);
         return last_lost == 0 ? last_worst : std::numeric_limits<double>::quiet_NaN();
     }
 

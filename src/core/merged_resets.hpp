@@ -25,9 +25,8 @@ public:
     /// Computes what the resets of `members`, all from the state `before`, make of it; with
     /// that of a time event if the set happens on time. `bank` says which of them reset.
     template <class Bank>
-    void apply(const SystemAt<X>& system, const Bank& bank,
-               std::span<const std::size_t> members, bool on_time, Mode mode, double t,
-               const X& before)
+    void apply(const SystemAt<X>& system, const Bank& bank, std::span<const std::size_t> members,
+               bool on_time, Mode mode, double t, const X& before)
     {
         assign(after_, before);
         mode_ = mode;

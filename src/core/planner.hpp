@@ -146,7 +146,8 @@ public:
     /// Looks at every guard that owes one, at the end of the step in hand and wherever that
     /// leaves a doubt. Returns the first step that could not be closed, or `none`; whoever
     /// is to be judged in it if it is the step in hand is in `judged`.
-    [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts, double h_next)
+    [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts,
+                                    double h_next)
     {
         meter_.look_back(counts);
         const std::size_t last = steps_.size() - 1;
@@ -603,9 +604,8 @@ private:
     void blame_change(std::size_t i, const Look& from, const Look& to, const Bank& bank)
     {
         const double tau = to.time - from.time;
-        const double allowed =
-            (1 + detector_->margin) * largest_change(from.bound, to.bound, tau) +
-            2 * band(bank, i, from.value, to.value);
+        const double allowed = (1 + detector_->margin) * largest_change(from.bound, to.bound, tau) +
+                               2 * band(bank, i, from.value, to.value);
         const double change = to.value - from.value;
         const bool wrong = from.exact ? std::fabs(change) > allowed : change < -allowed;
         if (wrong && !wrong_) blame(i, from, to, allowed);

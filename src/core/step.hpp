@@ -245,6 +245,14 @@ public:
         flow(0, state_.x0, state_.rate0);
     }
 
+    /// The same to an instant.
+    void restart(const Instant& at, const X& x, Mode mode)
+    {
+        state_.start = at;
+        begin(x, mode);
+        flow(0, state_.x0, state_.rate0);
+    }
+
     /// Moves the start of the step to where another one started.
     void restart(const StepStart<X>& at)
     {

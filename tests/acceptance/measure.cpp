@@ -25,10 +25,10 @@ std::vector<Check> all_checks()
     namespace bench = ricochet::bench;
     std::vector<Check> checks;
     for (const auto& some :
-         {bench::ball_checks(), bench::network_checks(), bench::event_checks(),
-          bench::resolution_checks(), bench::guard_checks(), bench::nonsmooth_checks(),
-          bench::inclusion_checks(), bench::step_checks(), bench::fault_checks(),
-          bench::friction_checks(), bench::file_checks()}) {
+         {bench::ball_checks(), bench::core_checks(), bench::network_checks(),
+          bench::event_checks(), bench::resolution_checks(), bench::guard_checks(),
+          bench::nonsmooth_checks(), bench::inclusion_checks(), bench::step_checks(),
+          bench::fault_checks(), bench::friction_checks(), bench::file_checks()}) {
         checks.insert(checks.end(), some.begin(), some.end());
     }
     return checks;
@@ -57,8 +57,8 @@ int run(int argc, char** argv)
     std::string json_file;
     bool list = false;
     app.add_option("TOPIC", wanted_topics, "only the checks of these topics")
-        ->check(CLI::IsMember(
-            std::vector<std::string>(ricochet::bench::topics.begin(), ricochet::bench::topics.end())))
+        ->check(CLI::IsMember(std::vector<std::string>(ricochet::bench::topics.begin(),
+                                                       ricochet::bench::topics.end())))
         ->type_name("");
     app.add_option("--only", only, "only the checks of these names");
     app.add_option("--json", json_file, "also write the results to this file");
@@ -70,16 +70,15 @@ int run(int argc, char** argv)
     bool any = false;
     for (const Check& check : all_checks()) {
         const bool wanted = only.empty() || std::ranges::find(only, check.id) != only.end();
-        const bool on_topic =
-            wanted_topics.empty() || std::ranges::find(wanted_topics, check.topic) != wanted_topics.end();
+        const bool on_topic = wanted_topics.empty() ||
+                              std::ranges::find(wanted_topics, check.topic) != wanted_topics.end();
         if (!on_topic || !wanted) continue;
         any = true;
         if (list) {
             fmt::print("{:<10}{:<24}{}\n", check.topic, check.id, check.sentence);
             continue;
         }
-        const std::string command =
-            fmt::format("{} --only {}", argv[0], check.id);
+        const std::string command = fmt::format("{} --only {}", argv[0], check.id);
         const Measured measured = run(check);
         fmt::print("{:<11} {} | target: {} | measured: {} | {}\n", verdict(check, measured),
                    check.sentence, check.target, measured.text, command);

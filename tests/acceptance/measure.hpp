@@ -16,13 +16,14 @@ struct Measured {
     std::vector<std::string> details{};  ///< printed below it
 };
 
-inline constexpr std::array<std::string_view, 9> topics = {
-    "ball", "network", "events", "guards", "nonsmooth", "steps", "fault", "friction", "files"};
+inline constexpr std::array<std::string_view, 10> topics = {
+    "ball",      "core",  "network", "events",   "guards",
+    "nonsmooth", "steps", "fault",   "friction", "files"};
 
 struct Check {
     std::string_view topic;  ///< one of `topics`
-    std::string id;        ///< e.g. "b1-rk4"
-    std::string sentence;  ///< what is claimed
+    std::string id;          ///< e.g. "b1-rk4"
+    std::string sentence;    ///< what is claimed
     std::string target;
     std::function<Measured()> run;
     bool required = true;  ///< false: a wish, which does not fail the run
@@ -30,6 +31,9 @@ struct Check {
 
 /// The bouncing ball, end to end.
 [[nodiscard]] std::vector<Check> ball_checks();
+
+/// The compiled core: what a step, a pointer and an impact in a large state cost.
+[[nodiscard]] std::vector<Check> core_checks();
 
 /// The network: kernels, models, training, gate.
 [[nodiscard]] std::vector<Check> network_checks();

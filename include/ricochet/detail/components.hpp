@@ -39,16 +39,6 @@ template <class X>
 template <class X>
 inline constexpr bool is_small = fixed_size<X>() > 0 && fixed_size<X>() <= 8;
 
-/// x, in a register of its own: the compiler does not load or compute it together with its
-/// neighbour. Two numbers that have just been stored one by one would be late as a pair.
-[[nodiscard, gnu::always_inline]] inline double alone(double x) noexcept
-{
-#if defined(__GNUC__) && defined(__x86_64__)
-    __asm__("" : "+x"(x));
-#endif
-    return x;
-}
-
 /// Calls `function(i)` for every component of x, with i of the state's own index
 /// type.
 template <class X, class Function>
@@ -56,9 +46,11 @@ template <class X, class Function>
 {
     using Index = decltype(x.size());
     if constexpr (is_small<X>) {
-        [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+        [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
+        {
             (function(static_cast<Index>(I)), ...);
-        }(std::make_index_sequence<fixed_size<X>()>{});
+        }
+        (std::make_index_sequence<fixed_size<X>()>{});
     } else {
         const Index n = x.size();
         // No component depends on another one: what is written to does not overlap by a shift.

@@ -4,8 +4,8 @@
 // table that the loop knows (detail/system_table.hpp).
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -67,7 +67,7 @@ public:
 
     Door(const System& system, [[maybe_unused]] const X& like) : system_(&system)
     {
-        if constexpr (copied) scratch_.assign(3, like);
+        if constexpr (copied) scratch_.fill(like);
     }
 
     [[nodiscard]] const System& system() const noexcept { return *system_; }
@@ -119,7 +119,7 @@ public:
 private:
     struct None {};
     const System* system_;
-    [[no_unique_address]] std::conditional_t<copied, std::vector<X>, None> scratch_{};
+    [[no_unique_address]] std::conditional_t<copied, std::array<X, 3>, None> scratch_{};
 };
 
 /// The table of `System` for states X.
@@ -150,9 +150,8 @@ class TableOf {
     }
     static double guard(void* door, std::size_t which, Mode mode, double t, const C& x)
     {
-        return with_guard(door, which, mode, false, [&](const Guard& guard) {
-            return guard.value(t, at(door).read(x, 0));
-        });
+        return with_guard(door, which, mode, false,
+                          [&](const Guard& guard) { return guard.value(t, at(door).read(x, 0)); });
     }
     static double guard_on(void* door, std::size_t which, Mode mode, double t, const View& x)
     {
@@ -291,14 +290,12 @@ class TableOf {
             return call_acceleration_bound(system(door), which, mode, t, at(door).read(x, 0));
         };
         if constexpr (HasLowerBound<System, X>) {
-            table.lower_bound = [](void* door, std::size_t which, Mode mode, double t,
-                                   const C& x) {
+            table.lower_bound = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
                 return call_lower_bound(system(door), which, mode, t, at(door).read(x, 0));
             };
         }
         if constexpr (HasUpperBound<System, X>) {
-            table.upper_bound = [](void* door, std::size_t which, Mode mode, double t,
-                                   const C& x) {
+            table.upper_bound = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
                 return call_upper_bound(system(door), which, mode, t, at(door).read(x, 0));
             };
         }
@@ -310,8 +307,14 @@ public:
         SystemTable<C> table;
         table.moded = Moded<System, X>;
         table.fixed_dimension = fixed_size<X>() > 0;
-        table.changes_dimension = requires { requires System::changes_dimension; };
-        table.forward_only = requires { requires System::forward_only; };
+        table.changes_dimension = requires
+        {
+            requires System::changes_dimension;
+        };
+        table.forward_only = requires
+        {
+            requires System::forward_only;
+        };
         table.flow = [](void* door, Mode mode, double t, const C& x, C& dxdt) {
             return at(door).flow(mode, t, x, dxdt);
         };

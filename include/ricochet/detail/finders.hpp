@@ -86,8 +86,8 @@ class DetectorTableOf {
 
     static bool clears(Self detector, void* door, const StepState<C>& step, std::uint64_t& calls)
     {
-        const GuardView<System, X> guard(at(door).system(), calls, 0, step.mode,
-                                         Crossing::falling, step.backward);
+        const GuardView<System, X> guard(at(door).system(), calls, 0, step.mode, Crossing::falling,
+                                         step.backward);
         return self(detector).clears(guard, StepToCome<System, X>(at(door), step));
     }
 
@@ -108,9 +108,7 @@ public:
         table.looks_inside = LooksInside<Detector>;
         table.evidence = Detector::evidence;
         table.suspects = [](double sign, double g0, double rate0, double g1, double rate1,
-                            double h) {
-            return Detector::suspects(sign, g0, rate0, g1, rate1, h);
-        };
+                            double h) { return Detector::suspects(sign, g0, rate0, g1, rate1, h); };
         table.leaves_plainly = [](double sign, double s0, double g0, double rate0, double s1,
                                   double g1, double rate1, double touch) {
             return Detector::leaves_plainly(sign, {s0, g0, rate0}, {s1, g1, rate1}, touch);
@@ -136,14 +134,14 @@ public:
 template <class Locator>
 [[nodiscard]] LocatorTable locator_table() noexcept
 {
-    return {.type = written_type<Locator>(),
-            .locate = [](const void* self, GuardPath& path, double lo, double lo_value,
-                         double lo_rate, double hi, double hi_value, double hi_rate,
-                         double tolerance) -> Location {
-                return static_cast<const Locator*>(self)->locate(
-                    path, GuardSample{lo, lo_value, lo_rate}, GuardSample{hi, hi_value, hi_rate},
-                    tolerance);
-            }};
+    return {
+        .type = written_type<Locator>(),
+        .locate = [](const void* self, GuardPath& path, double lo, double lo_value, double lo_rate,
+                     double hi, double hi_value, double hi_rate, double tolerance) -> Location {
+            return static_cast<const Locator*>(self)->locate(
+                path, GuardSample{lo, lo_value, lo_rate}, GuardSample{hi, hi_value, hi_rate},
+                tolerance);
+        }};
 }
 
 }  // namespace ricochet::detail

@@ -51,8 +51,7 @@ template <class X>
 inline constexpr bool fits_registers = is_small<X>&& std::is_trivially_copyable_v<X>;
 
 /// In the place of a system: its flow is called by pointer.
-struct ByPointer {
-};
+struct ByPointer {};
 
 template <class System, class X, class Method>
 class KernelOf {
@@ -94,10 +93,7 @@ class KernelOf {
               backward(step.backward)
         {
         }
-        [[nodiscard]] double time(double s) const noexcept
-        {
-            return start.plus(backward ? -s : s);
-        }
+        [[nodiscard]] double time(double s) const noexcept { return start.plus(backward ? -s : s); }
         void leave(State& step) const noexcept
         {
             step.flow_calls += calls;
@@ -166,14 +162,16 @@ class KernelOf {
     template <class From, class To>
     [[gnu::always_inline]] static void put(const From& from, To& to)
     {
-        [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+        [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
+        {
             ((to[own(I, to)] = from[own(I, from)]), ...);
-        }(std::make_index_sequence<fixed_size<X>()>{});
+        }
+        (std::make_index_sequence<fixed_size<X>()>{});
     }
     [[nodiscard, gnu::always_inline]] static X loaded(const C& from)
     {
         X to;
-        for_each_component(to, [&](auto i) { to[i] = alone(from[own(i, from)]); });
+        for_each_component(to, [&](auto i) { to[i] = from[own(i, from)]; });
         return to;
     }
 
@@ -196,20 +194,18 @@ class KernelOf {
         find_remainder(step, step.h);
     }
 
-    static constexpr std::size_t kept_stages = []
-    {
+    static constexpr std::size_t kept_stages = [] {
         if constexpr (ours) return Stepper::kept_stages;
         return std::size_t{0};
-    }
-    ();
+    }();
 
     /// The end of a step from `w`; false if it is not finite.
     [[gnu::always_inline]] static bool end([[maybe_unused]] Caller& caller, double h, const Y& x0,
                                            const Y& rate0, const Y& remainder, const Y& w,
                                            [[maybe_unused]] const Y& w_rate, Y& x1, Y& rate1)
     {
-        for_each_component(
-            x0, [&](auto i) { x1[i] = x0[i] + (h * rate0[i] + (w[i] + remainder[i])); });
+        for_each_component(x0,
+                           [&](auto i) { x1[i] = x0[i] + (h * rate0[i] + (w[i] + remainder[i])); });
         if constexpr (is_fsal<Stepper>) {
             for_each_component(x0, [&](auto i) { rate1[i] = rate0[i] + w_rate[i]; });
         } else {
@@ -367,18 +363,20 @@ class KernelOf {
         if constexpr (Stepper::has_dense_output) {
             using Ours = RungeKutta<typename Stepper::Coefficients, X>;
             const auto weights = Ours::template weights<InsideOf>(h);
-            for_each_component(x0, [&](auto i) __attribute__((always_inline)) {
-                const double d = Ours::dense(weights, k.data(), w_rate, i);
-                x[i] = x0[i] + (s * rate0[i] + (d + remainder[i]));
-            });
+            for_each_component(
+                x0, [&](auto i) __attribute__((always_inline)) {
+                    const double d = Ours::dense(weights, k.data(), w_rate, i);
+                    x[i] = x0[i] + (s * rate0[i] + (d + remainder[i]));
+                });
         } else {
             const double u = s / h;
             const double value = u * u * (3 - 2 * u);
             const double slope = h * u * u * (u - 1);
-            for_each_component(x0, [&](auto i) __attribute__((always_inline)) {
-                const double d = value * w[i] + slope * (rate1[i] - rate0[i]);
-                x[i] = x0[i] + (s * rate0[i] + (d + remainder[i]));
-            });
+            for_each_component(
+                x0, [&](auto i) __attribute__((always_inline)) {
+                    const double d = value * w[i] + slope * (rate1[i] - rate0[i]);
+                    x[i] = x0[i] + (s * rate0[i] + (d + remainder[i]));
+                });
         }
         return x;
     }
@@ -386,9 +384,8 @@ class KernelOf {
     [[nodiscard, gnu::always_inline]] static bool hardly_moves(const X& x0, const X& x1) noexcept
     {
         bool still = true;
-        for_each_component(x0, [&](auto i) {
-            still &= std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]);
-        });
+        for_each_component(
+            x0, [&](auto i) { still &= std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]); });
         return still;
     }
 
@@ -440,7 +437,8 @@ class KernelOf {
                 run.error = finite ? worst_ratio(x0, x1, error, run.rtol, run.atol)
                                    : std::numeric_limits<double>::quiet_NaN();
                 if (rule.accepts(run.error)) {
-                    next = std::min(h * std::min(largest, rule.factor(run.error, order)), run.h_max);
+                    next =
+                        std::min(h * std::min(largest, rule.factor(run.error, order)), run.h_max);
                     break;
                 }
                 const double shorter = h * rule.factor(run.error, order);
@@ -488,12 +486,13 @@ class KernelOf {
                 g_rate0 = g_rate1;
             }
             caller.start = caller.start.after(caller.backward ? -h : h);
-            for_each_component(x0, [&](auto i) __attribute__((always_inline)) {
-                const TwoSum sum = two_sum(x0[i], h * rate0[i] + (w[i] + remainder[i]));
-                x0[i] = sum.value;
-                remainder[i] = sum.remainder;
-                rate0[i] = rate1[i];
-            });
+            for_each_component(
+                x0, [&](auto i) __attribute__((always_inline)) {
+                    const TwoSum sum = two_sum(x0[i], h * rate0[i] + (w[i] + remainder[i]));
+                    x0[i] = sum.value;
+                    remainder[i] = sum.remainder;
+                    rate0[i] = rate1[i];
+                });
             ++run.steps;
             h = next;
         }
@@ -573,8 +572,9 @@ template <class X>
 template <class System, class X, class Method>
 inline const StepKernel<CoreState<X>> kernel_of = KernelOf<System, X, Method>::make();
 template <class System, class X, class Method>
-requires(NameOf<Method>::known) inline constexpr StepKernel<CoreState<X>>
-    kernel_of<System, X, Method> = KernelOf<System, X, Method>::make();
+requires(
+    NameOf<Method>::known) inline constexpr StepKernel<CoreState<X>> kernel_of<System, X, Method> =
+    KernelOf<System, X, Method>::make();
 
 /// The kernel of a method for a system: the library's own where the flow is no small part of a
 /// step, or nothing is inlined.

@@ -27,8 +27,8 @@ struct QuietRun {
     double end = 0;  ///< [s] of the run, or of the next time event: no step reaches it
     double rtol = 0;
     double atol = 0;
-    double h_min = 0;  ///< [s]
-    double h_max = 0;  ///< [s]
+    double h_min = 0;    ///< [s]
+    double h_max = 0;    ///< [s]
     bool looks = false;  ///< inside each step, once
     std::uint64_t most_steps = 0;
     const std::atomic<bool>* cancelled = nullptr;
@@ -41,8 +41,8 @@ struct QuietRun {
 
     // --- what was done ---
     QuietEnd why = QuietEnd::due;
-    double error = 0;        ///< of a failed step
-    bool repeated = false;   ///< it is an attempt after a failed one
+    double error = 0;       ///< of a failed step
+    bool repeated = false;  ///< it is an attempt after a failed one
     std::uint64_t steps = 0;
     std::uint64_t rejected = 0;
     std::uint64_t guard_calls = 0;

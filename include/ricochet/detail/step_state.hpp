@@ -156,7 +156,10 @@ public:
         }
     }
 
-    [[nodiscard]] std::size_t size() const noexcept { return step_ ? step_->x0.size() : all_->size(); }
+    [[nodiscard]] std::size_t size() const noexcept
+    {
+        return step_ ? step_->x0.size() : all_->size();
+    }
 
 private:
     struct Middle {

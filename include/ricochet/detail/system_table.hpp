@@ -111,7 +111,8 @@ public:
     }
 
     /// Whether a reset may leave `after` where the state was `before`.
-    [[nodiscard]] bool fits_dimension(const X& before, const X& after, bool same_mode) const noexcept
+    [[nodiscard]] bool fits_dimension(const X& before, const X& after,
+                                      bool same_mode) const noexcept
     {
         if constexpr (fixed_size<X>() > 0) {
             return true;

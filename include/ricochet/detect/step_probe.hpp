@@ -14,8 +14,8 @@
 #include <limits>
 #include <utility>
 
-#include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/hybrid/step.hpp"
 
@@ -284,8 +284,7 @@ private:
             step_->flow(s, space_->x, space_->dxdt);
         }
         placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
-        return {guard_->value(t, space_->x),
-                guard_->rate(t, space_->x, space_->dxdt, step_->h())};
+        return {guard_->value(t, space_->x), guard_->rate(t, space_->x, space_->dxdt, step_->h())};
     }
 
     [[nodiscard]] Point point_at(double s) override
@@ -355,8 +354,8 @@ private:
         const double value = guard_->value(t, view(s));
         if constexpr (Guard::template sees_rate<View, RateView>) {
             if (sees_rate()) {
-                return {value, guard_->rate(t, view(s), component_view<true>(*step_, s),
-                                            step_->h())};
+                return {value,
+                        guard_->rate(t, view(s), component_view<true>(*step_, s), step_->h())};
             }
         }
         const double delta = 1e-5 * step_->h();
@@ -365,7 +364,11 @@ private:
 
     [[nodiscard]] static bool is_rated(const Guard& guard) noexcept
     {
-        if constexpr (requires { { guard.is_rated() } -> std::same_as<bool>; }) {
+        if constexpr (requires {
+                          {
+                              guard.is_rated()
+                              } -> std::same_as<bool>;
+                      }) {
             return guard.is_rated();
         } else if constexpr (requires { Guard::is_rated; }) {
             return Guard::is_rated;

@@ -81,8 +81,8 @@ class PartsOfRun {
     }
 
 public:
-    PartsOfRun(const System& system, const X& x0, const Stepping& stepping, const Detector& detector,
-             const Locator& locator)
+    PartsOfRun(const System& system, const X& x0, const Stepping& stepping,
+               const Detector& detector, const Locator& locator)
         : door_(system, x0), stepping_(stepping), detector_(detector), locator_(locator)
     {
         check_bound_declarations<System, X>();
@@ -90,7 +90,10 @@ public:
     PartsOfRun(const PartsOfRun&) = delete;
     PartsOfRun& operator=(const PartsOfRun&) = delete;
 
-    [[nodiscard]] Door<System, X>& door() noexcept { return door_; }
+    [[nodiscard]] Door<System, X>& door() noexcept
+    {
+        return door_;
+    }
     [[nodiscard]] RunSetup<C> setup() noexcept
     {
         return {.system = &system_table<System, X>,

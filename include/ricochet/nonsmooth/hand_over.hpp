@@ -227,7 +227,6 @@ public:
     EventLoopBy(const System& system, const X& x, const Options& options)
         : simulation_(system, x, options)
     {
-        this->run_ = &simulation_.run();
         refresh();
     }
     bool step() override
@@ -242,6 +241,7 @@ private:
     void refresh()
     {
         this->t_ = simulation_.t();
+        this->run_ = &simulation_.run();
         this->x_ = &simulation_.x();
         this->mode_ = simulation_.mode();
     }

@@ -1,0 +1,140 @@
+// Arming: on which side every guard goes on, and which of them fire at once.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline void Loop<X, single>::enable_guards()
+{
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        GuardRecord& record = bank_[i];
+        const bool enabled = system_.enabled_in(i, step_.mode());
+        record.newly_enabled = enabled && !record.enabled;
+        if (record.newly_enabled) record.last = std::numeric_limits<double>::quiet_NaN();
+        record.enabled = enabled;
+    }
+    bank_.heed_enabled();
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::arm_all()
+{
+    double widest = 0;
+    for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].fired = false;
+    for (const std::size_t i : search_.members()) {
+        bank_[i].fired = true;
+        widest = std::max(widest, bank_[i].band);
+    }
+    search_.members().clear();
+    if (system_->moded) enable_guards();
+    bank_.await_nobody();
+    newly_armed_ = true;
+    watching_ = false;
+    last_h_ = h_next_;
+    bank_.begin_phase(step_.time(0));
+    bank_.sample_start(step_, calls(), h_next_);
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        if (!bank_[i].enabled) {
+            bank_.arm(i, Side::plateau);
+            continue;
+        }
+        if (!arm_one(i, widest)) return;
+    }
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::arm_one(std::size_t i, double widest)
+{
+    GuardRecord& record = bank_[i];
+    const double g = bank_.g0(i);
+    if (!std::isfinite(g)) {
+        end(Outcome::non_finite, i);
+        return false;
+    }
+    const Side before = record.side != Side::plateau ? record.side : record.awaited;
+    if (record.fired && record.estimated && std::fabs(g) > record.band) {
+        record.band = residue_of(i, step_.time(0));
+    }
+    record.estimated = false;
+    const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
+    const bool on_surface = std::fabs(g) <= band;
+    record.departs = on_surface || record.fired || record.newly_enabled;
+    const Side side = on_surface ? heading(i) : side_of(g);
+    bank_.arm(i, side);
+    record.from = 0;
+    if (side == Side::plateau) {
+        const bool begins = record.newly_enabled && record.acting;
+        const Side from = record.info.unilateral ? Side::above
+                          : begins               ? side_left_by(record.info.crossing, before)
+                                                 : before;
+        bank_.await(i, record.fired && !record.info.unilateral ? Side::plateau : from);
+    }
+    const bool kept_out = record.info.unilateral && side == Side::below;
+    const bool flipped =
+        side != Side::plateau && side == opposite(before) && counts(before, record.info.crossing);
+    const bool pressed = kept_out && on_surface;
+    const bool arrived = on_surface && counts(opposite(side), record.info.crossing);
+    const bool fires = record.fired           ? pressed
+                       : record.newly_enabled ? record.acting && (arrived || pressed)
+                                              : flipped;
+    if (fires && counts_here(i)) {
+        if (record.acting) {
+            search_.members().push_back(i);
+        } else {
+            record_jump(i, before);
+        }
+    }
+    const bool is_new = record.fired || record.newly_enabled;
+    const bool outside = kept_out && !on_surface && g < 0 && is_new;
+    if (outside) end(Outcome::outside_mode, i);
+    return !outside;
+}
+
+template <class X, bool single>
+inline Side Loop<X, single>::heading(std::size_t i)
+{
+    const bool known = bank_[i].fired && bank_[i].rated_over == h_next_;
+    double rate = known ? bank_[i].departure : bank_.complete_rate0(i, step_, h_next_, calls());
+    if (known) bank_.set_rate0(i, rate);
+    bank_[i].rated_over = stale;
+    if (!system_->rated) {
+        if (bank_[i].fired && bank_[i].turned && bank_[i].intervals.is_low()) {
+            rate = bank_[i].departure;
+            if (rate == 0) {
+                // Too slow to be told: its reset has sent it back, and it has its next event
+                // on the way down again.
+                const Side back = bank_[i].last_side;
+                bank_.set_rate0(i, sign_of(back) * std::numeric_limits<double>::min());
+                return back;
+            }
+            bank_.set_rate0(i, rate);
+        }
+    }
+    if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
+    if (rate != 0 && bank_[i].fired) return side_of(rate);
+    // The second derivative has the sign of the rate a little later. A rate that it
+    // undoes within rounding of the time is none; nor is one that is all rounding.
+    const double delta = 1e-6 * h_next_;
+    X& later = resets_.after();
+    X& rate_later = resets_.scratch();
+    assign(later, step_.x0());
+    assign(rate_later, step_.x0());
+    move(later, step_.x0(), delta, step_.rate0());
+    step_.flow(delta, later, rate_later);
+    const double next =
+        bank_.view(i, step_.mode(), calls()).rate(step_.time(delta), later, rate_later, h_next_);
+    const double moment =
+        64 * std::numeric_limits<double>::epsilon() * (std::fabs(step_.time(0)) + h_next_);
+    double noise = std::fabs(next - rate) * std::min(moment / delta, 0.5);
+    if (!system_->rated) {
+        if (!bank_[i].fired) noise = std::max(noise, rounding_of(i) / (1e-5 * h_next_));
+    }
+    if (std::fabs(rate) > noise) return side_of(rate);
+    const Side side = std::fabs(next) > noise ? side_of(next) : Side::plateau;
+    bank_.set_rate0(i, sign_of(side) * std::numeric_limits<double>::min());
+    return side;
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,138 @@
+// Steps whose checks are put off.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline void Loop<X, single>::advance_with_check(double remaining)
+{
+    if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
+    watching_ = newly_armed_ = true;
+    planner_->look_back(run_.statistics);
+    if (!take_step(remaining)) return;
+    if (handle_events()) return;
+    pass();
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& how)
+{
+    if (planner_->steps_aside()) return advance_with_check(remaining);
+    if (newly_armed_) {
+        newly_armed_ = watching_ = false;
+        planner_->begin(step_, bank_);
+    }
+    const double proposed = h_next_;
+    const std::uint64_t rejected = run_.statistics.rejected;
+    if (!take_step(remaining)) {
+        if (is_tentative()) {
+            // The failure may lie beyond an event: without looking ahead it will be seen.
+            ended_ = false;
+            run_.outcome = Outcome::reached_end;
+            take_back();
+        }
+        return;
+    }
+    const double t = step_.time(step_.h());
+    const double ends = backward_ ? -t : t;
+    if (planner_->covers(ends)) {
+        planner_->sample_sleeper(step_, bank_, run_.statistics);
+        if (planner_->wrong()) return name_wrong_bound();
+        count_put_off(1);
+        return pass();
+    }
+    remember_step(proposed, rejected);
+    planner_->overrun(ends);
+    if (may_go_on(ends, how)) return accept();
+    close_stretch();
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::remember_step(double proposed, std::uint64_t rejected)
+{
+    auto& tentative = planner_->steps().add();
+    step_.store(tentative.start);
+    tentative.h_next = proposed;
+    tentative.last_h = last_h_;
+    tentative.samples = next_sample_;
+    tentative.pieces = run_.solution.size();
+    tentative.rejected = rejected;
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::may_go_on(double ends, const Advance& how)
+{
+    if (careful_steps_ > 0) {
+        --careful_steps_;
+        return false;
+    }
+    const bool must_close = !how.look_ahead || planner_->steps().full() || is_last_ ||
+                            time_event_due_ || run_.statistics.steps + 1 >= options_.max_steps ||
+                            (how.to_next_sample && holds_sample()) ||
+                            !planner_->hopes(ends + h_next_);
+    return !must_close;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::close_stretch()
+{
+    const std::size_t steps = planner_->steps().size();
+    const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
+    if (planner_->wrong()) {
+        if (doubt != Planner<X, single>::none && doubt + 1 < steps) take_back_to(doubt);
+        return name_wrong_bound();
+    }
+    if (doubt == Planner<X, single>::none) {
+        count_put_off(steps);
+        planner_->steps().clear();
+        return pass();
+    }
+    count_put_off(doubt);
+    if (doubt + 1 < steps) return take_back_to(doubt);
+    planner_->steps().clear();
+    judge();
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::judge()
+{
+    planner_->wake(step_, bank_, run_.statistics, last_h_);
+    bool suspicious = false;
+    for (const std::size_t i : planner_->judged()) {
+        suspicious = suspicious || bank_.suspicious(i, step_.h());
+    }
+    if (suspicious) {
+        if (search(false)) return;
+    } else {
+        run_.statistics.evidence.add(finders_.detector.evidence);
+        for (const std::size_t i : planner_->judged()) bank_.leave_plateau(i);
+    }
+    planner_->settle(step_, bank_);
+    if (planner_->wrong()) return name_wrong_bound();
+    pass();
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::take_back_to(std::size_t k)
+{
+    const auto& tentative = planner_->steps()[k];
+    // The step in hand has not been accepted.
+    const std::size_t taken = planner_->steps().size() - 1 - k;
+    ++run_.statistics.rollbacks;
+    run_.statistics.repeated_steps += taken;
+    run_.statistics.steps -= taken;
+    run_.statistics.rejected = tentative.rejected;
+    step_.restart(tentative.start);
+    h_next_ = tentative.h_next;
+    last_h_ = tentative.last_h;
+    for (; next_sample_ > tentative.samples; --next_sample_) {
+        run_.trajectory.t.pop_back();
+        run_.trajectory.x.pop_back();
+    }
+    run_.solution.shrink(tentative.pieces);
+    planner_->steps().clear();
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,55 @@
+// Steps in a row in which nothing happens.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline bool Loop<X, single>::run_quietly()
+{
+    const bool time_event_first = timed_ && step_.until(time_event_) <= step_.until(options_.t_end);
+    QuietRun quiet{.end = time_event_first ? time_event_ : options_.t_end,
+                   .rtol = options_.rtol,
+                   .atol = options_.atol,
+                   .h_min = options_.h_min,
+                   .h_max = options_.h_max,
+                   .looks = bank_.looks() && options_.look_inside,
+                   .most_steps = next_review_ - run_.statistics.steps,
+                   .cancelled = options_.cancelled,
+                   .h_next = h_next_};
+    bank_.lend(quiet);
+    setup_.quiet(system_.door(), step_.lend(), quiet);
+    bank_.take_back(quiet);
+    h_next_ = error_controlled_ || quiet.why == QuietEnd::due ? quiet.h_next : h_next_;
+    if (quiet.steps > 0) last_h_ = step_.h();
+    Statistics& counts = run_.statistics;
+    counts.steps += quiet.steps;
+    counts.rejected += quiet.rejected;
+    counts.guard_calls += quiet.guard_calls;
+    if (bank_.size() > 0) add_evidence(finders_.detector.evidence, quiet.steps);
+    if (quiet.why == QuietEnd::due) return false;
+    is_last_ = time_event_due_ = asked_ = false;
+    if (quiet.why == QuietEnd::failed) {
+        const double h = step_.h();
+        const bool taken = error_controlled_
+                               ? retry(h, h, quiet.repeated ? 1 : rule_.largest, quiet.error)
+                               : take_fixed_step(h, true);
+        if (!taken || (guarded_ && handle_events())) {
+            calm_ = false;
+            return true;
+        }
+    } else if (deserves_search(quiet.why == QuietEnd::moving)) {
+        if (search(false)) {
+            calm_ = false;
+            return true;
+        }
+    } else {
+        add_evidence(finders_.detector.evidence, 1);
+        bank_.pass_on();
+    }
+    pass();
+    return true;
+}
+
+}  // namespace ricochet::detail

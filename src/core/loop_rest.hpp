@@ -1,0 +1,129 @@
+// Accumulating events, and what becomes of the motion there.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline bool Loop<X, single>::accumulates(bool located)
+{
+    bool rested = false;
+    for (const std::size_t i : search_.members()) {
+        ShrinkingIntervals& intervals = bank_[i].intervals;
+        const bool again = std::exchange(bank_[i].again, false);
+        const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
+        const double tolerance = resolution_.tolerance(step_.start().value);
+        const bool resetting = resets_any_ && bank_[i].info.resets;
+        if (resetting && located) intervals.blame(search_.where(i).error);
+        if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
+            come_to_rest(i, stalls ? 0 : intervals.remainder(), intervals.error());
+            rested = true;
+        }
+    }
+    if (rested && !ended_ && !resting_) arm_all();
+    return rested;
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::fades(std::size_t i)
+{
+    GuardRecord& record = bank_[i];
+    record.turned = false;
+    record.rated_over = stale;
+    record.intervals.depart(infinity, false);
+    if (record.info.boolean || !system_.enabled_in(i, step_.mode())) {
+        return false;
+    }
+    double rate = departure(i, h_next_);
+    const bool low = record.intervals.is_low_at(rate);
+    const double rounding = low ? rounding_of(i) : 0;
+    if (low && is_away(i, rounding)) return false;
+    bool lost = false;
+    if (!system_->rated) {
+        if (low) {
+            double part = 1e-5 * h_next_;
+            if (std::fabs(rate) * part <= rounding) {
+                part = std::max(part, low_part * record.intervals.interval());
+                rate = departure(i, 1e5 * part);
+            }
+            // A difference of a unit in the last place does not tell which way it goes.
+            lost = std::fabs(rate) * part <= rounding / 8;
+            if (lost) rate = 0;
+        }
+    }
+    record.departure = rate;
+    record.rated_over = low ? stale : h_next_;
+    record.turned = lost || sign_of(record.last_side) * rate > 0;
+    if (record.turned) record.intervals.depart(rate, low);
+    return low && record.intervals.fades(rounding);
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::is_away(std::size_t i, double rounding)
+{
+    GuardRecord& record = bank_[i];
+    const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
+    if (!(sign_of(record.last_side) * g > 1024 * rounding)) return false;
+    record.turned = true;
+    return true;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::come_to_rest(std::size_t i, double ahead, double error)
+{
+    if (!system_->rest) return end(Outcome::zeno, i);
+    {
+        if (resting_ || ended_) return;
+        const X before = step_.x0();
+        const Mode mode = step_.mode();
+        ahead = std::min(ahead, step_.until(options_.t_end));
+        if (timed_) ahead = std::min(ahead, step_.until(time_event_));
+        const double t = step_.time(ahead);
+        X after = before;
+        const Mode mode_after = system_->rest(system_.door(), i, mode, t, after);
+        ++run_.statistics.events;
+        record({.t = t,
+                .kind = EventKind::accumulation,
+                .guard = i,
+                .mode_before = mode,
+                .mode_after = mode_after,
+                .before = before,
+                .after = after,
+                .bracket = {step_.time(0), t},
+                .slope = 0,
+                .error = error});
+        const std::size_t modes = system_.modes();
+        if (modes > 0 && mode_after >= modes) return end(Outcome::unknown_mode, i);
+        if (!fits_dimension(before, after, mode_after == mode)) {
+            return end(Outcome::wrong_dimension, i);
+        }
+        if (!all_finite(after) || after.size() == 0) {
+            return end(Outcome::non_finite, i);
+        }
+        step_.restart(ahead, 0, after, mode_after);
+        for (const std::size_t k : search_.members()) {
+            bank_[k].rated_over = stale;
+        }
+        bank_[i].intervals = {};
+        bank_[i].band = 0;
+        resting_ = bank_.size() == 1 && !system_->moded;
+        if (resting_ && !stays_on_surface(i)) end(Outcome::zeno, i);
+    }
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::stays_on_surface(std::size_t i)
+{
+    const auto guard = bank_.view(i, step_.mode(), calls());
+    const double span = step_.until(options_.t_end);
+    const double rounding = rounding_of(i);
+    const double g = guard.value(step_.time(0), step_.x0());
+    for (const double part : {0.001, 0.0381966, 0.381966, 1.0}) {
+        const double later = guard.value(step_.time(part * span), step_.x0());
+        if (!(std::fabs(later - g) <= rounding)) return false;
+    }
+    return true;
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,81 @@
+// What a run is saved by.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline Snapshot Loop<X, single>::save()
+{
+    Snapshot snapshot;
+    snapshot.run = properties();
+    visit_state(SnapshotWriter(snapshot));
+    return snapshot;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::restore(const Snapshot& snapshot)
+{
+    const Snapshot old = save();
+    require_same_run(snapshot.run, old.run);
+    try {
+        SnapshotReader reader(snapshot);
+        visit_state(reader);
+        reader.finish();
+        refuse_bad_place();
+    } catch (const std::invalid_argument&) {
+        visit_state(SnapshotReader(old));
+        throw;
+    }
+    step_.restart(place_);
+    next_review_ = 0;
+    show_all();
+    if (guarded_) search_.begin(step_.x0());
+    if (puts_off_) planner_->restore(bank_);
+}
+
+template <class X, bool single>
+template <class Visitor>
+inline void Loop<X, single>::visit_state(Visitor&& visit)
+{
+    if constexpr (std::remove_cvref_t<Visitor>::saves) place_ = step_.place();
+    visit(place_.t.value);
+    visit(place_.t.remainder);
+    visit(place_.mode);
+    for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
+    visit(h_next_);
+    visit(first_step_);
+    visit(flight_start_);
+    visit(longest_step_);
+    visit(time_event_);
+    visit(resting_);
+    visit(ended_);
+    visit(run_.outcome);
+    visit_samples(visit);
+    if (guarded_) bank_.visit(visit);
+    if (puts_off_) {
+        visit(last_h_);
+        visit(newly_armed_);
+        planner_->visit(visit);
+    }
+}
+
+template <class X, bool single>
+template <class Visitor>
+inline void Loop<X, single>::visit_samples(Visitor&& visit)
+{
+    const auto& times = options_.sample_times;
+    double written = next_sample_ > 0 ? times[next_sample_ - 1] : -infinity;
+    if (backward_ && next_sample_ == 0) written = infinity;
+    visit(written);
+    if constexpr (!std::remove_cvref_t<Visitor>::saves) {
+        next_sample_ = 0;
+        while (next_sample_ < times.size() && (lies_before(times[next_sample_], place_.t.value) ||
+                                               !lies_before(written, times[next_sample_]))) {
+            ++next_sample_;
+        }
+    }
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,255 @@
+// Steps of the loop: their lengths, and what is done where one cannot be taken.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline bool Loop<X, single>::advance()
+{
+    for (;;) {
+        showing_sample_ = shown_samples_ < run_.trajectory.t.size();
+        if (showing_sample_) {
+            ++shown_samples_;
+            return true;
+        }
+        if (std::exchange(shown_events_, run_.statistics.events) != run_.statistics.events) {
+            return true;
+        }
+        if (ended_) return false;
+        do {
+            advance_one({.to_next_sample = true});
+        } while (!ended_ && is_tentative());
+    }
+}
+
+template <class X, bool single>
+inline Run<X> Loop<X, single>::take()
+{
+    while (!ended_) {
+        // Where one event follows the other a quiet run would be over at its first step.
+        const std::uint64_t events = run_.statistics.events;
+        if (calm_ && may_run_quietly() && run_quietly()) continue;
+        advance_one({});
+        calm_ = run_.statistics.events == events;
+    }
+    return finish();
+}
+
+template <class X, bool single>
+inline Run<X> Loop<X, single>::finish()
+{
+    if (!ended_) run_.outcome = Outcome::cancelled;
+    run_.t = step_.start().value;
+    run_.x = step_.x0();
+    run_.mode = step_.mode();
+    run_.statistics.flow_calls = step_.flow_calls();
+    run_.statistics.resteps = step_.resteps();
+    if (puts_off_) planner_->add_counts(run_.statistics);
+    run_.statistics.disabled += search_.disabled;
+    emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
+    ended_ = true;
+    return std::move(run_);
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::advance_one(const Advance& how)
+{
+    const double remaining = step_.until(options_.t_end);
+    if (!(remaining > 0)) return reach_end();
+    if (run_.statistics.steps >= next_review_ && !may_take_more_steps()) return;
+    if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+        if (is_tentative()) take_back();
+        return end(Outcome::cancelled);
+    }
+    if (resting_) return hold(remaining);
+    if (puts_off_) return advance_by_plan(remaining, how);
+    if (!take_step(remaining)) return;
+    if (guarded_ && handle_events()) return;
+    pass();
+}
+
+template <class X, bool single>
+bool Loop<X, single>::may_take_more_steps()
+{
+    const std::uint64_t steps = run_.statistics.steps;
+    if (steps >= options_.max_steps) {
+        end(Outcome::step_limit);
+    } else if (next_review_ > 0 && !is_tentative() && stands_still()) {
+        end(Outcome::stalled);
+    }
+    reviewed_ = step_.start().value;
+    const std::uint64_t stride = options_.stall_steps;
+    next_review_ =
+        stride > 0 && options_.max_steps - steps > stride ? steps + stride : options_.max_steps;
+    return !ended_;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::reach_end()
+{
+    if (puts_off_) {
+        planner_->look_last(step_, bank_, run_.statistics);
+        if (planner_->wrong()) return name_wrong_bound();
+    }
+    end(Outcome::reached_end);
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::accept()
+{
+    emit_samples(step_.h());
+    record_step(step_.h());
+    if (is_last_) {
+        step_.accept_at(options_.t_end);
+    } else if (time_event_due_) {
+        step_.accept_at(time_event_);
+    } else {
+        step_.accept();
+    }
+    last_h_ = step_.h();
+    ++run_.statistics.steps;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::add_evidence(Evidence evidence, std::uint64_t steps) noexcept
+{
+    EvidenceCounts& counts = run_.statistics.evidence;
+    switch (evidence) {
+        case Evidence::proved: counts.proved += steps; return;
+        case Evidence::checked: counts.checked += steps; return;
+        case Evidence::gated: counts.gated += steps; return;
+        case Evidence::assumed: counts.assumed += steps; return;
+    }
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::take_step(double remaining)
+{
+    double longest = remaining;
+    time_event_due_ = false;
+    if (timed_) {
+        const double ahead = step_.until(time_event_);
+        if (ahead <= remaining) {
+            longest = ahead;
+            // A remainder of a millionth of a step is rounding, not a step.
+            time_event_due_ = h_next_ * (1 + 1e-6) >= longest;
+        }
+    }
+    const bool to_the_end = h_next_ * (1 + 1e-6) >= longest;
+    is_last_ = to_the_end && longest == remaining;
+    const double h = to_the_end ? longest : h_next_;
+    return error_controlled_ ? take_controlled_step(h, h_next_) : take_fixed_step(h);
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::take_fixed_step(double h, bool failed)
+{
+    for (;;) {
+        if (!std::exchange(failed, false) && step_.attempt(h)) return true;
+        const double ahead = time_to_surface().ahead;
+        if (!(ahead <= h)) break;
+        if (ahead < smallest_step()) {
+            if (happen_where_flow_ends(h)) return false;
+            break;
+        }
+        is_last_ = time_event_due_ = false;
+        h = 0.9 * ahead;
+    }
+    end_step(Outcome::non_finite);
+    return false;
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::retry(double h, double proposed, double largest, double error)
+{
+    const int order = step_.error_order() + 1;
+    for (;;) {
+        if (rule_.accepts(error)) {
+            const double next = h * std::min(largest, rule_.factor(error, order));
+            const bool cut = largest > 1 && h < proposed;
+            h_next_ = std::min(cut ? std::max(next, proposed) : next, options_.h_max);
+            return true;
+        }
+        ++run_.statistics.rejected;
+        const bool finite = std::isfinite(error);
+        h = finite ? h * rule_.factor(error, order) : shorten_to_surface(h);
+        is_last_ = false;
+        time_event_due_ = false;
+        largest = 1;
+        if (h < smallest_step()) {
+            if (happen_where_flow_ends(h)) return false;
+            end_step(finite ? Outcome::step_underflow : Outcome::non_finite);
+            return false;
+        }
+        error = step_.attempt(h, options_.rtol, options_.atol);
+    }
+}
+
+template <class X, bool single>
+inline auto Loop<X, single>::time_to_surface() -> Approach
+{
+    Approach first;
+    if (puts_off_) return first;
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        const GuardRecord& record = bank_[i];
+        if (!record.enabled || record.info.boolean) continue;
+        if (!counts(record.side, record.info.crossing)) continue;
+        const double g = bank_.g0(i);
+        const double rate = approach_rate(i);
+        const double ahead = g * rate < 0 ? -g / rate : infinity;
+        if (ahead < first.ahead) first = {i, ahead};
+    }
+    return first;
+}
+
+template <class X, bool single>
+inline double Loop<X, single>::approach_rate(std::size_t i)
+{
+    double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+    if (!system_->rated) {
+        // Over a short step the rounding of the state may swallow the difference.
+        double scale = h_next_;
+        for (int k = 0; rate == 0 && k < 12; ++k) rate = departure(i, scale *= 16);
+    }
+    return rate;
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::happen_where_flow_ends(double h)
+{
+    if (puts_off_) return false;
+    const Approach approach = time_to_surface();
+    const std::size_t i = approach.guard;
+    if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !counts_here(i)) return false;
+    if (!bank_[i].acting) {
+        record_jump(i, bank_[i].side);
+        return false;
+    }
+    for (std::size_t k = 0; k < bank_.size(); ++k) bank_[k].band = 0;
+    bank_[i].band = std::fabs(bank_.g0(i));
+    search_.members().clear();
+    search_.members().push_back(i);
+    cascade();
+    return true;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::hold(double remaining)
+{
+    double until = options_.t_end;
+    time_event_due_ = false;
+    if (timed_) {
+        time_event_due_ = step_.until(time_event_) <= remaining;
+        if (time_event_due_) until = time_event_;
+    }
+    emit_held_samples(until);
+    step_.hold(until);
+    if (time_event_due_) {
+        step_.refresh();
+        apply_time_event();
+    }
+}
+
+}  // namespace ricochet::detail
