@@ -1,7 +1,7 @@
-#include "../any_system.hpp"
 #include "entries.hpp"
-#include "scenes.hpp"
 #include "problems/planar_arm.hpp"
+#include "run_system.hpp"
+#include "scenes.hpp"
 
 namespace ricochet::app {
 
@@ -34,8 +34,7 @@ std::vector<double> start(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(arm_of(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(arm_of(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
 }  // namespace

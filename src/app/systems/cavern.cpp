@@ -1,7 +1,7 @@
 #include "problems/cavern.hpp"
 
-#include "../any_system.hpp"
 #include "entries.hpp"
+#include "run_system.hpp"
 #include "scenes.hpp"
 
 namespace ricochet::app {
@@ -36,8 +36,8 @@ std::vector<double> start(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(cavern_of(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(cavern_of(settings.parameters), start(settings.parameters), settings,
+                      repeats);
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 #include "ricochet/systems/coulomb_oscillator.hpp"
 
-#include "../any_system.hpp"
 #include "../input.hpp"
 #include "entries.hpp"
 #include "friction_inclusion.hpp"
+#include "run_system.hpp"
 
 namespace ricochet::app {
 
@@ -46,8 +46,7 @@ TimedRun run(const RunSettings& settings, int repeats)
                                                      .static_friction = p[static_friction]}),
                               {p[position], p[velocity]}, settings, repeats);
     }
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
 /// From rest on the right; else none are known.

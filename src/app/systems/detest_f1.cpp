@@ -1,7 +1,7 @@
 #include "problems/detest_f1.hpp"
 
-#include "../any_system.hpp"
 #include "entries.hpp"
+#include "run_system.hpp"
 
 namespace ricochet::app {
 
@@ -14,7 +14,7 @@ std::vector<double> start(const std::vector<double>& /*p*/)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(DetestF1{}), start(settings.parameters), settings, repeats);
+    return run_system(DetestF1{}, start(settings.parameters), settings, repeats);
 }
 
 }  // namespace

@@ -35,8 +35,8 @@ std::vector<double> start(const std::vector<double>& p)
 TimedRun run(const RunSettings& settings, int repeats)
 {
     const auto& p = settings.parameters;
-    return run_inclusion<Fehlberg78>(system(p), Eigen::Vector3d(p[voltage_1], p[voltage_2], p[coil_current]),
-                         settings, repeats);
+    return run_inclusion<Fehlberg78>(
+        system(p), Eigen::Vector3d(p[voltage_1], p[voltage_2], p[coil_current]), settings, repeats);
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 #include <algorithm>
 
-#include "../any_system.hpp"
 #include "entries.hpp"
-#include "scenes.hpp"
 #include "problems/least_eigenvalue.hpp"
+#include "run_system.hpp"
+#include "scenes.hpp"
 
 namespace ricochet::app {
 
@@ -33,8 +33,8 @@ std::vector<double> start(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(eigenvalue_of(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(eigenvalue_of(settings.parameters), start(settings.parameters), settings,
+                      repeats);
 }
 
 }  // namespace

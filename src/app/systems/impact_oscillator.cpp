@@ -1,7 +1,7 @@
 #include "ricochet/systems/impact_oscillator.hpp"
 
-#include "../any_system.hpp"
 #include "entries.hpp"
+#include "run_system.hpp"
 
 namespace ricochet::app {
 
@@ -24,8 +24,7 @@ std::vector<double> start(const std::vector<double>& /*p*/)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
 std::vector<double> exact_events(const std::vector<double>& p, double t_end)

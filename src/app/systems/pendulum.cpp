@@ -1,8 +1,8 @@
 #include "ricochet/systems/pendulum.hpp"
 
-#include "../any_system.hpp"
 #include "../input.hpp"
 #include "entries.hpp"
+#include "run_system.hpp"
 
 namespace ricochet::app {
 
@@ -22,8 +22,7 @@ std::vector<double> start(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
 /// From rest; else none are known.

@@ -1,20 +1,24 @@
-// From settings to the templates: every detector for one system.
-//
-// Detectors are compiled, since detection is the inner loop; methods and locators are chosen at run
-// time. Included once per system.
+// From settings to a run: every method, detector and locator for one system. Included once per
+// system.
 #pragma once
 
 #include <chrono>
+#include <initializer_list>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "../input.hpp"
 #include "../registry.hpp"
 #include "ricochet/detail/ballistic_line.hpp"
+#include "ricochet/detail/features.hpp"
 #include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/certified.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detail/features.hpp"
 #include "ricochet/detect/verified.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
@@ -49,34 +53,58 @@ TimedRun with_stepping(const RunSettings& settings, Use&& use)
                                : use(ErrorControlled<MethodByName>{method});
 }
 
+/// Calls `use` with the gate of the settings.
+/// @throws BadInput for a gate that does not fit the system.
+template <class System, class X, class Use>
+TimedRun with_gate(const RunSettings& settings, Use&& use)
+{
+    const Model& model = settings.gate.value();
+    const bool horizon = model.kind == "gate-horizon";
+    const bool blind = settings.detector == DetectorKind::calibrated && horizon;
+    if (!blind && !Bounded<System, X>) {
+        throw BadInput("the " + std::string(name(settings.detector)) +
+                       " gate closes stretches by bounds, which this system does not declare; "
+                       "expected --gate calibrated with a horizon gate");
+    }
+    try {
+        if (settings.detector == DetectorKind::certified) return use(Certified<>(model));
+        if (settings.detector == DetectorKind::verified) return use(Foreseen<>(gates::Gate(model)));
+        if (horizon) return use(Calibrated<>(gates::Gate(model)));
+        return use(CalibratedBounds<>(gates::Gate(model)));
+    } catch (const std::invalid_argument& error) {
+        throw BadInput("model '" + settings.model.string() + "': " + error.what());
+    }
+}
+
 /// Calls `use` with the detector of the settings.
-/// @throws std::logic_error for `line` where the system has no closed curvature.
+/// @throws std::logic_error for one that the system's entry does not offer.
 template <class System, class X, class Use>
 TimedRun with_detector(const RunSettings& settings, Use&& use)
 {
+    if (settings.gate) return with_gate<System, X>(settings, use);
+    if constexpr (fixed_guard_count<System, X>() == 1) {
+        if (settings.detector == DetectorKind::network) return use(settings.network.value());
+        if (settings.detector == DetectorKind::verified) {
+            return use(Verified<Extremum>(settings.network.value()));
+        }
+    }
+    if constexpr (CurvedGuard<System, X>) {
+        if (settings.detector == DetectorKind::line) return use(BallisticLine{});
+    }
     switch (settings.detector) {
         case DetectorKind::ends: return use(Ends{});
         case DetectorKind::bernstein: return use(Bernstein{});
-        case DetectorKind::network: return use(settings.network.value());
-        case DetectorKind::verified: return use(Verified<Extremum>(settings.network.value()));
-        case DetectorKind::line:
-            if constexpr (CurvedGuard<System, X>) {
-                return use(BallisticLine{});
-            } else {
-                throw std::logic_error("a system with a line has a guard curvature");
-            }
-        case DetectorKind::certified:
-        case DetectorKind::calibrated: throw std::logic_error("gates are run by run_gated");
-        case DetectorKind::extremum: break;
+        case DetectorKind::extremum: return use(Extremum{});
+        default: throw std::logic_error("the system has no such detector");
     }
-    return use(Extremum{});
 }
 
 /// The same run with states of one type for all systems; without its solution, which
 /// nobody asks for here.
 template <class X>
-[[nodiscard]] Run<std::vector<double>> with_plain_states(const Run<X>& run)
+[[nodiscard]] Run<std::vector<double>> with_plain_states(Run<X> run)
 {
+    if constexpr (std::is_same_v<X, std::vector<double>>) return run;
     const auto plain = [](const X& x) {
         std::vector<double> out;
         for (std::size_t i = 0; i < static_cast<std::size_t>(x.size()); ++i) out.push_back(x[i]);
@@ -123,7 +151,7 @@ template <class System, class X, class Stepping, class Detector>
         run = integrate(system, x0, settings.options, stepping, detector, locator);
     }
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-    return TimedRun{.run = with_plain_states(run), .seconds = spent.count() / repeats};
+    return TimedRun{.run = with_plain_states(std::move(run)), .seconds = spent.count() / repeats};
 }
 
 /// As `run_with`, with the stepping and the detector of the settings.
@@ -136,6 +164,27 @@ template <class System, class X>
             return run_with(system, x0, settings, repeats, stepping, detector);
         });
     });
+}
+
+/// The guards of a system by their own names, with what happens on their surfaces.
+template <class System>
+[[nodiscard]] std::vector<GuardLabel> labels(const System& system,
+                                             std::initializer_list<std::string_view> events)
+{
+    std::vector<GuardLabel> out;
+    for (const std::string_view event : events) {
+        out.push_back({.name = system.guard_info(out.size()).name, .event = event});
+    }
+    return out;
+}
+
+/// The modes of a system by their own names.
+template <class System>
+[[nodiscard]] std::vector<std::string_view> mode_names()
+{
+    std::vector<std::string_view> out;
+    for (Mode mode = 0; mode < System::mode_count; ++mode) out.push_back(System::mode_name(mode));
+    return out;
 }
 
 }  // namespace ricochet::app

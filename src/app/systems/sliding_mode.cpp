@@ -22,8 +22,8 @@ std::vector<double> start(const std::vector<double>& p)
 TimedRun run(const RunSettings& settings, int repeats)
 {
     const auto& p = settings.parameters;
-    return run_inclusion<Fehlberg78>(system(p), SlidingMode::Vector(SlidingMode::Vector::Constant(p[from])),
-                         settings, repeats);
+    return run_inclusion<Fehlberg78>(
+        system(p), SlidingMode::Vector(SlidingMode::Vector::Constant(p[from])), settings, repeats);
 }
 
 std::vector<double> exact_state(const std::vector<double>& p, double t)

@@ -1,8 +1,8 @@
 #include "ricochet/systems/stick_slip.hpp"
 
-#include "../any_system.hpp"
 #include "entries.hpp"
 #include "friction_inclusion.hpp"
+#include "run_system.hpp"
 
 namespace ricochet::app {
 
@@ -49,8 +49,7 @@ TimedRun run(const RunSettings& settings, int repeats)
                                                      .weakening = p[weakening]}),
                               {p[position], p[velocity]}, settings, repeats);
     }
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
 /// Of the default parameters.

@@ -3,8 +3,8 @@
 #include <array>
 #include <string>
 
-#include "../any_system.hpp"
 #include "entries.hpp"
+#include "run_system.hpp"
 
 namespace ricochet::app {
 
@@ -27,8 +27,7 @@ std::vector<double> start(const std::vector<double>& p)
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    return run_any(AnySystem(system(settings.parameters)), start(settings.parameters), settings,
-                   repeats);
+    return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
 std::vector<GuardLabel> zone_labels()
