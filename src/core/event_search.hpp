@@ -89,10 +89,10 @@ struct Hit {
 /// The detector and the locator of a run.
 template <class X>
 struct Finders {
-    DetectorTable<X> detector;
-    const void* detecting = nullptr;
-    LocatorTable locator;
-    const void* locating = nullptr;
+    const DetectorTable<X>& detector;
+    const void* detecting;
+    const LocatorTable& locator;
+    const void* locating;
 
     [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const
     {

@@ -22,16 +22,29 @@ template <class X>
     return fixed_size<X>() > 0 && setup.system->guard_count(setup.door) == 1;
 }
 
+/// A loop with its setup.
+template <class X>
+struct KeptSetup {
+    RunSetup<X> kept;
+};
+template <class X, bool single>
+struct KeptLoop final : KeptSetup<X>, Loop<X, single> {
+    KeptLoop(const RunSetup<X>& setup, const X& x0, const Options& options)
+        : KeptSetup<X>{setup}, Loop<X, single>(this->kept, x0, options)
+    {
+    }
+};
+
 template <class X>
 Core<X>::Core(const RunSetup<X>& setup, const X& x0, const Options& options)
 {
     if constexpr (fixed_size<X>() > 0) {
         if (has_single_guard(setup)) {
-            loop_ = std::make_unique<Loop<X, true>>(setup, x0, options);
+            loop_ = std::make_unique<KeptLoop<X, true>>(setup, x0, options);
             return;
         }
     }
-    loop_ = std::make_unique<Loop<X, false>>(setup, x0, options);
+    loop_ = std::make_unique<KeptLoop<X, false>>(setup, x0, options);
 }
 
 template <class X>

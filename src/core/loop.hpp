@@ -66,10 +66,11 @@ public:
 };
 
 template <class X, bool single>
-class Loop final : public AnyLoop<X> {
+class Loop : public AnyLoop<X> {
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
 public:
+    /// Keeps a reference to `setup`.
     Loop(const RunSetup<X>& setup, const X& x0, const Options& options)
         : setup_(setup),
           system_(*setup.system, setup.door),
@@ -643,7 +644,7 @@ private:
     static constexpr double low_part = 0.05;
     static constexpr ErrorRule rule_{};
 
-    RunSetup<X> setup_;
+    const RunSetup<X>& setup_;
     SystemAt<X> system_;
     Finders<X> finders_;
     bool error_controlled_;
@@ -677,7 +678,7 @@ private:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
-    bool calm_ = false;   ///< the last step held no event
+    int calm_steps_ = 0;  ///< in a row that held no event
     bool asked_ = false;  ///< a network, about the step in hand
     MergedResets<X> resets_;
     Instant set_instant_;  ///< of the members, in a step that holds them

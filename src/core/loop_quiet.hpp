@@ -36,12 +36,12 @@ inline bool Loop<X, single>::run_quietly()
                                ? retry(h, h, quiet.repeated ? 1 : rule_.largest, quiet.error)
                                : take_fixed_step(h, true);
         if (!taken || (guarded_ && handle_events())) {
-            calm_ = false;
+            calm_steps_ = 0;
             return true;
         }
     } else if (deserves_search(quiet.why == QuietEnd::moving)) {
         if (search(false)) {
-            calm_ = false;
+            calm_steps_ = 0;
             return true;
         }
     } else {

@@ -30,9 +30,9 @@ inline Run<X> Loop<X, single>::take()
     while (!ended_) {
         // Where one event follows the other a quiet run would be over at its first step.
         const std::uint64_t events = run_.statistics.events;
-        if (calm_ && may_run_quietly() && run_quietly()) continue;
+        if (calm_steps_ > 1 && may_run_quietly() && run_quietly()) continue;
         advance_one({});
-        calm_ = run_.statistics.events == events;
+        calm_steps_ = run_.statistics.events == events ? calm_steps_ + 1 : 0;
     }
     return finish();
 }
