@@ -4,11 +4,10 @@
 //     guards at its end             screened, all at once
 //     search                        the first set of events in the step
 //     resets                        x⁻ becomes x⁺, the mode may change
-//     arming                        every guard anew; who was flipped fires in turn
+//     arming                        every guard anew; guards that a reset carried across fire
 //
-// Steps are half-open, (t, t + h]. A system without a guard compiles to the step
-// alone. Between the first step and the last nothing is allocated for states of
-// fixed size, unless something is recorded.
+// Steps are half-open, (t, t + h]. Between the first step and the last nothing is allocated for
+// states of fixed size, unless something is recorded.
 #pragma once
 
 #include <algorithm>
@@ -263,7 +262,7 @@ private:
 
     void accept();
 
-    // --- steps whose checks may be put off ---
+    // --- steps whose checks may be deferred ---
 
     [[nodiscard]] bool is_tentative() const noexcept { return puts_off_ && planner_->in_stretch(); }
 
@@ -477,7 +476,7 @@ private:
     void limit_next_step(double t) noexcept;
 
     /// How far from its surface a guard that has just fired may be. A guard with declared
-    /// bounds may be dear, and is not asked for what its location says as well.
+    /// bounds may be expensive, and is not asked for what its location says as well.
     void find_band(std::size_t i, double t);
 
     /// |g| where the guard has fired, at the state before.
@@ -493,8 +492,8 @@ private:
         bool on_time = false;  ///< with a time event
     };
 
-    /// The members fire: `search_.before()` becomes `resets_.after()`. Leaves who is flipped by
-    /// it as the new members.
+    /// The members fire: `search_.before()` becomes `resets_.after()`. Leaves
+    /// the guards that it carries across their surfaces as the new members.
     void fire(const Firing& how);
 
     [[nodiscard]] std::size_t first_member()
@@ -560,7 +559,8 @@ private:
     /// The side that a guard on its surface is about to be on.
     [[nodiscard]] Side heading(std::size_t i);
 
-    /// Those that were flipped fire in turn, at the same instant, until nobody is.
+    /// Guards that a reset has carried across fire in turn, at the same instant, until none is
+    /// left.
     void cascade();
 
     /// The rest rule has not stopped the setup into the surface.

@@ -1,4 +1,4 @@
-// Steps whose checks are put off.
+// Steps whose checks are deferred.
 #pragma once
 
 #include "core/loop.hpp"

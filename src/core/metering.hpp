@@ -16,7 +16,6 @@ public:
         if (options) meter_.emplace(*options, planned_guards);
     }
 
-    [[nodiscard]] bool is_on() const noexcept { return meter_.has_value(); }
     [[nodiscard]] bool asks() const noexcept { return !meter_ || meter_->asks(); }
     [[nodiscard]] bool checks() const noexcept { return meter_ && meter_->checks(); }
     void note_cleared() noexcept

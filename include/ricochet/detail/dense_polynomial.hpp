@@ -3,7 +3,7 @@
 // The solution inside a step as a polynomial, one component at a time.
 //
 // A step is known by its departure w from the tangent at its start (see
-// detail/explicit_step.hpp), which is zero with zero slope there, by the departure
+// detail/kernels.hpp), which is zero with zero slope there, by the departure
 // and its slope at the end, and where the method is of higher order by further nodes
 // inside. With u = s / h,
 //

@@ -48,7 +48,7 @@ struct DetectorTable {
     bool (*clears)(Self, void* door, const StepState<X>& step, std::uint64_t& calls) = nullptr;
     bool checks_every_step = true;
 
-    // --- checks that are put off ---
+    // --- deferred checks ---
     bool puts_off = false;
     bool needs_bounds = false;
     Evidence put_off = Evidence::assumed;  ///< of a step without a look

@@ -99,24 +99,6 @@ private:
     std::uint64_t samples_ = 0;
 };
 
-/// Stands for a meter where there is none.
-struct NoMeter {
-    static constexpr bool asks() noexcept { return true; }
-    static constexpr bool checks() noexcept { return false; }
-    static constexpr void note_cleared() noexcept {}
-    static constexpr void look_back(const Statistics&) noexcept {}
-    template <class Call>
-    static auto time_guard(Call&& call)
-    {
-        return call();
-    }
-    template <class Call>
-    static auto time_network(Call&& call)
-    {
-        return call();
-    }
-};
-
 class Meter {
 public:
     /// `planned_guards`: how many there are, if their checks are planned; 0: without the network
@@ -224,25 +206,10 @@ private:
     std::uint64_t most_asked_ = std::numeric_limits<std::uint64_t>::max();  ///< in this piece
     std::uint64_t next_steps_;
     std::uint64_t next_check_ = 0;
-    Counts then_;  ///< when the piece began
+    Counts then_;       ///< when the piece began
     double began_ = 0;  ///< [s] when the piece began
     double spent_ = 0;  ///< [s] on trials in vain
     double total_ = 0;  ///< [s] of the run
-};
-
-/// The meter of a detector that has one.
-template <class Detector>
-struct MeterOf {
-    using type = NoMeter;
-    static constexpr NoMeter make(const Detector&, std::size_t = 0) noexcept { return {}; }
-};
-template <Metering Detector>
-struct MeterOf<Detector> {
-    using type = Meter;
-    static Meter make(const Detector& detector, std::size_t planned_guards = 0)
-    {
-        return Meter(detector.metering(), planned_guards);
-    }
 };
 
 }  // namespace detail

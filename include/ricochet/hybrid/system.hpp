@@ -49,7 +49,7 @@
 // these, is refused by the compiler, see detail/declarations.hpp. Guards written
 // for any x that has `x[i]` are located without the rest of the state. A system
 // without a guard is integrated as a plain ordinary differential equation: none of
-// the machinery of events is compiled in.
+// the machinery of events is run.
 #pragma once
 
 #include <concepts>

@@ -4,7 +4,7 @@
 //     guards at its end             screened, all at once
 //     search                        the first set of events in the step
 //     resets                        x⁻ becomes x⁺, the mode may change
-//     arming                        every guard anew; who was flipped fires in turn
+//     arming                        every guard anew; guards that a reset carried across fire
 //
 // Steps are half-open, (t, t + h]. Between the first step and the last nothing is allocated for
 // states of fixed size, unless something is recorded.
