@@ -1,13 +1,16 @@
 // The loop for one type of state.
 #pragma once
 
+#include "core/engine_apply.hpp"
+#include "core/engine_find.hpp"
+#include "core/engine_record.hpp"
+#include "core/engine_rest.hpp"
+#include "core/engine_settle.hpp"
 #include "core/large_kernel.hpp"
-#include "core/loop_arming.hpp"
 #include "core/loop_events.hpp"
 #include "core/loop_output.hpp"
 #include "core/loop_planned.hpp"
 #include "core/loop_quiet.hpp"
-#include "core/loop_rest.hpp"
 #include "core/loop_saving.hpp"
 #include "core/loop_setup.hpp"
 #include "core/loop_steps.hpp"
@@ -36,93 +39,15 @@ struct KeptLoop final : KeptSetup<X>, Loop<X, single> {
 };
 
 template <class X>
-Core<X>::Core(const RunSetup<X>& setup, const X& x0, const Options& options)
+std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
+                                      const Options& options)
 {
     if constexpr (fixed_size<X>() > 0) {
         if (has_single_guard(setup)) {
-            loop_ = std::make_unique<KeptLoop<X, true>>(setup, x0, options);
-            return;
+            return std::make_unique<KeptLoop<X, true>>(setup, x0, options);
         }
     }
-    loop_ = std::make_unique<KeptLoop<X, false>>(setup, x0, options);
-}
-
-template <class X>
-Core<X>::~Core() = default;
-template <class X>
-Core<X>::Core(Core&&) noexcept = default;
-template <class X>
-Core<X>& Core<X>::operator=(Core&&) noexcept = default;
-
-template <class X>
-double Core<X>::t() const noexcept
-{
-    return loop_->t();
-}
-template <class X>
-const X& Core<X>::x() const noexcept
-{
-    return loop_->x();
-}
-template <class X>
-Mode Core<X>::mode() const noexcept
-{
-    return loop_->mode();
-}
-template <class X>
-bool Core<X>::ended() const noexcept
-{
-    return loop_->ended();
-}
-template <class X>
-const Run<X>& Core<X>::run() const noexcept
-{
-    return loop_->run();
-}
-template <class X>
-MeterReading Core<X>::meter() const
-{
-    return loop_->meter();
-}
-template <class X>
-bool Core<X>::step()
-{
-    return loop_->step();
-}
-template <class X>
-bool Core<X>::advance()
-{
-    return loop_->advance();
-}
-template <class X>
-void Core<X>::show_all()
-{
-    loop_->show_all();
-}
-template <class X>
-void Core<X>::advance_once(bool look_ahead)
-{
-    loop_->advance_once(look_ahead);
-}
-template <class X>
-Run<X> Core<X>::take()
-{
-    return loop_->take();
-}
-template <class X>
-Run<X> Core<X>::finish()
-{
-    return loop_->finish();
-}
-template <class X>
-Snapshot Core<X>::save()
-{
-    return loop_->save();
-}
-template <class X>
-void Core<X>::restore(const Snapshot& snapshot)
-{
-    loop_->restore(snapshot);
+    return std::make_unique<KeptLoop<X, false>>(setup, x0, options);
 }
 
 template <class X>
@@ -158,7 +83,8 @@ const StepKernel<X>& kernel_by_name(MethodName name) noexcept
 #define RICOCHET_CORE(...)                                                                        \
     namespace ricochet::detail {                                                                  \
     using CoreStateHere = __VA_ARGS__;                                                            \
-    template class Core<CoreStateHere>;                                                           \
+    template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(                                   \
+        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                    \
     template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \
                                           const Options&);                                        \
     template const StepKernel<CoreStateHere>& kernel_by_name<CoreStateHere>(MethodName) noexcept; \

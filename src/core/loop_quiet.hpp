@@ -27,7 +27,7 @@ inline bool Loop<X, single>::run_quietly()
     counts.steps += quiet.steps;
     counts.rejected += quiet.rejected;
     counts.guard_calls += quiet.guard_calls;
-    if (bank_.size() > 0) add_evidence(finders_.detector.evidence, quiet.steps);
+    if (bank_.size() > 0) this->add_evidence(finders_.detector.evidence, quiet.steps);
     if (quiet.why == QuietEnd::due) return false;
     is_last_ = time_event_due_ = asked_ = false;
     if (quiet.why == QuietEnd::failed) {
@@ -39,14 +39,13 @@ inline bool Loop<X, single>::run_quietly()
             calm_steps_ = 0;
             return true;
         }
-    } else if (deserves_search(quiet.why == QuietEnd::moving)) {
+    } else if (this->is_suspicious(quiet.why == QuietEnd::moving)) {
         if (search(false)) {
             calm_steps_ = 0;
             return true;
         }
     } else {
-        add_evidence(finders_.detector.evidence, 1);
-        bank_.pass_on();
+        this->pass_on_clear();
     }
     pass();
     return true;

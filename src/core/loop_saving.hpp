@@ -53,7 +53,7 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit(ended_);
     visit(run_.outcome);
     visit_samples(visit);
-    if (guarded_) bank_.visit(visit);
+    this->visit_guards(visit);
     if (puts_off_) {
         visit(last_h_);
         visit(newly_armed_);

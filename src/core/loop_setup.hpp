@@ -1,4 +1,4 @@
-// What a run refuses, and how its guards are armed at its start.
+// What a run refuses, and what it is known by.
 #pragma once
 
 #include "core/loop.hpp"
@@ -6,9 +6,10 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline const Options& Loop<X, single>::checked(const Options& options, const X& x0) const
+inline const Options& Loop<X, single>::checked(const RunSetup<X>& setup, const Options& options,
+                                               const X& x0)
 {
-    validate(options, !error_controlled_);
+    validate(options, !setup.error_controlled);
     if (x0.size() == 0) throw_start_empty();
     for_each_component(x0, [&](auto i) {
         if (!std::isfinite(x0[i])) {
@@ -63,74 +64,6 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(ended_ || lies_before(place_.t.value, time_event_) || !timed_, "the next time event");
     const std::size_t modes = system_.modes();
     require(modes == 0 || place_.mode < modes, "the mode");
-}
-
-template <class X, bool single>
-inline void Loop<X, single>::refuse_bad_guards()
-{
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        GuardRecord& record = bank_[i];
-        const GuardInfo& info = record.info;
-        record.acting =
-            (resets_any_ && info.resets) || info.stop_after > 0 || options_.stop_at_event;
-        if (info.unilateral && !(resets_any_ && info.resets)) {
-            throw_no_reset(i, info.name);
-        }
-        if (info.unilateral && info.crossing != Crossing::falling) {
-            throw_unilateral_not_falling(i, info.name);
-        }
-    }
-}
-
-template <class X, bool single>
-inline void Loop<X, single>::arm_at_start()
-{
-    enable_guards();
-    newly_armed_ = true;
-    last_h_ = h_next_;
-    bank_.begin_phase(step_.time(0));
-    bank_.sample_start(step_, calls(), h_next_);
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const GuardRecord& record = bank_[i];
-        const double g = bank_.g0(i);
-        if (!record.enabled) continue;
-        if (!std::isfinite(g)) {
-            throw_start_guard_not_finite(i, record.info.name, options_.t_start, g);
-        }
-        const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
-        if (record.info.unilateral && g < 0 && !on_surface) {
-            throw_start_outside_mode(i, record.info.name, options_.t_start, g);
-        }
-        if (on_surface) bank_[i].band = std::fabs(g);
-        bank_[i].departs = on_surface;
-        bank_.arm(i, on_surface ? heading(i) : side_of(g));
-        if (record.side == Side::plateau) {
-            bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
-        }
-        if (record.info.unilateral && record.side == Side::below) {
-            search_.members().push_back(i);
-        }
-    }
-    cascade();
-}
-
-template <class X, bool single>
-inline double Loop<X, single>::rounding_of(std::size_t i)
-{
-    constexpr double nudge = 8 * std::numeric_limits<double>::epsilon();
-    const auto guard = bank_.view(i, step_.mode(), calls());
-    const double t = step_.time(0);
-    const double g = guard.value(t, step_.x0());
-    double rounding = std::fabs(guard.value(t * (1 + nudge), step_.x0()) - g);
-    X near = step_.x0();
-    for_each_component(near, [&](auto c) {
-        const double kept = near[c];
-        if (kept == 0) return;
-        near[c] = kept * (1 + nudge);
-        rounding += std::fabs(guard.value(t, near) - g);
-        near[c] = kept;
-    });
-    return rounding;
 }
 
 }  // namespace ricochet::detail

@@ -113,18 +113,6 @@ inline void Loop<X, single>::accept()
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::add_evidence(Evidence evidence, std::uint64_t steps) noexcept
-{
-    EvidenceCounts& counts = run_.statistics.evidence;
-    switch (evidence) {
-        case Evidence::proved: counts.proved += steps; return;
-        case Evidence::checked: counts.checked += steps; return;
-        case Evidence::gated: counts.gated += steps; return;
-        case Evidence::assumed: counts.assumed += steps; return;
-    }
-}
-
-template <class X, bool single>
 inline bool Loop<X, single>::take_step(double remaining)
 {
     double longest = remaining;
@@ -211,7 +199,7 @@ inline double Loop<X, single>::approach_rate(std::size_t i)
     if (!system_->rated) {
         // Over a short step the rounding of the state may swallow the difference.
         double scale = h_next_;
-        for (int k = 0; rate == 0 && k < 12; ++k) rate = departure(i, scale *= 16);
+        for (int k = 0; rate == 0 && k < 12; ++k) rate = this->departure(i, scale *= 16);
     }
     return rate;
 }
@@ -222,16 +210,16 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
     if (puts_off_) return false;
     const Approach approach = time_to_surface();
     const std::size_t i = approach.guard;
-    if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !counts_here(i)) return false;
+    if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !this->counts_here(i)) return false;
     if (!bank_[i].acting) {
-        record_jump(i, bank_[i].side);
+        this->record_jump(i, bank_[i].side);
         return false;
     }
     for (std::size_t k = 0; k < bank_.size(); ++k) bank_[k].band = 0;
     bank_[i].band = std::fabs(bank_.g0(i));
     search_.members().clear();
     search_.members().push_back(i);
-    cascade();
+    this->settle_all();
     return true;
 }
 
@@ -248,7 +236,8 @@ inline void Loop<X, single>::hold(double remaining)
     step_.hold(until);
     if (time_event_due_) {
         step_.refresh();
-        apply_time_event();
+        this->apply_time_event();
+        this->settle_all();
     }
 }
 

@@ -34,39 +34,37 @@ struct RunSetup {
     const void* locating = nullptr;
 };
 
-template <class X>
-class AnyLoop;
-
 /// A run in progress; see `Simulation`.
 template <class X>
-class Core {
+class AnyLoop {
 public:
-    Core(const RunSetup<X>& setup, const X& x0, const Options& options);
-    ~Core();
-    Core(Core&&) noexcept;
-    Core& operator=(Core&&) noexcept;
+    AnyLoop() = default;
+    AnyLoop(const AnyLoop&) = delete;
+    AnyLoop& operator=(const AnyLoop&) = delete;
+    virtual ~AnyLoop() = default;
 
-    [[nodiscard]] double t() const noexcept;
-    [[nodiscard]] const X& x() const noexcept;
-    [[nodiscard]] Mode mode() const noexcept;
-    [[nodiscard]] bool ended() const noexcept;
-    [[nodiscard]] const Run<X>& run() const noexcept;
-    [[nodiscard]] MeterReading meter() const;
-
-    bool step();
-    bool advance();
+    [[nodiscard]] virtual double t() const noexcept = 0;
+    [[nodiscard]] virtual const X& x() const noexcept = 0;
+    [[nodiscard]] virtual Mode mode() const noexcept = 0;
+    [[nodiscard]] virtual bool ended() const noexcept = 0;
+    [[nodiscard]] virtual const Run<X>& run() const noexcept = 0;
+    [[nodiscard]] virtual MeterReading meter() const = 0;
+    virtual bool step() = 0;
+    virtual bool advance() = 0;
     /// Forgets what `advance` has not shown yet.
-    void show_all();
+    virtual void show_all() noexcept = 0;
     /// One step, which may be one of a stretch that is closed later if it looks ahead.
-    void advance_once(bool look_ahead);
-    [[nodiscard]] Run<X> take();
-    [[nodiscard]] Run<X> finish();
-    [[nodiscard]] Snapshot save();
-    void restore(const Snapshot& snapshot);
-
-private:
-    std::unique_ptr<AnyLoop<X>> loop_;
+    virtual void advance_once(bool look_ahead) = 0;
+    [[nodiscard]] virtual Run<X> take() = 0;
+    [[nodiscard]] virtual Run<X> finish() = 0;
+    [[nodiscard]] virtual Snapshot save() = 0;
+    virtual void restore(const Snapshot& snapshot) = 0;
 };
+
+/// Keeps a copy of `setup`. @throws std::invalid_argument, as `Simulation`
+template <class X>
+[[nodiscard]] std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
+                                                    const Options& options);
 
 /// A whole run, on the stack.
 template <class X>

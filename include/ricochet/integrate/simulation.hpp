@@ -210,48 +210,48 @@ public:
                const Stepping& stepping = {}, const Detector& detector = {},
                const Locator& locator = {})
         : parts_(std::make_unique<Parts>(system, x0, stepping, detector, locator)),
-          core_(parts_->setup(), detail::core_state(x0), options),
+          loop_(detail::make_loop(parts_->setup(), detail::core_state(x0), options)),
           shown_(x0)
     {
     }
     Simulation(System&&, const X&, const Options&, const Stepping& = {}, const Detector& = {},
                const Locator& = {}) = delete;
 
-    [[nodiscard]] double t() const noexcept { return core_.t(); }  ///< [s]
+    [[nodiscard]] double t() const noexcept { return loop_->t(); }  ///< [s]
     [[nodiscard]] const X& x() const noexcept
     {
         if constexpr (same) {
-            return core_.x();
+            return loop_->x();
         } else {
-            detail::copy_state(core_.x(), shown_.x);
+            detail::copy_state(loop_->x(), shown_.x);
             return shown_.x;
         }
     }
-    [[nodiscard]] Mode mode() const noexcept { return core_.mode(); }
-    [[nodiscard]] bool ended() const noexcept { return core_.ended(); }
+    [[nodiscard]] Mode mode() const noexcept { return loop_->mode(); }
+    [[nodiscard]] bool ended() const noexcept { return loop_->ended(); }
     /// What has been computed so far; its time and state are brought up to date by
     /// `finish`.
     [[nodiscard]] const Run<X>& run() const
     {
         if constexpr (same) {
-            return core_.run();
+            return loop_->run();
         } else {
-            detail::update(shown_.run, core_.run(), shown_.x);
+            detail::update(shown_.run, loop_->run(), shown_.x);
             return shown_.run;
         }
     }
 
     /// Of a `Metered` detector: what asking its network has cost and saved so far.
-    [[nodiscard]] MeterReading meter() const requires Metering<Detector> { return core_.meter(); }
+    [[nodiscard]] MeterReading meter() const requires Metering<Detector> { return loop_->meter(); }
 
     /// Takes one step, with whatever events it holds. False: the run has ended. A detector
     /// that puts off checks does not look ahead here, since every step is final.
-    bool step() { return core_.step(); }
+    bool step() { return loop_->step(); }
 
     /// Goes on to the next sample time, or to the end of the next step that holds events;
     /// `t`, `x` and `mode` are those there, after the events. False: the run has ended, and
     /// nothing has happened in it that was not shown.
-    bool advance() { return core_.advance(); }
+    bool advance() { return loop_->advance(); }
 
     /// Goes on to the end, and calls `observe(event)` for every event recorded on the
     /// way, `observe(simulation)` after every step; whichever of the two it takes. Neither
@@ -263,35 +263,35 @@ public:
         {
             observe(std::as_const(*this));
         };
-        const auto& events = core_.run().events;
+        const auto& events = loop_->run().events;
         std::size_t seen = events.size();
-        core_.show_all();
+        loop_->show_all();
         while (!ended()) {
-            core_.advance_once(!watches_steps);
+            loop_->advance_once(!watches_steps);
             if constexpr (requires(const Event<X>& event) { observe(event); }) {
                 for (; seen < events.size(); ++seen) show(events[seen], observe);
             }
             if constexpr (watches_steps) observe(std::as_const(*this));
         }
-        core_.show_all();
+        loop_->show_all();
     }
 
     /// Goes on to the end and hands over all that was computed.
-    [[nodiscard]] Run<X> take() { return detail::as_callers<X>(core_.take(), shown_.x); }
+    [[nodiscard]] Run<X> take() { return detail::as_callers<X>(loop_->take(), shown_.x); }
 
     /// Hands over what has been computed so far; before the end its outcome is `cancelled`. The
     /// simulation is over.
-    [[nodiscard]] Run<X> finish() { return detail::as_callers<X>(core_.finish(), shown_.x); }
+    [[nodiscard]] Run<X> finish() { return detail::as_callers<X>(loop_->finish(), shown_.x); }
 
     /// All that the future depends on. A simulation of the same system with the same
     /// options, stepping, detector and locator that restores it goes on with the same
     /// bits; only its end, its sample times and what it records may be others. What was
     /// recorded is not part of it.
-    [[nodiscard]] Snapshot save() { return core_.save(); }
+    [[nodiscard]] Snapshot save() { return loop_->save(); }
 
     /// @throws std::invalid_argument naming what does not agree if the snapshot is of another
     /// run, or no state of one; then nothing has changed.
-    void restore(const Snapshot& snapshot) { core_.restore(snapshot); }
+    void restore(const Snapshot& snapshot) { loop_->restore(snapshot); }
 
 private:
     /// What is shown of a run whose states are of another type than the loop's.
@@ -313,7 +313,7 @@ private:
     }
 
     std::unique_ptr<Parts> parts_;
-    detail::Core<C> core_;
+    std::unique_ptr<detail::AnyLoop<C>> loop_;
     mutable Shown shown_;
 };
 

@@ -1,12 +1,12 @@
 // Accumulating events, and what becomes of the motion there.
 #pragma once
 
-#include "core/loop.hpp"
+#include "core/engine.hpp"
 
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline bool Loop<X, single>::accumulates(bool located)
+inline bool EventEngine<X, single>::rest_members()
 {
     bool rested = false;
     for (const std::size_t i : search_.members()) {
@@ -15,18 +15,18 @@ inline bool Loop<X, single>::accumulates(bool located)
         const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
         const double tolerance = resolution_.tolerance(step_.start().value);
         const bool resetting = resets_any_ && bank_[i].info.resets;
-        if (resetting && located) intervals.blame(search_.where(i).error);
+        if (resetting && firing_.located) intervals.blame(search_.where(i).error);
         if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
             come_to_rest(i, stalls ? 0 : intervals.remainder(), intervals.error());
             rested = true;
         }
     }
-    if (rested && !ended_ && !resting_) arm_all();
+    if (rested && !ended_) pending_ = resting_ ? Pending::hold : Pending::arm;
     return rested;
 }
 
 template <class X, bool single>
-inline bool Loop<X, single>::fades(std::size_t i)
+inline bool EventEngine<X, single>::fades(std::size_t i)
 {
     GuardRecord& record = bank_[i];
     record.turned = false;
@@ -60,7 +60,7 @@ inline bool Loop<X, single>::fades(std::size_t i)
 }
 
 template <class X, bool single>
-inline bool Loop<X, single>::is_away(std::size_t i, double rounding)
+inline bool EventEngine<X, single>::is_away(std::size_t i, double rounding)
 {
     GuardRecord& record = bank_[i];
     const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
@@ -70,50 +70,48 @@ inline bool Loop<X, single>::is_away(std::size_t i, double rounding)
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::come_to_rest(std::size_t i, double ahead, double error)
+inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, double error)
 {
     if (!system_->rest) return end(Outcome::zeno, i);
-    {
-        if (resting_ || ended_) return;
-        const X before = step_.x0();
-        const Mode mode = step_.mode();
-        ahead = std::min(ahead, step_.until(options_.t_end));
-        if (timed_) ahead = std::min(ahead, step_.until(time_event_));
-        const double t = step_.time(ahead);
-        X after = before;
-        const Mode mode_after = system_->rest(system_.door(), i, mode, t, after);
-        ++run_.statistics.events;
-        record({.t = t,
-                .kind = EventKind::accumulation,
-                .guard = i,
-                .mode_before = mode,
-                .mode_after = mode_after,
-                .before = before,
-                .after = after,
-                .bracket = {step_.time(0), t},
-                .slope = 0,
-                .error = error});
-        const std::size_t modes = system_.modes();
-        if (modes > 0 && mode_after >= modes) return end(Outcome::unknown_mode, i);
-        if (!fits_dimension(before, after, mode_after == mode)) {
-            return end(Outcome::wrong_dimension, i);
-        }
-        if (!all_finite(after) || after.size() == 0) {
-            return end(Outcome::non_finite, i);
-        }
-        step_.restart(ahead, 0, after, mode_after);
-        for (const std::size_t k : search_.members()) {
-            bank_[k].rated_over = stale;
-        }
-        bank_[i].intervals = {};
-        bank_[i].band = 0;
-        resting_ = bank_.size() == 1 && !system_->moded;
-        if (resting_ && !stays_on_surface(i)) end(Outcome::zeno, i);
+    if (resting_ || ended_) return;
+    const X before = step_.x0();
+    const Mode mode = step_.mode();
+    ahead = std::min(ahead, step_.until(options_.t_end));
+    if (timed_) ahead = std::min(ahead, step_.until(time_event_));
+    const double t = step_.time(ahead);
+    X after = before;
+    const Mode mode_after = system_->rest(system_.door(), i, mode, t, after);
+    ++run_.statistics.events;
+    record({.t = t,
+            .kind = EventKind::accumulation,
+            .guard = i,
+            .mode_before = mode,
+            .mode_after = mode_after,
+            .before = before,
+            .after = after,
+            .bracket = {step_.time(0), t},
+            .slope = 0,
+            .error = error});
+    const std::size_t modes = system_.modes();
+    if (modes > 0 && mode_after >= modes) return end(Outcome::unknown_mode, i);
+    if (!fits_dimension(before, after, mode_after == mode)) {
+        return end(Outcome::wrong_dimension, i);
     }
+    if (!all_finite(after) || after.size() == 0) {
+        return end(Outcome::non_finite, i);
+    }
+    step_.restart(ahead, 0, after, mode_after);
+    for (const std::size_t k : search_.members()) {
+        bank_[k].rated_over = stale;
+    }
+    bank_[i].intervals = {};
+    bank_[i].band = 0;
+    resting_ = bank_.size() == 1 && !system_->moded;
+    if (resting_ && !stays_on_surface(i)) end(Outcome::zeno, i);
 }
 
 template <class X, bool single>
-inline bool Loop<X, single>::stays_on_surface(std::size_t i)
+inline bool EventEngine<X, single>::stays_on_surface(std::size_t i)
 {
     const auto guard = bank_.view(i, step_.mode(), calls());
     const double span = step_.until(options_.t_end);

@@ -1,12 +1,103 @@
-// Arming: on which side every guard goes on, and which of them fire at once.
+// On which side every guard goes on, and which of them fire at once.
 #pragma once
 
-#include "core/loop.hpp"
+#include "core/engine.hpp"
 
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline void Loop<X, single>::enable_guards()
+inline bool EventEngine<X, single>::settle()
+{
+    switch (std::exchange(pending_, Pending::nothing)) {
+        case Pending::nothing: break;
+        case Pending::hold: return false;
+        case Pending::settle:
+            if (guarded_ && !resting_ && !rest_members()) arm_all();
+            if (firing_.on_time && !ended_) find_time_event();
+            break;
+        case Pending::arm_stuck:
+            arm_all();
+            if (still_stuck(stuck_)) end(Outcome::zeno, stuck_);
+            break;
+        case Pending::arm: arm_all(); break;
+    }
+    if (ended_) return false;
+    if (pending_ != Pending::nothing) return true;
+    return !resting_ && !search_.members().empty() && apply_next_set();
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::apply_next_set()
+{
+    if (level_++ == most_levels) {
+        end(Outcome::endless_cascade, search_.members()[0]);
+        return false;
+    }
+    search_.begin(step_.x0());
+    assign(search_.before(), step_.x0());
+    search_.stay_at_start();
+    set_instant_ = step_.instant(0, 0);
+    transform(false);
+    stuck_ = stuck_member();
+    if (stuck_ == no_guard) {
+        apply({});
+        return !ended_;
+    }
+    if (bank_.g0(stuck_) < -bank_[stuck_].band) {
+        end(Outcome::outside_mode, stuck_);
+        return false;
+    }
+    come_to_rest(stuck_, 0, 0);
+    if (ended_) return false;
+    search_.members().clear();
+    search_.members().push_back(stuck_);
+    pending_ = resting_ ? Pending::hold : Pending::arm_stuck;
+    return true;
+}
+
+template <class X, bool single>
+inline std::size_t EventEngine<X, single>::stuck_member()
+{
+    if (resets_.mode() != step_.mode() || !same_state(resets_.after(), step_.x0())) return no_guard;
+    for (const std::size_t i : search_.members()) {
+        if (bank_[i].info.unilateral) return i;
+    }
+    return no_guard;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::arm_at_start()
+{
+    enable_guards();
+    newly_armed_ = true;
+    last_h_ = h_next_;
+    bank_.begin_phase(step_.time(0));
+    bank_.sample_start(step_, calls(), h_next_);
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        const GuardRecord& record = bank_[i];
+        const double g = bank_.g0(i);
+        if (!record.enabled) continue;
+        if (!std::isfinite(g)) {
+            throw_start_guard_not_finite(i, record.info.name, options_.t_start, g);
+        }
+        const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
+        if (record.info.unilateral && g < 0 && !on_surface) {
+            throw_start_outside_mode(i, record.info.name, options_.t_start, g);
+        }
+        if (on_surface) bank_[i].band = std::fabs(g);
+        bank_[i].departs = on_surface;
+        bank_.arm(i, on_surface ? heading(i) : side_of(g));
+        if (record.side == Side::plateau) {
+            bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
+        }
+        if (record.info.unilateral && record.side == Side::below) {
+            search_.members().push_back(i);
+        }
+    }
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::enable_guards()
 {
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         GuardRecord& record = bank_[i];
@@ -19,7 +110,7 @@ inline void Loop<X, single>::enable_guards()
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::arm_all()
+inline void EventEngine<X, single>::arm_all()
 {
     double widest = 0;
     for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].fired = false;
@@ -45,7 +136,7 @@ inline void Loop<X, single>::arm_all()
 }
 
 template <class X, bool single>
-inline bool Loop<X, single>::arm_one(std::size_t i, double widest)
+inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
 {
     GuardRecord& record = bank_[i];
     const double g = bank_.g0(i);
@@ -93,7 +184,7 @@ inline bool Loop<X, single>::arm_one(std::size_t i, double widest)
 }
 
 template <class X, bool single>
-inline Side Loop<X, single>::heading(std::size_t i)
+inline Side EventEngine<X, single>::heading(std::size_t i)
 {
     const bool known = bank_[i].fired && bank_[i].rated_over == h_next_;
     double rate = known ? bank_[i].departure : bank_.complete_rate0(i, step_, h_next_, calls());
@@ -135,6 +226,42 @@ inline Side Loop<X, single>::heading(std::size_t i)
     const Side side = std::fabs(next) > noise ? side_of(next) : Side::plateau;
     bank_.set_rate0(i, sign_of(side) * std::numeric_limits<double>::min());
     return side;
+}
+
+template <class X, bool single>
+inline double EventEngine<X, single>::rounding_of(std::size_t i)
+{
+    constexpr double nudge = 8 * std::numeric_limits<double>::epsilon();
+    const auto guard = bank_.view(i, step_.mode(), calls());
+    const double t = step_.time(0);
+    const double g = guard.value(t, step_.x0());
+    double rounding = std::fabs(guard.value(t * (1 + nudge), step_.x0()) - g);
+    X near = step_.x0();
+    for_each_component(near, [&](auto c) {
+        const double kept = near[c];
+        if (kept == 0) return;
+        near[c] = kept * (1 + nudge);
+        rounding += std::fabs(guard.value(t, near) - g);
+        near[c] = kept;
+    });
+    return rounding;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::refuse_bad_guards()
+{
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        GuardRecord& record = bank_[i];
+        const GuardInfo& info = record.info;
+        record.acting =
+            (resets_any_ && info.resets) || info.stop_after > 0 || options_.stop_at_event;
+        if (info.unilateral && !(resets_any_ && info.resets)) {
+            throw_no_reset(i, info.name);
+        }
+        if (info.unilateral && info.crossing != Crossing::falling) {
+            throw_unilateral_not_falling(i, info.name);
+        }
+    }
 }
 
 }  // namespace ricochet::detail

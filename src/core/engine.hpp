@@ -1,0 +1,396 @@
+// The events of a motion, whoever moves it: which set comes first in a step, what its resets make
+// of the state, and on which side every guard goes on.
+//
+//     find      the first set of events in the step in hand, and the state x⁻ there
+//     apply     the resets of its members: x⁻ becomes x⁺, the mode may change
+//     settle    every guard anew with the flow at x⁺; guards that a reset has carried across their
+//               surfaces are the next set, at the same instant
+//
+// `Loop` adds a method that takes the steps, `MonitorLoop` is shown those of a host.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/event_search.hpp"
+#include "core/guard_bank.hpp"
+#include "core/merged_resets.hpp"
+#include "core/metering.hpp"
+#include "core/step.hpp"
+#include "ricochet/detail/core.hpp"
+#include "ricochet/detail/refusals.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/run.hpp"
+#include "ricochet/integrate/snapshot.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+class EventEngine {
+protected:
+    static constexpr double infinity = std::numeric_limits<double>::infinity();
+
+    /// Places the step in hand at the start. Keeps a reference to `setup`.
+    /// @param options  valid ones
+    EventEngine(const RunSetup<X>& setup, const X& x0, const Options& options)
+        : setup_(setup),
+          system_(*setup.system, setup.door),
+          finders_{setup.detector, setup.detecting, setup.locator, setup.locating},
+          error_controlled_(setup.error_controlled),
+          guarded_(system_->guarded),
+          resets_any_(system_->resets()),
+          timed_(system_->timed()),
+          predicts_(setup.detector.clears != nullptr),
+          options_(options),
+          meter_(setup.detector.puts_off ? nullptr : setup.detector.metering),
+          resolution_(options),
+          backward_(options.t_end < options.t_start),
+          step_(system_, *setup.kernel, options.t_start, x0, options.mode, backward_),
+          bank_(system_, BankRules::of(setup.detector, system_), backward_),
+          search_(x0, bank_.size(), finders_, resolution_),
+          resets_(x0)
+    {
+    }
+
+    // --- set-up ---
+
+    void refuse_bad_modes() const
+    {
+        const std::size_t modes = system_.modes();
+        if (modes > 0 && options_.mode >= modes) throw_unknown_mode(options_.mode, modes);
+    }
+
+    void refuse_bad_guards();
+
+    /// Leaves the guards that fire at the start as members.
+    void arm_at_start();
+
+    /// What rounding of the time and of the state, 8 units in the last place of each
+    /// component, may make of guard i at the start of the step.
+    [[nodiscard]] double rounding_of(std::size_t i);
+
+    [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
+
+    void end(Outcome outcome, std::size_t guard = no_guard) noexcept
+    {
+        run_.outcome = outcome;
+        run_.guard = guard;
+        ended_ = true;
+    }
+
+    void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
+
+    // --- time events ---
+
+    /// One that is not ahead would be lost, with all that follow it.
+    void find_time_event(bool at_start = false);
+
+    /// At the start of the step. What it causes is settled by `settle`.
+    void apply_time_event();
+
+    // --- finding ---
+
+    /// Looks at the step as the detector does of every step. False: it holds no event.
+    /// @param cleared  whether a network has predicted that it holds none
+    [[nodiscard]] bool deserves_search(bool& cleared);
+
+    /// Whether any guard deserves a search. Detectors that ask for it see the guards inside
+    /// the step, too; a second time where the first leaves doubts.
+    [[nodiscard]] bool any_suspicious()
+    {
+        if (!bank_.looks() || !options_.look_inside) return bank_.suspicious(step_.h());
+        look_inside();
+        return is_suspicious(error_controlled_ && hardly_moves());
+    }
+
+    /// The same after a look inside, if there is one; `moves` hardly: at several places more.
+    [[nodiscard]] bool is_suspicious(bool hardly_moves);
+
+    void look_inside();
+
+    /// Whether the state hardly changes in the step, which error control then does not limit.
+    [[nodiscard]] bool hardly_moves() const noexcept;
+
+    /// Whether the network predicts that the step is free of events.
+    [[nodiscard]] bool ask_network();
+
+    void pass_on_clear() noexcept
+    {
+        run_.statistics.evidence.add(finders_.detector.evidence);
+        bank_.pass_on();
+    }
+
+    /// Finds the first set that cuts the step short, and what its resets make of the state. False:
+    /// the step stands, with what it holds besides recorded.
+    [[nodiscard]] bool find(bool cleared);
+
+    void count_refined() noexcept
+    {
+        run_.statistics.refined_steps += search_.refined();
+        run_.statistics.unresolved_steps += search_.unresolved();
+    }
+
+    [[gnu::noinline]] void end_plateaus()
+    {
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            if (bank_.leaves_plateau(i)) search_.end_plateau(step_, bank_, i, calls());
+        }
+    }
+
+    /// Whether guard i counts at the start of the step; it is about to fire there.
+    [[nodiscard]] bool counts_here(std::size_t i);
+
+    /// Members whose crossing is no event go on without one: those that `enabled`
+    /// rules out, and repeats of an event inside its own window.
+    void dismiss_members();
+
+    /// The guard has just had its event in the same direction. If it has not turned back
+    /// since, this is the same crossing, seen again because the reset moved the state by a
+    /// rounding; else it is a new event, and events accumulate.
+    [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
+    {
+        const GuardRecord& record = bank_[i];
+        return record.side == record.last_side &&
+               std::fabs(t - record.last) <= resolution_.window(t);
+    }
+
+    [[nodiscard]] bool turned_back(std::size_t i) const noexcept
+    {
+        return resets_any_ && bank_[i].info.resets && bank_[i].turned;
+    }
+
+    /// Computes what the resets of the members make of the state before.
+    void transform(bool on_time)
+    {
+        const double t = on_time ? time_event_ : time_of_set();
+        resets_.apply(system_, bank_, search_.members().span(), on_time, step_.mode(), t,
+                      search_.before());
+    }
+
+    /// Whether the event leaves everything as it was, so that the step can stand.
+    [[nodiscard]] bool changes_nothing();
+
+    /// Whether this event of the guard, not yet counted, ends the run.
+    [[nodiscard]] bool ends_run(std::size_t i) const noexcept;
+
+    void go_on_past_members();
+
+    // --- applying ---
+
+    struct Firing {
+        bool located = false;  ///< inside the current step, else at its start
+        bool on_time = false;  ///< with a time event
+    };
+
+    /// The set that was found cuts the step short: applies it.
+    void cut();
+
+    /// The members fire: the step is placed at `search_.before()` made `resets_.after()`. Unless
+    /// the run has ended, `settle` is due.
+    void apply(const Firing& how);
+
+    /// How far from its surface a guard that has just fired may be. A guard with declared
+    /// bounds may be expensive, and is not asked for what its location says as well.
+    void find_band(std::size_t i, double t);
+
+    /// |g| where the guard has fired, at the state before.
+    [[nodiscard]] double residue_of(std::size_t i, double t)
+    {
+        return std::fabs(bank_.view(i, mode_before_, calls()).value(t, search_.before()));
+    }
+
+    [[nodiscard]] double time_of_set() const noexcept { return set_instant_.value; }
+
+    [[nodiscard]] std::size_t first_member()
+    {
+        return search_.members().empty() ? no_guard : search_.members()[0];
+    }
+
+    /// Whether the resets have left something to go on from; else the run has ended.
+    [[nodiscard]] bool goes_on();
+
+    [[nodiscard]] bool fits_dimension(const X& before, const X& after, bool same_mode) const
+    {
+        return system_.fits_dimension(before, after, same_mode);
+    }
+
+    // --- settling ---
+
+    /// What is left to do once the flow at the start of the step is known.
+    enum class Pending : std::uint8_t {
+        nothing,
+        settle,     ///< members have fired: their accumulations, then all guards
+        arm,        ///< a member has come to rest: all guards
+        arm_stuck,  ///< one that its reset did not turn back has
+        hold,       ///< the whole system has
+    };
+
+    /// Arms the guards with the flow at x⁺. True: another set has been applied at the same
+    /// instant, or a member has come to rest, and `settle` is due again.
+    [[nodiscard]] bool settle();
+
+    /// Settles all that happens at one instant, where the flow is there to be evaluated.
+    void settle_all()
+    {
+        level_ = 0;
+        while (settle()) {
+        }
+    }
+
+    /// The guards that were carried across their surfaces fire in turn.
+    [[nodiscard]] bool apply_next_set();
+
+    /// Whether the events of a member accumulate here. It comes to rest, or the run
+    /// ends.
+    [[nodiscard]] bool rest_members();
+
+    /// Notes how guard i leaves its surface after its reset. True if it is not going to rise
+    /// above its rounding any more.
+    [[nodiscard]] bool fades(std::size_t i);
+
+    /// Whether the reset has put guard i so far from its surface, on the side it came from, that
+    /// it need not rise: not a residue of the location.
+    [[nodiscard]] bool is_away(std::size_t i, double rounding);
+
+    /// The rate [1/s] of guard i at the start of the step; where it is a difference quotient,
+    /// over 1e-5 of `scale` [s].
+    [[nodiscard]] double departure(std::size_t i, double scale)
+    {
+        return bank_.view(i, step_.mode(), calls())
+            .rate(step_.time(0), step_.x0(), step_.rate0(), scale);
+    }
+
+    /// The limit of the events of guard i is `ahead` [s] from here, give or take `error`.
+    void come_to_rest(std::size_t i, double ahead, double error);
+
+    /// Whether guard i stays where it is while the state stands still: its surface does not
+    /// move. Looked at from a thousandth of the time that is left to all of it.
+    [[nodiscard]] bool stays_on_surface(std::size_t i);
+
+    void enable_guards();
+
+    /// Arms every guard at the start of a flight. The members have fired and count as
+    /// being on their surface up to the residue of their location. Those that the
+    /// resets have carried across their surface become the new members.
+    void arm_all();
+
+    /// False: the run has ended.
+    [[nodiscard]] bool arm_one(std::size_t i, double widest);
+
+    /// The side that a crossing which counts leaves; `else_side` where both do.
+    [[nodiscard]] static constexpr Side side_left_by(Crossing crossing, Side else_side) noexcept
+    {
+        return crossing == Crossing::falling  ? Side::above
+               : crossing == Crossing::rising ? Side::below
+                                              : else_side;
+    }
+
+    /// The side that a guard on its surface is about to be on.
+    [[nodiscard]] Side heading(std::size_t i);
+
+    /// The rest rule has not stopped the setup into the surface.
+    [[nodiscard]] bool still_stuck(std::size_t i) const noexcept
+    {
+        return bank_[i].info.unilateral && bank_[i].enabled && bank_[i].side == Side::below;
+    }
+
+    /// A unilateral guard on its surface that its reset does not turn back.
+    [[nodiscard]] std::size_t stuck_member();
+
+    // --- recording ---
+
+    void note_crossings(double s);
+
+    /// All that other guards do up to the set of the members: crossings before it, which
+    /// leave a guard on its other side, and crossings with it.
+    void note_crossings_to_set();
+
+    [[nodiscard]] bool counts_at_set(std::size_t i);
+
+    [[nodiscard]] bool is_member(std::size_t i) noexcept
+    {
+        auto& members = search_.members();
+        return std::find(members.begin(), members.end(), i) != members.end();
+    }
+
+    void record(Event<X>&& event)
+    {
+        if (!options_.record_events) return;
+        if (run_.events.empty()) run_.events.reserve(16);  // most runs grow no further
+        run_.events.push_back(std::move(event));
+    }
+
+    void count_event(std::size_t i, double t, Side side);
+
+    void record_time_event(double t);
+
+    /// A member of the set, found inside the step or flipped at its start.
+    void record_crossing(std::size_t i, double t, bool located);
+
+    /// A notification of a guard that a reset has carried across its surface.
+    void record_jump(std::size_t i, Side before);
+
+    /// What happened in the step up to offset s without consequence.
+    void record_notes(double s);
+
+    // --- saving ---
+
+    /// All that the future of the guards depends on.
+    template <class Visitor>
+    void visit_guards(Visitor&& visit)
+    {
+        if (guarded_) bank_.visit(visit);
+    }
+
+    static constexpr int most_levels = 100;  ///< of sets at one instant
+    static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
+    /// Of the last flight of a guard: over so long the rounding of its small excursions is
+    /// magnified less by a difference quotient than over the usual 1e-5 of a step.
+    static constexpr double low_part = 0.05;
+
+    const RunSetup<X>& setup_;
+    SystemAt<X> system_;
+    Finders<X> finders_;
+    bool error_controlled_;
+    bool guarded_;     ///< has guards, if only none of them yet
+    bool resets_any_;  ///< has resets
+    bool timed_;
+    bool predicts_;
+    Options options_;
+    Metering meter_;
+    EventResolution resolution_;
+    bool backward_;
+    Step<X> step_;
+    GuardBank<X, single> bank_;
+    EventSearch<X, single> search_;
+    double h_next_ = 0;        ///< [s] length of the next step, roughly
+    double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
+    bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
+    bool watching_ = false;    ///< with their rates: every step is checked
+    double time_event_ = std::numeric_limits<double>::infinity();
+    bool time_event_due_ = false;
+    bool ended_ = false;
+    bool resting_ = false;
+    bool stops_ = false;
+    bool asked_ = false;  ///< a network, about the step in hand
+    MergedResets<X> resets_;
+    Instant set_instant_;  ///< of the members, in a step that holds them
+    Mode mode_before_ = 0;
+    Firing firing_;  ///< of the set in hand
+    Pending pending_ = Pending::nothing;
+    std::size_t stuck_ = no_guard;
+    int level_ = 0;  ///< of sets at this instant
+    Run<X> run_;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,103 @@
+// What a set of events makes of the state.
+#pragma once
+
+#include "core/engine.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline void EventEngine<X, single>::cut()
+{
+    const double s = search_.at();
+    const double t = firing_.on_time ? time_event_ : time_of_set();
+    for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
+    note_crossings_to_set();
+    mode_before_ = step_.mode();
+    for (const std::size_t i : search_.members()) find_band(i, t);
+    ++run_.statistics.steps;
+    count_refined();
+    record_notes(s);
+    apply(firing_);
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::apply(const Firing& how)
+{
+    const Instant at = how.located ? set_instant_ : step_.instant(0, 0);
+    const double t = how.on_time ? time_event_ : at.value;
+    firing_ = how;
+    if (how.on_time) record_time_event(t);
+    for (const std::size_t i : search_.members()) record_crossing(i, t, how.located);
+    if (!goes_on()) {
+        step_.restart(at, search_.before(), step_.mode());
+        return;
+    }
+    step_.restart(at, resets_.after(), resets_.mode());
+    if (how.on_time) step_.hold(t);
+    if (stops_) return end(Outcome::stopped_by_event, first_member());
+    pending_ = Pending::settle;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::find_band(std::size_t i, double t)
+{
+    GuardRecord& record = bank_[i];
+    const Location& where = search_.where(i);
+    record.jumped = where.jump;
+    if (where.jump) {  // the state is beyond, and the guard anything but small
+        record.estimated = false;
+        record.band = 0;
+        return;
+    }
+    const double residue = 2 * std::fabs(where.slope) * where.error;
+    record.estimated = system_->bounded && !record.info.boolean && std::isfinite(residue) &&
+                       search_.at() == where.root && !search_.late();
+    record.band =
+        record.estimated ? std::max(residue, bank_.touch(i, step_.h())) : residue_of(i, t);
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::goes_on()
+{
+    const std::size_t modes = system_.modes();
+    if (resets_.conflict().first != no_guard) {
+        run_.other_guard = resets_.conflict().second;
+        end(Outcome::conflicting_resets, resets_.conflict().first);
+    } else if (modes > 0 && resets_.mode() >= modes) {
+        end(Outcome::unknown_mode, first_member());
+    } else if (!fits_dimension(search_.before(), resets_.after(), resets_.mode() == step_.mode())) {
+        end(Outcome::wrong_dimension, first_member());
+    } else if (!all_finite(resets_.after()) || resets_.after().size() == 0) {
+        end(Outcome::non_finite, first_member());
+    }
+    return !ended_;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::find_time_event(bool at_start)
+{
+    if (!timed_) return;
+    const double t = step_.start().value;
+    if (!backward_) {
+        time_event_ = system_->next_time_event(system_.door(), t);
+    } else if (system_->previous_time_event) {
+        time_event_ = system_->previous_time_event(system_.door(), t);
+    }
+    if (step_.until(time_event_) > 0) return;
+    if (at_start) throw_time_event_not_ahead(backward_, t, time_event_);
+    end(Outcome::time_event_not_ahead);
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::apply_time_event()
+{
+    for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
+    search_.members().clear();
+    assign(search_.before(), step_.x0());
+    transform(true);
+    resting_ =
+        resting_ && resets_.mode() == step_.mode() && same_state(resets_.after(), step_.x0());
+    apply({.located = false, .on_time = true});
+}
+
+}  // namespace ricochet::detail

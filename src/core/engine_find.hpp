@@ -1,0 +1,182 @@
+// Which set of events comes first in the step in hand.
+#pragma once
+
+#include "core/engine.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::deserves_search(bool& cleared)
+{
+    cleared = false;
+    if (predicts_) {
+        meter_.look_back(run_.statistics);
+        asked_ = meter_.asks();
+        if (asked_) cleared = ask_network();
+        if (cleared && !finders_.detector.checks_every_step) {
+            ++run_.statistics.checks_put_off;
+            run_.statistics.evidence.add(Evidence::assumed);
+            return false;
+        }
+    }
+    if (bank_.size() == 0) return false;
+    bank_.sample_end(step_, calls());
+    if (any_suspicious()) return true;
+    if (asked_ && !cleared) ++run_.statistics.false_alarms;
+    pass_on_clear();
+    return false;
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::is_suspicious(bool hardly_moves)
+{
+    if (!bank_.looked()) return bank_.suspicious(step_.h());
+    if (hardly_moves) {
+        X& x = search_.space(step_.x0());
+        for (const double u : CubicLook::places) {
+            step_.peek(u * step_.h(), x);
+            bank_.sample_place(step_, u, x, calls());
+        }
+        return bank_.suspicious(step_.h());
+    }
+    if (!bank_.doubtful(step_.h())) return false;
+    if (bank_.needs_second_look(step_.h())) {
+        X& x = search_.space(step_.x0());
+        step_.peek(CubicLook::further * step_.h(), x);
+        bank_.sample_further(step_, x, calls());
+    }
+    return bank_.suspicious(step_.h());
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::look_inside()
+{
+    if constexpr (is_small<X> && std::is_trivially_copyable_v<X>) {
+        // Components that no guard reads are not computed.
+        X x{};
+        step_.template peek<InsideOf>(x);
+        bank_.sample_inside(step_, x, calls());
+    } else {
+        X& x = search_.space(step_.x0());
+        step_.template peek<InsideOf>(x);
+        bank_.sample_inside(step_, x, calls());
+    }
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::hardly_moves() const noexcept
+{
+    const X& x0 = step_.x0();
+    const X& x1 = step_.x1();
+    const auto is_still = [&](auto i) {
+        return std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]);
+    };
+    if constexpr (is_small<X>) {
+        bool still = true;
+        for_each_component(x0, [&](auto i) { still &= is_still(i); });
+        return still;
+    } else {
+        for (decltype(x0.size()) i = 0; i < x0.size(); ++i) {
+            if (!is_still(i)) return false;
+        }
+        return true;
+    }
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::ask_network()
+{
+    ++run_.statistics.network_calls;
+    return meter_.time_network([&] {
+        return finders_.detector.clears(finders_.detecting, system_.door(), step_.state(), calls());
+    });
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::find(bool cleared)
+{
+    search_.begin(step_.x0());
+    if (bank_.waiting()) end_plateaus();
+    bank_.begin_search(step_.h());
+    while (search_.find_set(step_, bank_, resolution_, time_event_due_, calls())) {
+        if (predicts_ && (cleared || search_.late())) ++run_.statistics.missed_events;
+        if (search_.late()) ++run_.statistics.late_events;
+        dismiss_members();
+        if (search_.members().empty()) continue;
+        firing_ = {.located = true, .on_time = time_event_due_ && search_.at() == step_.h()};
+        set_instant_ = step_.instant(search_.at(), search_.at_remainder());
+        transform(firing_.on_time);
+        if (firing_.on_time || !changes_nothing()) return true;
+        go_on_past_members();
+    }
+    note_crossings(step_.h());
+    if (search_.notes().empty()) {
+        if (asked_ && !cleared) ++run_.statistics.false_alarms;
+        run_.statistics.evidence.add(search_.evidence());
+    } else {
+        record_notes(step_.h());
+    }
+    count_refined();
+    bank_.pass_on_after_events();
+    return false;
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::counts_here(std::size_t i)
+{
+    const bool enabled = system_.enabled_at(i, step_.mode(), step_.time(0), step_.x0());
+    run_.statistics.disabled += !enabled;
+    return enabled;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::dismiss_members()
+{
+    auto& members = search_.members();
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+        const std::size_t i = members[k];
+        const double t = step_.time(search_.at());
+        if (!system_.enabled_at(i, step_.mode(), t, search_.before())) {
+            ++run_.statistics.disabled;
+        } else if (repeats(i, t) && !bank_[i].info.unilateral && !turned_back(i)) {
+            ++run_.statistics.suppressed;
+        } else {
+            bank_[i].again = repeats(i, t) && turned_back(i);
+            members[kept++] = i;
+            continue;
+        }
+        search_.pass(step_, bank_, i, calls());
+    }
+    members.shrink(kept);
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::changes_nothing()
+{
+    if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
+    for (const std::size_t i : search_.members()) {
+        if (bank_[i].info.unilateral || ends_run(i)) return false;
+    }
+    return same_state(resets_.after(), search_.before());
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::ends_run(std::size_t i) const noexcept
+{
+    const GuardRecord& record = bank_[i];
+    if (options_.stop_at_event) return true;
+    return record.info.stop_after > 0 &&
+           record.events + search_.noted(i) + 1 >= record.info.stop_after;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::go_on_past_members()
+{
+    for (const std::size_t i : search_.members()) {
+        search_.note(i, bank_[i].side);
+        search_.pass(step_, bank_, i, calls());
+    }
+}
+
+}  // namespace ricochet::detail

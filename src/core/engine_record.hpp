@@ -1,0 +1,158 @@
+// What is kept of events.
+#pragma once
+
+#include "core/engine.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline void EventEngine<X, single>::note_crossings(double s)
+{
+    for (const std::size_t i : bank_.suspects()) {
+        if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
+        search_.note_crossings(step_, bank_, i, bank_.end(i, s), resolution_, calls());
+    }
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::note_crossings_to_set()
+{
+    if (search_.members().size() == bank_.size()) return;
+    for (const std::size_t i : bank_.suspects()) {
+        GuardRecord& record = bank_[i];
+        if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
+        const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
+        const bool with_set = !record.info.boolean && at.s > record.from &&
+                              search_.crosses_with_set(step_, bank_, i, at, resolution_);
+        GuardSample last = at;
+        // On the side that it comes from, until it crosses.
+        if (with_set) record.band = std::fabs(at.value);
+        if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
+        if (!record.acting) {
+            search_.note_crossings(step_, bank_, i, last, resolution_, calls());
+        }
+        if (has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
+        const Side side = record.side;
+        if (!with_set || side_of(last.value) != side) continue;
+        if (!counts(side, record.info.crossing)) {
+            bank_.arm(i, opposite(side));
+        } else if (!record.acting) {
+            if (counts_at_set(i)) {
+                search_.note_at_set(bank_, i, side, at.rate);
+            } else {
+                bank_.arm(i, opposite(side));
+            }
+        }  // else its own event is still to come
+    }
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::counts_at_set(std::size_t i)
+{
+    const bool enabled =
+        system_.enabled_at(i, step_.mode(), step_.time(search_.at()), search_.before());
+    run_.statistics.disabled += !enabled;
+    return enabled;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::count_event(std::size_t i, double t, Side side)
+{
+    GuardRecord& record = bank_[i];
+    ++run_.statistics.events;
+    ++record.events;
+    record.last = t;
+    record.last_side = side;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::record_time_event(double t)
+{
+    stops_ = options_.stop_at_event;
+    ++run_.statistics.events;
+    record({.t = t,
+            .kind = EventKind::time,
+            .guard = no_guard,
+            .mode_before = step_.mode(),
+            .mode_after = resets_.mode(),
+            .before = search_.before(),
+            .after = resets_.after(),
+            .bracket = {t, t},
+            .slope = 0});
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, bool located)
+{
+    stops_ = (stops_ && i != first_member()) || ends_run(i);
+    count_event(i, t, bank_[i].side);
+    if (!options_.record_events) return;
+    const Location where = located ? search_.where(i) : Location{};
+    record({.t = t,
+            .kind = kind_of(where),
+            .guard = i,
+            .mode_before = step_.mode(),
+            .mode_after = resets_.mode(),
+            .before = search_.before(),
+            .after = resets_.after(),
+            .bracket = {step_.time(where.lo), step_.time(where.hi)},
+            .slope = where.slope,
+            .error = where.error,
+            .late = located && search_.late()});
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::record_jump(std::size_t i, Side before)
+{
+    const double t = step_.time(0);
+    count_event(i, t, before);
+    record({.t = t,
+            .guard = i,
+            .mode_before = step_.mode(),
+            .mode_after = step_.mode(),
+            .before = step_.x0(),
+            .after = step_.x0(),
+            .bracket = {t, t}});
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::record_notes(double s)
+{
+    if (search_.notes().empty()) return;
+    search_.keep_notes_until(s);
+    const double remainder = s == search_.at() ? search_.at_remainder() : 0;
+    const double latest = step_.instant(s, remainder).value;
+    for (const Note& note : search_.notes()) {
+        const double t = backward_ ? std::max(step_.time(note.where.root), latest)
+                                   : std::min(step_.time(note.where.root), latest);
+        count_event(note.guard, t, note.side);
+        if (!options_.record_events) continue;
+        Event<X> event{.t = t,
+                       .kind = note.kind,
+                       .guard = note.guard,
+                       .mode_before = step_.mode(),
+                       .mode_after = step_.mode(),
+                       .bracket = {step_.time(note.where.lo), step_.time(note.where.hi)},
+                       .slope = note.where.slope,
+                       .error = note.where.error};
+        if (options_.event_states || system_->fixed_dimension) {
+            event.before = search_.state_at(step_, note);
+            event.after = event.before;
+        }
+        record(std::move(event));
+    }
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::add_evidence(Evidence evidence, std::uint64_t steps) noexcept
+{
+    EvidenceCounts& counts = run_.statistics.evidence;
+    switch (evidence) {
+        case Evidence::proved: counts.proved += steps; return;
+        case Evidence::checked: counts.checked += steps; return;
+        case Evidence::gated: counts.gated += steps; return;
+        case Evidence::assumed: counts.assumed += steps; return;
+    }
+}
+
+}  // namespace ricochet::detail
