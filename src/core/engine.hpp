@@ -177,7 +177,7 @@ protected:
                       search_.before());
     }
 
-    /// Whether the event leaves everything as it was, so that the step can stand.
+    /// Whether the event leaves everything as it was, and no host wants to know, so that the step can stand.
     [[nodiscard]] bool changes_nothing();
 
     /// Whether this event of the guard, not yet counted, ends the run.
@@ -193,7 +193,7 @@ protected:
     };
 
     /// The set that was found cuts the step short: applies it.
-    void cut();
+    void cut_short();
 
     /// The members fire: the step is placed at `search_.before()` made `resets_.after()`. Unless
     /// the run has ended, `settle` is due.
@@ -383,6 +383,7 @@ protected:
     bool resting_ = false;
     bool stops_ = false;
     bool asked_ = false;  ///< a network, about the step in hand
+    bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
     Instant set_instant_;  ///< of the members, in a step that holds them
     Mode mode_before_ = 0;

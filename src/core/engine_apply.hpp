@@ -6,7 +6,7 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline void EventEngine<X, single>::cut()
+inline void EventEngine<X, single>::cut_short()
 {
     const double s = search_.at();
     const double t = firing_.on_time ? time_event_ : time_of_set();
@@ -26,6 +26,7 @@ inline void EventEngine<X, single>::apply(const Firing& how)
     const Instant at = how.located ? set_instant_ : step_.instant(0, 0);
     const double t = how.on_time ? time_event_ : at.value;
     firing_ = how;
+    mode_before_ = step_.mode();
     if (how.on_time) record_time_event(t);
     for (const std::size_t i : search_.members()) record_crossing(i, t, how.located);
     if (!goes_on()) {

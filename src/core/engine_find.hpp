@@ -154,6 +154,7 @@ inline void EventEngine<X, single>::dismiss_members()
 template <class X, bool single>
 inline bool EventEngine<X, single>::changes_nothing()
 {
+    if (cuts_at_all_) return false;
     if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
     for (const std::size_t i : search_.members()) {
         if (bank_[i].info.unilateral || ends_run(i)) return false;

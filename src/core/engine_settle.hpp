@@ -254,7 +254,8 @@ inline void EventEngine<X, single>::refuse_bad_guards()
         GuardRecord& record = bank_[i];
         const GuardInfo& info = record.info;
         record.acting =
-            (resets_any_ && info.resets) || info.stop_after > 0 || options_.stop_at_event;
+            (resets_any_ && info.resets) || info.stop_after > 0 ||
+                        options_.stop_at_event || cuts_at_all_;
         if (info.unilateral && !(resets_any_ && info.resets)) {
             throw_no_reset(i, info.name);
         }

@@ -160,6 +160,22 @@ public:
         heed_enabled();
     }
 
+    /// What happened before is of no account; events go on to be counted.
+    void forget() noexcept
+    {
+        for (GuardRecord& record : records_) {
+            GuardRecord fresh;
+            fresh.info = record.info;
+            fresh.acting = record.acting;
+            fresh.events = record.events;
+            record = fresh;
+        }
+        for (double& size : sizes_) size = 0;
+        waiting_ = false;
+        forget_screening();
+        looked_ = Looked::not_at_all;
+    }
+
     [[nodiscard]] std::size_t size() const noexcept { return single ? 1 : records_.size(); }
     [[nodiscard]] bool looks() const noexcept { return rules_.looks; }
     [[nodiscard]] GuardRecord& operator[](std::size_t i) noexcept { return records_[i]; }

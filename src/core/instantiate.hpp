@@ -14,6 +14,7 @@
 #include "core/loop_saving.hpp"
 #include "core/loop_setup.hpp"
 #include "core/loop_steps.hpp"
+#include "core/monitor_loop.hpp"
 #include "ricochet/detail/kernels.hpp"
 
 namespace ricochet::detail {
@@ -48,6 +49,29 @@ std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
         }
     }
     return std::make_unique<KeptLoop<X, false>>(setup, x0, options);
+}
+
+template <class X, bool single>
+struct KeptMonitor final : KeptSetup<X>, MonitorLoop<X, single> {
+    KeptMonitor(const RunSetup<X>& setup, const X& like, const Options& options,
+                bool cuts_at_all)
+        : KeptSetup<X>{setup}, MonitorLoop<X, single>(this->kept, like, options, cuts_at_all)
+    {
+    }
+};
+
+template <class X>
+std::unique_ptr<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
+                                            const Options& options, bool cuts_at_all)
+{
+    RunSetup<X> shown = setup;
+    shown.kernel = &host_kernel<X>;
+    if constexpr (fixed_size<X>() > 0) {
+        if (has_single_guard(setup)) {
+            return std::make_unique<KeptMonitor<X, true>>(shown, like, options, cuts_at_all);
+        }
+    }
+    return std::make_unique<KeptMonitor<X, false>>(shown, like, options, cuts_at_all);
 }
 
 template <class X>
@@ -85,6 +109,8 @@ const StepKernel<X>& kernel_by_name(MethodName name) noexcept
     using CoreStateHere = __VA_ARGS__;                                                            \
     template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(                                   \
         const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                    \
+    template std::unique_ptr<AnyMonitor<CoreStateHere>> make_monitor(                             \
+        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, bool);              \
     template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \
                                           const Options&);                                        \
     template const StepKernel<CoreStateHere>& kernel_by_name<CoreStateHere>(MethodName) noexcept; \

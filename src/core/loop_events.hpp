@@ -26,7 +26,7 @@ bool Loop<X, single>::search(bool cleared)
     emit_samples(search_.at());
     record_step(search_.at());
     limit_next_step(firing_.on_time ? time_event_ : this->time_of_set());
-    this->cut();
+    this->cut_short();
     this->settle_all();
     return true;
 }

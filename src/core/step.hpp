@@ -5,6 +5,7 @@
 // what is being asked about.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -39,7 +40,7 @@ public:
         state_.start = {t, 0};
         state_.mode = mode;
         state_.backward = backward;
-        flow(0, state_.x0, state_.rate0);
+        arrive();
     }
 
     [[nodiscard]] const StepState<X>& state() const noexcept { return state_; }
@@ -79,6 +80,8 @@ public:
         if (kernel_->interpolates()) {
             departure(s, x);
             add_tangent(s, x);
+        } else if (state_.host) {
+            interpolate_on_host(s, x);
         } else {
             const DenseView<X, false> view(dense(), s);
             for_components([&](auto i) { x[i] = view[i]; });
@@ -92,6 +95,8 @@ public:
         if (kernel_->interpolates()) {
             departure(s, x);
             add_tangent(s, x);
+        } else if (state_.host) {
+            interpolate_on_host(s, x);
         } else {
             const double h = state_.h;
             const double u = s / h;
@@ -162,6 +167,7 @@ public:
     void restep(double s, X& x) const
     {
         ++resteps_;
+        if (state_.host) return restep_on_host(s, x);
         kernel_->depart(system_.door(), state_, s, x, unused_rate_);
         add_tangent(s, x);
     }
@@ -181,6 +187,10 @@ public:
     void restep(double s, X& x, X& dxdt) const
     {
         ++resteps_;
+        if (state_.host) {
+            restep_on_host(s, x);
+            return rate_on_host(s, dxdt);
+        }
         kernel_->depart(system_.door(), state_, s, x, dxdt);
         add_tangent(s, x);
         if (kernel_->end_rate) {
@@ -190,12 +200,54 @@ public:
         }
     }
 
-    /// x' = f(t0 + s, x).
+    /// x' = f(t0 + s, x); in a step of a host, where x lies on its path, the rate of that.
     void flow(double s, const X& x, X& dxdt) const
     {
+        if (state_.host) return rate_on_host(s, dxdt);
         ++state_.flow_calls;
         state_.flow_fits &= system_->flow(system_.door(), state_.mode, time(s), x, dxdt);
         if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
+    }
+
+    /// The rate of the step's polynomial at offset s.
+    void rate_of_polynomial(double s, X& dxdt) const
+    {
+        if (state_.host) return rate_on_host(s, dxdt);
+        const DenseView<X, true> rate(dense(), s);
+        for_components([&](auto i) { dxdt[i] = rate[i]; });
+    }
+
+    [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
+
+    /// The step in hand is one that a host has taken from the state in hand.
+    void show(const HostStepTable& host) noexcept
+    {
+        StepState<X>& of = state_;
+        of.host = &host;
+        of.start = host.start;
+        of.h = host.h;
+        for_components([&](auto i) {
+            const auto c = static_cast<std::size_t>(i);
+            of.x1[i] = host.x1[c];
+            of.rate0[i] = host.rate0[c];
+            of.rate1[i] = host.rate1[c];
+        });
+    }
+
+    /// As `accept`, of a step that a host has taken.
+    void accept_shown() noexcept
+    {
+        StepState<X>& of = state_;
+        of.start = of.start.after(of.in_time(of.h));
+        assign(of.x0, of.x1);
+        assign(of.rate0, of.rate1);
+        of.host = nullptr;
+    }
+
+    /// The flow at the start, as a host has computed it.
+    void set_rate(const double* dxdt) noexcept
+    {
+        for_components([&](auto i) { state_.rate0[i] = dxdt[static_cast<std::size_t>(i)]; });
     }
 
     /// Takes a step of length h, without a look at its error. False if the end of the step or the
@@ -242,7 +294,7 @@ public:
     {
         state_.start = instant(s, remainder);
         begin(x, mode);
-        flow(0, state_.x0, state_.rate0);
+        arrive();
     }
 
     /// The same to an instant.
@@ -250,7 +302,7 @@ public:
     {
         state_.start = at;
         begin(x, mode);
-        flow(0, state_.x0, state_.rate0);
+        arrive();
     }
 
     /// Moves the start of the step to where another one started.
@@ -306,6 +358,40 @@ private:
     [[gnu::always_inline]] void for_components(const Function& function) const
     {
         for_each_component(state_.x0, function);
+    }
+
+    /// The flow at the start; a host has it, and says so (`set_rate`).
+    void arrive()
+    {
+        state_.host = nullptr;
+        if (kernel_->take) flow(0, state_.x0, state_.rate0);
+    }
+
+    void interpolate_on_host(double s, X& x) const
+    {
+        const HostStepTable& host = *state_.host;
+        host.interpolate(host.host, s, x.data(), state_.x0.size());
+    }
+
+    void restep_on_host(double s, X& x) const
+    {
+        const HostStepTable& host = *state_.host;
+        const auto place = host.restep ? host.restep : host.interpolate;
+        place(host.host, s, x.data(), state_.x0.size());
+    }
+
+    /// Over a ten-thousandth of the step the rounding and the bend of a difference are alike.
+    void rate_on_host(double s, X& dxdt) const
+    {
+        const HostStepTable& host = *state_.host;
+        if (host.rate) return host.rate(host.host, s, dxdt.data(), state_.x0.size());
+        const double reach = 1e-4 * host.h;
+        const double from = std::max(0.0, s - reach);
+        const double to = std::min(host.h, s + reach);
+        X& at = state_.at;
+        interpolate_on_host(from, at);
+        interpolate_on_host(to, dxdt);
+        for_components([&](auto i) { dxdt[i] = (dxdt[i] - at[i]) / (to - from); });
     }
 
     void begin(const X& x, Mode mode)

@@ -16,6 +16,7 @@
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
+#include "ricochet/detail/host_step.hpp"
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/detail/runge_kutta.hpp"
 #include "ricochet/hybrid/guard.hpp"
@@ -67,6 +68,8 @@ struct StepState {
     /// Of the system, for kernels that do not have it inlined; see `SystemTable::flow`.
     bool (*flow)(void* door, Mode mode, double t, const X& x, X& dxdt) = nullptr;
 
+    const HostStepTable* host = nullptr;  ///< the step in hand, where a host has taken it
+
     Instant start;
     Mode mode = 0;
     bool backward = false;  ///< time runs backward, and offsets and rates with it
@@ -96,7 +99,7 @@ struct StepState {
     [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }
 };
 
-/// A method for one system.
+/// A method for one system. Without functions it is a host's.
 template <class X>
 struct StepKernel {
     int order = 0;

@@ -169,7 +169,7 @@ public:
         : GuardPath({.h = step.h(),
                      .crossing = guard.crossing(),
                      .is_rated = is_rated(guard),
-                     .is_polynomial = DenseStep<Step, State>},
+                     .is_polynomial = has_polynomial(step)},
                     path),
           guard_(&guard),
           step_(&step),
@@ -242,10 +242,11 @@ public:
     [[nodiscard]] int degree() const override
     {
         if constexpr (DenseStep<Step, State>) {
-            return guard_->degree() * degree_of(step_->dense().nodes);
-        } else {
-            return 0;
+            if (has_polynomial(*step_)) {
+                return guard_->degree() * degree_of(step_->dense().nodes);
+            }
         }
+        return 0;
     }
 
 private:
@@ -276,8 +277,10 @@ private:
             if (sees()) return point_of_view(s, t);
         }
         step_->interpolate(s, space_->x);
-        if constexpr (DenseStep<Step, State>) {
-            // The polynomial's own: a flow that jumps does not agree with it.
+        // The polynomial's own: a flow that jumps does not agree with it.
+        if constexpr (requires { step_->rate_of_polynomial(s, space_->dxdt); }) {
+            step_->rate_of_polynomial(s, space_->dxdt);
+        } else if constexpr (DenseStep<Step, State>) {
             const DenseView<State, true> rate(step_->dense(), s);
             detail::for_each_component(space_->x, [&](auto i) { space_->dxdt[i] = rate[i]; });
         } else {
@@ -375,6 +378,13 @@ private:
         } else {
             return true;
         }
+    }
+
+    /// Whether the step is a polynomial; one of a host need not be.
+    [[nodiscard]] static bool has_polynomial(const Step& step) noexcept
+    {
+        if constexpr (requires { step.is_hosts(); }) return !step.is_hosts();
+        return DenseStep<Step, State>;
     }
 
     [[nodiscard]] View view(double s) const { return component_view<false>(*step_, s); }

@@ -1,0 +1,29 @@
+// Internal: what it declares may change without notice.
+//
+// A step of a host, as the engine knows it.
+#pragma once
+
+#include <cstddef>
+
+#include "ricochet/detail/instant.hpp"
+
+namespace ricochet::detail {
+
+/// Arrays have as many elements as the state. Rates are with respect to the offset s in [0, h].
+struct HostStepTable {
+    Instant start;
+    double h = 0;  ///< [s]
+    const double* x0 = nullptr;
+    const double* x1 = nullptr;
+    const double* rate0 = nullptr;
+    const double* rate1 = nullptr;
+
+    const void* host = nullptr;  ///< what the functions are called with
+    void (*interpolate)(const void* host, double s, double* x, std::size_t n) = nullptr;
+    /// The derivative of `interpolate`. Null: it is a difference.
+    void (*rate)(const void* host, double s, double* dxdt, std::size_t n) = nullptr;
+    /// The host's own map from the start of the step. Null: `interpolate` is as good.
+    void (*restep)(const void* host, double s, double* x, std::size_t n) = nullptr;
+};
+
+}  // namespace ricochet::detail

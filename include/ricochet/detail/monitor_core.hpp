@@ -1,0 +1,86 @@
+// Internal: what it declares may change without notice.
+//
+// The events of a host's steps, as they are compiled in the library.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "ricochet/detail/core.hpp"
+#include "ricochet/detail/host_step.hpp"
+#include "ricochet/integrate/options.hpp"
+
+namespace ricochet {
+
+/// What a host is to do next.
+enum class Verdict {
+    stands,  ///< the step stands: go on from its end
+    cut,     ///< the step ends at a set of events: go on from `cut().after`, and `resume`
+    rests,   ///< the motion has come to rest: keep the state until `must_stop_at`, then `hold`
+    ended,   ///< the run is over; `outcome` says why
+};
+
+/// A set of events that ends a step, at the same instant for all its members.
+template <class X>
+struct Cut {
+    double s = 0;  ///< [s] offset in the step shown last; 0 where the set follows another at once
+    Instant t;     ///< [s]
+    X before{};    ///< x⁻
+    X after{};     ///< x⁺
+    Mode mode_before = 0;
+    Mode mode_after = 0;
+    /// The guards that fired, in ascending order; of an accumulation the guard that came to rest.
+    std::vector<std::size_t> fired;
+    bool on_time = false;        ///< with a time event
+    bool accumulation = false;   ///< `after` is what `rest` makes of the limit, `t` its time
+    bool state_changed = false;  ///< false: the host need not start anew
+};
+
+namespace detail {
+
+/// @throws std::invalid_argument: an array of a host's is not of the size of the state.
+[[noreturn]] void throw_wrong_size(std::size_t expected, std::size_t found);
+
+/// See `EventMonitor`.
+template <class X>
+class AnyMonitor {
+public:
+    AnyMonitor() = default;
+    AnyMonitor(const AnyMonitor&) = delete;
+    AnyMonitor& operator=(const AnyMonitor&) = delete;
+    virtual ~AnyMonitor() = default;
+
+    /// @param dxdt  null: the system's flow is asked
+    virtual Verdict start(const Instant& t, const X& x, const double* dxdt, Mode mode,
+                          double scale) = 0;
+    virtual Verdict examine(const HostStepTable& step) = 0;
+    virtual Verdict resume(const double* dxdt, double scale) = 0;
+    virtual Verdict resume(const X& after, Mode mode, const double* dxdt, double scale) = 0;
+    virtual Verdict hold(double t) = 0;
+
+    [[nodiscard]] virtual const Cut<X>& cut() const noexcept = 0;
+    [[nodiscard]] virtual Instant t() const noexcept = 0;
+    [[nodiscard]] virtual const X& x() const noexcept = 0;
+    [[nodiscard]] virtual Mode mode() const noexcept = 0;
+    [[nodiscard]] virtual double must_stop_at() const noexcept = 0;
+    [[nodiscard]] virtual Side side(std::size_t guard) const = 0;
+    /// What has been recorded so far; its time and state are those of the last `start`.
+    [[nodiscard]] virtual const Run<X>& run() const noexcept = 0;
+    virtual void clear_events() noexcept = 0;
+    [[nodiscard]] virtual Snapshot save() = 0;
+    virtual void restore(const Snapshot& snapshot) = 0;
+};
+
+/// Keeps a copy of `setup`, of which it needs no method.
+/// @param cuts_at_all  guards without a reset cut the step, too
+/// @throws std::invalid_argument, as `EventMonitor`
+template <class X>
+[[nodiscard]] std::unique_ptr<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
+                                                          const Options& options,
+                                                          bool cuts_at_all);
+
+}  // namespace detail
+
+}  // namespace ricochet

@@ -1,0 +1,333 @@
+// Events of a motion that somebody else integrates.
+//
+//     monitor.start(t, x, dxdt, h);
+//     while (t < t_end) {
+//         host.step_to(std::min(t_end, monitor.must_stop_at()));
+//         Verdict verdict = monitor.examine(host.last_step());
+//         while (verdict == Verdict::cut) {
+//             host.restart(monitor.cut().t, monitor.cut().after);
+//             verdict = monitor.resume(host.rate(), host.h());
+//         }
+//         if (verdict != Verdict::stands) break;
+//     }
+//
+// A host shows every step that it has accepted, in order, each beginning where the last one ended;
+// steps that it rejects are never shown. Steps are half-open, (t, t + h]. The monitor changes
+// nothing of the host. What happens on the way is what `Simulation` does with the same steps: the
+// first set of events, its resets, the arming of all guards with the flow after them.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+
+#include "ricochet/detail/declarations.hpp"
+#include "ricochet/detail/finders.hpp"
+#include "ricochet/detail/monitor_core.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/locate/newton.hpp"
+
+namespace ricochet {
+
+/// A step that a host has accepted, from t0 to t0 + h. The states and the rates at its ends are
+/// arrays of n doubles. Offsets s lie in [0, h], and rates are with respect to them: those of the
+/// path that `interpolate` follows.
+template <class S>
+concept HostStep = requires(const S& step, double s, std::span<double> x) {
+    Instant{step.t0()};  // [s]; or an Instant, of a host that keeps what its sum of times loses
+    { step.h() } -> std::convertible_to<double>;  // [s]
+    { step.x0() } -> std::convertible_to<std::span<const double>>;
+    { step.x1() } -> std::convertible_to<std::span<const double>>;
+    { step.rate0() } -> std::convertible_to<std::span<const double>>;
+    { step.rate1() } -> std::convertible_to<std::span<const double>>;
+    step.interpolate(s, x);  // x(t0 + s)
+};
+
+/// A host that knows the derivative of its interpolant; else it is a difference over 1e-4 h, and
+/// events near tangency are found less finely.
+template <class S>
+concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt) {
+    step.interpolate_rate(s, dxdt);
+};
+
+/// A host that can take its step again with another length, as exactly as the whole one. Events
+/// are then located on this map.
+template <class S>
+concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> x) {
+    step.restep(s, x);
+};
+
+/// The cubic through the values and the rates at the ends of a step, for hosts without an
+/// interpolant of their own. Keeps views of its arguments.
+class HermiteStep {
+public:
+    HermiteStep(const Instant& t0, double h, std::span<const double> x0, std::span<const double> x1,
+                std::span<const double> rate0, std::span<const double> rate1) noexcept
+        : t0_(t0), h_(h), x0_(x0), x1_(x1), rate0_(rate0), rate1_(rate1)
+    {
+    }
+
+    [[nodiscard]] const Instant& t0() const noexcept { return t0_; }
+    [[nodiscard]] double h() const noexcept { return h_; }
+    [[nodiscard]] std::span<const double> x0() const noexcept { return x0_; }
+    [[nodiscard]] std::span<const double> x1() const noexcept { return x1_; }
+    [[nodiscard]] std::span<const double> rate0() const noexcept { return rate0_; }
+    [[nodiscard]] std::span<const double> rate1() const noexcept { return rate1_; }
+
+    void interpolate(double s, std::span<double> x) const noexcept
+    {
+        const double u = s / h_;
+        const double bent = u * u * (3 - 2 * u);
+        const double from = s * (1 - u) * (1 - u);
+        const double to = s * u * (u - 1);
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            x[i] = x0_[i] + (bent * (x1_[i] - x0_[i]) + (from * rate0_[i] + to * rate1_[i]));
+        }
+    }
+
+    void interpolate_rate(double s, std::span<double> dxdt) const noexcept
+    {
+        const double u = s / h_;
+        const double bent = 6 * u * (1 - u) / h_;
+        const double from = (1 - u) * (1 - 3 * u);
+        const double to = u * (3 * u - 2);
+        for (std::size_t i = 0; i < dxdt.size(); ++i) {
+            dxdt[i] = bent * (x1_[i] - x0_[i]) + (from * rate0_[i] + to * rate1_[i]);
+        }
+    }
+
+private:
+    Instant t0_;
+    double h_;
+    std::span<const double> x0_, x1_, rate0_, rate1_;
+};
+
+struct MonitorOptions {
+    double event_tolerance = 0;  ///< as in `Options`
+    double event_rtol = 0;
+    double event_window = 0;
+    bool look_inside = true;
+    bool record_events = true;  ///< keep them, for `events`; off: they are counted
+    bool event_states = true;   ///< of events that change nothing, too
+    bool backward = false;      ///< the host's time runs backward
+    /// Every crossing ends its step, whether the system has a reset for it or not: for hosts that
+    /// change the state themselves.
+    bool cut_at_all = false;
+};
+
+/// The events of a hybrid system in the steps of a host.
+///
+/// The system is one for `Simulation`; its flow is asked for where a guard starts on its surface
+/// without a rate, and where the host does not give the rate after an event.
+///
+/// After construction nothing is allocated for up to 8 guards and states of fixed size, but what is
+/// recorded, and what a reset of several guards at once merges.
+template <class System, class X, class Detector = Extremum, class Locator = Newton>
+requires Flowing<System, X> && StateVector<X>
+class EventMonitor {
+    static_assert(detail::check_declarations<System, X>());
+    static_assert(!puts_off_checks<Detector, System, X>(),
+                  "ricochet: EventMonitor examines every step; expected a detector that puts off no "
+                  "checks, such as Extremum");
+
+public:
+    /// What `cut` and `events` show states as: contiguous doubles.
+    using State = detail::CoreState<X>;
+
+    /// Keeps a reference to the system.
+    /// @param like  a state of the dimension of the motion
+    /// @throws std::invalid_argument for declarations that contradict each other, and a system
+    /// without events.
+    explicit EventMonitor(const System& system, const X& like, const MonitorOptions& options = {},
+                          const Detector& detector = {}, const Locator& locator = {})
+        : parts_(std::make_unique<Parts>(system, like, detector, locator)),
+          monitor_(detail::make_monitor<State>(parts_->setup(), detail::core_state(like),
+                                               engine_options(options), options.cut_at_all)),
+          room_(detail::core_state(like))
+    {
+    }
+    explicit EventMonitor(System&&, const X&, const MonitorOptions& = {}, const Detector& = {},
+                          const Locator& = {}) = delete;
+
+    /// Arms all guards at a state that no event has led to: at the start, and after whatever a host
+    /// does to the state by itself. May be a cut at once: a guard that is about to be crossed.
+    /// @param dxdt   the rate at x in offsets, n doubles
+    /// @param scale  [s] length of the next step, roughly
+    /// @throws std::invalid_argument naming a guard that is not finite, or behind a surface that
+    /// bounds the motion.
+    Verdict start(const Instant& t, std::span<const double> x, std::span<const double> dxdt,
+                  double scale, Mode mode = 0)
+    {
+        return monitor_->start(t, taken(x), checked(dxdt, x.size()), mode, scale);
+    }
+    /// With the rate of the system's flow.
+    Verdict start(const Instant& t, std::span<const double> x, double scale, Mode mode = 0)
+    {
+        return monitor_->start(t, taken(x), nullptr, mode, scale);
+    }
+
+    /// Looks for events in the next step.
+    /// @throws std::logic_error for a step out of turn: not where the last one ended, beyond a time
+    /// event, or before `resume`; nothing has changed then.
+    template <HostStep S>
+    [[nodiscard]] Verdict examine(const S& step)
+    {
+        const std::size_t n = monitor_->x().size();
+        detail::HostStepTable table{.start = Instant{step.t0()},
+                                    .h = step.h(),
+                                    .x0 = checked(step.x0(), n),
+                                    .x1 = checked(step.x1(), n),
+                                    .rate0 = checked(step.rate0(), n),
+                                    .rate1 = checked(step.rate1(), n),
+                                    .host = &step,
+                                    .interpolate = &interpolate<S>};
+        if constexpr (RatedHostStep<S>) table.rate = &interpolate_rate<S>;
+        if constexpr (RepeatableHostStep<S>) table.restep = &restep<S>;
+        return monitor_->examine(table);
+    }
+
+    /// After a cut, once the host has gone to `cut().after`: arms all guards with the rate there.
+    /// May be a cut again: guards that a reset has carried across their surfaces, at the same
+    /// instant, or a motion that comes to rest.
+    [[nodiscard]] Verdict resume(std::span<const double> dxdt, double scale)
+    {
+        return monitor_->resume(checked(dxdt, monitor_->x().size()), scale);
+    }
+    /// With the rate of the system's flow.
+    [[nodiscard]] Verdict resume(double scale) { return monitor_->resume(nullptr, scale); }
+    /// After a cut, from a state of the host's own making in the place of `cut().after`.
+    [[nodiscard]] Verdict resume(std::span<const double> after, Mode mode,
+                                 std::span<const double> dxdt, double scale)
+    {
+        return monitor_->resume(taken(after), mode, checked(dxdt, after.size()), scale);
+    }
+
+    /// The state has been kept until t [s], at most `must_stop_at`. At a time event a cut.
+    [[nodiscard]] Verdict hold(double t) { return monitor_->hold(t); }
+
+    [[nodiscard]] const Cut<State>& cut() const noexcept { return monitor_->cut(); }
+
+    /// Where the next step begins.
+    [[nodiscard]] Instant t() const noexcept { return monitor_->t(); }  ///< [s]
+    [[nodiscard]] std::span<const double> x() const noexcept { return monitor_->x(); }
+    [[nodiscard]] Mode mode() const noexcept { return monitor_->mode(); }
+
+    /// The next time event [s], beyond which no step goes; infinite where there is none.
+    [[nodiscard]] double must_stop_at() const noexcept { return monitor_->must_stop_at(); }
+
+    /// The side of its surface that a guard is on.
+    /// @throws std::out_of_range
+    [[nodiscard]] Side side(std::size_t guard) const { return monitor_->side(guard); }
+
+    [[nodiscard]] Outcome outcome() const noexcept { return monitor_->run().outcome; }
+    /// That ended the run, or `no_guard`.
+    [[nodiscard]] std::size_t guard() const noexcept { return monitor_->run().guard; }
+    [[nodiscard]] const Statistics& statistics() const noexcept
+    {
+        return monitor_->run().statistics;
+    }
+    /// Since `clear_events`, in the order in which they happened.
+    [[nodiscard]] std::span<const Event<State>> events() const noexcept
+    {
+        return monitor_->run().events;
+    }
+    void clear_events() noexcept { monitor_->clear_events(); }
+
+    /// All that the future depends on, between two steps.
+    [[nodiscard]] Snapshot save() const { return monitor_->save(); }
+    /// @throws std::invalid_argument if the snapshot is of another system, or no state of one;
+    /// then nothing has changed.
+    void restore(const Snapshot& snapshot) { monitor_->restore(snapshot); }
+
+private:
+    class Parts {
+    public:
+        Parts(const System& system, const X& like, const Detector& detector, const Locator& locator)
+            : door_(system, like), detector_(detector), locator_(locator)
+        {
+            detail::check_bound_declarations<System, X>();
+        }
+        Parts(const Parts&) = delete;
+        Parts& operator=(const Parts&) = delete;
+
+        [[nodiscard]] detail::RunSetup<State> setup() noexcept
+        {
+            return {.system = &table,
+                    .door = &door_,
+                    .detector = detail::DetectorTableOf<Detector, System, X>::make(detector_),
+                    .detecting = &detector_,
+                    .locator = detail::locator_table<Locator>(),
+                    .locating = &locator_};
+        }
+
+    private:
+        /// Guards see whole states: a host's interpolant need be no polynomial.
+        [[nodiscard]] static constexpr detail::SystemTable<State> of_whole_states() noexcept
+        {
+            detail::SystemTable<State> table = detail::system_table<System, X>;
+            table.guard_on = nullptr;
+            table.rate_on = nullptr;
+            return table;
+        }
+        static constexpr detail::SystemTable<State> table = of_whole_states();
+
+        detail::Door<System, X> door_;
+        Detector detector_;
+        Locator locator_;
+    };
+
+    [[nodiscard]] static Options engine_options(const MonitorOptions& options)
+    {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        Options out{.t_end = options.backward ? -infinity : infinity,
+                    .event_tolerance = options.event_tolerance,
+                    .event_rtol = options.event_rtol,
+                    .event_window = options.event_window,
+                    .look_inside = options.look_inside,
+                    .record_events = options.record_events,
+                    .event_states = options.event_states};
+        Options finite = out;
+        finite.t_end = options.backward ? -1 : 1;
+        validate(finite, false);
+        return out;
+    }
+
+    template <class S>
+    static void interpolate(const void* step, double s, double* x, std::size_t n)
+    {
+        static_cast<const S*>(step)->interpolate(s, std::span<double>(x, n));
+    }
+    template <class S>
+    static void interpolate_rate(const void* step, double s, double* dxdt, std::size_t n)
+    {
+        static_cast<const S*>(step)->interpolate_rate(s, std::span<double>(dxdt, n));
+    }
+    template <class S>
+    static void restep(const void* step, double s, double* x, std::size_t n)
+    {
+        static_cast<const S*>(step)->restep(s, std::span<double>(x, n));
+    }
+
+    [[nodiscard]] static const double* checked(std::span<const double> x, std::size_t n)
+    {
+        if (x.size() != n) detail::throw_wrong_size(n, x.size());
+        return x.data();
+    }
+
+    [[nodiscard]] const State& taken(std::span<const double> x)
+    {
+        if constexpr (detail::fixed_size<State>() > 0) (void)checked(x, room_.size());
+        detail::copy_state(x, room_);
+        return room_;
+    }
+
+    std::unique_ptr<Parts> parts_;
+    std::unique_ptr<detail::AnyMonitor<State>> monitor_;
+    State room_;
+};
+
+}  // namespace ricochet

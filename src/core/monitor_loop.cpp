@@ -1,0 +1,66 @@
+#include "core/monitor_loop.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <string_view>
+
+namespace ricochet::detail {
+
+void throw_out_of_turn(std::string_view call, std::string_view expected)
+{
+    throw std::logic_error(fmt::format("EventMonitor: found `{}`; expected {}", call, expected));
+}
+
+void throw_gap(double expected, double found)
+{
+    throw std::logic_error(fmt::format(
+        "EventMonitor: found a step that begins at {:.17g} s; expected one that begins where the "
+        "last one ended, at {:.17g} s, or `start` after a gap",
+        found, expected));
+}
+
+void throw_state_moved(std::size_t component, double expected, double found)
+{
+    throw std::logic_error(fmt::format(
+        "EventMonitor: found a step with x0[{}] = {:.17g}; expected {:.17g}, as the last one "
+        "ended, or `start` after the host has moved the state",
+        component, found, expected));
+}
+
+void throw_beyond_time_event(double event, double end)
+{
+    throw std::logic_error(fmt::format(
+        "EventMonitor: found a step that ends at {:.17g} s; expected no step beyond the time "
+        "event at {:.17g} s, see `must_stop_at`",
+        end, event));
+}
+
+void throw_no_length(std::string_view what, double found)
+{
+    throw std::invalid_argument(fmt::format(
+        "EventMonitor: found {} s for {}; expected a finite time, and lengths above 0", found,
+        what));
+}
+
+void throw_wrong_size(std::size_t expected, std::size_t found)
+{
+    throw std::invalid_argument(fmt::format(
+        "EventMonitor: found an array of {} numbers; expected {}, as the state has components",
+        found, expected));
+}
+
+void throw_no_such_guard(std::size_t found, std::size_t guards)
+{
+    throw std::out_of_range(
+        fmt::format("EventMonitor: found guard {}; expected one below {}", found, guards));
+}
+
+void throw_without_events()
+{
+    throw std::invalid_argument(
+        "EventMonitor: found a system without guards and time events; expected one that has "
+        "events");
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,351 @@
+// The events of a host's steps.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "core/engine.hpp"
+#include "ricochet/detail/monitor_core.hpp"
+
+namespace ricochet::detail {
+
+/// @throws std::logic_error: what a host did, and what was expected.
+[[noreturn]] void throw_out_of_turn(std::string_view call, std::string_view expected);
+/// @throws std::logic_error: a step that does not begin where the last one ended.
+[[noreturn]] void throw_gap(double expected, double found);
+/// @throws std::logic_error: the state at the start of a step is not that at the end of the last.
+[[noreturn]] void throw_state_moved(std::size_t component, double expected, double found);
+/// @throws std::logic_error: the step goes beyond a time event.
+[[noreturn]] void throw_beyond_time_event(double event, double end);
+/// @throws std::invalid_argument: a length, time or scale that is none.
+[[noreturn]] void throw_no_length(std::string_view what, double found);
+
+/// @throws std::invalid_argument
+[[noreturn]] void throw_without_events();
+
+/// @throws std::out_of_range
+[[noreturn]] void throw_no_such_guard(std::size_t found, std::size_t guards);
+
+/// The kernel of a motion that is shown, not computed.
+template <class X>
+inline constexpr StepKernel<X> host_kernel{};
+
+template <class X, bool single>
+class MonitorLoop : public AnyMonitor<X>, private EventEngine<X, single> {
+    using Engine = EventEngine<X, single>;
+    using typename Engine::Pending;
+
+public:
+    /// Keeps a reference to `setup`.
+    MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options,
+                bool cuts_at_all)
+        : Engine(setup, like, options)
+    {
+        this->cuts_at_all_ = cuts_at_all;
+        if (!guarded_ && !timed_) {
+            throw_without_events();
+        }
+        if (guarded_) this->refuse_bad_guards();
+        cut_.before = cut_.after = like;
+        cut_.fired.reserve(std::max<std::size_t>(bank_.size(), 1));
+    }
+
+    Verdict start(const Instant& t, const X& x, const double* dxdt, Mode mode,
+                  double scale) override
+    {
+        require_finite(t, x);
+        require_length("the scale of `start`", scale);
+        options_.t_start = t.value;
+        options_.mode = mode;
+        this->refuse_bad_modes();
+        ended_ = resting_ = this->stops_ = false;
+        run_.outcome = Outcome::reached_end;
+        run_.guard = run_.other_guard = no_guard;
+        this->pending_ = Pending::nothing;
+        this->level_ = 0;
+        search_.members().clear();
+        step_.restart(t, x, mode);
+        place_rate(dxdt);
+        h_next_ = scale;
+        started_ = false;
+        if (timed_) this->find_time_event(true);
+        bank_.forget();
+        if (guarded_) this->arm_at_start();
+        started_ = true;
+        return go_on();
+    }
+
+    Verdict examine(const HostStepTable& step) override
+    {
+        require_turn("examine");
+        require_next(step);
+        step_.show(step);
+        h_next_ = step.h;
+        time_event_due_ = false;
+        if (timed_) heed_time_event();
+        bool cleared = false;
+        if (this->deserves_search(cleared)) {
+            const std::size_t broken = bank_.first_not_finite();
+            if (broken != no_guard) {
+                this->end(Outcome::non_finite, broken);
+                step_.restart(step_.start(), step_.x0(), step_.mode());
+                return Verdict::ended;
+            }
+            if (this->find(cleared)) {
+                cut_.s = search_.at();
+                this->cut_short();
+                return show_set();
+            }
+        }
+        step_.accept_shown();
+        ++run_.statistics.steps;
+        this->last_h_ = step.h;
+        if (!time_event_due_) return Verdict::stands;
+        cut_.s = step.h;
+        step_.hold(time_event_);
+        this->apply_time_event();
+        return show_set();
+    }
+
+    Verdict resume(const double* dxdt, double scale) override
+    {
+        if (this->pending_ == Pending::nothing || ended_) {
+            throw_out_of_turn("resume", "it after a verdict `cut` alone");
+        }
+        require_length("the scale of `resume`", scale);
+        place_rate(dxdt);
+        h_next_ = scale;
+        return go_on();
+    }
+
+    Verdict resume(const X& after, Mode mode, const double* dxdt, double scale) override
+    {
+        if (this->pending_ == Pending::nothing || ended_) {
+            throw_out_of_turn("resume", "it after a verdict `cut` alone");
+        }
+        require_finite(step_.start(), after);
+        const std::size_t modes = system_.modes();
+        if (modes > 0 && mode >= modes) throw_unknown_mode(mode, modes);
+        step_.restart(step_.start(), after, mode);
+        return resume(dxdt, scale);
+    }
+
+    Verdict hold(double t) override
+    {
+        if (!resting_ || ended_) throw_out_of_turn("hold", "it after a verdict `rests` alone");
+        if (!(t > step_.start().value) != backward_) throw_no_length("the time of `hold`", t);
+        const bool due = timed_ && !lies_before(t, time_event_);
+        if (due && t != time_event_) throw_beyond_time_event(time_event_, t);
+        step_.hold(t);
+        if (!due) return Verdict::rests;
+        cut_.s = 0;
+        step_.refresh();
+        this->apply_time_event();
+        return show_set();
+    }
+
+    [[nodiscard]] const Cut<X>& cut() const noexcept override { return cut_; }
+    [[nodiscard]] Instant t() const noexcept override { return step_.start(); }
+    [[nodiscard]] const X& x() const noexcept override { return step_.x0(); }
+    [[nodiscard]] Mode mode() const noexcept override { return step_.mode(); }
+    [[nodiscard]] double must_stop_at() const noexcept override { return time_event_; }
+    [[nodiscard]] Side side(std::size_t guard) const override
+    {
+        if (guard >= bank_.size()) throw_no_such_guard(guard, bank_.size());
+        return bank_[guard].side;
+    }
+    [[nodiscard]] const Run<X>& run() const noexcept override { return run_; }
+    void clear_events() noexcept override { run_.events.clear(); }
+
+    [[nodiscard]] Snapshot save() override
+    {
+        require_turn("save");
+        Snapshot snapshot;
+        snapshot.run = properties();
+        visit_state(SnapshotWriter(snapshot));
+        return snapshot;
+    }
+
+    void restore(const Snapshot& snapshot) override
+    {
+        require_same_run(snapshot.run, properties());
+        Snapshot old;
+        const bool had_started = started_;
+        visit_state(SnapshotWriter(old));
+        try {
+            SnapshotReader reader(snapshot);
+            visit_state(reader);
+            reader.finish();
+            refuse_bad_place();
+        } catch (const std::invalid_argument&) {
+            visit_state(SnapshotReader(old));
+            started_ = had_started;
+            throw;
+        }
+        step_.restart(place_);
+        this->pending_ = Pending::nothing;
+        started_ = true;
+        if (guarded_) search_.begin(step_.x0());
+    }
+
+private:
+    using Engine::backward_;
+    using Engine::bank_;
+    using Engine::ended_;
+    using Engine::finders_;
+    using Engine::guarded_;
+    using Engine::h_next_;
+    using Engine::options_;
+    using Engine::resting_;
+    using Engine::run_;
+    using Engine::search_;
+    using Engine::step_;
+    using Engine::system_;
+    using Engine::time_event_;
+    using Engine::time_event_due_;
+    using Engine::timed_;
+
+    // --- what a host may not do ---
+
+    void require_turn(std::string_view call) const
+    {
+        if (!started_) throw_out_of_turn(call, "`start` before it");
+        if (this->pending_ != Pending::nothing) throw_out_of_turn(call, "`resume` after a cut");
+        if (ended_) throw_out_of_turn(call, "`start` after the end of a run");
+        if (resting_ && call == "examine") throw_out_of_turn(call, "`hold` where the motion rests");
+    }
+
+    static void require_length(std::string_view what, double length)
+    {
+        if (!(length > 0) || !std::isfinite(length)) throw_no_length(what, length);
+    }
+
+    static void require_finite(const Instant& t, const X& x)
+    {
+        if (!std::isfinite(t.value) || !std::isfinite(t.remainder)) {
+            throw_no_length("the time", t.value);
+        }
+        if (x.size() == 0) throw_start_empty();
+        for_each_component(x, [&](auto i) {
+            if (!std::isfinite(x[i])) throw_start_not_finite(static_cast<std::size_t>(i), x[i]);
+        });
+    }
+
+    /// A step begins where the last one ended, up to the rounding of a host's sum of times.
+    void require_next(const HostStepTable& step) const
+    {
+        require_length("the length of a step", step.h);
+        const double gap = std::fabs(step_.until(step.start.value));
+        const double ulp =
+            std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
+        if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(step_.start().value, step.start.value);
+        const X& x = step_.x0();
+        for_each_component(x, [&](auto i) {
+            const auto c = static_cast<std::size_t>(i);
+            if (!(x[i] == step.x0[c])) throw_state_moved(c, x[i], step.x0[c]);
+        });
+    }
+
+    void heed_time_event()
+    {
+        const double end = step_.time(step_.h());
+        const double ahead = step_.until(time_event_);
+        const double rounding =
+            8 * std::numeric_limits<double>::epsilon() * std::fabs(end) + 1e-12 * step_.h();
+        if (ahead < step_.h() - rounding) throw_beyond_time_event(time_event_, end);
+        time_event_due_ = ahead <= step_.h() + rounding;
+    }
+
+    [[nodiscard]] bool lies_before(double t, double end) const noexcept
+    {
+        return backward_ ? t > end : t < end;
+    }
+
+    // --- sets ---
+
+    void place_rate(const double* dxdt)
+    {
+        if (dxdt) return step_.set_rate(dxdt);
+        step_.refresh();
+        if (!step_.flow_fits()) throw_flow_does_not_fit(step_.x0().size());
+    }
+
+    /// Arms the guards; a set that follows at once is a cut of its own.
+    Verdict go_on()
+    {
+        assign(cut_.before, step_.x0());
+        cut_.mode_before = step_.mode();
+        if (!this->settle()) {
+            return ended_ ? Verdict::ended : resting_ ? Verdict::rests : Verdict::stands;
+        }
+        cut_.s = 0;
+        return show_set();
+    }
+
+    Verdict show_set()
+    {
+        if (this->pending_ == Pending::nothing) return Verdict::ended;
+        cut_.t = step_.start();
+        cut_.accumulation = this->pending_ != Pending::settle;
+        if (!cut_.accumulation) {
+            assign(cut_.before, search_.before());
+            cut_.mode_before = this->mode_before_;
+        }
+        assign(cut_.after, step_.x0());
+        cut_.mode_after = step_.mode();
+        cut_.on_time = !cut_.accumulation && this->firing_.on_time;
+        cut_.state_changed = !same_state(cut_.before, cut_.after);
+        cut_.fired.assign(search_.members().begin(), search_.members().end());
+        std::sort(cut_.fired.begin(), cut_.fired.end());
+        return Verdict::cut;
+    }
+
+    // --- saving ---
+
+    [[nodiscard]] std::vector<RunProperty> properties() const
+    {
+        return {{"monitor of", system_->name(system_.door())},
+                {"detector", plain_type_name(finders_.detector.type)},
+                {"locator", plain_type_name(finders_.locator.type)},
+                {"guards", std::to_string(bank_.size())}};
+    }
+
+    void refuse_bad_place() const
+    {
+        const auto require = [](bool fulfilled, std::string_view what) {
+            if (!fulfilled) throw_snapshot_is_no_state(what);
+        };
+        require(place_.x.size() > 0 && place_.remainder.size() == place_.x.size() &&
+                    place_.rate.size() == place_.x.size(),
+                "the number of components");
+        require(std::isfinite(place_.t.value) && std::isfinite(place_.t.remainder), "the time");
+        require(all_finite(place_.x), "the state");
+        require(h_next_ > 0 && std::isfinite(h_next_), "the scale");
+        const std::size_t modes = system_.modes();
+        require(modes == 0 || place_.mode < modes, "the mode");
+    }
+
+    template <class Visitor>
+    void visit_state(Visitor&& visit)
+    {
+        if constexpr (std::remove_cvref_t<Visitor>::saves) place_ = step_.place();
+        visit(place_.t.value);
+        visit(place_.t.remainder);
+        visit(place_.mode);
+        for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
+        visit(h_next_);
+        visit(time_event_);
+        visit(resting_);
+        visit(ended_);
+        visit(run_.outcome);
+        this->visit_guards(visit);
+    }
+
+    Cut<X> cut_;
+    bool started_ = false;
+    StepStart<X> place_;
+};
+
+}  // namespace ricochet::detail
