@@ -26,6 +26,7 @@
 #include "core/guard_bank.hpp"
 #include "core/merged_resets.hpp"
 #include "core/metering.hpp"
+#include "core/planner.hpp"
 #include "core/step.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/refusals.hpp"
@@ -50,9 +51,10 @@ protected:
           guarded_(system_->guarded),
           resets_any_(system_->resets()),
           timed_(system_->timed()),
+          puts_off_(setup.detector.puts_off),
           predicts_(setup.detector.clears != nullptr),
           options_(options),
-          meter_(setup.detector.puts_off ? nullptr : setup.detector.metering),
+          meter_(puts_off_ ? nullptr : setup.detector.metering),
           resolution_(options),
           backward_(options.t_end < options.t_start),
           step_(system_, *setup.kernel, options.t_start, x0, options.mode, backward_),
@@ -60,6 +62,7 @@ protected:
           search_(x0, bank_.size(), finders_, resolution_),
           resets_(x0)
     {
+        if (puts_off_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
     }
 
     // --- set-up ---
@@ -184,6 +187,38 @@ protected:
     [[nodiscard]] bool ends_run(std::size_t i) const noexcept;
 
     void go_on_past_members();
+
+    // --- checks that are deferred ---
+
+    void name_wrong_bound()
+    {
+        run_.wrong_bound = planner_->wrong();
+        end(Outcome::wrong_bound, run_.wrong_bound->guard);
+    }
+
+    void count_put_off(std::size_t steps) noexcept
+    {
+        run_.statistics.checks_put_off += steps;
+        add_evidence(finders_.detector.put_off, steps);
+    }
+
+    /// Samples all guards at the start of the step in hand, every one of which is looked at.
+    void watch_all()
+    {
+        if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
+        watching_ = newly_armed_ = true;
+        planner_->look_back(run_.statistics);
+    }
+
+    /// After the guards have been armed.
+    void begin_plan()
+    {
+        newly_armed_ = watching_ = false;
+        planner_->begin(step_, bank_);
+    }
+
+    /// Whether one of the guards in doubt deserves a search in the step in hand.
+    [[nodiscard]] bool judges_suspicious();
 
     // --- applying ---
 
@@ -365,6 +400,7 @@ protected:
     bool guarded_;     ///< has guards, if only none of them yet
     bool resets_any_;  ///< has resets
     bool timed_;
+    bool puts_off_;
     bool predicts_;
     Options options_;
     Metering meter_;
@@ -373,6 +409,7 @@ protected:
     Step<X> step_;
     GuardBank<X, single> bank_;
     EventSearch<X, single> search_;
+    std::optional<Planner<X, single>> planner_;
     double h_next_ = 0;        ///< [s] length of the next step, roughly
     double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned

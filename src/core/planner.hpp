@@ -95,6 +95,9 @@ public:
     /// Whether nothing need be looked at until the time `end`.
     [[nodiscard]] bool covers(double end) const noexcept { return end <= limit_; }
 
+    /// Until when nothing need be looked at.
+    [[nodiscard]] double limit() const noexcept { return limit_; }
+
     /// Whether planning is known to cost more than it saves, so that the exact detector is to
     /// look at every step. Stretches are closed first.
     [[nodiscard]] bool steps_aside() const noexcept { return meter_.checks() && !in_stretch(); }
