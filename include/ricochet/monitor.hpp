@@ -37,27 +37,40 @@ namespace ricochet {
 /// arrays of n doubles. Offsets s lie in [0, h], and rates are with respect to them: those of the
 /// path that `interpolate` follows.
 template <class S>
-concept HostStep = requires(const S& step, double s, std::span<double> x) {
+concept HostStep = requires(const S& step, double s, std::span<double> x)
+{
     Instant{step.t0()};  // [s]; or an Instant, of a host that keeps what its sum of times loses
-    { step.h() } -> std::convertible_to<double>;  // [s]
-    { step.x0() } -> std::convertible_to<std::span<const double>>;
-    { step.x1() } -> std::convertible_to<std::span<const double>>;
-    { step.rate0() } -> std::convertible_to<std::span<const double>>;
-    { step.rate1() } -> std::convertible_to<std::span<const double>>;
+    {
+        step.h()
+        } -> std::convertible_to<double>;  // [s]
+    {
+        step.x0()
+        } -> std::convertible_to<std::span<const double>>;
+    {
+        step.x1()
+        } -> std::convertible_to<std::span<const double>>;
+    {
+        step.rate0()
+        } -> std::convertible_to<std::span<const double>>;
+    {
+        step.rate1()
+        } -> std::convertible_to<std::span<const double>>;
     step.interpolate(s, x);  // x(t0 + s)
 };
 
 /// A host that knows the derivative of its interpolant; else it is a difference over 1e-4 h, and
 /// events near tangency are found less finely.
 template <class S>
-concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt) {
+concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt)
+{
     step.interpolate_rate(s, dxdt);
 };
 
 /// A host that can take its step again with another length, as exactly as the whole one. Events
 /// are then located on this map.
 template <class S>
-concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> x) {
+concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> x)
+{
     step.restep(s, x);
 };
 

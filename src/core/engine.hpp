@@ -180,7 +180,8 @@ protected:
                       search_.before());
     }
 
-    /// Whether the event leaves everything as it was, and no host wants to know, so that the step can stand.
+    /// Whether the event leaves everything as it was, and no host wants to know, so that the step
+    /// can stand.
     [[nodiscard]] bool changes_nothing();
 
     /// Whether this event of the guard, not yet counted, ends the run.
@@ -222,17 +223,14 @@ protected:
 
     // --- applying ---
 
-    struct Firing {
-        bool located = false;  ///< inside the current step, else at its start
-        bool on_time = false;  ///< with a time event
-    };
-
     /// The set that was found cuts the step short: applies it.
     void cut_short();
 
     /// The members fire: the step is placed at `search_.before()` made `resets_.after()`. Unless
     /// the run has ended, `settle` is due.
-    void apply(const Firing& how);
+    /// @param located  inside the current step, else at its start
+    /// @param on_time  with a time event
+    void apply(bool located, bool on_time);
 
     /// How far from its surface a guard that has just fired may be. A guard with declared
     /// bounds may be expensive, and is not asked for what its location says as well.
@@ -419,12 +417,13 @@ protected:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
-    bool asked_ = false;  ///< a network, about the step in hand
+    bool asked_ = false;        ///< a network, about the step in hand
     bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
     Instant set_instant_;  ///< of the members, in a step that holds them
     Mode mode_before_ = 0;
-    Firing firing_;  ///< of the set in hand
+    bool located_ = false;  ///< the set in hand lies inside the step, else at its start
+    bool on_time_ = false;  ///< and happens with a time event
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;
     int level_ = 0;  ///< of sets at this instant

@@ -141,7 +141,7 @@ private:
     using Engine::ended_;
     using Engine::error_controlled_;
     using Engine::finders_;
-    using Engine::firing_;
+    using Engine::on_time_;
     using Engine::guarded_;
     using Engine::h_next_;
     using Engine::infinity;

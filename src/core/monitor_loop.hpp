@@ -41,8 +41,7 @@ class MonitorLoop : public AnyMonitor<X>, private EventEngine<X, single> {
 
 public:
     /// Keeps a reference to `setup`.
-    MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options,
-                bool cuts_at_all)
+    MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options, bool cuts_at_all)
         : Engine(setup, like, options)
     {
         this->cuts_at_all_ = cuts_at_all;
@@ -264,8 +263,7 @@ private:
     {
         require_length("the length of a step", step.h);
         const double gap = std::fabs(step_.until(step.start.value));
-        const double ulp =
-            std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
         if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(step_.start().value, step.start.value);
         const X& x = step_.x0();
         for_each_component(x, [&](auto i) {
@@ -369,7 +367,7 @@ private:
         }
         assign(cut_.after, step_.x0());
         cut_.mode_after = step_.mode();
-        cut_.on_time = !cut_.accumulation && this->firing_.on_time;
+        cut_.on_time = !cut_.accumulation && this->on_time_;
         cut_.state_changed = !same_state(cut_.before, cut_.after);
         cut_.fired.assign(search_.members().begin(), search_.members().end());
         std::sort(cut_.fired.begin(), cut_.fired.end());

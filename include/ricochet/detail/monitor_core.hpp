@@ -80,8 +80,7 @@ public:
 /// @throws std::invalid_argument, as `EventMonitor`
 template <class X>
 [[nodiscard]] std::unique_ptr<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
-                                                          const Options& options,
-                                                          bool cuts_at_all);
+                                                          const Options& options, bool cuts_at_all);
 
 }  // namespace detail
 
