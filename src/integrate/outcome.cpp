@@ -21,6 +21,7 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::time_event_not_ahead: return "time_event_not_ahead";
         case Outcome::wrong_dimension: return "wrong_dimension";
         case Outcome::stalled: return "stalled";
+        case Outcome::stopped_by_callback: return "stopped_by_callback";
     }
     return "unknown";
 }
@@ -71,6 +72,9 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::stalled:
             return "stall_steps steps advanced the time by less than 1e-9 of the span; end the run "
                    "earlier, let events that accumulate come to rest, or raise stall_steps";
+        case Outcome::stopped_by_callback:
+            return "a function of the system reported an error; all that was computed before is "
+                   "kept, and the run goes on from the last completed step when it is asked to";
     }
     return "unknown outcome";
 }

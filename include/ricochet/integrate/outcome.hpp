@@ -23,6 +23,7 @@ enum class Outcome {
     time_event_not_ahead,  ///< `next_time_event(t)` returned a time that is not after t
     wrong_dimension,       ///< the flow or a reset left a state of another dimension
     stalled,               ///< `Options::stall_steps` steps hardly advanced the time
+    stopped_by_callback,   ///< a function of the system reported an error, see `ricochet.h`
 };
 
 /// The enumerator's name, e.g. "reached_end".
