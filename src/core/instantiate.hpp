@@ -12,6 +12,7 @@
 #include "core/loop_output.hpp"
 #include "core/loop_planned.hpp"
 #include "core/loop_quiet.hpp"
+#include "core/loop_resume.hpp"
 #include "core/loop_saving.hpp"
 #include "core/loop_setup.hpp"
 #include "core/loop_steps.hpp"
@@ -29,7 +30,7 @@ template <class X>
     return fixed_size<X>() > 0 && setup.system->guard_count(setup.door) == 1;
 }
 
-/// A loop with its setup.
+/// A loop with its setup, which goes on after exceptions from the system.
 template <class X>
 struct KeptSetup {
     RunSetup<X> kept;
@@ -39,6 +40,7 @@ struct KeptLoop final : KeptSetup<X>, Loop<X, single> {
     KeptLoop(const RunSetup<X>& setup, const X& x0, const Options& options)
         : KeptSetup<X>{setup}, Loop<X, single>(this->kept, x0, options)
     {
+        this->keep_resumable();
     }
 };
 

@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -122,6 +123,19 @@ public:
     /// simulation is over.
     [[nodiscard]] Run<X> finish() override;
 
+    /// Brings the time, the state and the counts of `run` up to date, and its last samples where
+    /// it has ended.
+    const Run<X>& bring_up_to_date() override;
+
+    /// A run that was cancelled may be continued.
+    void go_on() noexcept override
+    {
+        if (ended_ && run_.outcome == Outcome::cancelled) {
+            ended_ = false;
+            run_.outcome = Outcome::reached_end;
+        }
+    }
+
     /// All that the future depends on. A simulation of the same system with the same
     /// options, stepping, detector and locator that restores it goes on with the same
     /// bits; only its end, its sample times and what it records may be others. What was
@@ -131,6 +145,14 @@ public:
     /// @throws std::invalid_argument naming what does not agree if the snapshot is of another
     /// run, or no state of one; then nothing has changed.
     void restore(const Snapshot& snapshot) override;
+
+protected:
+    /// What an exception from the system leads back to is kept from here on.
+    void keep_resumable()
+    {
+        mark_ = std::make_unique<Mark>(bank_);
+        step_.store(mark_->start);
+    }
 
 private:
     using Engine::asked_;
@@ -149,6 +171,7 @@ private:
     using Engine::meter_;
     using Engine::newly_armed_;
     using Engine::options_;
+    using Engine::pending_;
     using Engine::planner_;
     using Engine::puts_off_;
     using Engine::resolution_;
@@ -181,8 +204,55 @@ private:
         bool to_next_sample = false;  ///< but none beyond one with a sample time
     };
 
-    /// One step, with whatever events it holds.
-    void advance_one(const Advance& how);
+    /// One step, with whatever events it holds. Where a function of the system throws, all is
+    /// as it was at the start of the step if the run is kept resumable.
+    void advance_one(const Advance& how)
+    {
+        if (!mark_) return advance_from_here(how);
+        mark_step();
+        try {
+            advance_from_here(how);
+        } catch (...) {
+            go_back_to_mark();
+            throw;
+        }
+    }
+    void advance_from_here(const Advance& how);
+
+    // --- where exceptions lead back to ---
+
+    struct Mark {
+        explicit Mark(const GuardBank<X, single>& bank_) : bank(bank_) {}
+
+        double h_next = 0;
+        Statistics counts{};
+        std::size_t events = 0, samples = 0, pieces = 0, next_sample = 0;
+        std::size_t tentative = 0;  ///< steps that were not closed yet
+        bool planned = false;       ///< the guards are left alone until their deadlines
+        bool newly_armed = false;
+        bool everything = false;  ///< what follows, too
+        StepStart<X> start{};
+        GuardBank<X, single> bank;
+        double flight_start = 0, longest_step = 0, last_h = 0, time_event = 0;
+        bool resting = false, watching = false;
+    };
+
+    void mark_step() noexcept;
+    /// Before events change what the next step depends on.
+    void mark_everything()
+    {
+        if (mark_ && !mark_->everything) copy_to_mark();
+    }
+    [[gnu::noinline]] void copy_to_mark();
+    void go_back_to_mark();
+
+    /// Before a step that ends at a time event, or that is recorded by further evaluations.
+    void mark_what_lasts()
+    {
+        if (mark_ && (time_event_due_ || options_.record_steps || holds_sample())) {
+            mark_everything();
+        }
+    }
 
     // --- steps in a row in which nothing happens ---
 
@@ -193,8 +263,10 @@ private:
                bank_.is_steady();
     }
 
-    /// Goes on until a step deserves a look, and deals with it. False: there is none.
+    /// Goes on until a step deserves a look, and deals with it. False: there is none. An exception
+    /// leads back to where the run or, after it, the step in hand has started.
     bool run_quietly();
+    void end_quiet_run(const QuietRun& quiet);
 
     /// Whether the run may go on after as many steps; decides when it is asked next.
     [[gnu::noinline]] bool may_take_more_steps();
@@ -218,6 +290,7 @@ private:
     void pass()
     {
         if (timed_ && time_event_due_) {
+            mark_everything();
             accept();
             this->apply_time_event();
             return this->settle_all();
@@ -386,6 +459,8 @@ private:
     bool showing_sample_ = false;
     Mode sample_mode_ = 0;
     StepStart<X> place_;
+    std::unique_ptr<Mark> mark_;  ///< null: nobody will go on after an exception
+    bool replans_ = false;  ///< all deadlines of guards are to be found anew
 };
 
 }  // namespace ricochet::detail

@@ -15,6 +15,7 @@ inline bool Loop<X, single>::handle_events()
 template <class X, bool single>
 bool Loop<X, single>::search(bool cleared)
 {
+    mark_everything();
     if (bank_.first_not_finite() != no_guard) {
         if (!return_to_domain()) return true;
         if (!this->any_suspicious()) {

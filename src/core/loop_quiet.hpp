@@ -29,6 +29,24 @@ inline bool Loop<X, single>::run_quietly()
     counts.guard_calls += quiet.guard_calls;
     if (bank_.size() > 0) this->add_evidence(finders_.detector.evidence, quiet.steps);
     if (quiet.why == QuietEnd::due) return false;
+    if (!mark_) {
+        end_quiet_run(quiet);
+        return true;
+    }
+    mark_step();
+    if (error_controlled_) mark_->h_next = step_.h();
+    try {
+        end_quiet_run(quiet);
+    } catch (...) {
+        go_back_to_mark();
+        throw;
+    }
+    return true;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::end_quiet_run(const QuietRun& quiet)
+{
     is_last_ = time_event_due_ = asked_ = false;
     if (quiet.why == QuietEnd::failed) {
         const double h = step_.h();
@@ -37,18 +55,17 @@ inline bool Loop<X, single>::run_quietly()
                                : take_fixed_step(h, true);
         if (!taken || (guarded_ && handle_events())) {
             calm_steps_ = 0;
-            return true;
+            return;
         }
     } else if (this->is_suspicious(quiet.why == QuietEnd::moving)) {
         if (search(false)) {
             calm_steps_ = 0;
-            return true;
+            return;
         }
     } else {
         this->pass_on_clear();
     }
     pass();
-    return true;
 }
 
 }  // namespace ricochet::detail

@@ -41,20 +41,27 @@ template <class X, bool single>
 inline Run<X> Loop<X, single>::finish()
 {
     if (!ended_) run_.outcome = Outcome::cancelled;
+    ended_ = true;
+    bring_up_to_date();
+    return std::move(run_);
+}
+
+template <class X, bool single>
+inline const Run<X>& Loop<X, single>::bring_up_to_date()
+{
     run_.t = step_.start().value;
     run_.x = step_.x0();
     run_.mode = step_.mode();
     run_.statistics.flow_calls = step_.flow_calls();
     run_.statistics.resteps = step_.resteps();
     if (puts_off_) planner_->add_counts(run_.statistics);
-    run_.statistics.disabled += search_.disabled;
-    emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
-    ended_ = true;
-    return std::move(run_);
+    run_.statistics.disabled += std::exchange(search_.disabled, 0);
+    if (ended_) emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
+    return run_;
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::advance_one(const Advance& how)
+inline void Loop<X, single>::advance_from_here(const Advance& how)
 {
     const double remaining = step_.until(options_.t_end);
     if (!(remaining > 0)) return reach_end();
@@ -66,6 +73,7 @@ inline void Loop<X, single>::advance_one(const Advance& how)
     if (resting_) return hold(remaining);
     if (puts_off_) return advance_by_plan(remaining, how);
     if (!take_step(remaining)) return;
+    mark_what_lasts();
     if (guarded_ && handle_events()) return;
     pass();
 }
@@ -208,6 +216,7 @@ template <class X, bool single>
 inline bool Loop<X, single>::happen_where_flow_ends(double h)
 {
     if (puts_off_) return false;
+    mark_everything();
     const Approach approach = time_to_surface();
     const std::size_t i = approach.guard;
     if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !this->counts_here(i)) return false;
@@ -226,6 +235,7 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
 template <class X, bool single>
 inline void Loop<X, single>::hold(double remaining)
 {
+    mark_everything();
     double until = options_.t_end;
     time_event_due_ = false;
     if (timed_) {

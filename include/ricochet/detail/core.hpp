@@ -57,6 +57,10 @@ public:
     virtual void advance_once(bool look_ahead) = 0;
     [[nodiscard]] virtual Run<X> take() = 0;
     [[nodiscard]] virtual Run<X> finish() = 0;
+    /// What has been computed so far, with its time, state and counts up to date.
+    virtual const Run<X>& bring_up_to_date() = 0;
+    /// Lets a run that was cancelled be continued.
+    virtual void go_on() noexcept = 0;
     [[nodiscard]] virtual Snapshot save() = 0;
     virtual void restore(const Snapshot& snapshot) = 0;
 };

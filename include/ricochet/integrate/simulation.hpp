@@ -196,6 +196,12 @@ template <class X>
 
 }  // namespace detail
 
+/// A run that the caller drives.
+///
+/// Exceptions from the functions of the system pass through unchanged. The simulation then stands
+/// at the end of its last complete step with its events (`take`: at most as far back as its last
+/// step in which anything happened), and the next call goes on with the bits of a run in which
+/// nothing was thrown.
 template <class System, class X, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>

@@ -1,0 +1,109 @@
+// What an exception from the functions of a system leads back to: the start of the step in hand.
+//
+// A step changes nothing that the next depends on before it stands, but for its own length, what
+// it has recorded and, where it may hold events or ends at a time event, nearly everything. So the
+// first two are noted at every step and the rest only where a search begins.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline void Loop<X, single>::mark_step() noexcept
+{
+    mark_->everything = false;
+    mark_->h_next = h_next_;
+    if (puts_off_) {
+        mark_->counts = run_.statistics;
+    } else {
+        mark_->counts.rejected = run_.statistics.rejected;
+    }
+    mark_->events = run_.events.size();
+    mark_->samples = run_.trajectory.t.size();
+    mark_->pieces = run_.solution.size();
+    mark_->next_sample = next_sample_;
+    mark_->tentative = puts_off_ ? planner_->steps().size() : 0;
+    mark_->planned = puts_off_ && !watching_;
+    mark_->newly_armed = newly_armed_;
+}
+
+template <class X, bool single>
+void Loop<X, single>::copy_to_mark()
+{
+    if (!puts_off_) {
+        const std::uint64_t rejected = mark_->counts.rejected;
+        mark_->counts = run_.statistics;
+        mark_->counts.rejected = rejected;
+    }
+    step_.store(mark_->start);
+    mark_->bank = bank_;
+    mark_->flight_start = flight_start_;
+    mark_->longest_step = longest_step_;
+    mark_->last_h = last_h_;
+    mark_->time_event = time_event_;
+    mark_->resting = resting_;
+    mark_->watching = watching_;
+    mark_->everything = true;
+}
+
+template <class X, bool single>
+void Loop<X, single>::go_back_to_mark()
+{
+    Mark& mark = *mark_;
+    std::size_t samples = mark.samples;
+    std::size_t pieces = mark.pieces;
+    std::uint64_t steps = puts_off_ ? mark.counts.steps : run_.statistics.steps;
+    if (mark.everything) {
+        steps = mark.counts.steps;
+        step_.restart(mark.start);
+        bank_ = mark.bank;
+        flight_start_ = mark.flight_start;
+        longest_step_ = mark.longest_step;
+        last_h_ = mark.last_h;
+        time_event_ = mark.time_event;
+        resting_ = mark.resting;
+        watching_ = mark.watching;
+    }
+    h_next_ = mark.h_next;
+    newly_armed_ = mark.newly_armed;
+    if (mark.tentative > 0) {
+        const auto& first = planner_->steps()[0];
+        step_.restart(first.start);
+        h_next_ = first.h_next;
+        last_h_ = first.last_h;
+        samples -= mark.next_sample - first.samples;
+        pieces = first.pieces;
+        steps -= mark.tentative;
+        mark.next_sample = first.samples;
+    }
+    if (mark.planned) {
+        // Deadlines may be half renewed: they are found anew where the step starts.
+        planner_->steps().clear();
+        replans_ = true;
+    }
+    run_.statistics.rejected = mark.counts.rejected;
+    if (mark.everything || puts_off_) {
+        const Statistics seen = std::exchange(run_.statistics, mark.counts);
+        run_.statistics.guard_calls = seen.guard_calls;
+        run_.statistics.network_calls = seen.network_calls;
+        run_.statistics.bound_calls = seen.bound_calls;
+    }
+    run_.statistics.steps = steps;
+    run_.events.resize(mark.events);
+    run_.trajectory.t.resize(samples);
+    run_.trajectory.x.resize(samples);
+    run_.solution.shrink(pieces);
+    run_.outcome = Outcome::reached_end;
+    run_.guard = run_.other_guard = no_guard;
+    run_.wrong_bound.reset();
+    next_sample_ = mark.next_sample;
+    ended_ = false;
+    pending_ = Engine::Pending::nothing;
+    if (guarded_) {
+        search_.members().clear();
+        search_.begin(step_.x0());
+    }
+}
+
+}  // namespace ricochet::detail
