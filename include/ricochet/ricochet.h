@@ -1,0 +1,432 @@
+/* ricochet for C: hybrid systems, that is smooth motion with events, resets and modes.
+ *
+ *     rc_system        the functions of a system, as pointers, and what is said of its guards
+ *     rc_simulation    a run of it, taken in steps, from event to event, or to the end
+ *
+ * Link with the shared library ricochet_c (`ricochet::c` in CMake, `ricochet-c` in pkg-config).
+ * C99; the same from C++. docs/c.md is the guide, examples/c/bouncing_ball.c a whole program.
+ *
+ * Times are in seconds. A state is an array of n doubles, where n is the dimension of the system.
+ *
+ * Results. Every function that can fail returns an rc_status, RC_OK for success; those that
+ * return what is asked for name the value that means failure. After a failure `rc_last_error()`
+ * is a sentence about it. What becomes of the motion (it reached its end, its events accumulated,
+ * no step met the tolerance) is no failure: it is the outcome of the run, `rc_outcome()`.
+ *
+ * Structs that go in or come out have their own size first, as the program was compiled with it.
+ * A library that is newer than the program takes the fields it does not find as zero, or an
+ * option at its default; an older one refuses the struct as RC_WRONG_SIZE.
+ *
+ * Threads. One simulation belongs to one thread at a time: a call while another is in progress,
+ * from another thread or from a callback, is refused as RC_BUSY; `rc_cancel` is the exception.
+ * Different simulations may run at once, also of one system, if its callbacks allow it.
+ *
+ * Handles. A handle that is null, freed or of the other kind is refused as RC_BAD_HANDLE. A freed
+ * handle is recognised for certain in debug builds of the library, which keep its memory.
+ */
+#ifndef RICOCHET_RICOCHET_H
+#define RICOCHET_RICOCHET_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(RC_BUILDING_LIBRARY) && defined(__GNUC__)
+#define RC_API __attribute__((visibility("default")))
+#else
+#define RC_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --- results ----------------------------------------------------------------------------- */
+
+/** What a call came to. */
+typedef enum rc_status {
+    RC_OK = 0,
+    RC_INVALID = 1,    /**< an argument, an option or the system is not as it has to be */
+    RC_CALLBACK = 2,   /**< a callback returned a number other than 0, see rc_callback_error */
+    RC_NO_MEMORY = 3,  /**< nothing has changed */
+    RC_BUSY = 4,       /**< the simulation is in another call, of a thread or around a callback */
+    RC_BAD_HANDLE = 5, /**< null, freed, or of another kind */
+    RC_WRONG_SIZE = 6, /**< a struct of a newer header than the library, or of none */
+    RC_INTERNAL = 7    /**< a defect of the library, or an exception from a callback */
+} rc_status;
+
+/** The last failure in this thread as a sentence that says what was given and what was expected;
+ *  empty if there was none. Until the next failure in this thread. */
+RC_API const char* rc_last_error(void);
+
+/** The name of a status, e.g. "RC_BUSY"; "unknown" for a number that is none. */
+RC_API const char* rc_status_name(rc_status status);
+
+/** The version of the library, e.g. "0.1.0". */
+RC_API const char* rc_version(void);
+
+/* --- systems ----------------------------------------------------------------------------- */
+
+/** A hybrid system: callbacks and what is said of its guards. Immutable, so that simulations and
+ *  threads share it. */
+typedef struct rc_system rc_system;
+
+/** The discrete state, counted from 0. */
+typedef uint32_t rc_mode;
+
+/** The sign change of a guard that counts as its event, as the run meets it. */
+typedef enum rc_crossing {
+    RC_FALLING = 0, /**< positive, then zero or negative: leaving the mode */
+    RC_RISING = 1,
+    RC_EITHER = 2
+} rc_crossing;
+
+/** In the place of a guard: none. */
+#define RC_NO_GUARD ((size_t)-1)
+/** In the place of a guard: the reset of a time event. */
+#define RC_TIME_EVENT_RESET ((size_t)-2)
+
+/** What is said of a guard. All fields but the size may be zero. */
+typedef struct rc_guard_info {
+    size_t size;         /**< sizeof(rc_guard_info) */
+    const char* name;    /**< for messages, copied; null: none */
+    int32_t crossing;    /**< an rc_crossing */
+    int32_t notifies;    /**< 1: its events are only recorded, no reset is called */
+    int32_t unilateral;  /**< 1: g >= 0 bounds the motion; needs a reset, and RC_FALLING */
+    int32_t boolean;     /**< 1: only its sign means anything: no rates, located by bisection */
+    uint32_t stop_after; /**< the run ends with this many of its events; 0: never */
+    int32_t degree;      /**< of the guard as a polynomial in (t, x) together; 0: not known */
+    double touch;        /**< |g| at a zero of its rate that counts as a touch */
+    double lipschitz;    /**< its change per unit of path, see speed_bound; 0: 1 */
+} rc_guard_info;
+
+/* Callbacks. Each returns 0, or another number, an error of the host's own: then the call that
+ * needed it returns RC_CALLBACK and the run stands where its last step, or event, was complete.
+ * `user` is that of the rc_callbacks. `x` has `n` doubles and must not be written to where it is
+ * const. A callback must not have side effects that change what it computes: steps are repeated.
+ * It must not jump out (longjmp). `mode` is 0 in systems without modes. */
+
+/** x' = f(t, x) into `dxdt`, n doubles, all of which are written. */
+typedef int (*rc_flow_fn)(void* user, rc_mode mode, double t, const double* x, double* dxdt,
+                          size_t n);
+/** All guards into `g`, `count` doubles: positive inside the mode, zero on the event surface. */
+typedef int (*rc_guards_fn)(void* user, rc_mode mode, double t, const double* x, size_t n,
+                            double* g, size_t count);
+/** Guard `which` into `g`. */
+typedef int (*rc_guard_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
+                           size_t n, double* g);
+/** The rates dg/dt along the flow of all guards into `rates`; `dxdt` is x'. */
+typedef int (*rc_guard_rates_fn)(void* user, rc_mode mode, double t, const double* x,
+                                 const double* dxdt, size_t n, double* rates, size_t count);
+/** The rate dg/dt along the flow of guard `which` into `rate`. */
+typedef int (*rc_guard_rate_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
+                                const double* dxdt, size_t n, double* rate);
+/** Makes the state after the event of guard `which` of the state before, and the next mode of the
+ *  mode, both in place. What is not written to stays. */
+typedef int (*rc_reset_fn)(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n);
+/** The same for all guards that fired together, ascending in `fired`; `on_time` is 1 where a time
+ *  event belongs to them. */
+typedef int (*rc_reset_set_fn)(void* user, const size_t* fired, size_t count, int on_time,
+                               rc_mode* mode, double t, double* x, size_t n);
+/** Whether guard `which` is looked at in this mode: 1 or 0 into `enabled`. */
+typedef int (*rc_enabled_in_fn)(void* user, size_t which, rc_mode mode, int* enabled);
+/** Whether a crossing of guard `which` here is an event: 1 or 0 into `enabled`. */
+typedef int (*rc_enabled_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
+                             size_t n, int* enabled);
+/** The first time event after t, t excluded, into `next`, or INFINITY; for runs backward in time
+ *  the last before t, or -INFINITY. */
+typedef int (*rc_time_event_fn)(void* user, double t, double* next);
+/** As rc_reset_fn, for a time event. */
+typedef int (*rc_time_reset_fn)(void* user, rc_mode* mode, double t, double* x, size_t n);
+/** A bound of guard `which`, valid at (t, x), into `bound`. */
+typedef int (*rc_bound_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
+                           size_t n, double* bound);
+/** The value of the parameter `name`, which a gate was trained for, into `value`. Leaves it as it
+ *  is, NaN, where the system has no such parameter. */
+typedef int (*rc_parameter_fn)(void* user, const char* name, double* value);
+
+/** A system to be. Set it to zero, then its size, its dimension, its flow and what else it has. */
+typedef struct rc_callbacks {
+    size_t size;        /**< sizeof(rc_callbacks) */
+    size_t dimension;   /**< n, the number of components of the state, at least 1 */
+    size_t guard_count; /**< 0: an ordinary differential equation */
+    size_t mode_count;  /**< 0: there are no modes */
+    const char* name;   /**< copied; snapshots and gates belong to a name. null: "callbacks" */
+    void* user;         /**< handed to every callback; must outlive the system */
+    const rc_guard_info* guard_infos; /**< guard_count of them, copied; null: all fields zero */
+
+    rc_flow_fn flow;               /**< required */
+    rc_guards_fn guards;           /**< this or `guard` is required where there are guards */
+    rc_guard_fn guard;             /**< spares the others where one is located */
+    rc_guard_rates_fn guard_rates; /**< without rates they are differences along the flow */
+    rc_guard_rate_fn guard_rate;
+    rc_reset_fn reset;             /**< null: events change nothing */
+    rc_reset_set_fn reset_set;     /**< in the place of `reset` */
+    rc_reset_fn rest;              /**< what becomes of the motion where events accumulate */
+    rc_enabled_in_fn enabled_in;   /**< null: all guards in all modes */
+    rc_enabled_fn enabled;         /**< null: every crossing is an event */
+    rc_time_event_fn next_time_event;     /**< null: none */
+    rc_time_event_fn previous_time_event; /**< for runs backward in time */
+    rc_time_reset_fn time_reset;          /**< null: a time event changes nothing */
+
+    /* How fast guards can change, for RC_PLANNED; see ricochet/hybrid/bounds.hpp. */
+    rc_bound_fn speed_bound;        /**< path per second, at most this now */
+    rc_bound_fn acceleration_bound; /**< of that speed, per second; null: speed_bound always holds */
+    rc_bound_fn lower_bound;        /**< guard >= this; null: none is known */
+    rc_bound_fn upper_bound;        /**< guard <= this; null: none is known */
+
+    rc_parameter_fn parameter; /**< null: the gate's parameters are not compared */
+} rc_callbacks;
+
+/** Makes a system; `*system` is null after a failure. The callbacks struct need not be kept.
+ *  RC_INVALID: no flow, no dimension, guards without a callback, a contradiction in a guard's
+ *  infos. RC_WRONG_SIZE, RC_NO_MEMORY. */
+RC_API rc_status rc_system_new(const rc_callbacks* callbacks, rc_system** system);
+
+/** Lets go of the system; simulations of it keep what they need. Null is allowed. */
+RC_API void rc_system_free(rc_system* system);
+
+/* --- options ----------------------------------------------------------------------------- */
+
+/** The method, by whose steps the motion goes on. */
+typedef enum rc_method {
+    RC_DOPRI5 = 0,     /**< order 5, error estimate, dense output */
+    RC_FEHLBERG78 = 1, /**< order 8, error estimate: the cheapest for small errors */
+    RC_CASH_KARP54 = 2,
+    RC_RK4 = 3,  /**< fixed steps only */
+    RC_EULER = 4 /**< fixed steps only */
+} rc_method;
+
+/** How it is decided whether a step holds events. */
+typedef enum rc_detector {
+    RC_EXTREMUM = 0,  /**< ends and extremum inside, a look inside each step */
+    RC_ENDS = 1,      /**< ends of the step only */
+    RC_BERNSTEIN = 2, /**< proves for guards that declare a degree */
+    RC_PLANNED = 3,   /**< looks when declared bounds demand it; finds what RC_EXTREMUM finds */
+    /* With a gate, `rc_options.gate`, that has been trained elsewhere: */
+    RC_CALIBRATED = 4, /**< looks when a horizon gate says; may miss, as often as it was measured */
+    RC_CALIBRATED_BOUNDS = 5, /**< as RC_PLANNED, with the levels of a level gate as bounds */
+    RC_FORESEEN = 6 /**< as RC_PLANNED, a horizon gate says when a look is likely to do */
+} rc_detector;
+
+/** How an event is located in its step. */
+typedef enum rc_locator { RC_NEWTON = 0, RC_BISECTION = 1, RC_TOMS748 = 2 } rc_locator;
+
+/** Options of a run. Fill them by rc_options_default, then change what is to be changed; t_end has
+ *  no default. */
+typedef struct rc_options {
+    size_t size;        /**< sizeof(rc_options) */
+    double t_start;     /**< [s], 0 */
+    double t_end;       /**< [s]; before t_start: backward in time */
+    rc_mode mode;       /**< at the start, 0 */
+    int32_t method;     /**< an rc_method, RC_DOPRI5 */
+    int32_t fixed_step; /**< 1: steps of the length `step`; 0: error control */
+    int32_t detector;   /**< an rc_detector, RC_EXTREMUM */
+    int32_t locator;    /**< an rc_locator, RC_NEWTON */
+    int32_t look_inside;   /**< 1: RC_EXTREMUM evaluates the guards once inside each step */
+    int32_t stop_at_event; /**< 0; 1: the run ends with its first event */
+    int32_t record_events; /**< 1; 0: events are counted, not kept */
+    int32_t event_states;  /**< 1; 0: events without a reset are kept without their states if
+                              the state has more than four components */
+    int32_t record_steps;  /**< 0; 1: every step is kept, for rc_solution */
+    double step;  /**< [s] of fixed steps, required there; else of the first step, 0: estimated */
+    double rtol;  /**< 1e-8; a step is accepted if each error is below atol + rtol |x| */
+    double atol;  /**< 1e-10 */
+    double h_min; /**< [s], 0: a few units in the last place of the time */
+    double h_max; /**< [s], INFINITY */
+    double event_tolerance; /**< [s] of the bracket of an event, 0: neighbouring doubles */
+    double event_rtol;      /**< added to it per second of |t|, 0 */
+    double event_window;    /**< [s] within which events happen together, 0 */
+    const double* sample_times; /**< [s] where the trajectory is wanted, in the order of the run,
+                                   copied; null: none */
+    size_t sample_count;        /**< 0 */
+    uint64_t max_steps;         /**< UINT64_MAX */
+    uint64_t stall_steps; /**< 1000000 steps in a row advance the time by 1e-9 of the span, or the
+                             run ends as RC_STALLED; 0: any number may stand still */
+    const char* gate;     /**< path of the model of the detectors that ask one, else null */
+} rc_options;
+
+/** Fills in the defaults; `size` is sizeof(rc_options), and t_end becomes NaN. RC_WRONG_SIZE. */
+RC_API rc_status rc_options_default(rc_options* options, size_t size);
+
+/* --- runs -------------------------------------------------------------------------------- */
+
+/** A run in progress, or at its end. */
+typedef struct rc_simulation rc_simulation;
+
+/** How a run ended. */
+typedef enum rc_outcome_code {
+    RC_RUNNING = -1, /**< it has not ended */
+    RC_REACHED_END = 0,
+    RC_STOPPED_BY_EVENT = 1,
+    RC_ZENO = 2,         /**< events accumulate and nothing stops the motion */
+    RC_OUTSIDE_MODE = 3, /**< a reset left the state behind a unilateral guard */
+    RC_ENDLESS_CASCADE = 4,
+    RC_CONFLICTING_RESETS = 5,
+    RC_UNKNOWN_MODE = 6,
+    RC_STEP_UNDERFLOW = 7, /**< no step above h_min met the tolerance */
+    RC_STEP_LIMIT = 8,
+    RC_NON_FINITE = 9, /**< the flow, a guard or a reset gave NaN or infinity */
+    RC_CANCELLED = 10, /**< by rc_cancel; the run can be continued */
+    RC_WRONG_BOUND = 11,
+    RC_NOT_CONVERGED = 12,
+    RC_TIME_EVENT_NOT_AHEAD = 13,
+    RC_WRONG_DIMENSION = 14,
+    RC_STALLED = 15,
+    RC_STOPPED_BY_CALLBACK = 16 /**< a callback failed; the run can be continued */
+} rc_outcome_code;
+
+/** Places a run of `system` at x0, n doubles, which are copied, and evaluates the flow and the
+ *  guards there. `n` must be the dimension of the system. `*simulation` is null after a failure.
+ *  RC_INVALID with the option in question, RC_CALLBACK, RC_NO_MEMORY, RC_BAD_HANDLE,
+ *  RC_WRONG_SIZE. */
+RC_API rc_status rc_simulation_new(const rc_system* system, const double* x0, size_t n,
+                                   const rc_options* options, rc_simulation** simulation);
+
+/** Frees it, with all that was handed out of it. Null is allowed; RC_BUSY while it runs, and then
+ *  nothing is freed. */
+RC_API rc_status rc_simulation_free(rc_simulation* simulation);
+
+/* The three below return RC_CALLBACK where a callback failed. What has been computed is kept, time
+ * and state are those of the last complete step or event, the outcome is RC_STOPPED_BY_CALLBACK,
+ * and the next call goes on from there, with the same bits as if nothing had happened. A run that
+ * has ended stays as it is. */
+
+/** Takes one step, with whatever events it holds. 0 into `goes_on` (which may be null) if the run
+ *  has ended. */
+RC_API rc_status rc_step(rc_simulation* simulation, int* goes_on);
+
+/** Goes on to the next sample time, or to the end of the next step that holds events. 0 into
+ *  `goes_on` if the run has ended and nothing happened that was not shown. */
+RC_API rc_status rc_advance(rc_simulation* simulation, int* goes_on);
+
+/** Goes on to the end. */
+RC_API rc_status rc_run(rc_simulation* simulation);
+
+/** Ends the run after the step in progress, as RC_CANCELLED; from any thread, a signal handler or
+ *  a callback. The next call that advances the run continues it. */
+RC_API rc_status rc_cancel(rc_simulation* simulation);
+
+/** Where a callback failed last. */
+typedef struct rc_callback_error {
+    size_t size;          /**< sizeof(rc_callback_error), filled in by the caller */
+    int32_t code;         /**< what it returned; 0: none has failed */
+    uint32_t reserved;    /**< 0 */
+    const char* callback; /**< its name in rc_callbacks, e.g. "flow"; null: none has failed */
+    size_t guard;         /**< that it was called for, else RC_NO_GUARD */
+    double t;             /**< [s] that it was called with; NaN: none */
+} rc_callback_error;
+
+/** Where a callback failed last in this run; after RC_CALLBACK of rc_simulation_new, which leaves
+ *  no simulation, pass null for the last failure of that kind in this thread. */
+RC_API rc_status rc_callback_failure(rc_simulation* simulation, rc_callback_error* error);
+
+/* --- what a run has come to -------------------------------------------------------------- */
+
+/** The time [s]; NaN for a handle that cannot be used. */
+RC_API double rc_time(rc_simulation* simulation);
+/** The state at that time, n doubles, until the next call that advances, restores or frees the
+ *  simulation; null for a handle that cannot be used. */
+RC_API const double* rc_state(rc_simulation* simulation);
+/** The mode at that time; UINT32_MAX for a handle that cannot be used. */
+RC_API rc_mode rc_mode_now(rc_simulation* simulation);
+
+/** How the run ended; RC_RUNNING before, and for a handle that cannot be used. */
+RC_API rc_outcome_code rc_outcome(rc_simulation* simulation);
+/** The name of an outcome, e.g. "reached_end"; "running"; "unknown" for a number that is none. */
+RC_API const char* rc_outcome_name(rc_outcome_code outcome);
+/** One sentence about it, with the remedy. */
+RC_API const char* rc_outcome_text(rc_outcome_code outcome);
+
+/** What the run has counted. */
+typedef struct rc_statistics {
+    size_t size;               /**< sizeof(rc_statistics), filled in by the caller */
+    uint64_t steps;            /**< accepted, also those cut short by an event */
+    uint64_t rejected;         /**< steps that failed the error test */
+    uint64_t refined_steps;    /**< steps divided for a guard that they did not resolve */
+    uint64_t unresolved_steps; /**< of these, not resolved by the finest division */
+    uint64_t resteps;          /**< steps repeated from their start to locate an event */
+    uint64_t flow_calls;
+    uint64_t guard_calls;
+    uint64_t network_calls;  /**< of gates */
+    uint64_t late_events;    /**< missed at first, found at a later step */
+    uint64_t checks_put_off; /**< steps whose check a plan or a gate saved */
+    uint64_t outside_domain; /**< states outside the box of a gate: checked exactly */
+    uint64_t bound_calls;
+    uint64_t rollbacks;      /**< stretches taken back to a step that was not closed */
+    uint64_t repeated_steps; /**< steps taken again for that */
+    uint64_t events;
+    uint64_t suppressed; /**< repeats of an event inside its own window */
+    uint64_t disabled;   /**< crossings that `enabled` said were no events */
+    /* Steps without an event, by what is known of them. */
+    uint64_t proved;  /**< a bound or a polynomial excludes a root */
+    uint64_t checked; /**< the ends and the extremum inside were looked at */
+    uint64_t gated;   /**< a calibrated gate skipped the check */
+    uint64_t assumed; /**< only the ends were looked at */
+    size_t guard;       /**< that ended the run, or RC_NO_GUARD */
+    size_t other_guard; /**< of two conflicting resets the second, or RC_TIME_EVENT_RESET */
+} rc_statistics;
+
+/** Fills it in. RC_WRONG_SIZE, RC_BAD_HANDLE, RC_BUSY. */
+RC_API rc_status rc_get_statistics(rc_simulation* simulation, rc_statistics* statistics);
+
+/** What happened. */
+typedef enum rc_event_kind {
+    RC_CROSSING = 0,     /**< the guard changed sign */
+    RC_TOUCH = 1,        /**< the guard reached its surface and turned back */
+    RC_TIME = 2,         /**< a time event */
+    RC_ACCUMULATION = 3, /**< the limit of infinitely many events */
+    RC_JUMP = 7          /**< the guard changed sign without a zero */
+} rc_event_kind;
+
+/** One event. */
+typedef struct rc_event {
+    size_t size;           /**< sizeof(rc_event), filled in by the caller */
+    double t;              /**< [s] */
+    size_t guard;          /**< or RC_NO_GUARD */
+    int32_t kind;          /**< an rc_event_kind */
+    int32_t late;          /**< 1: found at a step after the one that held it */
+    rc_mode mode_before;
+    rc_mode mode_after;
+    const double* before;  /**< n doubles; null if not kept. Until the simulation goes on */
+    const double* after;   /**< n doubles, the same as before where nothing is reset */
+    double bracket_lo;     /**< [s] the guard is still on its side here, */
+    double bracket_hi;     /**< [s] and has left it here */
+    double slope;          /**< rate of the guard [1/s]; NaN if not computed */
+    double error;          /**< [s] of location within the step, not of the solution */
+} rc_event;
+
+/** Number of events recorded so far; 0 for a handle that cannot be used. */
+RC_API size_t rc_event_count(rc_simulation* simulation);
+/** Event `index`, in the order of time. RC_INVALID if there is none. */
+RC_API rc_status rc_event_at(rc_simulation* simulation, size_t index, rc_event* event);
+
+/** Number of samples taken so far, see `sample_times`; 0 for a handle that cannot be used. */
+RC_API size_t rc_sample_count(rc_simulation* simulation);
+/** The time [s] of sample `index` into `t` and its state, n doubles until the simulation goes on,
+ *  into `x`; either may be null. RC_INVALID if there is none. */
+RC_API rc_status rc_sample_at(rc_simulation* simulation, size_t index, double* t, const double** x);
+
+/** The state at time t [s], after an event at t, into x, n doubles, where `record_steps` is set:
+ *  before the first and after the last step the nearest state. RC_INVALID if no step was kept, n is
+ *  not the dimension or t is NaN. */
+RC_API rc_status rc_solution(rc_simulation* simulation, double t, double* x, size_t n);
+/** The same before an event at t. */
+RC_API rc_status rc_solution_before(rc_simulation* simulation, double t, double* x, size_t n);
+/** The mode at time t, after an event at t. */
+RC_API rc_status rc_solution_mode(rc_simulation* simulation, double t, rc_mode* mode);
+
+/** Saves all that the future of the run depends on, as text without a terminating zero. On entry
+ *  `*size` is the room at `bytes`, on return the number of bytes that it takes. Null for `bytes`
+ *  asks for the number alone; RC_INVALID if the room is too small. What was recorded is not part
+ *  of it. */
+RC_API rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size);
+/** Goes back, or on, to what was saved, of the same or of another simulation of the same system
+ *  with the same options, but for its end, its sample times and what it records. What was
+ *  recorded stays. RC_INVALID names what does not agree; then nothing has changed. */
+RC_API rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t size);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,198 @@
+// A system whose functions are a C program's.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bindings/c/error.hpp"
+#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/ricochet.h"
+
+namespace ricochet::c {
+
+[[noreturn]] void throw_callback_failed(const char* callback, int code, std::size_t guard,
+                                        double t);
+
+/// What a callback has returned.
+[[gnu::always_inline]] inline void heed(int code, const char* callback, double t,
+                                        std::size_t guard = RC_NO_GUARD)
+{
+    if (code != 0) [[unlikely]] {
+        throw_callback_failed(callback, code, guard, t);
+    }
+}
+
+/// Callbacks by the names that the library calls. Those that the program has not given must not
+/// be called; the table that the loop is handed leaves them out.
+///
+/// @throws CallbackFailed from every function whose callback returns a number other than 0.
+class CallbackSystem {
+public:
+    static constexpr bool unchecked_names = true;
+
+    /// @throws Refusal naming the field that is not as it has to be.
+    explicit CallbackSystem(const rc_callbacks& given);
+    CallbackSystem(const CallbackSystem&) = delete;
+    CallbackSystem& operator=(const CallbackSystem&) = delete;
+
+    [[nodiscard]] const rc_callbacks& callbacks() const noexcept { return at_; }
+    [[nodiscard]] std::size_t dimension() const noexcept { return at_.dimension; }
+    [[nodiscard]] std::size_t guard_count() const noexcept { return at_.guard_count; }
+    /// A system without modes has one.
+    [[nodiscard]] std::size_t mode_count() const noexcept
+    {
+        return std::max<std::size_t>(at_.mode_count, 1);
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const noexcept { return infos_[which]; }
+
+    template <class X>
+    [[gnu::always_inline]] void flow(Mode mode, double t, const X& x, X& dxdt) const
+    {
+        heed(at_.flow(at_.user, mode, t, x.data(), dxdt.data(), x.size()), "flow", t);
+    }
+
+    template <class X>
+    void guards(Mode mode, double t, const X& x, std::span<double> g) const
+    {
+        if (at_.guards) {
+            heed(at_.guards(at_.user, mode, t, x.data(), x.size(), g.data(), g.size()), "guards",
+                 t);
+        } else {
+            for (std::size_t i = 0; i < g.size(); ++i) g[i] = guard(i, mode, t, x);
+        }
+    }
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const X& x) const
+    {
+        double g = nan;
+        heed(at_.guard(at_.user, which, mode, t, x.data(), x.size(), &g), "guard", t, which);
+        return g;
+    }
+    template <class X>
+    void guard_rates(Mode mode, double t, const X& x, const X& dxdt, std::span<double> rates) const
+    {
+        heed(at_.guard_rates(at_.user, mode, t, x.data(), dxdt.data(), x.size(), rates.data(),
+                             rates.size()),
+             "guard_rates", t);
+    }
+    template <class X>
+    [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const X& x,
+                                    const X& dxdt) const
+    {
+        double rate = nan;
+        heed(at_.guard_rate(at_.user, which, mode, t, x.data(), dxdt.data(), x.size(), &rate),
+             "guard_rate", t, which);
+        return rate;
+    }
+
+    template <class X>
+    [[nodiscard]] Mode reset(std::size_t which, Mode mode, double t, X& x) const
+    {
+        heed(at_.reset(at_.user, which, &mode, t, x.data(), x.size()), "reset", t, which);
+        return mode;
+    }
+    template <class X>
+    [[nodiscard]] Mode reset_set(std::span<const std::size_t> fired, bool on_time, Mode mode,
+                                 double t, X& x) const
+    {
+        heed(at_.reset_set(at_.user, fired.data(), fired.size(), on_time, &mode, t, x.data(),
+                           x.size()),
+             "reset_set", t);
+        return mode;
+    }
+    template <class X>
+    [[nodiscard]] Mode rest(std::size_t which, Mode mode, double t, X& x) const
+    {
+        heed(at_.rest(at_.user, which, &mode, t, x.data(), x.size()), "rest", t, which);
+        return mode;
+    }
+
+    [[nodiscard]] bool enabled_in(std::size_t which, Mode mode) const
+    {
+        int enabled = 0;
+        heed(at_.enabled_in(at_.user, which, mode, &enabled), "enabled_in", nan, which);
+        return enabled != 0;
+    }
+    template <class X>
+    [[nodiscard]] bool enabled_at(std::size_t which, Mode mode, double t, const X& x) const
+    {
+        int enabled = 0;
+        heed(at_.enabled(at_.user, which, mode, t, x.data(), x.size(), &enabled), "enabled", t,
+             which);
+        return enabled != 0;
+    }
+
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        double next = nan;
+        heed(at_.next_time_event(at_.user, t, &next), "next_time_event", t);
+        return next;
+    }
+    [[nodiscard]] double previous_time_event(double t) const
+    {
+        double previous = nan;
+        heed(at_.previous_time_event(at_.user, t, &previous), "previous_time_event", t);
+        return previous;
+    }
+    template <class X>
+    [[nodiscard]] Mode time_reset(Mode mode, double t, X& x) const
+    {
+        if (!at_.time_reset) return mode;
+        heed(at_.time_reset(at_.user, &mode, t, x.data(), x.size()), "time_reset", t);
+        return mode;
+    }
+
+    [[nodiscard]] double lipschitz(std::size_t which) const noexcept { return lipschitz_[which]; }
+    template <class X>
+    [[nodiscard]] double speed_bound(std::size_t which, Mode mode, double t, const X& x) const
+    {
+        return bound(at_.speed_bound, "speed_bound", which, mode, t, x);
+    }
+    template <class X>
+    [[nodiscard]] double acceleration_bound(std::size_t which, Mode mode, double t,
+                                            const X& x) const
+    {
+        if (!at_.acceleration_bound) return 0;
+        return bound(at_.acceleration_bound, "acceleration_bound", which, mode, t, x);
+    }
+    template <class X>
+    [[nodiscard]] double lower_bound(std::size_t which, Mode mode, double t, const X& x) const
+    {
+        return bound(at_.lower_bound, "lower_bound", which, mode, t, x);
+    }
+    template <class X>
+    [[nodiscard]] double upper_bound(std::size_t which, Mode mode, double t, const X& x) const
+    {
+        return bound(at_.upper_bound, "upper_bound", which, mode, t, x);
+    }
+
+    /// A parameter that gates are trained for.
+    [[nodiscard]] std::optional<double> parameter(std::string_view name) const;
+
+    std::string name;
+
+private:
+    static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+    template <class X>
+    [[nodiscard]] double bound(rc_bound_fn function, const char* callback, std::size_t which,
+                               Mode mode, double t, const X& x) const
+    {
+        double bound = nan;
+        heed(function(at_.user, which, mode, t, x.data(), x.size(), &bound), callback, t, which);
+        return bound;
+    }
+
+    rc_callbacks at_;
+    std::vector<std::string> guard_names_;
+    std::vector<GuardInfo> infos_;
+    std::vector<double> lipschitz_;
+};
+
+}  // namespace ricochet::c

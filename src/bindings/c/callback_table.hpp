@@ -1,0 +1,208 @@
+// The table of a system of callbacks, with what it has.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bindings/c/callback_system.hpp"
+#include "ricochet/detail/door.hpp"
+#include "ricochet/detail/system_table.hpp"
+
+namespace ricochet::c {
+
+/// What the functions of the table take.
+template <class X>
+class CallbackDoor : public detail::Door<CallbackSystem, X> {
+public:
+    CallbackDoor(const CallbackSystem& system, const X& like)
+        : detail::Door<CallbackSystem, X>(system, like),
+          all(system.guard_count()),
+          moved(like),
+          turned(like)
+    {
+    }
+
+    std::vector<double> all;  ///< guards, or their rates
+    X moved, turned;
+};
+
+template <class X>
+class CallbackTable {
+    using Table = detail::SystemTable<X>;
+    using D = CallbackDoor<X>;
+
+    [[nodiscard]] static D& at(void* door) noexcept
+    {
+        return *static_cast<D*>(static_cast<detail::Door<CallbackSystem, X>*>(door));
+    }
+    [[nodiscard]] static const CallbackSystem& of(void* door) noexcept { return at(door).system(); }
+
+    static double guard(void* door, std::size_t which, Mode mode, double t, const X& x)
+    {
+        const CallbackSystem& system = of(door);
+        if (system.callbacks().guard) return system.guard(which, mode, t, x);
+        system.guards(mode, t, x, at(door).all);
+        return at(door).all[which];
+    }
+
+    /// The guard a time `s` later along a straight line.
+    static double guard_at(void* door, std::size_t which, Mode mode, double t, const X& x,
+                           const X& dxdt, double s)
+    {
+        X& moved = at(door).moved;
+        if (moved.size() != x.size()) moved = x;
+        detail::move(moved, x, s, dxdt);
+        return guard(door, which, mode, t, moved);
+    }
+
+    static double rate(void* door, std::size_t which, Mode mode, bool backward, double t,
+                       const X& x, const X& dxdt, double scale)
+    {
+        const CallbackSystem& system = of(door);
+        const rc_callbacks& has = system.callbacks();
+        if (!has.guard_rate && !has.guard_rates) {
+            const double delta = 1e-5 * scale;
+            const double ahead = backward ? -delta : delta;
+            const double after = guard_at(door, which, mode, t + ahead, x, dxdt, delta);
+            const double before = guard_at(door, which, mode, t - ahead, x, dxdt, -delta);
+            return (after - before) / (2 * delta);
+        }
+        const X* forward = &dxdt;
+        if (backward) {
+            X& turned = at(door).turned;
+            turned = dxdt;
+            detail::for_each_component(turned, [&](auto i) { turned[i] = -turned[i]; });
+            forward = &turned;
+        }
+        double rate = 0;
+        if (has.guard_rate) {
+            rate = system.guard_rate(which, mode, t, x, *forward);
+        } else {
+            system.guard_rates(mode, t, x, *forward, at(door).all);
+            rate = at(door).all[which];
+        }
+        return backward ? -rate : rate;
+    }
+
+    static detail::GuardPoint point(void* door, std::size_t which, Mode mode, bool backward,
+                                    double t, const X& x, const X& dxdt, double scale)
+    {
+        return {of(door).guard(which, mode, t, x),
+                rate(door, which, mode, backward, t, x, dxdt, scale)};
+    }
+
+    static void each_rate(void* door, Mode mode, double t, const X& x, const X& dxdt,
+                          std::span<double> rates)
+    {
+        for (std::size_t i = 0; i < rates.size(); ++i) {
+            rates[i] = of(door).guard_rate(i, mode, t, x, dxdt);
+        }
+    }
+
+    static void add_guards(Table& table, const rc_callbacks& has)
+    {
+        table.guarded = true;
+        table.rated = has.guard_rate || has.guard_rates;
+        table.guard_alone = has.guard != nullptr;
+        table.calls_of_rate = table.rated ? 0 : 2;
+        table.info = [](void* door, std::size_t which) { return of(door).guard_info(which); };
+        table.guards = [](void* door, Mode mode, double t, const X& x, std::span<double> g) {
+            of(door).guards(mode, t, x, g);
+        };
+        table.guard = &guard;
+        table.rate = &rate;
+        if (has.guard && !has.guard_rates) table.point = &point;
+        if (has.guard_rates) {
+            table.rates = [](void* door, Mode mode, double t, const X& x, const X& dxdt,
+                             std::span<double> rates) {
+                of(door).guard_rates(mode, t, x, dxdt, rates);
+            };
+        } else if (has.guard_rate) {
+            table.each_rate = &each_rate;
+        }
+        if (has.enabled_in) {
+            table.enabled_in = [](void* door, std::size_t which, Mode mode) {
+                return of(door).enabled_in(which, mode);
+            };
+        }
+        if (has.enabled) {
+            table.enabled_at = [](void* door, std::size_t which, Mode mode, double t, const X& x) {
+                return of(door).enabled_at(which, mode, t, x);
+            };
+        }
+        if (has.reset_set) {
+            table.reset_set = [](void* door, std::span<const std::size_t> fired, bool on_time,
+                                 Mode mode, double t,
+                                 X& x) { return of(door).reset_set(fired, on_time, mode, t, x); };
+        } else if (has.reset) {
+            table.reset = [](void* door, std::size_t which, Mode mode, double t, X& x) {
+                return of(door).reset(which, mode, t, x);
+            };
+        }
+        if (has.rest) {
+            table.rest = [](void* door, std::size_t which, Mode mode, double t, X& x) {
+                return of(door).rest(which, mode, t, x);
+            };
+        }
+    }
+
+    static void add_times(Table& table, const rc_callbacks& has)
+    {
+        table.next_time_event = [](void* door, double t) { return of(door).next_time_event(t); };
+        if (has.previous_time_event) {
+            table.previous_time_event = [](void* door, double t) {
+                return of(door).previous_time_event(t);
+            };
+        }
+        table.time_reset = [](void* door, Mode mode, double t, X& x) {
+            return of(door).time_reset(mode, t, x);
+        };
+    }
+
+    static void add_bounds(Table& table, const rc_callbacks& has)
+    {
+        table.bounded = true;
+        table.lipschitz = [](void* door, std::size_t which) { return of(door).lipschitz(which); };
+        table.speed_bound = [](void* door, std::size_t which, Mode mode, double t, const X& x) {
+            return of(door).speed_bound(which, mode, t, x);
+        };
+        table.acceleration_bound = [](void* door, std::size_t which, Mode mode, double t,
+                                      const X& x) {
+            return of(door).acceleration_bound(which, mode, t, x);
+        };
+        if (has.lower_bound) {
+            table.lower_bound = [](void* door, std::size_t which, Mode mode, double t, const X& x) {
+                return of(door).lower_bound(which, mode, t, x);
+            };
+        }
+        if (has.upper_bound) {
+            table.upper_bound = [](void* door, std::size_t which, Mode mode, double t, const X& x) {
+                return of(door).upper_bound(which, mode, t, x);
+            };
+        }
+    }
+
+public:
+    [[nodiscard]] static Table make(const CallbackSystem& system)
+    {
+        const rc_callbacks& has = system.callbacks();
+        Table table;
+        table.moded = has.mode_count > 0;
+        table.fixed_dimension = detail::fixed_size<X>() > 0;
+        table.flow = [](void* door, Mode mode, double t, const X& x, X& dxdt) {
+            of(door).flow(mode, t, x, dxdt);
+            return true;
+        };
+        table.mode_count = [](void* door) { return of(door).mode_count(); };
+        table.guard_count = [](void* door) { return of(door).guard_count(); };
+        table.name = [](void* door) { return of(door).name; };
+        if (has.guard_count > 0) add_guards(table, has);
+        if (has.next_time_event) add_times(table, has);
+        if (has.speed_bound) add_bounds(table, has);
+        return table;
+    }
+};
+
+}  // namespace ricochet::c

@@ -1,0 +1,47 @@
+// Handles: what makes a pointer of the caller's one of ours.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "bindings/c/error.hpp"
+
+namespace ricochet::c {
+
+enum class Kind : std::uint64_t {
+    freed = 0,
+    system = 0x6d65747379736372,      // "rcsystem" in memory
+    simulation = 0x616c756d69736372,  // "rcsimula"
+};
+
+/// What every handle begins with.
+struct Handle {
+    explicit Handle(Kind kind_) noexcept : kind(kind_) {}
+
+    std::atomic<Kind> kind;
+    std::atomic<bool> busy{false};
+};
+
+/// Whether the memory of freed handles is kept, so that they are recognised.
+[[nodiscard]] bool keeps_freed_handles() noexcept;
+
+/// Marks the handle as freed; `release` gives its memory back, unless freed handles are kept.
+void retire(Handle* handle, void (*release)(Handle*)) noexcept;
+
+/// @throws Refusal
+void check_handle(const Handle* handle, Kind kind);
+
+/// A handle in use by this call alone.
+class InUse {
+public:
+    /// @throws Refusal if it is no such handle, or in use.
+    InUse(Handle* handle, Kind kind);
+    InUse(const InUse&) = delete;
+    InUse& operator=(const InUse&) = delete;
+    ~InUse() { handle_->busy.store(false, std::memory_order_release); }
+
+private:
+    Handle* handle_;
+};
+
+}  // namespace ricochet::c

@@ -1,0 +1,99 @@
+// A run of callbacks behind one interface, whatever state its loop works with.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bindings/c/callback_system.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/statistics.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/outcome.hpp"
+
+namespace ricochet::c {
+
+/// Options of a run, checked.
+struct RunOptions {
+    Options options;
+    rc_method method = RC_DOPRI5;
+    bool fixed_step = false;
+    rc_detector detector = RC_EXTREMUM;
+    rc_locator locator = RC_NEWTON;
+    std::string gate;  ///< path of a model; empty: none
+};
+
+/// @throws Refusal naming the option.
+[[nodiscard]] RunOptions read_options(const rc_options* given);
+
+/// An event whose states are read where they lie.
+struct ShownEvent {
+    double t = 0;
+    EventKind kind = EventKind::crossing;
+    std::size_t guard = 0;
+    Mode mode_before = 0, mode_after = 0;
+    const double* before = nullptr;  ///< null where it was not kept
+    const double* after = nullptr;
+    Bracket bracket;
+    double slope = 0, error = 0;
+    bool late = false;
+};
+
+/// As `Simulation`, for states of a size known at run time. Whatever its functions throw, the run
+/// stands where its last step was complete.
+class AnyRun {
+public:
+    AnyRun() = default;
+    AnyRun(const AnyRun&) = delete;
+    AnyRun& operator=(const AnyRun&) = delete;
+    virtual ~AnyRun() = default;
+
+    virtual bool step() = 0;
+    virtual bool advance() = 0;
+    virtual void run_to_end() = 0;
+    /// Lets a run that was cancelled go on; true if it was.
+    virtual bool continue_cancelled() noexcept = 0;
+
+    [[nodiscard]] virtual double t() const noexcept = 0;
+    [[nodiscard]] virtual const double* x() const noexcept = 0;
+    [[nodiscard]] virtual Mode mode() const noexcept = 0;
+    [[nodiscard]] virtual bool ended() const noexcept = 0;
+    [[nodiscard]] virtual Outcome outcome() const noexcept = 0;
+
+    struct Counts {
+        Statistics statistics;
+        std::size_t guard = no_guard, other_guard = no_guard;
+    };
+    [[nodiscard]] virtual Counts counts() = 0;
+    [[nodiscard]] virtual std::size_t events() const noexcept = 0;
+    [[nodiscard]] virtual ShownEvent event(std::size_t i) const noexcept = 0;
+    [[nodiscard]] virtual const std::vector<double>& sample_times() const noexcept = 0;
+    [[nodiscard]] virtual const double* sample(std::size_t i) const noexcept = 0;
+    [[nodiscard]] virtual bool keeps_steps() const noexcept = 0;
+    virtual void solution(double t, bool before, double* x) const = 0;
+    [[nodiscard]] virtual Mode solution_mode(double t) const = 0;
+    [[nodiscard]] virtual std::string save() = 0;
+    virtual void restore(std::string_view text) = 0;
+};
+
+/// A run from x0, whose size is the dimension of the system.
+/// @throws std::invalid_argument as `Simulation`; CallbackFailed
+[[nodiscard]] std::unique_ptr<AnyRun> make_run(std::shared_ptr<const CallbackSystem> system,
+                                               const double* x0, const RunOptions& options);
+
+// One for each state of the loop's.
+[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_1(std::shared_ptr<const CallbackSystem>,
+                                                    const double*, const RunOptions&);
+[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_2(std::shared_ptr<const CallbackSystem>,
+                                                    const double*, const RunOptions&);
+[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_3(std::shared_ptr<const CallbackSystem>,
+                                                    const double*, const RunOptions&);
+[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_4(std::shared_ptr<const CallbackSystem>,
+                                                    const double*, const RunOptions&);
+[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_any(std::shared_ptr<const CallbackSystem>,
+                                                      const double*, const RunOptions&);
+
+}  // namespace ricochet::c

@@ -1,0 +1,3 @@
+#include "bindings/c/run_of.hpp"
+
+RICOCHET_C_RUN(2, 2)

@@ -1,0 +1,62 @@
+// Structs with their own size first, as another version of the header may have them.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <string>
+#include <type_traits>
+
+#include "bindings/c/error.hpp"
+
+namespace ricochet::c {
+
+[[noreturn]] inline void throw_null(const char* name)
+{
+    throw Refusal(RC_INVALID, std::string(name) + ": found null; expected a pointer");
+}
+
+/// The size that a struct of the caller's says it has.
+/// @throws Refusal if it is larger than the library's, or none that a release can have had:
+/// fields come in groups of eight bytes.
+template <class T>
+[[nodiscard]] std::size_t size_of_given(const void* given, const char* name)
+{
+    static_assert(std::is_trivially_copyable_v<T> && offsetof(T, size) == 0);
+    if (!given) throw_null(name);
+    std::size_t size = 0;
+    std::memcpy(&size, given, sizeof size);
+    if (size > sizeof(T)) {
+        throw Refusal(RC_WRONG_SIZE,
+                      std::string(name) + ": found a size of " + std::to_string(size) +
+                          " bytes; this library, version " RICOCHET_VERSION ", knows " +
+                          std::to_string(sizeof(T)) +
+                          " of them: it is older than the program, or `size` has not been set");
+    }
+    if (size < 2 * sizeof(std::size_t) || size % 8 != 0) {
+        throw Refusal(RC_WRONG_SIZE, std::string(name) + ": found a size of " +
+                                         std::to_string(size) + " bytes; expected sizeof(" + name +
+                                         ") in its field `size`");
+    }
+    return size;
+}
+
+/// A struct of the caller's over `full`, whose fields stand for those that it does not have.
+template <class T>
+[[nodiscard]] T read_struct(const void* given, const char* name, T full = {})
+{
+    const std::size_t size = size_of_given<T>(given, name);
+    std::memcpy(&full, given, size);
+    full.size = sizeof(T);
+    return full;
+}
+
+/// Fills in a struct of the caller's, as far as it goes.
+template <class T>
+void write_struct(T* given, T full, const char* name)
+{
+    const std::size_t size = size_of_given<T>(given, name);
+    full.size = size;
+    std::memcpy(given, &full, size);
+}
+
+}  // namespace ricochet::c
