@@ -237,6 +237,15 @@ private:
         bool resting = false, watching = false;
     };
 
+    /// After an exception has left the deadlines of guards half renewed.
+    void plan_anew()
+    {
+        if (!replans_) return;
+        bank_.wake_all(step_, last_h_, calls(), false);
+        newly_armed_ = true;
+        replans_ = false;
+    }
+
     void mark_step() noexcept;
     /// Before events change what the next step depends on.
     void mark_everything()
@@ -460,7 +469,7 @@ private:
     Mode sample_mode_ = 0;
     StepStart<X> place_;
     std::unique_ptr<Mark> mark_;  ///< null: nobody will go on after an exception
-    bool replans_ = false;  ///< all deadlines of guards are to be found anew
+    bool replans_ = false;        ///< all deadlines of guards are to be found anew
 };
 
 }  // namespace ricochet::detail

@@ -18,11 +18,7 @@ inline void Loop<X, single>::advance_with_check(double remaining)
 template <class X, bool single>
 inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& how)
 {
-    if (replans_) {
-        bank_.wake_all(step_, last_h_, calls(), false);
-        newly_armed_ = true;
-        replans_ = false;
-    }
+    plan_anew();
     if (planner_->steps_aside()) return advance_with_check(remaining);
     if (newly_armed_) this->begin_plan();
     const double proposed = h_next_;

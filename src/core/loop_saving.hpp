@@ -8,6 +8,7 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline Snapshot Loop<X, single>::save()
 {
+    plan_anew();
     Snapshot snapshot;
     snapshot.run = properties();
     visit_state(SnapshotWriter(snapshot));

@@ -23,6 +23,7 @@ enum {
 struct world {
     size_t calls;      /* so far */
     size_t fails_at;   /* the call that fails, once; 0: none */
+    int moves;         /* after that, another simulation goes on from a snapshot */
     int moded;         /* impacts of the first ball change the mode */
     size_t seen[calls_of];
 };
@@ -188,6 +189,7 @@ static struct result run(const struct setting* of, struct world* world, size_t* 
     rc_simulation* simulation;
     rc_status status;
     rc_statistics statistics;
+    size_t events_before = 0;
     size_t i;
 
     world->moded = of->moded;
@@ -243,7 +245,6 @@ static struct result run(const struct setting* of, struct world* world, size_t* 
         status = rc_simulation_new(system, start, of->dimension, &options, &simulation);
     }
     CHECK_STATUS(RC_OK, status);
-    rc_system_free(system);
     for (;;) {
         int goes_on = 0;
         status = of->by_advance ? rc_advance(simulation, &goes_on) : rc_run(simulation);
@@ -255,17 +256,33 @@ static struct result run(const struct setting* of, struct world* world, size_t* 
             CHECK(error.code == 42 && error.callback != NULL);
             CHECK(rc_time(simulation) <= of->t_end);
             ++*failures;
+            if (world->moves) {
+                static char bytes[1 << 18];
+                size_t size = sizeof bytes;
+                events_before = rc_event_count(simulation);
+                CHECK_STATUS(RC_OK, rc_save(simulation, bytes, &size));
+                CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
+                CHECK_STATUS(RC_OK, rc_simulation_new(system, start, of->dimension, &options,
+                                                      &simulation));
+                CHECK_STATUS(RC_OK, rc_restore(simulation, bytes, size));
+            }
         } else {
             CHECK_STATUS(RC_OK, status);
             if (!goes_on) break;
         }
     }
+    rc_system_free(system);
     result.outcome = rc_outcome(simulation);
     result.t = rc_time(simulation);
     memcpy(result.x, rc_state(simulation), of->dimension * sizeof(double));
     result.mode = rc_mode_now(simulation);
     result.events = rc_event_count(simulation);
     CHECK(result.events <= most_events);
+    if (world->moves && *failures > 0) { /* what was recorded stays with the first */
+        result.events += events_before;
+        CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
+        return result;
+    }
     for (i = 0; i < result.events; ++i) {
         const rc_event event = event_at(simulation, i);
         result.when[i] = event.t;
@@ -287,6 +304,12 @@ static struct result run(const struct setting* of, struct world* world, size_t* 
     result.counted = statistics.events;
     CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
     return result;
+}
+
+static int ends_alike(const struct result* a, const struct result* b)
+{
+    return a->outcome == b->outcome && a->t == b->t && memcmp(a->x, b->x, sizeof a->x) == 0 &&
+           a->mode == b->mode && a->events == b->events;
 }
 
 int main(void)
@@ -321,10 +344,12 @@ int main(void)
             struct result found;
             memset(&world, 0, sizeof world);
             world.fails_at = k;
+            world.moves = k % 3 == 0;
             failures = 0;
             found = run(of, &world, &failures);
             CHECK(failures == 1);
-            if (memcmp(&found, &expected, sizeof found) != 0) {
+            if (world.moves ? !ends_alike(&found, &expected)
+                            : memcmp(&found, &expected, sizeof found) != 0) {
                 fprintf(stderr,
                         "%s, call %lu of %lu: %lu events in %lu steps, not %lu in %lu; "
                         "t %.17g, not %.17g, x %.17g, not %.17g\n",
