@@ -17,7 +17,7 @@
 #include "input.hpp"
 #include "json_text.hpp"
 #include "model_lookup.hpp"
-#include "policy_lookup.hpp"
+#include "policy_advice.hpp"
 #include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/detail/gate_features.hpp"

@@ -23,6 +23,7 @@
 #include "run_watch.hpp"
 #include "settings.hpp"
 #include "learn/step_world.hpp"
+#include "policy_advice.hpp"
 #include "policy_lookup.hpp"
 #include "faults/step_progress.hpp"
 #include "faults/fault.hpp"
