@@ -26,7 +26,7 @@
 
 // Defined by the library's target.
 #ifndef RICOCHET_WITH_NONSMOOTH
-#error "ricochet: found event_hand_over.hpp without its library; expected that the target links ricochet::nonsmooth"
+#error "ricochet: found event_hand_over.hpp; expected the target to link ricochet::nonsmooth"
 #endif
 
 namespace ricochet {

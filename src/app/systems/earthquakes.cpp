@@ -1,5 +1,6 @@
 // The fault and the spring-slider as the command line lists them. They are simulated by the program
-// ricochet-fault, so that this one is not linked to ricochet::faults; its headers have the defaults.
+// ricochet-fault: this one takes the defaults from the headers of ricochet::faults, and does not
+// link to it.
 #include <limits>
 #include <vector>
 
@@ -17,33 +18,33 @@ std::vector<Parameter> rate_state_parameters()
     constexpr Range not_negative{.lower = 0, .lower_included = true};
     const FaultFriction friction;
     const RateStateOptions options;
-    return {{"rate_and_state",
-             0,
-             "1",
-             {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
-             "1: rate-and-state friction, with all that follows"},
-            {"a", friction.law.a, "1", positive, "direct effect"},
-            {"b", friction.law.b, "1", positive, "effect of the state"},
-            {"f_star", friction.law.f_star, "1", positive, "steady friction coefficient at v_star"},
-            {"v_star", friction.law.v_star, "m/s", positive, "reference slip rate"},
-            {"d_rs", friction.law.d_rs, "m", positive, "characteristic slip distance"},
-            {"law",
-             0,
-             "1",
-             {.lower = 0, .upper = 2, .lower_included = true, .upper_included = true},
-             "0 ageing, 1 slip, 2 Perrin-Rice-Zheng"},
-            {"plate_velocity", friction.plate_velocity, "m/s", not_negative,
-             "that loads the fault"},
-            {"slip_rate", friction.slip_rate, "m/s", positive, "at the start"},
-            {"theta", 0, "s", not_negative, "state at the start; 0: that of steady sliding"},
-            {"normal_stress", friction.normal_stress, "Pa", not_negative,
-             "effective, everywhere; 0: by depth"},
-            {"threshold", options.threshold, "m/s", positive, "slip rate of an earthquake"},
-            {"order",
-             static_cast<double>(options.order),
-             "1",
-             {.lower = 1, .upper = 4, .lower_included = true, .upper_included = true},
-             "of the steps: 1, 2 or 4"}};
+    return {
+        {"rate_and_state",
+         0,
+         "1",
+         {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
+         "1: rate-and-state friction, with all that follows"},
+        {"a", friction.law.a, "1", positive, "direct effect"},
+        {"b", friction.law.b, "1", positive, "effect of the state"},
+        {"f_star", friction.law.f_star, "1", positive, "steady friction coefficient at v_star"},
+        {"v_star", friction.law.v_star, "m/s", positive, "reference slip rate"},
+        {"d_rs", friction.law.d_rs, "m", positive, "characteristic slip distance"},
+        {"law",
+         0,
+         "1",
+         {.lower = 0, .upper = 2, .lower_included = true, .upper_included = true},
+         "0 ageing, 1 slip, 2 Perrin-Rice-Zheng"},
+        {"plate_velocity", friction.plate_velocity, "m/s", not_negative, "that loads the fault"},
+        {"slip_rate", friction.slip_rate, "m/s", positive, "at the start"},
+        {"theta", 0, "s", not_negative, "state at the start; 0: that of steady sliding"},
+        {"normal_stress", friction.normal_stress, "Pa", not_negative,
+         "effective, everywhere; 0: by depth"},
+        {"threshold", options.threshold, "m/s", positive, "slip rate of an earthquake"},
+        {"order",
+         static_cast<double>(options.order),
+         "1",
+         {.lower = 1, .upper = 4, .lower_included = true, .upper_included = true},
+         "of the steps: 1, 2 or 4"}};
 }
 
 }  // namespace

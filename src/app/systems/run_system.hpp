@@ -157,8 +157,8 @@ template <class System, class X>
                                   int repeats)
 {
     using Core = detail::CoreState<X>;
-    using Parts = detail::PartsOfRun<System, X, ErrorControlled<MethodByName>, Extremum,
-                                     ChosenLocator>;
+    using Parts =
+        detail::PartsOfRun<System, X, ErrorControlled<MethodByName>, Extremum, ChosenLocator>;
     return with_detector<System, X>(settings, [&](const ChosenDetector<Core>& chosen) {
         Run<Core> run;
         const auto start = std::chrono::steady_clock::now();
