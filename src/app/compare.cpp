@@ -17,7 +17,6 @@
 #include "registry.hpp"
 #include "report.hpp"
 #include "run_watch.hpp"
-#include "set_valued.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -395,7 +394,6 @@ std::string to_csv(const SystemEntry& system, const std::vector<double>& exact,
 int compare(const CompareRequest& request)
 {
     SystemEntry system = find_system(request.system);
-    if (!system.published_errors.empty()) return compare_set_valued(system, request);
     if (system.exact_events == nullptr) {
         throw BadInput(
             fmt::format("the system {} has no known event times to compare with", system.name));

@@ -10,9 +10,6 @@ using Json = nlohmann::ordered_json;
 
 /// Indented, with a line end. Numbers round-trip, those that are not finite are
 /// null; bytes that are not UTF-8, as a file name may hold, are replaced.
-[[nodiscard]] inline std::string json_text(const Json& json)
-{
-    return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
-}
+[[nodiscard]] std::string json_text(const Json& json);
 
 }  // namespace ricochet::app

@@ -7,13 +7,11 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 
 #include "inspect.hpp"
-#include "options.hpp"
 #include "program.hpp"
 #include "registry.hpp"
 #include "systems.hpp"
@@ -21,6 +19,8 @@
 namespace ricochet::app {
 
 namespace {
+
+constexpr std::string_view nonsmooth = "nonsmooth";
 
 char** all_arguments = nullptr;  ///< of main, for the programs that take its place
 
@@ -33,8 +33,10 @@ int run_instead(std::string_view name, char** arguments)
     std::string file = (here.parent_path() / program).string();
     arguments[-1] = file.data();
     execv(file.c_str(), arguments - 1);
-    throw std::runtime_error(fmt::format("'{}' cannot be run: {}; it is built by the target ricochet_{}",
-                                         file, std::strerror(errno), name));
+    const std::string_view kind = name == nonsmooth ? "_app" : "";  // ricochet_nonsmooth: a library
+    throw std::runtime_error(
+        fmt::format("'{}' cannot be run: {}; it is built by the target ricochet_{}{}", file,
+                    std::strerror(errno), name, kind));
 }
 
 int simulate_here_or_there(const SimulateRequest& request)
@@ -49,33 +51,9 @@ int compare_here_or_there(const CompareRequest& request)
     for (const std::string_view study : {"fault", "rate-and-state", "step-control"}) {
         if (request.system == study) return run_instead("studies", all_arguments + 1);
     }
-    return compare(request);
-}
-
-void add_systems(CLI::App& app, int& status)
-{
-    CLI::App& command = *app.add_subcommand("systems", "List the systems and their parameters");
-    auto format = std::make_shared<ListFormat>(ListFormat::text);
-    CLI::Option* json = command.add_flag_callback(
-        "--json", [format] { *format = ListFormat::json; }, "print JSON");
-    command
-        .add_flag_callback(
-            "--markdown", [format] { *format = ListFormat::markdown; }, "print docs/systems.md")
-        ->excludes(json);
-    command.footer("Example:\n  ricochet systems");
-    command.callback([&status, format] { status = list_systems(*format); });
-}
-
-void add_inspect(CLI::App& app, int& status)
-{
-    CLI::App& command = *app.add_subcommand("inspect", "Print what a model file is");
-    auto request = std::make_shared<InspectRequest>();
-    command.add_option("MODEL", request->model, "by path, or the name of one that comes along")
-        ->required()
-        ->type_name("");
-    command.add_flag("--json", request->json, "print JSON");
-    command.footer("Example:\n  ricochet inspect bouncing-ball");
-    command.callback([&status, request] { status = inspect(*request); });
+    return find_system(request.system).program == nonsmooth
+               ? run_instead(nonsmooth, all_arguments + 1)
+               : compare(request);
 }
 
 /// Commands that are programs, with what the list of commands says of them.
@@ -89,14 +67,11 @@ constexpr std::array<Program, 2> programs{
 
 void add_commands(CLI::App& app, int& status)
 {
-    const auto add_program = [&app](const Program& program) {
-        app.add_subcommand(std::string(program.name), std::string(program.meaning));
-    };
-    add_systems(app, status);
+    add_systems(app, status, list_systems);
     add_simulate(app, status, simulate_here_or_there);
-    add_program(programs[0]);
-    add_inspect(app, status);
-    add_program(programs[1]);
+    add_program(app, programs[0].name, programs[0].meaning);
+    add_inspect(app, status, inspect);
+    add_program(app, programs[1].name, programs[1].meaning);
     add_compare(app, status, compare_here_or_there);
 }
 

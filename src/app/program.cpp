@@ -125,6 +125,37 @@ int fail(int status, std::string_view sentence)
 
 }  // namespace
 
+void add_systems(CLI::App& app, int& status, SystemsHandler handler)
+{
+    CLI::App& command = *app.add_subcommand("systems", "List the systems and their parameters");
+    auto format = std::make_shared<ListFormat>(ListFormat::text);
+    CLI::Option* json = command.add_flag_callback(
+        "--json", [format] { *format = ListFormat::json; }, "print JSON");
+    command
+        .add_flag_callback(
+            "--markdown", [format] { *format = ListFormat::markdown; }, "print docs/systems.md")
+        ->excludes(json);
+    command.footer("Example:\n  ricochet systems");
+    command.callback([&status, format, handler] { status = handler(*format); });
+}
+
+void add_inspect(CLI::App& app, int& status, InspectHandler handler)
+{
+    CLI::App& command = *app.add_subcommand("inspect", "Print what a model file is");
+    auto request = std::make_shared<InspectRequest>();
+    command.add_option("MODEL", request->model, "by path, or the name of one that comes along")
+        ->required()
+        ->type_name("");
+    command.add_flag("--json", request->json, "print JSON");
+    command.footer("Example:\n  ricochet inspect bouncing-ball");
+    command.callback([&status, request, handler] { status = handler(*request); });
+}
+
+void add_program(CLI::App& app, std::string_view name, std::string_view meaning)
+{
+    app.add_subcommand(std::string(name), std::string(meaning));
+}
+
 void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
 {
     CLI::App& command = *app.add_subcommand("simulate", "Run a system and print its events");

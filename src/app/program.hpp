@@ -10,7 +10,9 @@
 #include <string_view>
 
 #include "compare.hpp"
+#include "inspect.hpp"
 #include "simulate.hpp"
+#include "systems.hpp"
 
 namespace CLI {
 class App;
@@ -21,12 +23,20 @@ namespace ricochet::app {
 /// Adds the commands of a program; each sets the exit status when it is run.
 using AddCommands = std::function<void(CLI::App& app, int& status)>;
 
+using SystemsHandler = int (*)(ListFormat format);
+using InspectHandler = int (*)(const InspectRequest& request);
 using SimulateHandler = int (*)(const SimulateRequest& request);
 using CompareHandler = int (*)(const CompareRequest& request);
+
+void add_systems(CLI::App& app, int& status, SystemsHandler handler);
+void add_inspect(CLI::App& app, int& status, InspectHandler handler);
 
 /// `simulate` and `compare` with all their options, which several programs take.
 void add_simulate(CLI::App& app, int& status, SimulateHandler handler);
 void add_compare(CLI::App& app, int& status, CompareHandler handler);
+
+/// A command that is a program of its own, for the list of commands.
+void add_program(CLI::App& app, std::string_view name, std::string_view meaning);
 
 /// The main function of a program with these commands. @return the exit status
 int run_program(const AddCommands& add, int count, char** arguments);

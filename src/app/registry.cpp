@@ -19,9 +19,11 @@ std::string to_string(const Range& range)
                        range.upper_included ? ']' : ')');
 }
 
-const std::vector<SystemEntry>& systems()
+namespace {
+
+std::vector<SystemEntry>& entries()
 {
-    static const std::vector<SystemEntry> all{
+    static std::vector<SystemEntry> all{
         bouncing_ball_entry(),
         pendulum_entry(),
         henon_heiles_entry(),
@@ -54,6 +56,20 @@ const std::vector<SystemEntry>& systems()
         spring_slider_entry(),
     };
     return all;
+}
+
+}  // namespace
+
+const std::vector<SystemEntry>& systems()
+{
+    return entries();
+}
+
+void complete_system(std::string_view name, void (*complete)(SystemEntry& entry))
+{
+    for (SystemEntry& entry : entries()) {
+        if (entry.name == name) complete(entry);
+    }
 }
 
 const SystemEntry& find_system(std::string_view name)

@@ -1,7 +1,8 @@
 // The systems that the command line knows, as values.
 //
 // A system is added by one file in systems/ that defines its entry, and one line in
-// registry.cpp.
+// registry.cpp. The functions of a system that needs more than the core are in a file of the
+// program that simulates it.
 #pragma once
 
 #include <cstddef>
@@ -129,11 +130,23 @@ struct SystemEntry {
     std::vector<double> (*exact_state)(const std::vector<double>& parameters, double t) = nullptr;
     std::vector<std::string_view> published_errors{};  ///< lines of a source
 
-    /// Of another program, `ricochet-<name>`, which simulates it; `start` and `run` are then null.
+    /// What is known of its solution, in words, where the functions that know it are of `program`.
+    std::string_view known_solution{};
+
+    /// Another program, `ricochet-<name>`, which simulates it; it has the functions, which are null
+    /// elsewhere.
     std::string_view program{};
+
+    /// Fills in how a differential inclusion is integrated; false: as any other system. Else null.
+    /// @throws BadInput for what does not fit the system or the integrator.
+    bool (*choose_integrator)(const SystemEntry& system, const RunRequest& request,
+                              RunSettings& settings) = nullptr;
 };
 
 [[nodiscard]] const std::vector<SystemEntry>& systems();
+
+/// Fills in the functions of a system, in the program that has them.
+void complete_system(std::string_view name, void (*complete)(SystemEntry& entry));
 
 /// @throws BadInput naming the systems there are.
 [[nodiscard]] const SystemEntry& find_system(std::string_view name);

@@ -10,7 +10,6 @@
 #include "interrupt.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
-#include "set_valued.hpp"
 
 namespace ricochet::app {
 
@@ -101,6 +100,19 @@ void choose_stepping(const RunRequest& request, RunSettings& settings)
     require_not_negative("--atol", options.atol);
     if (options.rtol == 0 && options.atol == 0) {
         throw BadInput("--rtol or --atol must be positive, got zero for both");
+    }
+}
+
+/// Of a system that is no differential inclusion.
+void refuse_integrator(const SystemEntry& system, const RunRequest& request)
+{
+    if (request.integrator && *request.integrator != "event") {
+        throw BadInput(fmt::format(
+            "--integrator {} is for differential inclusions, and {} is none; expected event",
+            *request.integrator, system.name));
+    }
+    if (request.controller) {
+        throw BadInput("--controller is for --integrator bathe of differential inclusions");
     }
 }
 
@@ -268,7 +280,11 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     options.max_steps = request.max_steps.value_or(default_max_steps);
     options.cancelled = Interrupts::flag();
 
-    if (choose_set_valued(system, request, settings)) return settings;
+    if (system.choose_integrator != nullptr) {
+        if (system.choose_integrator(system, request, settings)) return settings;
+    } else {
+        refuse_integrator(system, request);
+    }
     choose_stepping(request, settings);
     if (request.locator) settings.locator = named("locator", locators, *request.locator);
     choose_detector(system, request, settings);

@@ -69,12 +69,12 @@ std::string text(const SystemEntry& system)
 /// What is known of its solution, in words.
 std::string known_solution(const SystemEntry& system)
 {
+    if (!system.known_solution.empty()) return std::string(system.known_solution);
     if (system.exact_events != nullptr) {
         return fmt::format("event times {}{}",
                            system.numerical_reference ? "computed to higher accuracy" : "in closed form",
                            system.any_parameters ? "" : ", for the default parameters");
     }
-    if (system.exact_state != nullptr) return "the state at any time";
     return "";
 }
 

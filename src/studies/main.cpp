@@ -1,6 +1,7 @@
 // `ricochet-studies`: the comparisons that take a minute and more, and the papers' tables and
 // figures.
 #include "input.hpp"
+#include "nonsmooth/complete.hpp"
 #include "papers.hpp"
 #include "program.hpp"
 #include "studies.hpp"
@@ -24,6 +25,7 @@ int compare_study(const CompareRequest& request)
 int main(int count, char** arguments)
 {
     using namespace ricochet::app;
+    complete_set_valued_systems();
     return run_program(
         [](CLI::App& app, int& status) {
             add_compare(app, status, compare_study);

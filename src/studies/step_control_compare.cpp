@@ -11,21 +11,22 @@
 #include <utility>
 #include <vector>
 
+#include "faults/fault.hpp"
+#include "faults/step_progress.hpp"
 #include "files.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
+#include "learn/step_world.hpp"
+#include "policy_advice.hpp"
+#include "policy_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
-#include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 #include "run_watch.hpp"
 #include "settings.hpp"
-#include "learn/step_world.hpp"
-#include "policy_lookup.hpp"
-#include "faults/step_progress.hpp"
-#include "faults/fault.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet::test {
 

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "input.hpp"
+#include "nonsmooth/complete.hpp"
 #include "registry.hpp"
 
 namespace ricochet::app {
@@ -131,6 +132,7 @@ std::vector<RunRequest> requests(const SystemEntry& system)
 
 std::vector<std::string> all_lines()
 {
+    complete_set_valued_systems();
     std::vector<std::string> out{fmt::format("mathematical library {:016x}", mathematical_library())};
     for (const SystemEntry& system : systems()) {
         if (system.run == nullptr) continue;

@@ -72,7 +72,7 @@
 #include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/integrate/solution.hpp"
 #include "ricochet/detail/step_control.hpp"
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 #include "ricochet/detail/adam.hpp"
 #include "ricochet/detail/assessment.hpp"
 #include "ricochet/learn/bouncing_ball.hpp"

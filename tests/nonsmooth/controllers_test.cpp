@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
 namespace {

@@ -35,8 +35,8 @@ for compiler in "$@"; do
     consume "$compiler" "the core" -DCMAKE_PREFIX_PATH="$work/core" -- consumer
 done
 last=${!#}
-consume "$last" "faults and learn" -DCMAKE_PREFIX_PATH="$work/whole" \
-    -DRICOCHET_COMPONENTS="faults;learn" -- faults learn
+consume "$last" "all components" -DCMAKE_PREFIX_PATH="$work/whole" \
+    -DRICOCHET_COMPONENTS="nonsmooth;sensitivity;faults;learn" -- nonsmooth sensitivity faults learn
 consume "$last" "add_subdirectory" -DRICOCHET_SOURCE="$source" -- consumer
 
 if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_PATH="$work/core" \
@@ -45,9 +45,13 @@ if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_P
     exit 1
 fi
 grep -q learn "$work/log"
-[ ! -e "$work/core/include/ricochet/learn" ] && [ ! -e "$work/core/include/ricochet/faults" ]
+for room in learn faults nonsmooth sensitivity systems/sliding_mode.hpp; do
+    [ -e "$work/whole/include/ricochet/$room" ]
+    [ ! -e "$work/core/include/ricochet/$room" ]
+done
 echo "the core alone: no other component is installed or found"
 "$work/whole/bin/ricochet" simulate bouncing-ball --step 0.01 --detector network --json >/dev/null
 "$work/whole/bin/ricochet" simulate fault --json >/dev/null
+"$work/whole/bin/ricochet" simulate sliding-mode --json >/dev/null
 "$work/whole/bin/ricochet" train --help >/dev/null
 echo "installed command line: finds its models and its further programs"

@@ -155,6 +155,33 @@ RICOCHET_INLINE void dense(const T* parameters, const T* x, std::size_t inputs, 
     }
 }
 
+/// Outputs `First` ... `Row` - 1 where both are known: only the numbers of registers that occur are
+/// compiled.
+template <class T, class Activation, std::size_t Registers, std::size_t Chains, std::size_t First,
+          std::size_t Row>
+RICOCHET_INLINE void known_outputs(const T* parameters, const T* x, std::size_t inputs,
+                                   T* y) noexcept
+{
+    constexpr std::size_t step = Registers * lanes<T>;
+    constexpr std::size_t end = First + (Row - First) / step * step;
+    for (std::size_t first = First; first < end; first += step) {
+        outputs_together<T, Activation, Registers, Chains>(parameters + first, Row, x, inputs,
+                                                           y + first);
+    }
+    if constexpr (end < Row) {
+        known_outputs<T, Activation, Registers / 2, Chains, end, Row>(parameters, x, inputs, y);
+    }
+}
+
+/// As `dense`.
+template <class T, class Activation, std::size_t Outputs>
+RICOCHET_INLINE void known_dense(const T* parameters, const T* x, std::size_t inputs, T* y) noexcept
+{
+    constexpr std::size_t together = chains<T>(Outputs);
+    known_outputs<T, Activation, accumulators / together, together, 0, padded<T>(Outputs)>(
+        parameters, x, inputs, y);
+}
+
 /// Zeroes what a layer left in the padding of y: infinite inputs make NaN of it.
 template <class T>
 RICOCHET_INLINE void clear_padding(T* y, std::size_t outputs) noexcept
@@ -229,11 +256,13 @@ RICOCHET_INLINE void last(const T* parameters, const T* x, std::size_t inputs, s
 template <class T, class Activation, std::size_t Width, std::size_t... Widths>
 RICOCHET_INLINE void layers(const T* parameters, const T* x, std::size_t inputs, T* y) noexcept
 {
-    if constexpr (sizeof...(Widths) == 0) {
+    if constexpr (sizeof...(Widths) == 0 && Width == 1) {
+        *y = dot(parameters, x, inputs);
+    } else if constexpr (sizeof...(Widths) == 0) {
         last(parameters, x, inputs, Width, y);
     } else {
         alignas(block_bytes) T hidden[padded<T>(Width)];
-        dense<T, Activation>(parameters, x, inputs, Width, hidden);
+        known_dense<T, Activation, Width>(parameters, x, inputs, hidden);
         clear_padding(hidden, Width);
         layers<T, Activation, Widths...>(parameters + layer_size<T>(inputs, Width, false), hidden,
                                          Width, y);
@@ -260,15 +289,14 @@ template <class T, class Activation>
 RICOCHET_INLINE void network(const T* parameters, const std::uint16_t* widths, std::size_t layers,
                              const T* in, T* out) noexcept
 {
-    if (layers == 1) {
-        alignas(block_bytes) T x[max_width];
-        for (std::size_t i = 0; i < widths[0]; ++i) x[i] = in[i];
-        clear_padding(x, widths[0]);
-        last(parameters, x, widths[0], widths[1], out);
-        return;
-    }
     alignas(block_bytes) T hidden[2][max_width];
     const T* x = in;
+    if (layers == 1) {
+        T* padded_input = hidden[0];
+        for (std::size_t i = 0; i < widths[0]; ++i) padded_input[i] = in[i];
+        clear_padding(padded_input, widths[0]);
+        x = padded_input;
+    }
     for (std::size_t k = 0; k + 1 < layers; ++k) {
         T* y = hidden[k % 2];
         dense<T, Activation>(parameters, x, widths[k], widths[k + 1], y);

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
 

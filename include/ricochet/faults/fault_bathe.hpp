@@ -17,7 +17,7 @@
 #include <functional>
 #include <memory>
 
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
 #include "ricochet/faults/fault_rupture.hpp"

@@ -37,8 +37,9 @@ requires Flowing<System, X> && StateVector<X>
                                const Locator& locator = {})
 {
     static_assert(!detail::WantsHandOver<System>,
-                  "ricochet: found a system with set_valued(); expected that "
-                  "ricochet/nonsmooth/event_hand_over.hpp is included, which hands it over");
+                  "ricochet: found a system with set_valued(); expected the target to link "
+                  "ricochet::nonsmooth, and ricochet/nonsmooth/event_hand_over.hpp to be included, "
+                  "which hands it over");
     detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
                                                                    locator);
     return detail::as_callers<X>(

@@ -24,6 +24,11 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
+// Defined by the library's target.
+#ifndef RICOCHET_WITH_NONSMOOTH
+#error "ricochet: found event_hand_over.hpp; expected the target to link ricochet::nonsmooth"
+#endif
+
 namespace ricochet {
 
 template <class System>

@@ -16,7 +16,7 @@
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
 #include "ricochet/detail/step_layout.hpp"
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
 

@@ -12,7 +12,7 @@
 #include "input.hpp"
 #include "json_text.hpp"
 #include "keep_model.hpp"
-#include "policy_lookup.hpp"
+#include "policy_advice.hpp"
 #include "progress_bar.hpp"
 #include "report.hpp"
 #include "ricochet/learn/td3.hpp"

@@ -7,7 +7,7 @@
 
 #include "input.hpp"
 #include "model_lookup.hpp"
-#include "policy_lookup.hpp"
+#include "policy_advice.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/diode_circuit.hpp"

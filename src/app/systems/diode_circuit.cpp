@@ -1,45 +1,8 @@
 #include "ricochet/systems/diode_circuit.hpp"
 
 #include "entries.hpp"
-#include "run_inclusion.hpp"
 
 namespace ricochet::app {
-
-namespace {
-
-enum : std::size_t {
-    capacitance_1,
-    capacitance_2,
-    resistance,
-    inductance,
-    current,
-    voltage_1,
-    voltage_2,
-    coil_current
-};  // the order of parameters
-
-DiodeCircuit system(const std::vector<double>& p)
-{
-    return DiodeCircuit({.capacitance_1 = p[capacitance_1],
-                         .capacitance_2 = p[capacitance_2],
-                         .resistance = p[resistance],
-                         .inductance = p[inductance],
-                         .current = p[current]});
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {p[voltage_1], p[voltage_2], p[coil_current]};
-}
-
-TimedRun run(const RunSettings& settings, int repeats)
-{
-    const auto& p = settings.parameters;
-    return run_inclusion<Fehlberg78>(
-        system(p), Eigen::Vector3d(p[voltage_1], p[voltage_2], p[coil_current]), settings, repeats);
-}
-
-}  // namespace
 
 SystemEntry diode_circuit_entry()
 {
@@ -97,14 +60,15 @@ SystemEntry diode_circuit_entry()
         .guards = {{.name = "element", .event = "switch"}},
         .modes = {"positive", "held", "negative", "set-valued"},
         .t_end = DiodeCircuit::t_end,
-        .start = start,
-        .run = run,
+        .start = nullptr,
+        .run = nullptr,
         .integrators = {"handover", "event", "bathe", "time-stepping"},
         .set_valued_step = 0.05,
         .published_errors = {"PI         293 steps, 25.3 s, relative L2 3.8e-3",
                              "heuristic  414 steps, 34.8 s, relative L2 4.4e-3",
                              "TQC        41 steps, 2.67 s, relative L2 0.196",
                              "TD3        4572 steps, 260.7 s, relative L2 0.272"},
+        .program = "nonsmooth",
     };
 }
 

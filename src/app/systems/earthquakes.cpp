@@ -1,10 +1,11 @@
 // The fault and the spring-slider as the command line lists them. They are simulated by the program
-// ricochet-fault, so that this one needs nothing of ricochet::faults; a test holds the defaults to
-// the library's.
+// ricochet-fault: this one takes the defaults from the headers of ricochet::faults, and does not
+// link to it.
 #include <limits>
 #include <vector>
 
 #include "entries.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet::app {
 
@@ -15,31 +16,35 @@ std::vector<Parameter> rate_state_parameters()
 {
     constexpr Range positive{.lower = 0};
     constexpr Range not_negative{.lower = 0, .lower_included = true};
-    return {{"rate_and_state",
-             0,
-             "1",
-             {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
-             "1: rate-and-state friction, with all that follows"},
-            {"a", 0.01, "1", positive, "direct effect"},
-            {"b", 0.02, "1", positive, "effect of the state"},
-            {"f_star", 0.6, "1", positive, "steady friction coefficient at v_star"},
-            {"v_star", 1e-6, "m/s", positive, "reference slip rate"},
-            {"d_rs", 0.01, "m", positive, "characteristic slip distance"},
-            {"law",
-             0,
-             "1",
-             {.lower = 0, .upper = 2, .lower_included = true, .upper_included = true},
-             "0 ageing, 1 slip, 2 Perrin-Rice-Zheng"},
-            {"plate_velocity", 1e-9, "m/s", not_negative, "that loads the fault"},
-            {"slip_rate", 1e-9, "m/s", positive, "at the start"},
-            {"theta", 0, "s", not_negative, "state at the start; 0: that of steady sliding"},
-            {"normal_stress", 0, "Pa", not_negative, "effective, everywhere; 0: by depth"},
-            {"threshold", 1e-3, "m/s", positive, "slip rate of an earthquake"},
-            {"order",
-             4,
-             "1",
-             {.lower = 1, .upper = 4, .lower_included = true, .upper_included = true},
-             "of the steps: 1, 2 or 4"}};
+    const FaultFriction friction;
+    const RateStateOptions options;
+    return {
+        {"rate_and_state",
+         0,
+         "1",
+         {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
+         "1: rate-and-state friction, with all that follows"},
+        {"a", friction.law.a, "1", positive, "direct effect"},
+        {"b", friction.law.b, "1", positive, "effect of the state"},
+        {"f_star", friction.law.f_star, "1", positive, "steady friction coefficient at v_star"},
+        {"v_star", friction.law.v_star, "m/s", positive, "reference slip rate"},
+        {"d_rs", friction.law.d_rs, "m", positive, "characteristic slip distance"},
+        {"law",
+         0,
+         "1",
+         {.lower = 0, .upper = 2, .lower_included = true, .upper_included = true},
+         "0 ageing, 1 slip, 2 Perrin-Rice-Zheng"},
+        {"plate_velocity", friction.plate_velocity, "m/s", not_negative, "that loads the fault"},
+        {"slip_rate", friction.slip_rate, "m/s", positive, "at the start"},
+        {"theta", 0, "s", not_negative, "state at the start; 0: that of steady sliding"},
+        {"normal_stress", friction.normal_stress, "Pa", not_negative,
+         "effective, everywhere; 0: by depth"},
+        {"threshold", options.threshold, "m/s", positive, "slip rate of an earthquake"},
+        {"order",
+         static_cast<double>(options.order),
+         "1",
+         {.lower = 1, .upper = 4, .lower_included = true, .upper_included = true},
+         "of the steps: 1, 2 or 4"}};
 }
 
 }  // namespace
@@ -50,6 +55,7 @@ SystemEntry fault_entry()
     const Range positive{.lower = 0};
     const Range not_negative{.lower = 0, .lower_included = true};
     const Range share{.lower = 0, .upper = 1, .lower_included = true, .upper_included = true};
+    const StrikeSlipFault::Parameters fault;
     SystemEntry entry{
         .name = "fault",
         .description = "A strike-slip fault of n x n elements slips in an earthquake.",
@@ -59,52 +65,52 @@ SystemEntry fault_entry()
                         .range = {.lower = 1, .upper = inf, .lower_included = true},
                         .meaning = "per side, a whole number"},
                        {.name = "side",
-                        .initial = 3000,
+                        .initial = fault.side,
                         .unit = "m",
                         .range = positive,
                         .meaning = "of the square"},
                        {.name = "shear_modulus",
-                        .initial = 30e9,
+                        .initial = fault.shear_modulus,
                         .unit = "Pa",
                         .range = positive,
                         .meaning = "of the rock"},
                        {.name = "poisson",
-                        .initial = 0.25,
+                        .initial = fault.poisson,
                         .unit = "1",
                         .range = {.lower = 0, .upper = 0.5, .lower_included = true},
                         .meaning = "Poisson's ratio"},
                        {.name = "density",
-                        .initial = 2500,
+                        .initial = fault.density,
                         .unit = "kg/m³",
                         .range = positive,
                         .meaning = "of the rock"},
                        {.name = "damping",
-                        .initial = 4.0 / 15,
+                        .initial = fault.damping,
                         .unit = "1",
                         .range = not_negative,
                         .meaning = "damping ratio of every mode"},
                        {.name = "stress_gradient",
-                        .initial = 15e3,
+                        .initial = fault.stress_gradient,
                         .unit = "Pa/m",
                         .range = positive,
                         .meaning = "effective normal stress by depth"},
                        {.name = "residual_friction",
-                        .initial = 0.5,
+                        .initial = fault.residual_friction,
                         .unit = "1",
                         .range = not_negative,
                         .meaning = "coefficient after much slip"},
                        {.name = "friction_drop",
-                        .initial = 0.1,
+                        .initial = fault.friction_drop,
                         .unit = "1",
                         .range = positive,
                         .meaning = "by which it begins higher"},
                        {.name = "slip_distance",
-                        .initial = 0.1,
+                        .initial = fault.slip_distance,
                         .unit = "m",
                         .range = positive,
                         .meaning = "over which friction falls"},
                        {.name = "overload",
-                        .initial = 1e-5,
+                        .initial = fault.overload,
                         .unit = "1",
                         .range = positive,
                         .meaning = "stress beyond strength at the start"},
@@ -119,7 +125,7 @@ SystemEntry fault_entry()
                         .range = share,
                         .meaning = "1: elements a quarter off the edges"},
                        {.name = "memory",
-                        .initial = 1024,
+                        .initial = fault.memory_limit / 1048576,
                         .unit = "MiB",
                         .range = positive,
                         .meaning = "a larger mesh is refused"}},
@@ -137,17 +143,18 @@ SystemEntry fault_entry()
 SystemEntry spring_slider_entry()
 {
     constexpr Range positive_range{.lower = 0};
+    const RateStateParameters law;
     return {
         .name = "spring-slider",
         .description = "A block with rate-and-state friction, pulled by a spring: stick-slip.",
         .parameters = {{"ratio", 0.5, "1", positive_range, "stiffness, in critical stiffnesses"},
                        {"velocity", 1.5e-4, "m/s", positive_range, "of the load"},
-                       {"a", 0.011, "1", positive_range, "direct effect"},
-                       {"b", 0.016, "1", positive_range, "effect of the state, above a"},
-                       {"f_star", 0.5109, "1", positive_range,
+                       {"a", law.a, "1", positive_range, "direct effect"},
+                       {"b", law.b, "1", positive_range, "effect of the state, above a"},
+                       {"f_star", law.f_star, "1", positive_range,
                         "steady friction coefficient at v_star"},
-                       {"v_star", 1e-4, "m/s", positive_range, "reference slip rate"},
-                       {"d_rs", 1e-6, "m", positive_range, "characteristic slip distance"},
+                       {"v_star", law.v_star, "m/s", positive_range, "reference slip rate"},
+                       {"d_rs", law.d_rs, "m", positive_range, "characteristic slip distance"},
                        {"mass", 1, "kg", positive_range, "of the block"},
                        {"force", 9.81, "N", positive_range, "normal force"},
                        {"law",

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "entries.hpp"
+#include "labels.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "run_system.hpp"
 #include "scenes.hpp"

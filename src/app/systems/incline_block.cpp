@@ -1,31 +1,8 @@
 #include "problems/incline_block.hpp"
 
 #include "entries.hpp"
-#include "run_inclusion.hpp"
 
 namespace ricochet::app {
-
-namespace {
-
-enum : std::size_t { slope, friction, gravity, vx, vy };  // the order of parameters
-
-InclineBlock system(const std::vector<double>& p)
-{
-    return InclineBlock({.slope = p[slope], .friction = p[friction], .gravity = p[gravity]});
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {p[vx], p[vy], 0, 0};
-}
-
-TimedRun run(const RunSettings& settings, int repeats)
-{
-    const auto& p = settings.parameters;
-    return run_inclusion(system(p), InclineBlock::Vector(p[vx], p[vy], 0, 0), settings, repeats);
-}
-
-}  // namespace
 
 SystemEntry incline_block_entry()
 {
@@ -64,10 +41,11 @@ SystemEntry incline_block_entry()
                   {.name = "y", .unit = "m", .meaning = "position across the slope"}},
         .guards = {},
         .t_end = 2,
-        .start = start,
-        .run = run,
+        .start = nullptr,
+        .run = nullptr,
         .integrators = {"handover", "bathe", "time-stepping"},
         .set_valued_step = 0.001,
+        .program = "nonsmooth",
     };
 }
 

@@ -2,6 +2,7 @@
 
 #include "../input.hpp"
 #include "entries.hpp"
+#include "labels.hpp"
 #include "run_system.hpp"
 
 namespace ricochet::app {

@@ -1,47 +1,8 @@
 #include "problems/rolling_ball.hpp"
 
 #include "entries.hpp"
-#include "run_inclusion.hpp"
 
 namespace ricochet::app {
-
-namespace {
-
-enum : std::size_t {
-    mass,
-    radius,
-    friction,
-    resistance,
-    plate_speed,
-    plate_frequency,
-    gravity,
-    velocity,
-    spin
-};  // the order of parameters
-
-RollingBall system(const std::vector<double>& p)
-{
-    return RollingBall({.mass = p[mass],
-                        .radius = p[radius],
-                        .friction = p[friction],
-                        .resistance = p[resistance],
-                        .plate_speed = p[plate_speed],
-                        .plate_frequency = p[plate_frequency],
-                        .gravity = p[gravity]});
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {p[velocity], p[spin]};
-}
-
-TimedRun run(const RunSettings& settings, int repeats)
-{
-    const auto& p = settings.parameters;
-    return run_inclusion(system(p), RollingBall::Vector(p[velocity], p[spin]), settings, repeats);
-}
-
-}  // namespace
 
 SystemEntry rolling_ball_entry()
 {
@@ -101,10 +62,11 @@ SystemEntry rolling_ball_entry()
                   "sliding ahead, spinning back", "rolling back", "sliding back, spinning back",
                   "set-valued"},
         .t_end = 6,
-        .start = start,
-        .run = run,
+        .start = nullptr,
+        .run = nullptr,
         .integrators = {"handover", "event", "bathe", "time-stepping"},
         .set_valued_step = 0.005,
+        .program = "nonsmooth",
     };
 }
 

@@ -3,10 +3,8 @@
 #pragma once
 
 #include <chrono>
-#include <initializer_list>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -44,13 +42,17 @@ struct ChosenLocator {
     }
 };
 
-/// Calls `use` with the stepping of the settings.
-template <class Use>
-TimedRun with_stepping(const RunSettings& settings, Use&& use)
+/// A detector as the loop takes it.
+template <class X>
+struct ChosenDetector {
+    detail::DetectorTable<X> table;
+    const void* detector;
+};
+
+template <class System, class X, class Detector>
+[[nodiscard]] ChosenDetector<detail::CoreState<X>> chosen(const Detector& detector)
 {
-    const MethodByName method{settings.stepper};
-    return settings.fixed_step ? use(FixedStep<MethodByName>{method})
-                               : use(ErrorControlled<MethodByName>{method});
+    return {detail::DetectorTableOf<Detector, System, X>::make(detector), &detector};
 }
 
 /// Calls `use` with the gate of the settings.
@@ -67,10 +69,14 @@ TimedRun with_gate(const RunSettings& settings, Use&& use)
                        "expected --gate calibrated with a horizon gate");
     }
     try {
-        if (settings.detector == DetectorKind::certified) return use(Certified<>(model));
-        if (settings.detector == DetectorKind::verified) return use(Foreseen<>(gates::Gate(model)));
-        if (horizon) return use(Calibrated<>(gates::Gate(model)));
-        return use(CalibratedBounds<>(gates::Gate(model)));
+        if (settings.detector == DetectorKind::certified) {
+            return use(chosen<System, X>(Certified<>(model)));
+        }
+        if (settings.detector == DetectorKind::verified) {
+            return use(chosen<System, X>(Foreseen<>(gates::Gate(model))));
+        }
+        if (horizon) return use(chosen<System, X>(Calibrated<>(gates::Gate(model))));
+        return use(chosen<System, X>(CalibratedBounds<>(gates::Gate(model))));
     } catch (const std::invalid_argument& error) {
         throw BadInput("model '" + settings.model.string() + "': " + error.what());
     }
@@ -83,18 +89,22 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
 {
     if (settings.gate) return with_gate<System, X>(settings, use);
     if constexpr (fixed_guard_count<System, X>() == 1) {
-        if (settings.detector == DetectorKind::network) return use(settings.network.value());
+        if (settings.detector == DetectorKind::network) {
+            return use(chosen<System, X>(settings.network.value()));
+        }
         if (settings.detector == DetectorKind::verified) {
-            return use(Verified<Extremum>(settings.network.value()));
+            return use(chosen<System, X>(Verified<Extremum>(settings.network.value())));
         }
     }
     if constexpr (CurvedGuard<System, X>) {
-        if (settings.detector == DetectorKind::line) return use(BallisticLine{});
+        if (settings.detector == DetectorKind::line) {
+            return use(chosen<System, X>(BallisticLine{}));
+        }
     }
     switch (settings.detector) {
-        case DetectorKind::ends: return use(Ends{});
-        case DetectorKind::bernstein: return use(Bernstein{});
-        case DetectorKind::extremum: return use(Extremum{});
+        case DetectorKind::ends: return use(chosen<System, X>(Ends{}));
+        case DetectorKind::bernstein: return use(chosen<System, X>(Bernstein{}));
+        case DetectorKind::extremum: return use(chosen<System, X>(Extremum{}));
         default: throw std::logic_error("the system has no such detector");
     }
 }
@@ -138,53 +148,32 @@ template <class X>
     return out;
 }
 
-/// Runs `system` from x0 `repeats` times with this stepping and detector, and returns
-/// the last run.
-template <class System, class X, class Stepping, class Detector>
-[[nodiscard]] TimedRun run_with(const System& system, const X& x0, const RunSettings& settings,
-                                int repeats, const Stepping& stepping, const Detector& detector)
-{
-    const ChosenLocator locator{settings.locator};
-    Run<X> run;
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < repeats; ++i) {
-        run = integrate(system, x0, settings.options, stepping, detector, locator);
-    }
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-    return TimedRun{.run = with_plain_states(std::move(run)), .seconds = spent.count() / repeats};
-}
-
-/// As `run_with`, with the stepping and the detector of the settings.
+/// Runs `system` from x0 `repeats` times as `integrate` does, and returns the last run.
+///
+/// The loop takes its method, detector and locator as tables: one run is compiled for each system,
+/// whatever the settings.
 template <class System, class X>
 [[nodiscard]] TimedRun run_system(const System& system, const X& x0, const RunSettings& settings,
                                   int repeats)
 {
-    return with_stepping(settings, [&](auto stepping) {
-        return with_detector<System, X>(settings, [&](const auto& detector) {
-            return run_with(system, x0, settings, repeats, stepping, detector);
-        });
+    using Core = detail::CoreState<X>;
+    using Parts =
+        detail::PartsOfRun<System, X, ErrorControlled<MethodByName>, Extremum, ChosenLocator>;
+    return with_detector<System, X>(settings, [&](const ChosenDetector<Core>& chosen) {
+        Run<Core> run;
+        const auto start = std::chrono::steady_clock::now();
+        for (int i = 0; i < repeats; ++i) {
+            Parts parts(system, x0, {{settings.stepper}}, {}, {settings.locator});
+            detail::RunSetup<Core> setup = parts.setup();
+            setup.error_controlled = !settings.fixed_step;
+            setup.detector = chosen.table;
+            setup.detecting = chosen.detector;
+            run = detail::run_whole(setup, detail::core_state(x0), settings.options);
+        }
+        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+        return TimedRun{.run = with_plain_states(std::move(run)),
+                        .seconds = spent.count() / repeats};
     });
-}
-
-/// The guards of a system by their own names, with what happens on their surfaces.
-template <class System>
-[[nodiscard]] std::vector<GuardLabel> labels(const System& system,
-                                             std::initializer_list<std::string_view> events)
-{
-    std::vector<GuardLabel> out;
-    for (const std::string_view event : events) {
-        out.push_back({.name = system.guard_info(out.size()).name, .event = event});
-    }
-    return out;
-}
-
-/// The modes of a system by their own names.
-template <class System>
-[[nodiscard]] std::vector<std::string_view> mode_names()
-{
-    std::vector<std::string_view> out;
-    for (Mode mode = 0; mode < System::mode_count; ++mode) out.push_back(System::mode_name(mode));
-    return out;
 }
 
 }  // namespace ricochet::app

@@ -1,38 +1,8 @@
 #include "ricochet/systems/sliding_mode.hpp"
 
 #include "entries.hpp"
-#include "run_inclusion.hpp"
 
 namespace ricochet::app {
-
-namespace {
-
-enum : std::size_t { amplitude, frequency, gain, from };  // the order of parameters
-
-SlidingMode system(const std::vector<double>& p)
-{
-    return SlidingMode({.amplitude = p[amplitude], .frequency = p[frequency], .gain = p[gain]});
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {p[from]};
-}
-
-TimedRun run(const RunSettings& settings, int repeats)
-{
-    const auto& p = settings.parameters;
-    return run_inclusion<Fehlberg78>(
-        system(p), SlidingMode::Vector(SlidingMode::Vector::Constant(p[from])), settings, repeats);
-}
-
-std::vector<double> exact_state(const std::vector<double>& p, double t)
-{
-    if (!(p[from] > 0 && p[gain] > p[amplitude])) return {};
-    return {system(p).exact(t, p[from])};
-}
-
-}  // namespace
 
 SystemEntry sliding_mode_entry()
 {
@@ -66,14 +36,15 @@ SystemEntry sliding_mode_entry()
         .guards = {{.name = "relay", .event = "switch"}},
         .modes = {"positive", "held", "negative", "set-valued"},
         .t_end = SlidingMode::t_end,
-        .start = start,
-        .run = run,
+        .start = nullptr,
+        .run = nullptr,
         .integrators = {"handover", "event", "bathe", "time-stepping"},
         .set_valued_step = 1.25e-3,
-        .exact_state = exact_state,
         .published_errors = {"PI         48 steps, 0.678 s, L2 1.94e-4",
                              "heuristic  55 steps, 0.631 s, L2 1.70e-4",
                              "TQC        0.278 s, L2 2.94e-4", "TD3        0.297 s, L2 2.71e-4"},
+        .known_solution = "the state at any time",
+        .program = "nonsmooth",
     };
 }
 

@@ -1,34 +1,8 @@
 #include "problems/super_twisting.hpp"
 
 #include "entries.hpp"
-#include "run_inclusion.hpp"
 
 namespace ricochet::app {
-
-namespace {
-
-enum : std::size_t { gain_1, gain_2, amplitude, frequency, x1, x2 };  // the order of parameters
-
-SuperTwisting system(const std::vector<double>& p)
-{
-    return SuperTwisting({.gain_1 = p[gain_1],
-                          .gain_2 = p[gain_2],
-                          .amplitude = p[amplitude],
-                          .frequency = p[frequency]});
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {p[x1], p[x2]};
-}
-
-TimedRun run(const RunSettings& settings, int repeats)
-{
-    const auto& p = settings.parameters;
-    return run_inclusion(system(p), SuperTwisting::Vector(p[x1], p[x2]), settings, repeats);
-}
-
-}  // namespace
 
 SystemEntry super_twisting_entry()
 {
@@ -67,10 +41,11 @@ SystemEntry super_twisting_entry()
         .guards = {{.name = "relay", .event = "switch"}},
         .modes = {"positive", "held", "negative", "set-valued"},
         .t_end = 10,
-        .start = start,
-        .run = run,
+        .start = nullptr,
+        .run = nullptr,
         .integrators = {"handover", "event", "bathe", "time-stepping"},
         .set_valued_step = 0.005,
+        .program = "nonsmooth",
     };
 }
 

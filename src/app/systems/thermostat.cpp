@@ -1,6 +1,7 @@
 #include "ricochet/systems/thermostat.hpp"
 
 #include "entries.hpp"
+#include "labels.hpp"
 #include "run_system.hpp"
 
 namespace ricochet::app {

@@ -1,6 +1,7 @@
 #include "problems/three_body.hpp"
 
 #include "entries.hpp"
+#include "labels.hpp"
 #include "run_system.hpp"
 
 namespace ricochet::app {

@@ -1,47 +1,8 @@
 #include "ricochet/systems/two_contact_block.hpp"
 
 #include "entries.hpp"
-#include "run_contact.hpp"
 
 namespace ricochet::app {
-
-namespace {
-
-enum : std::size_t {
-    mass,
-    half_width,
-    half_height,
-    gravity,
-    friction,
-    restitution,
-    height,
-    tilt,
-    velocity
-};  // the order of parameters
-
-TwoContactBlock system(const std::vector<double>& p)
-{
-    return {.mass_of_block = p[mass],
-            .half_width = p[half_width],
-            .half_height = p[half_height],
-            .gravity = p[gravity],
-            .coefficient = p[friction],
-            .bounce = p[restitution]};
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {0, p[height], p[tilt], p[velocity], 0, 0};
-}
-
-TimedRun run(const RunSettings& settings, int repeats)
-{
-    const auto& p = settings.parameters;
-    return run_contact(system(p), TwoContactBlock::Vector(0, p[height], p[tilt]),
-                       TwoContactBlock::Vector(p[velocity], 0, 0), settings, repeats);
-}
-
-}  // namespace
 
 SystemEntry two_contact_block_entry()
 {
@@ -103,10 +64,11 @@ SystemEntry two_contact_block_entry()
         .guards = {{.name = "rear corner", .event = "impact"},
                    {.name = "front corner", .event = "impact"}},
         .t_end = 3,
-        .start = start,
-        .run = run,
+        .start = nullptr,
+        .run = nullptr,
         .integrators = {"handover", "time-stepping"},
         .set_valued_step = 1e-3,
+        .program = "nonsmooth",
     };
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "entries.hpp"
+#include "labels.hpp"
 #include "run_system.hpp"
 
 namespace ricochet::app {

@@ -1,4 +1,5 @@
-// What the integrators of inclusions are told, and what they answer.
+// How differential inclusions are integrated: from requests to settings, from settings to the
+// options of the integrators, and their outcomes.
 #pragma once
 
 #include "../settings.hpp"
@@ -6,6 +7,12 @@
 #include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet::app {
+
+/// Of a differential inclusion, `SystemEntry::choose_integrator`. False: by events alone, as any
+/// other system.
+/// @throws BadInput for what does not fit the system or the integrator.
+[[nodiscard]] bool choose_set_valued(const SystemEntry& system, const RunRequest& request,
+                                     RunSettings& settings);
 
 /// Whether errors are measured against the norm of the start.
 [[nodiscard]] bool measured_by_norm(const SetValuedSettings& settings) noexcept;

@@ -1,4 +1,4 @@
-#include "ricochet/integrate/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -7,8 +7,8 @@
 
 #include "../input.hpp"
 #include "../registry.hpp"
-#include "inclusion_options.hpp"
 #include "ricochet/nonsmooth/contact_motion.hpp"
+#include "set_valued_options.hpp"
 
 namespace ricochet::app {
 

@@ -15,7 +15,4 @@ namespace ricochet::app {
                                       const FrictionInclusion::Vector& w0,
                                       const RunSettings& settings, int repeats);
 
-/// The modes of `FrictionOscillator`, and the one more.
-[[nodiscard]] std::vector<std::string_view> with_set_valued(std::vector<std::string_view> modes);
-
 }  // namespace ricochet::app

@@ -7,7 +7,7 @@
 
 #include "../input.hpp"
 #include "../registry.hpp"
-#include "inclusion_options.hpp"
+#include "set_valued_options.hpp"
 
 namespace ricochet::app {
 

@@ -1,0 +1,42 @@
+// The names of guards and modes, as systems declare them.
+#pragma once
+
+#include <initializer_list>
+#include <string_view>
+#include <vector>
+
+#include "../registry.hpp"
+
+namespace ricochet::app {
+
+/// The guards of a system by their own names, with what happens on their surfaces.
+template <class System>
+[[nodiscard]] std::vector<GuardLabel> labels(const System& system,
+                                             std::initializer_list<std::string_view> events)
+{
+    std::vector<GuardLabel> out;
+    for (const std::string_view event : events) {
+        out.push_back({.name = system.guard_info(out.size()).name, .event = event});
+    }
+    return out;
+}
+
+/// The modes of a system by their own names.
+template <class System>
+[[nodiscard]] std::vector<std::string_view> mode_names()
+{
+    std::vector<std::string_view> out;
+    for (Mode mode = 0; mode < System::mode_count; ++mode) out.push_back(System::mode_name(mode));
+    return out;
+}
+
+/// The same, and that of set-valued steps.
+template <class System>
+[[nodiscard]] std::vector<std::string_view> mode_names_and_set_valued()
+{
+    std::vector<std::string_view> out = mode_names<System>();
+    out.push_back("set-valued");
+    return out;
+}
+
+}  // namespace ricochet::app

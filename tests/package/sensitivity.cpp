@@ -1,0 +1,15 @@
+// A user of the component `sensitivity`: how far a bounce moves with the height of the drop.
+#include <cmath>
+#include <cstdio>
+
+#include "ricochet/sensitivity/sensitivities.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
+
+int main()
+{
+    const ricochet::BouncingBall ball;
+    const auto s = ricochet::sensitivities(ball, {1.0, 0.0}, {}, {.t_end = 0.6});
+    const bool fine = s.run.events.size() == 1 && std::isfinite(s.state(0, 0));
+    std::puts(fine ? "fine" : "no derivative");
+    return fine ? 0 : 1;
+}
