@@ -20,6 +20,9 @@ _WITHOUT = {
 _IMPLICIT_OPTIONS = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 _KINDS = {kind.value: kind.name.lower() for kind in Kind}
 _EPS = np.finfo(float).eps
+#: What SciPy says of these, for programs that compare.
+_MESSAGES = {"reached_end": "The solver successfully reached the end of the integration interval.",
+             "stopped_by_event": "A termination event occurred."}
 
 
 class OdeResult(dict):
@@ -110,8 +113,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         try:
             args = tuple(args)
         except TypeError:
-            raise TypeError(f"args: found {args!r}, expected a tuple; of one argument: "
-                            f"args=({args!r},)") from None
+            raise TypeError(f"Supplied 'args' cannot be unpacked. Found {args!r}, expected a "
+                            f"tuple; of one argument: args=({args!r},)") from None
     given = _options(options, t0, t1, len(start))
     given["method"] = _METHODS[method]
     samples = _sample_times(t_eval, t0, t1)
@@ -162,7 +165,8 @@ def _options(options, t0, t1, components):
     rtol = np.asarray(options.pop("rtol", 1e-3), dtype=float)
     rtol = float(rtol.min())
     if rtol < 100 * _EPS:
-        warn(f"rtol: found {rtol}, which is too small; {100 * _EPS} is taken", stacklevel=3)
+        warn(f"At least one element of rtol, {rtol}, is too small; {100 * _EPS} is taken",
+             stacklevel=3)
         rtol = 100 * _EPS
     given = {"t_start": t0, "t_end": t1, "rtol": rtol}
     atol = options.pop("atol", 1e-6)
@@ -251,7 +255,7 @@ def _result(run, count, dense_output):
     statistics = run.statistics
     result.update(nfev=statistics.flow_calls, njev=0, nlu=0,
                   status={"reached_end": 0, "stopped_by_event": 1}.get(run.outcome, -1),
-                  message=run.message, success=run.success)
+                  message=_MESSAGES.get(run.outcome, run.message), success=run.success)
     result.update(y_events_after=None, kinds=None, modes=None)
     if count is not None:
         events = run.events
@@ -276,6 +280,6 @@ def _nothing(t, y, samples, dense_output, count):
     return OdeResult(t=t_out, y=np.tile(np.array(y)[:, None], (1, t_out.size)),
                      sol=_Constant(t, y) if dense_output else None, t_events=nobody,
                      y_events=nobody, nfev=0, njev=0, nlu=0, status=0,
-                     message="the span has no length", success=True, y_events_after=nobody,
+                     message=_MESSAGES["reached_end"], success=True, y_events_after=nobody,
                      kinds=None if count is None else [[] for _ in range(count)],
                      modes=nobody, outcome="reached_end", statistics=None, guard=None, run=None)

@@ -25,6 +25,8 @@ class Kind(IntEnum):
 
 def state_from(given, what):
     """A start as a list of numbers."""
+    if type(given) in (list, tuple) and given and all(type(x) in (float, int) for x in given):
+        return list(given)
     array = np.asarray(given)
     if np.iscomplexobj(array):
         raise ValueError(f"{what}: found complex numbers, expected real ones: write real and "
@@ -86,7 +88,7 @@ def prepare(system, x0, t_end, options, args=None):
             options["mode"] = list(names).index(options["mode"])
     elif isinstance(modes, list) and not modes:
         raise ValueError("modes: found none, expected at least one")
-    if np.ndim(options.get("atol", 0)) > 0:
+    if not isinstance(options.get("atol", 0), (float, int)):
         set_tolerance(options, options["atol"], len(x0))
     samples = options.get("sample_times")
     if samples is not None:

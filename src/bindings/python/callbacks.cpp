@@ -154,6 +154,7 @@ private:
                                         std::to_string(PyArray_NDIM(given)) +
                                         " dimensions, expected 1");
         }
+        if (type == NPY_OBJECT) return read_objects(array);
         if (type != NPY_DOUBLE || !PyArray_ISCARRAY_RO(given)) {
             array = Ref::take(PyArray_FromAny(array.get(), PyArray_DescrFromType(NPY_DOUBLE), 0, 1,
                                               NPY_ARRAY_CARRAY_RO | NPY_ARRAY_FORCECAST, nullptr));
@@ -168,9 +169,27 @@ private:
         kept_ = std::move(array);
     }
 
+    void read_objects(const Ref& array)
+    {
+        const Ref list = checked(
+            PyArray_ToList(reinterpret_cast<PyArrayObject*>(array.get())));
+        if (!PyList_Check(list.get())) refuse("a " + type_of(result_));
+        for (Py_ssize_t i = 0; i < PyList_GET_SIZE(list.get()); ++i) {
+            converted_.push_back(PyFloat_AsDouble(PyList_GET_ITEM(list.get(), i)));
+            if (PyErr_Occurred()) {
+                PyErr_Clear();
+                refuse("a " + type_of(result_) + " with a " +
+                       type_of(PyList_GET_ITEM(list.get(), i)));
+            }
+        }
+        data_ = converted_.data();
+        size_ = converted_.size();
+    }
+
     PyObject* result_;
     std::string who_;
     const std::string& of_;
+    std::vector<double> converted_;
     PyObject** items_ = nullptr;
     const double* data_ = nullptr;
     std::size_t size_ = 0;

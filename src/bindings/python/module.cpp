@@ -622,100 +622,124 @@ private:
 
 void bind_results(py::module_& module)
 {
-    py::class_<PySolution, std::shared_ptr<PySolution>>(module, "Solution")
+    py::class_<PySolution, std::shared_ptr<PySolution>>(module, "Solution",
+            "The solution at any time: called with a time, or an array of them, it gives the state, or "
+            "states as columns; at an event those after it.")
         .def("__call__", [](const PySolution& self, const py::object& t) {
             return self.at(t, false);
         })
         .def("before", [](const PySolution& self, const py::object& t) {
             return self.at(t, true);
-        })
+        },
+             "The state before an event at t; else as a call.")
         .def("mode", [](const PySolution& self, double t) {
             const PyRun names{.record = {}, .modes = self.modes, .guard_names = {}};
             return names.mode_named(self.solution->mode(t));
-        })
+        },
+             "The mode at t, after an event there.")
         .def_property_readonly("ts", [](const PySolution& self) {
             std::vector<double> times;
             for (std::size_t k = 0; k <= self.solution->size(); ++k) {
                 times.push_back(self.solution->time(k));
             }
             return py::array_t<double>(static_cast<py::ssize_t>(times.size()), times.data());
-        })
+        },
+             "When the steps start, and the end of the last.")
         .def_property_readonly("t_min", [](const PySolution& self) {
             const auto& solution = *self.solution;
             return std::min(solution.time(0), solution.time(solution.size()));
-        })
+        },
+             "The earlier end of the solution.")
         .def_property_readonly("t_max", [](const PySolution& self) {
             const auto& solution = *self.solution;
             return std::max(solution.time(0), solution.time(solution.size()));
-        })
+        },
+             "The later end of the solution.")
         .def(py::pickle([](const PySolution& self) { return pickled(self); },
                         [](const py::tuple& state) { return solution_from(state); }));
 
     const auto self_of = [](const py::object& self) -> const PyRun& {
         return py::cast<const PyRun&>(self);
     };
-    py::class_<PyRun, std::shared_ptr<PyRun>>(module, "Run")
+    py::class_<PyRun, std::shared_ptr<PyRun>>(module, "Run", "What a run has computed; its arrays are views of it.")
         .def_property_readonly("outcome", [](const PyRun& self) {
             return std::string(name(self.record.outcome));
-        })
+        },
+             "How the run ended, e.g. 'reached_end' or 'zeno'.")
         .def_property_readonly("message", [](const PyRun& self) {
             std::string out(describe(self.record.outcome));
             if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
             return out;
-        })
+        },
+             "A sentence about the outcome.")
         .def_property_readonly("success", [](const PyRun& self) {
             return self.record.outcome == Outcome::reached_end ||
                    self.record.outcome == Outcome::stopped_by_event;
-        })
-        .def_property_readonly("t", [](const PyRun& self) { return self.record.t; })
+        },
+             "Whether the run reached its end, or an event that ends it.")
+        .def_property_readonly("t", [](const PyRun& self) { return self.record.t; },
+             "The time reached.")
         .def_property_readonly("x", [self_of](const py::object& self) {
             const Record& r = self_of(self).record;
             return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.x.size())}, {8},
                         r.x.data(), self);
-        })
+        },
+             "The state at that time.")
         .def_property_readonly("mode", [](const PyRun& self) {
             return self.mode_named(self.record.mode);
-        })
+        },
+             "The mode at that time.")
         .def_property_readonly("guard", [](const PyRun& self) -> py::object {
             if (self.record.guard < 0) return py::none();
             return py::int_(self.record.guard);
-        })
+        },
+             "The number of the guard that ended the run, or None.")
         .def_property_readonly("other_guard", [](const PyRun& self) -> py::object {
             if (self.record.other_guard < 0) return py::none();
             return py::int_(self.record.other_guard);
-        })
-        .def_readonly("modes", &PyRun::modes)
-        .def_readonly("guard_names", &PyRun::guard_names)
+        },
+             "Of two conflicting resets the second, or None.")
+        .def_readonly("modes", &PyRun::modes,
+             "What the modes are called, or None.")
+        .def_readonly("guard_names", &PyRun::guard_names,
+             "What the guards are called.")
         .def_property_readonly("statistics", [](const PyRun& self) {
             return statistics_of(self.record.statistics);
-        })
+        },
+             "What the run did, counted; its evidence says why steps were taken to hold no event.")
         .def_property_readonly("events", [self_of](const py::object& self) {
             const Record& r = self_of(self).record;
             return view(event_type(r.width), {static_cast<py::ssize_t>(r.event_count)},
                         {static_cast<py::ssize_t>(8 * r.event_stride())}, r.events.data(), self);
-        })
+        },
+             "The events, as a structured array with the fields t, guard, bracket, slope, error, mode_before, mode_after, kind, late, before, after.")
         .def_property_readonly("times", [self_of](const py::object& self) {
             const Record& r = self_of(self).record;
             return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.times.size())}, {8},
                         r.times.data(), self);
-        })
+        },
+             "The times of `states`: sample times, or the ends of steps.")
         .def_property_readonly("states", [self_of](const py::object& self) {
             const Record& r = self_of(self).record;
             const auto width = static_cast<py::ssize_t>(r.width);
             return view(py::dtype::of<double>(),
                         {static_cast<py::ssize_t>(r.times.size()), width}, {8 * width, 8},
                         r.states.data(), self);
-        })
+        },
+             "States, one a row; shorter ones end in NaN.")
         .def_property_readonly("solution", [](const PyRun& self) -> py::object {
             if (!self.record.solution) return py::none();
             return py::cast(PySolution{self.record.solution, self.record.scale, self.modes});
-        })
+        },
+             "The solution at any time, or None where it was not kept.")
         .def(py::pickle([](const PyRun& self) { return pickled(self); },
                         [](const py::tuple& state) { return run_from(state); }));
 
-    py::class_<Snapshot>(module, "Snapshot")
-        .def_property_readonly("text", [](const Snapshot& self) { return to_text(self); })
-        .def_static("from_text", [](const std::string& text) { return snapshot_from_text(text); })
+    py::class_<Snapshot>(module, "Snapshot", "A simulation, saved.")
+        .def_property_readonly("text", [](const Snapshot& self) { return to_text(self); },
+             "The snapshot as text, with a checksum.")
+        .def_static("from_text", [](const std::string& text) { return snapshot_from_text(text); },
+             "The snapshot that was written as this text.")
         .def("__eq__", [](const Snapshot& self, const Snapshot& other) { return self == other; })
         .def(py::pickle([](const Snapshot& self) { return to_text(self); },
                         [](const std::string& text) { return snapshot_from_text(text); }));
@@ -750,15 +774,26 @@ PYBIND11_MODULE(_ricochet, module)
     module.def("integrate", &integrate);
     py::class_<PySimulation>(module, "Simulation")
         .def(py::init<std::shared_ptr<Source>, const State&, const py::dict&, const py::object&>())
-        .def("step", &PySimulation::step)
-        .def("advance", &PySimulation::advance)
-        .def("run_to_end", &PySimulation::run_to_end)
-        .def("finish", &PySimulation::finish)
-        .def("save", &PySimulation::save)
-        .def("restore", &PySimulation::restore)
-        .def_property_readonly("t", &PySimulation::t)
-        .def_property_readonly("x", &PySimulation::x)
-        .def_property_readonly("mode", &PySimulation::mode)
-        .def_property_readonly("ended", &PySimulation::ended)
-        .def_property_readonly("run", &PySimulation::so_far);
+        .def("step", &PySimulation::step,
+             "Takes one step, with whatever events it holds. False: the run has ended.")
+        .def("advance", &PySimulation::advance,
+             "Goes on to the next event or sample time. False: the run has ended.")
+        .def("run_to_end", &PySimulation::run_to_end,
+             "Goes on to the end, and returns the Run.")
+        .def("finish", &PySimulation::finish,
+             "Ends the run here, and returns what was computed.")
+        .def("save", &PySimulation::save,
+             "All that the future depends on, as a Snapshot.")
+        .def("restore", &PySimulation::restore,
+             "Goes on where the snapshot of a run of the same system was taken, with the same bits.")
+        .def_property_readonly("t", &PySimulation::t,
+             "The time.")
+        .def_property_readonly("x", &PySimulation::x,
+             "The state, which may be kept.")
+        .def_property_readonly("mode", &PySimulation::mode,
+             "The mode.")
+        .def_property_readonly("ended", &PySimulation::ended,
+             "Whether the run has ended.")
+        .def_property_readonly("run", &PySimulation::so_far,
+             "What has been computed so far, as a Run.");
 }
