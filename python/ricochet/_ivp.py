@@ -267,8 +267,10 @@ def _result(run, count, dense_output):
             result[name] = [states[which] if which.size else np.empty(0) for which in chosen]
         kinds = events["kind"]
         result.kinds = [[_KINDS[kind] for kind in kinds[which].tolist()] for which in chosen]
-        result.modes = [np.stack((events["mode_before"][which], events["mode_after"][which]),
-                                 axis=1) for which in chosen]
+        result.modes = [np.column_stack((events["mode_before"][which],
+                                         events["mode_after"][which]))
+                        if run.modes else np.zeros((which.size, 2), np.uint32)
+                        for which in chosen]
     result.update(outcome=run.outcome, statistics=statistics, guard=run.guard, run=run)
     return result
 

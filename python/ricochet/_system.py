@@ -7,11 +7,6 @@ from types import MethodType
 from . import _ricochet
 from ._compiled import Compiled
 
-_FUNCTIONS = ("value", "rate", "reset", "rest", "enabled", "speed_bound", "acceleration_bound",
-              "lower_bound", "upper_bound")
-_NUMBERS = ("direction", "in_modes", "unilateral", "boolean", "degree", "touch", "stop_after",
-            "lipschitz", "resets")
-
 
 class Guard:
     """A scalar function whose change of sign is an event.
@@ -120,6 +115,8 @@ class Guard:
                 out["in_modes"] = [out["in_modes"]]
             out["in_modes"] = list(out["in_modes"])
         for what in ("degree", "stop_after"):
+            if out[what] == 0:
+                continue
             if out[what] != int(out[what]) or out[what] < 0:
                 raise ValueError(f"guard {out['name']}: {what}: found {out[what]!r}, expected a "
                                  "whole number that is not negative")

@@ -155,7 +155,7 @@ void set(Request& request, const py::handle& value)
     return out;
 }
 
-[[nodiscard]] py::dtype event_type(std::size_t width)
+[[nodiscard]] py::dtype make_event_type(std::size_t width)
 {
     py::list names, formats, offsets;
     const auto add = [&](const char* name, const std::string& format, std::size_t offset) {
@@ -177,6 +177,16 @@ void set(Request& request, const py::handle& value)
     add("after", states, sizeof(EventHead) + 8 * width);
     return py::dtype(names, formats, offsets,
                      static_cast<py::ssize_t>(sizeof(EventHead) + 16 * width));
+}
+
+/// The type of events with states of `width` components; made once, since NumPy takes its time.
+[[nodiscard]] py::dtype event_type(std::size_t width)
+{
+    // Never destroyed: the interpreter may be gone by then.
+    static auto& made = *new std::map<std::size_t, py::dtype>;
+    const auto known = made.find(width);
+    if (known != made.end()) return known->second;
+    return made.emplace(width, make_event_type(width)).first->second;
 }
 
 /// A record with the names that belong to it.
@@ -240,7 +250,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
 
 [[nodiscard]] py::object statistics_of(const Statistics& s)
 {
-    const py::object space = py::module_::import("types").attr("SimpleNamespace");
+    static const auto& space =
+        *new py::object(py::module_::import("types").attr("SimpleNamespace"));
     using namespace py::literals;
     const py::object evidence =
         space("proved"_a = s.evidence.proved, "checked"_a = s.evidence.checked,
