@@ -2,7 +2,8 @@
 
 ``solve_ivp`` takes SciPy's arguments and returns SciPy's result; events may also reset the
 state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation`` run it, and
-``BouncingBall``, ``Pendulum`` and others are ready. Events are located to neighbouring floating-point numbers.
+``BouncingBall``, ``Pendulum`` and others are ready. Events are located to neighbouring
+floating-point numbers.
 """
 
 from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)

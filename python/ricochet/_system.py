@@ -149,16 +149,16 @@ class System:
     guards
         A sequence of `Guard`; those that a class makes with ``@guard`` come first.
     modes
-        A number, a sequence of names, or an Enum. Every function takes the mode before ``t``, as it is written there,
-        and a reset returns a mode, or a tuple (mode, x).
+        A number, a sequence of names, or an Enum. Every function takes the mode before ``t``, as
+        it is written there, and a reset returns a mode, or a tuple (mode, x).
     guard_values(t, x) -> numbers
         All guards at once, instead of their own functions.
     reset_set(t, x, fired) -> x
-        The reset of all guards that fired together, instead of their own: a list of their numbers,
-        with ``"time"`` at its end where a time event belongs to it.
+        The reset of all guards that fired together, instead of their own: ``fired`` is a list of
+        their numbers, with ``"time"`` at its end where a time event belongs to it.
     time_events
-        Known times of events; or next_time_event(t), the first after ``t`` or None, and for runs backward in
-        time previous_time_event(t).
+        Known times of events; or next_time_event(t), the first after ``t`` or None, and for runs
+        backward in time previous_time_event(t).
     time_reset(t, x) -> x
         What happens at these times.
     changes_dimension

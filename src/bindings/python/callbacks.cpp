@@ -171,8 +171,7 @@ private:
 
     void read_objects(const Ref& array)
     {
-        const Ref list = checked(
-            PyArray_ToList(reinterpret_cast<PyArrayObject*>(array.get())));
+        const Ref list = checked(PyArray_ToList(reinterpret_cast<PyArrayObject*>(array.get())));
         if (!PyList_Check(list.get())) refuse("a " + type_of(result_));
         for (Py_ssize_t i = 0; i < PyList_GET_SIZE(list.get()); ++i) {
             converted_.push_back(PyFloat_AsDouble(PyList_GET_ITEM(list.get(), i)));
@@ -306,12 +305,11 @@ public:
             return at(door).rate(which, mode, backward, t, x, dxdt, scale);
         };
         if (table.rated) {
-            table.each_rate = [](void* door, Mode mode, double t, const State& x,
-                                 const State& dxdt, std::span<double> rates) {
+            table.each_rate = [](void* door, Mode mode, double t, const State& x, const State& dxdt,
+                                 std::span<double> rates) {
                 for (std::size_t i = 0; i < rates.size(); ++i) {
-                    rates[i] = at(door).is_in(i, mode)
-                                   ? at(door).closed_rate(i, mode, t, x, dxdt)
-                                   : 0;
+                    rates[i] =
+                        at(door).is_in(i, mode) ? at(door).closed_rate(i, mode, t, x, dxdt) : 0;
                 }
             };
         }
@@ -323,9 +321,7 @@ public:
         }
         if (any(&CallbackGuard::enabled)) {
             table.enabled_at = [](void* door, std::size_t which, Mode mode, double t,
-                                  const State& x) {
-                return at(door).enabled(which, mode, t, x);
-            };
+                                  const State& x) { return at(door).enabled(which, mode, t, x); };
         }
         if (source.reset_set_) {
             table.reset_set = [](void* door, std::span<const std::size_t> fired, bool on_time,
@@ -412,8 +408,7 @@ private:
         ((stack[count++] = further), ...);
         for (const Ref& argument : source_.arguments_) stack[count++] = argument.get();
         return checked(PyObject_Vectorcall(function.object.get(), stack.data() + 1,
-                                           (count - 1) | PY_VECTORCALL_ARGUMENTS_OFFSET,
-                                           nullptr));
+                                           (count - 1) | PY_VECTORCALL_ARGUMENTS_OFFSET, nullptr));
     }
 
     [[nodiscard]] std::string name() const
@@ -479,8 +474,8 @@ private:
         }
         const CallbackGuard& guard = source_.guards_[which];
         if (guard.value.address) {
-            return reinterpret_cast<CompiledGuard>(guard.value.address)(
-                mode, t, plain(x, room_), x.size(), guard.value.user);
+            return reinterpret_cast<CompiledGuard>(guard.value.address)(mode, t, plain(x, room_),
+                                                                        x.size(), guard.value.user);
         }
         return number(guard.value, "guard ", guard.name, mode, t, x);
     }
@@ -502,14 +497,13 @@ private:
             return reinterpret_cast<CompiledRate>(guard.rate.address)(
                 mode, t, state, plain(dxdt, rate_room_), x.size(), guard.rate.user);
         }
-        const Ref result =
-            call(guard.rate, mode, t, x_.show(x, scale_), dxdt_.show(dxdt, scale_));
+        const Ref result = call(guard.rate, mode, t, x_.show(x, scale_), dxdt_.show(dxdt, scale_));
         return as_guard(result.get(), "rate of " + guard.name);
     }
 
     /// In closed form, else the central difference along the flow; see `GuardView::rate`.
-    [[nodiscard]] double rate(std::size_t which, Mode mode, bool backward, double t,
-                              const State& x, const State& dxdt, double scale)
+    [[nodiscard]] double rate(std::size_t which, Mode mode, bool backward, double t, const State& x,
+                              const State& dxdt, double scale)
     {
         if (source_.guards_[which].rate) {
             if (!backward) return closed_rate(which, mode, t, x, dxdt);
@@ -576,8 +570,7 @@ private:
     {
         const Ref list = checked(PyList_New(static_cast<Py_ssize_t>(fired.size() + on_time)));
         for (std::size_t i = 0; i < fired.size(); ++i) {
-            PyList_SET_ITEM(list.get(), static_cast<Py_ssize_t>(i),
-                            PyLong_FromSize_t(fired[i]));
+            PyList_SET_ITEM(list.get(), static_cast<Py_ssize_t>(i), PyLong_FromSize_t(fired[i]));
         }
         if (on_time) {
             PyList_SET_ITEM(list.get(), static_cast<Py_ssize_t>(fired.size()),
@@ -615,10 +608,9 @@ private:
             PyErr_Clear();
             const Ref text = checked(PyObject_Repr(name));
             const Ref modes = checked(PyObject_Repr(source_.mode_list_.get()));
-            raise(PyExc_ValueError,
-                  what + of + " returned " + PyUnicode_AsUTF8(text.get()) +
-                      ", expected a mode or (mode, state), the modes being " +
-                      PyUnicode_AsUTF8(modes.get()));
+            raise(PyExc_ValueError, what + of + " returned " + PyUnicode_AsUTF8(text.get()) +
+                                        ", expected a mode or (mode, state), the modes being " +
+                                        PyUnicode_AsUTF8(modes.get()));
         }
         return static_cast<Mode>(PyLong_AsUnsignedLong(number));
     }
@@ -642,9 +634,9 @@ private:
         const Ref time = checked(PyFloat_FromDouble(t));
         stack[count++] = time.get();
         for (const Ref& argument : source_.arguments_) stack[count++] = argument.get();
-        const Ref result = checked(
-            PyObject_Vectorcall(function.object.get(), stack.data() + 1,
-                                (count - 1) | PY_VECTORCALL_ARGUMENTS_OFFSET, nullptr));
+        const Ref result =
+            checked(PyObject_Vectorcall(function.object.get(), stack.data() + 1,
+                                        (count - 1) | PY_VECTORCALL_ARGUMENTS_OFFSET, nullptr));
         return result.get() == Py_None ? never : as_guard(result.get(), "next_time_event");
     }
 
@@ -662,9 +654,7 @@ CallbackSource::CallbackSource(PyObject* specification)
     if (!PyDict_Check(specification)) {
         raise(PyExc_TypeError, "found a " + type_of(specification) + ", expected a dictionary");
     }
-    const auto function = [&](const char* key) {
-        return Function(item(specification, key).get());
-    };
+    const auto function = [&](const char* key) { return Function(item(specification, key).get()); };
     name_ = text_in(specification, "name");
     flow_ = function("flow");
     if (!flow_) raise(PyExc_TypeError, "flow: found None, expected a function");
@@ -680,8 +670,8 @@ CallbackSource::CallbackSource(PyObject* specification)
             checked(PySequence_Fast(arguments.get(), "args: expected a tuple or a list"));
         const Py_ssize_t count = PySequence_Fast_GET_SIZE(sequence.get());
         if (count > static_cast<Py_ssize_t>(most_arguments) - 8) {
-            raise(PyExc_ValueError, "args: found " + std::to_string(count) +
-                                        " arguments, expected at most 24");
+            raise(PyExc_ValueError,
+                  "args: found " + std::to_string(count) + " arguments, expected at most 24");
         }
         for (Py_ssize_t i = 0; i < count; ++i) {
             arguments_.push_back(Ref::share(PySequence_Fast_GET_ITEM(sequence.get(), i)));
@@ -730,9 +720,7 @@ CallbackSource::CallbackSource(PyObject* specification)
 void CallbackSource::read_guard(PyObject* specification)
 {
     CallbackGuard& guard = guards_.emplace_back();
-    const auto function = [&](const char* key) {
-        return Function(item(specification, key).get());
-    };
+    const auto function = [&](const char* key) { return Function(item(specification, key).get()); };
     guard.name = text_in(specification, "name");
     guard.value = function("value");
     guard.rate = function("rate");
@@ -748,17 +736,17 @@ void CallbackSource::read_guard(PyObject* specification)
         raise(PyExc_TypeError, "guard " + guard.name + ": found None, expected a function");
     }
     const double direction = number_in(specification, "direction", 0);
-    guard.info = {.name = guard.name,
-                  .crossing = direction < 0   ? Crossing::falling
-                              : direction > 0 ? Crossing::rising
-                                              : Crossing::either,
-                  .resets = guard.reset || (reset_set_ && truth_in(specification, "resets")),
-                  .stop_after =
-                      static_cast<std::uint32_t>(number_in(specification, "stop_after", 0)),
-                  .unilateral = truth_in(specification, "unilateral"),
-                  .boolean = truth_in(specification, "boolean"),
-                  .degree = static_cast<int>(number_in(specification, "degree", 0)),
-                  .touch = number_in(specification, "touch", 0)};
+    guard.info = {
+        .name = guard.name,
+        .crossing = direction < 0   ? Crossing::falling
+                    : direction > 0 ? Crossing::rising
+                                    : Crossing::either,
+        .resets = guard.reset || (reset_set_ && truth_in(specification, "resets")),
+        .stop_after = static_cast<std::uint32_t>(number_in(specification, "stop_after", 0)),
+        .unilateral = truth_in(specification, "unilateral"),
+        .boolean = truth_in(specification, "boolean"),
+        .degree = static_cast<int>(number_in(specification, "degree", 0)),
+        .touch = number_in(specification, "touch", 0)};
     const Ref modes = item(specification, "in_modes");
     if (modes.get() == Py_None) return;
     guard.in_mode.assign(mode_count_, false);

@@ -31,8 +31,8 @@ using CompiledFlow = void (*)(std::uint32_t mode, double t, const double* x, dou
                               std::size_t n, void* user);
 using CompiledGuard = double (*)(std::uint32_t mode, double t, const double* x, std::size_t n,
                                  void* user);
-using CompiledRate = double (*)(std::uint32_t mode, double t, const double* x,
-                                const double* dxdt, std::size_t n, void* user);
+using CompiledRate = double (*)(std::uint32_t mode, double t, const double* x, const double* dxdt,
+                                std::size_t n, void* user);
 using CompiledReset = std::uint32_t (*)(std::uint32_t mode, double t, double* x, std::size_t n,
                                         void* user);
 
@@ -66,7 +66,7 @@ private:
     Function flow_, guard_values_, reset_set_;
     Function next_time_event_, previous_time_event_, time_reset_;
     std::vector<CallbackGuard> guards_;
-    std::vector<Ref> arguments_;  ///< further ones, of every function
+    std::vector<Ref> arguments_;    ///< further ones, of every function
     Ref mode_list_, mode_numbers_;  ///< null without modes; what modes are called, and back
     std::size_t mode_count_ = 0;
     bool moded_ = false;

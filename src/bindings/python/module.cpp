@@ -89,13 +89,11 @@ void set(Request& request, const py::handle& value)
              request.method = method_named(py::cast<std::string>(value));
          }},
         {"fixed",
-         [](Request& request, const py::handle& value) {
-             request.fixed = py::cast<bool>(value);
-         }},
+         [](Request& request, const py::handle& value) { request.fixed = py::cast<bool>(value); }},
         {"detector",
          [](Request& request, const py::handle& value) {
-             request.detector = one_of(py::cast<std::string>(value),
-                                       {"extremum", "ends", "bernstein", "planned"});
+             request.detector =
+                 one_of(py::cast<std::string>(value), {"extremum", "ends", "bernstein", "planned"});
          }},
         {"locator",
          [](Request& request, const py::handle& value) {
@@ -134,9 +132,9 @@ void set(Request& request, const py::handle& value)
         try {
             setter->second(request, value);
         } catch (const py::cast_error&) {
-            throw py::type_error(name + ": found " + py::cast<std::string>(py::repr(value)) +
-                                 ", a " + py::cast<std::string>(py::str(
-                                              py::type::of(value).attr("__name__"))));
+            throw py::type_error(
+                name + ": found " + py::cast<std::string>(py::repr(value)) + ", a " +
+                py::cast<std::string>(py::str(py::type::of(value).attr("__name__"))));
         } catch (const py::value_error& error) {
             throw py::value_error(name + ": " + error.what());
         }
@@ -315,13 +313,12 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
 [[nodiscard]] py::tuple pickled(const PyRun& self)
 {
     const Record& r = self.record;
-    return py::make_tuple(static_cast<int>(r.outcome), r.t, r.x, r.mode, r.guard, r.other_guard,
-                          std::bit_cast<Counts>(r.statistics), r.width, r.event_count,
-                          bytes_of(r.events), bytes_of(r.times), bytes_of(r.states),
-                          r.wrong_bound,
-                          r.solution ? py::object(pickled(PySolution{r.solution, r.scale}))
-                                     : py::object(py::none()),
-                          self.modes, self.guard_names);
+    return py::make_tuple(
+        static_cast<int>(r.outcome), r.t, r.x, r.mode, r.guard, r.other_guard,
+        std::bit_cast<Counts>(r.statistics), r.width, r.event_count, bytes_of(r.events),
+        bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
+        r.solution ? py::object(pickled(PySolution{r.solution, r.scale})) : py::object(py::none()),
+        self.modes, self.guard_names);
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
@@ -357,7 +354,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
 
 // --- running ---
 
-/// Goes to the end; the state at the end of every step into `steps` if there is one, both sides of a reset.
+/// Goes to the end; the state at the end of every step into `steps` if there is one, both sides of
+/// a reset.
 void drive(Core& core, Trajectory<State>* steps)
 {
     if (!steps) {
@@ -439,9 +437,8 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
 {
     Request request = request_from(given);
     if (!given.contains("mode")) request.options.mode = source->start_mode();
-    PyRun out{.record = {},
-              .modes = modes_of(*source, mode_names),
-              .guard_names = source->guard_names()};
+    PyRun out{
+        .record = {}, .modes = modes_of(*source, mode_names), .guard_names = source->guard_names()};
 
     SignalWatch watch;
     request.options.cancelled = watch.cancelled();
@@ -467,8 +464,8 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
         core.emplace(setup, scaled(x0, request.scale), request.options);
         work_freely(door->is_free(), [&] { drive(*core, kept); });
     } catch (const PythonError& error) {
-        out.record = core ? record_of(core->finish(), request.scale, kept)
-                          : start_of(x0, request.options);
+        out.record =
+            core ? record_of(core->finish(), request.scale, kept) : start_of(x0, request.options);
         raise_with(error, std::move(out));
     }
     out.record = record_of(core->finish(), request.scale, kept);
@@ -633,124 +630,149 @@ private:
 
 void bind_results(py::module_& module)
 {
-    py::class_<PySolution, std::shared_ptr<PySolution>>(module, "Solution",
-            "The solution at any time: called with a time, or an array of them, it gives the state, or "
-            "states as columns; at an event those after it.")
-        .def("__call__", [](const PySolution& self, const py::object& t) {
-            return self.at(t, false);
-        })
-        .def("before", [](const PySolution& self, const py::object& t) {
-            return self.at(t, true);
-        },
-             "The state before an event at t; else as a call.")
-        .def("mode", [](const PySolution& self, double t) {
-            const PyRun names{.record = {}, .modes = self.modes, .guard_names = {}};
-            return names.mode_named(self.solution->mode(t));
-        },
-             "The mode at t, after an event there.")
-        .def_property_readonly("ts", [](const PySolution& self) {
-            std::vector<double> times;
-            for (std::size_t k = 0; k <= self.solution->size(); ++k) {
-                times.push_back(self.solution->time(k));
-            }
-            return py::array_t<double>(static_cast<py::ssize_t>(times.size()), times.data());
-        },
-             "When the steps start, and the end of the last.")
-        .def_property_readonly("t_min", [](const PySolution& self) {
-            const auto& solution = *self.solution;
-            return std::min(solution.time(0), solution.time(solution.size()));
-        },
-             "The earlier end of the solution.")
-        .def_property_readonly("t_max", [](const PySolution& self) {
-            const auto& solution = *self.solution;
-            return std::max(solution.time(0), solution.time(solution.size()));
-        },
-             "The later end of the solution.")
+    py::class_<PySolution, std::shared_ptr<PySolution>>(
+        module, "Solution",
+        "The solution at any time: called with a time, or an array of them, it gives the state, or "
+        "states as columns; at an event those after it.")
+        .def("__call__",
+             [](const PySolution& self, const py::object& t) { return self.at(t, false); })
+        .def(
+            "before", [](const PySolution& self, const py::object& t) { return self.at(t, true); },
+            "The state before an event at t; else as a call.")
+        .def(
+            "mode",
+            [](const PySolution& self, double t) {
+                const PyRun names{.record = {}, .modes = self.modes, .guard_names = {}};
+                return names.mode_named(self.solution->mode(t));
+            },
+            "The mode at t, after an event there.")
+        .def_property_readonly(
+            "ts",
+            [](const PySolution& self) {
+                std::vector<double> times;
+                for (std::size_t k = 0; k <= self.solution->size(); ++k) {
+                    times.push_back(self.solution->time(k));
+                }
+                return py::array_t<double>(static_cast<py::ssize_t>(times.size()), times.data());
+            },
+            "When the steps start, and the end of the last.")
+        .def_property_readonly(
+            "t_min",
+            [](const PySolution& self) {
+                const auto& solution = *self.solution;
+                return std::min(solution.time(0), solution.time(solution.size()));
+            },
+            "The earlier end of the solution.")
+        .def_property_readonly(
+            "t_max",
+            [](const PySolution& self) {
+                const auto& solution = *self.solution;
+                return std::max(solution.time(0), solution.time(solution.size()));
+            },
+            "The later end of the solution.")
         .def(py::pickle([](const PySolution& self) { return pickled(self); },
                         [](const py::tuple& state) { return solution_from(state); }));
 
     const auto self_of = [](const py::object& self) -> const PyRun& {
         return py::cast<const PyRun&>(self);
     };
-    py::class_<PyRun, std::shared_ptr<PyRun>>(module, "Run", "What a run has computed; its arrays are views of it.")
-        .def_property_readonly("outcome", [](const PyRun& self) {
-            return std::string(name(self.record.outcome));
-        },
-             "How the run ended, e.g. 'reached_end' or 'zeno'.")
-        .def_property_readonly("message", [](const PyRun& self) {
-            std::string out(describe(self.record.outcome));
-            if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
-            return out;
-        },
-             "A sentence about the outcome.")
-        .def_property_readonly("success", [](const PyRun& self) {
-            return self.record.outcome == Outcome::reached_end ||
-                   self.record.outcome == Outcome::stopped_by_event;
-        },
-             "Whether the run reached its end, or an event that ends it.")
-        .def_property_readonly("t", [](const PyRun& self) { return self.record.t; },
-             "The time reached.")
-        .def_property_readonly("x", [self_of](const py::object& self) {
-            const Record& r = self_of(self).record;
-            return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.x.size())}, {8},
-                        r.x.data(), self);
-        },
-             "The state at that time.")
-        .def_property_readonly("mode", [](const PyRun& self) {
-            return self.mode_named(self.record.mode);
-        },
-             "The mode at that time.")
-        .def_property_readonly("guard", [](const PyRun& self) -> py::object {
-            if (self.record.guard < 0) return py::none();
-            return py::int_(self.record.guard);
-        },
-             "The number of the guard that ended the run, or None.")
-        .def_property_readonly("other_guard", [](const PyRun& self) -> py::object {
-            if (self.record.other_guard < 0) return py::none();
-            return py::int_(self.record.other_guard);
-        },
-             "Of two conflicting resets the second, or None.")
-        .def_readonly("modes", &PyRun::modes,
-             "What the modes are called, or None.")
-        .def_readonly("guard_names", &PyRun::guard_names,
-             "What the guards are called.")
-        .def_property_readonly("statistics", [](const PyRun& self) {
-            return statistics_of(self.record.statistics);
-        },
-             "What the run did, counted; its evidence says why steps were taken to hold no event.")
-        .def_property_readonly("events", [self_of](const py::object& self) {
-            const Record& r = self_of(self).record;
-            return view(event_type(r.width), {static_cast<py::ssize_t>(r.event_count)},
-                        {static_cast<py::ssize_t>(8 * r.event_stride())}, r.events.data(), self);
-        },
-             "The events, as a structured array with the fields t, guard, bracket, slope, error, mode_before, mode_after, kind, late, before, after.")
-        .def_property_readonly("times", [self_of](const py::object& self) {
-            const Record& r = self_of(self).record;
-            return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.times.size())}, {8},
-                        r.times.data(), self);
-        },
-             "The times of `states`: sample times, or the ends of steps.")
-        .def_property_readonly("states", [self_of](const py::object& self) {
-            const Record& r = self_of(self).record;
-            const auto width = static_cast<py::ssize_t>(r.width);
-            return view(py::dtype::of<double>(),
-                        {static_cast<py::ssize_t>(r.times.size()), width}, {8 * width, 8},
-                        r.states.data(), self);
-        },
-             "States, one a row; shorter ones end in NaN.")
-        .def_property_readonly("solution", [](const PyRun& self) -> py::object {
-            if (!self.record.solution) return py::none();
-            return py::cast(PySolution{self.record.solution, self.record.scale, self.modes});
-        },
-             "The solution at any time, or None where it was not kept.")
+    py::class_<PyRun, std::shared_ptr<PyRun>>(
+        module, "Run", "What a run has computed; its arrays are views of it.")
+        .def_property_readonly(
+            "outcome", [](const PyRun& self) { return std::string(name(self.record.outcome)); },
+            "How the run ended, e.g. 'reached_end' or 'zeno'.")
+        .def_property_readonly(
+            "message",
+            [](const PyRun& self) {
+                std::string out(describe(self.record.outcome));
+                if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
+                return out;
+            },
+            "A sentence about the outcome.")
+        .def_property_readonly(
+            "success",
+            [](const PyRun& self) {
+                return self.record.outcome == Outcome::reached_end ||
+                       self.record.outcome == Outcome::stopped_by_event;
+            },
+            "Whether the run reached its end, or an event that ends it.")
+        .def_property_readonly(
+            "t", [](const PyRun& self) { return self.record.t; }, "The time reached.")
+        .def_property_readonly(
+            "x",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.x.size())}, {8},
+                            r.x.data(), self);
+            },
+            "The state at that time.")
+        .def_property_readonly(
+            "mode", [](const PyRun& self) { return self.mode_named(self.record.mode); },
+            "The mode at that time.")
+        .def_property_readonly(
+            "guard",
+            [](const PyRun& self) -> py::object {
+                if (self.record.guard < 0) return py::none();
+                return py::int_(self.record.guard);
+            },
+            "The number of the guard that ended the run, or None.")
+        .def_property_readonly(
+            "other_guard",
+            [](const PyRun& self) -> py::object {
+                if (self.record.other_guard < 0) return py::none();
+                return py::int_(self.record.other_guard);
+            },
+            "Of two conflicting resets the second, or None.")
+        .def_readonly("modes", &PyRun::modes, "What the modes are called, or None.")
+        .def_readonly("guard_names", &PyRun::guard_names, "What the guards are called.")
+        .def_property_readonly(
+            "statistics", [](const PyRun& self) { return statistics_of(self.record.statistics); },
+            "What the run did, counted; its evidence says why steps were taken to hold no event.")
+        .def_property_readonly(
+            "events",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                return view(event_type(r.width), {static_cast<py::ssize_t>(r.event_count)},
+                            {static_cast<py::ssize_t>(8 * r.event_stride())}, r.events.data(),
+                            self);
+            },
+            "The events, as a structured array with the fields t, guard, bracket, slope, error, "
+            "mode_before, mode_after, kind, late, before, after.")
+        .def_property_readonly(
+            "times",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.times.size())},
+                            {8}, r.times.data(), self);
+            },
+            "The times of `states`: sample times, or the ends of steps.")
+        .def_property_readonly(
+            "states",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                const auto width = static_cast<py::ssize_t>(r.width);
+                return view(py::dtype::of<double>(),
+                            {static_cast<py::ssize_t>(r.times.size()), width}, {8 * width, 8},
+                            r.states.data(), self);
+            },
+            "States, one a row; shorter ones end in NaN.")
+        .def_property_readonly(
+            "solution",
+            [](const PyRun& self) -> py::object {
+                if (!self.record.solution) return py::none();
+                return py::cast(PySolution{self.record.solution, self.record.scale, self.modes});
+            },
+            "The solution at any time, or None where it was not kept.")
         .def(py::pickle([](const PyRun& self) { return pickled(self); },
                         [](const py::tuple& state) { return run_from(state); }));
 
     py::class_<Snapshot>(module, "Snapshot", "A simulation, saved.")
-        .def_property_readonly("text", [](const Snapshot& self) { return to_text(self); },
-             "The snapshot as text, with a checksum.")
-        .def_static("from_text", [](const std::string& text) { return snapshot_from_text(text); },
-             "The snapshot that was written as this text.")
+        .def_property_readonly(
+            "text", [](const Snapshot& self) { return to_text(self); },
+            "The snapshot as text, with a checksum.")
+        .def_static(
+            "from_text", [](const std::string& text) { return snapshot_from_text(text); },
+            "The snapshot that was written as this text.")
         .def("__eq__", [](const Snapshot& self, const Snapshot& other) { return self == other; })
         .def(py::pickle([](const Snapshot& self) { return to_text(self); },
                         [](const std::string& text) { return snapshot_from_text(text); }));
@@ -789,22 +811,16 @@ PYBIND11_MODULE(_ricochet, module)
              "Takes one step, with whatever events it holds. False: the run has ended.")
         .def("advance", &PySimulation::advance,
              "Goes on to the next event or sample time. False: the run has ended.")
-        .def("run_to_end", &PySimulation::run_to_end,
-             "Goes on to the end, and returns the Run.")
-        .def("finish", &PySimulation::finish,
-             "Ends the run here, and returns what was computed.")
-        .def("save", &PySimulation::save,
-             "All that the future depends on, as a Snapshot.")
-        .def("restore", &PySimulation::restore,
-             "Goes on where the snapshot of a run of the same system was taken, with the same bits.")
-        .def_property_readonly("t", &PySimulation::t,
-             "The time.")
-        .def_property_readonly("x", &PySimulation::x,
-             "The state, which may be kept.")
-        .def_property_readonly("mode", &PySimulation::mode,
-             "The mode.")
-        .def_property_readonly("ended", &PySimulation::ended,
-             "Whether the run has ended.")
+        .def("run_to_end", &PySimulation::run_to_end, "Goes on to the end, and returns the Run.")
+        .def("finish", &PySimulation::finish, "Ends the run here, and returns what was computed.")
+        .def("save", &PySimulation::save, "All that the future depends on, as a Snapshot.")
+        .def(
+            "restore", &PySimulation::restore,
+            "Goes on where the snapshot of a run of the same system was taken, with the same bits.")
+        .def_property_readonly("t", &PySimulation::t, "The time.")
+        .def_property_readonly("x", &PySimulation::x, "The state, which may be kept.")
+        .def_property_readonly("mode", &PySimulation::mode, "The mode.")
+        .def_property_readonly("ended", &PySimulation::ended, "Whether the run has ended.")
         .def_property_readonly("run", &PySimulation::so_far,
-             "What has been computed so far, as a Run.");
+                               "What has been computed so far, as a Run.");
 }

@@ -74,8 +74,8 @@ Record run_by(const Method& method, const System& system, const State& x0, const
     const Watched<System> watched(system, watch);
     detail::PartsOfRun<Watched<System>, X, Stepping, Extremum, Newton> parts(
         watched, start, Stepping{method}, Extremum{}, Newton{});
-    return record_of(
-        detail::run_whole(parts.setup(), detail::core_state(start), request.options), {});
+    return record_of(detail::run_whole(parts.setup(), detail::core_state(start), request.options),
+                     {});
 }
 
 template <class System>

@@ -43,10 +43,10 @@ struct Record {
     std::size_t event_count = 0;
     std::vector<double> events;  ///< heads with their states, in units of 8 bytes
     std::vector<double> times;
-    std::vector<double> states;  ///< row after row of `width`
+    std::vector<double> states;                 ///< row after row of `width`
     std::shared_ptr<Solution<State>> solution;  ///< null: not kept
-    std::vector<double> scale;  ///< of the states in `solution`
-    std::string wrong_bound;    ///< what is known of one, as a sentence
+    std::vector<double> scale;                  ///< of the states in `solution`
+    std::string wrong_bound;                    ///< what is known of one, as a sentence
 
     [[nodiscard]] std::size_t event_stride() const noexcept
     {

@@ -28,8 +28,8 @@ struct Request {
     /// Everything by default, so that a loop made for its system at compile time may serve.
     [[nodiscard]] bool is_plain() const noexcept
     {
-        return detector == "extremum" && locator == "newton" && !fixed && !record_steps &&
-               !dense && scale.empty();
+        return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense &&
+               scale.empty();
     }
 };
 

@@ -25,7 +25,8 @@ class SignalWatch {
 public:
     void tick() noexcept
     {
-        if (--ticks_left_ == 0) [[unlikely]] look();
+        if (--ticks_left_ == 0) [[unlikely]]
+            look();
     }
     [[nodiscard]] const std::atomic<bool>* cancelled() const noexcept { return &cancelled_; }
     /// What a handler has raised.
