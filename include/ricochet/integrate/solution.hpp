@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -35,6 +36,40 @@ public:
 
     /// The mode at time t [s], after an event at t.
     [[nodiscard]] Mode mode(double t) const { return pieces_[after(t)].mode; }
+
+    /// When step k starts [s]; for k = size(), when the last one ends. At least one step.
+    [[nodiscard]] double time(std::size_t k) const
+    {
+        if (k < pieces_.size()) return pieces_[k].t;
+        const Piece& last = pieces_.back();
+        return last.backward ? last.t - last.length : last.t + last.length;
+    }
+
+    /// Hands every number to `visit`, which writes it or replaces it by what it reads
+    /// (`detail::SnapshotWriter`, `detail::SnapshotReader`).
+    template <class Visitor>
+    void visit(Visitor&& visit)
+    {
+        std::size_t size = pieces_.size();
+        visit(size);
+        pieces_.resize(size);
+        for (Piece& piece : pieces_) {
+            for (double* number : {&piece.t, &piece.length, &piece.h}) visit(*number);
+            auto nodes = static_cast<std::uint8_t>(piece.nodes);
+            std::size_t departures = piece.w.size(), slopes = piece.slope.size();
+            visit(piece.backward);
+            visit(piece.mode);
+            visit(nodes);
+            visit(departures);
+            visit(slopes);
+            piece.nodes = static_cast<DenseNodes>(nodes);
+            piece.w.resize(std::min<std::size_t>(departures, 3));
+            piece.slope.resize(std::min<std::size_t>(slopes, piece.w.size()));
+            for (State* x : {&piece.x0, &piece.remainder, &piece.rate0}) visit.state(*x);
+            for (State& x : piece.w) visit.state(x);
+            for (State& x : piece.slope) visit.state(x);
+        }
+    }
 
     /// Adds a step of which the first `length` [s] were used.
     void add(double t0, bool backward, Mode mode, const DenseParts<State>& parts, double length)

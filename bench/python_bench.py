@@ -1,0 +1,135 @@
+"""Python against SciPy at equal error, and ready systems against C++.
+
+usage: PYTHONPATH=build/release/python python3 bench/python_bench.py
+
+Processor time of one run, the least of several; errors are the largest of any event's time, against
+the closed form (ball) and against a run of tolerance 1e-13 (pendulum). SciPy restarts at
+every event, since it has no resets; that is part of its time. Compare rows of equal error.
+"""
+
+import math
+import time
+
+import numpy as np
+from scipy.integrate import solve_ivp as scipy_solve
+
+import ricochet
+
+
+def least_time(run, repeats=5):
+    run()
+    best = math.inf
+    for _ in range(repeats):
+        count, start = 0, time.process_time()
+        while (took := time.process_time() - start) < 0.05:
+            run()
+            count += 1
+        best = min(best, took / count)
+    return 1e6 * best
+
+
+def by_scipy(fun, event, reset, t_end, y0, **options):
+    event.terminal = True
+    t, y, times = 0.0, y0, []
+    while True:
+        result = scipy_solve(fun, (t, t_end), y, events=event, **options)
+        if result.status != 1:
+            return np.array(times)
+        t = result.t_events[0][0]
+        times.append(t)
+        y = reset(t, result.y_events[0][0])
+        y[0] += 1e-15  # off the surface, or SciPy finds the same event again
+
+
+def by_ricochet(fun, event, reset, t_end, y0, **options):
+    event.terminal, event.reset = False, reset
+    return ricochet.solve_ivp(fun, (0, t_end), y0, events=event, t_eval=[], **options).t_events[0]
+
+
+def ball():
+    def fun(t, y):
+        return [y[1], -9.81]
+
+    def event(t, y):
+        return y[0]
+
+    event.direction = -1
+    ready = ricochet.BouncingBall()
+    exact = np.array([ready.impact_time(n, 10.0) for n in range(13)])
+    return "ball, 13 impacts", fun, event, lambda t, y: [0.0, -0.9 * y[1]], 20.5, [10.0, 0.0], exact
+
+
+def pendulum():
+    sin = math.sin
+
+    def fun(t, y):
+        angle, rate = y
+        return [rate, -9.81 * sin(angle)]
+
+    def event(t, y):
+        return y[0]
+
+    event.direction = -1
+    problem = (fun, event, lambda t, y: [0.0, -0.9 * y[1]], 10.0, [1.0, 0.0])
+    exact = by_ricochet(*problem, method="DOP853", rtol=1e-13, atol=1e-14)
+    return ("pendulum on a wall, 10 s", *problem, exact)
+
+
+def compiled_pendulum():
+    """The same from functions that numba has compiled, where it is installed."""
+    try:
+        import numba
+        from numba import types as n
+    except ImportError:
+        return None
+    sin, number, numbers = math.sin, n.double, n.CPointer(n.double)
+
+    @numba.cfunc(n.void(n.uint32, number, numbers, numbers, n.uintp, n.voidptr))
+    def flow(mode, t, x, dxdt, size, user):
+        dxdt[0] = x[1]
+        dxdt[1] = -9.81 * sin(x[0])
+
+    @numba.cfunc(number(n.uint32, number, numbers, n.uintp, n.voidptr))
+    def wall(mode, t, x, size, user):
+        return x[0]
+
+    @numba.cfunc(n.uint32(n.uint32, number, numbers, n.uintp, n.voidptr))
+    def bounce(mode, t, x, size, user):
+        x[0] = 0.0
+        x[1] *= -0.9
+        return mode
+
+    guard = ricochet.Guard(ricochet.Compiled(wall), reset=ricochet.Compiled(bounce))
+    return ricochet.Compiled(flow), guard
+
+
+print(f"{'':48}{'us a run':>10}{'error':>10}")
+for name, *problem, exact in (ball(), pendulum()):
+    for who, solve in (("SciPy", by_scipy), ("ricochet", by_ricochet)):
+        for method in ("RK45", "DOP853"):
+            for rtol in (1e-6, 1e-9, 1e-10):
+                options = dict(method=method, rtol=rtol, atol=rtol)
+                times = solve(*problem, **options)
+                error = (abs(times - exact).max() if times.shape == exact.shape
+                         else f"{times.size} events")
+                took = least_time(lambda: solve(*problem, **options), 3)
+                print(f"{name}: {who} {method} {rtol:g}".ljust(48) + f"{took:10.0f}{error:>10.2}")
+
+compiled = compiled_pendulum()
+if compiled is not None:
+    *_, exact = pendulum()
+    for method in ("RK45", "DOP853"):
+        for rtol in (1e-9, 1e-10):
+            def run():
+                return ricochet.solve_ivp(compiled[0], (0, 10.0), [1.0, 0.0], events=compiled[1],
+                                          t_eval=[], method=method, rtol=rtol, atol=rtol)
+            error = abs(run().t_events[0] - exact).max()
+            print(f"{'the same, compiled'}: {method} {rtol:g}".ljust(48)
+                  + f"{least_time(run):10.0f}{error:>10.2}")
+
+print()
+for system, start, t_end in ((ricochet.BouncingBall(), (10.0, 0.0), 20.5),
+                             (ricochet.StickSlip(), (1.0, 0.2), 120.0),
+                             (ricochet.ImpactOscillator(), (0.0, 0.0), 1795.0)):
+    took = least_time(lambda: ricochet.integrate(system, start, t_end))
+    print(f"{system!r}, {t_end:g} s".ljust(96) + f"{took:10.1f} us")

@@ -1,0 +1,25 @@
+"""Hybrid systems: smooth motion, events, resets.
+
+``solve_ivp`` takes SciPy's arguments and returns SciPy's result; events may also reset the
+state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation`` run it, and
+``BouncingBall``, ``Pendulum`` and others are ready. Events are located to neighbouring
+floating-point numbers.
+"""
+
+from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
+from ._ivp import OdeResult, solve_ivp
+from ._plot import plot
+from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum, StickSlip,
+                     Thermostat)
+from ._ricochet import Run, Snapshot, Solution
+from ._run import Kind, Simulation, integrate
+from ._system import Guard, System, guard
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Compiled", "CoulombOscillator",
+    "Guard", "ImpactOscillator", "Kind", "OdeResult", "Pendulum", "Run", "Simulation",
+    "Snapshot", "Solution", "StickSlip", "System", "Thermostat", "guard", "integrate", "plot",
+    "solve_ivp",
+]

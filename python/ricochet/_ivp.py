@@ -1,0 +1,287 @@
+"""Initial value problems with SciPy's arguments and SciPy's result."""
+
+from warnings import warn
+
+import numpy as np
+
+from . import _ricochet
+from ._compiled import Compiled
+from ._ready import Ready
+from ._run import Kind, set_tolerance, source_of, state_from
+from ._system import Guard, System
+
+_METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78"}
+_WITHOUT = {
+    "RK23": "it has no method of order 3; take 'RK45'",
+    "Radau": "it has no implicit method",
+    "BDF": "it has no implicit method",
+    "LSODA": "it has no implicit method",
+}
+_IMPLICIT_OPTIONS = ("jac", "jac_sparsity", "lband", "uband", "min_step")
+_KINDS = {kind.value: kind.name.lower() for kind in Kind}
+_EPS = np.finfo(float).eps
+#: What SciPy says of these, for programs that compare.
+_MESSAGES = {"reached_end": "The solver successfully reached the end of the integration interval.",
+             "stopped_by_event": "A termination event occurred."}
+
+
+class OdeResult(dict):
+    """A dictionary whose values are attributes, too."""
+
+    def __getattr__(self, name):
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+    __setattr__ = dict.__setitem__
+    __delattr__ = dict.__delitem__
+
+    def __dir__(self):
+        return list(self)
+
+    def __repr__(self):
+        width = max(map(len, self), default=0)
+        return "\n".join(f"{name:>{width}}: {value!r}" for name, value in self.items())
+
+
+class _Constant:
+    """The solution over no time."""
+
+    def __init__(self, t, y):
+        self.t_min = self.t_max = t
+        self.ts = np.array([t])
+        self._y = np.array(y)
+
+    def __call__(self, t):
+        t = np.asarray(t)
+        return self._y.copy() if t.ndim == 0 else np.tile(self._y[:, None], (1, t.size))
+
+    before = __call__
+
+
+def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, events=None,
+              vectorized=False, args=None, **options):
+    """Solves y' = fun(t, y), y(t0) = y0, with events and resets.
+
+    Arguments and result are those of ``scipy.integrate.solve_ivp``; code that uses these runs
+    unchanged. What differs:
+
+    - ``method``: ``'RK45'`` (Dormand and Prince, as SciPy's) or ``'DOP853'``, for which a method
+      of order 8 by Fehlberg stands in. There are no others.
+    - ``fun`` may also be a `System`, whose guards then are the events.
+    - An event may have, besides ``terminal`` (also a number of events) and ``direction``:
+
+      reset(t, y) -> y
+          the state after the event;
+      rest(t, y) -> y
+          what becomes of the motion where infinitely many events accumulate;
+      unilateral : bool
+          the event function is never negative, as the height above a floor; needs ``reset``;
+      name : str
+          for messages.
+
+    - ``rtol`` is one number; of several the smallest holds for all. ``atol`` may have one for each
+      component.
+    - Further options are those of `integrate`, such as ``event_tolerance`` and ``max_steps``.
+
+    Returns
+    -------
+    OdeResult
+        With SciPy's ``t, y, sol, t_events, y_events, nfev, njev, nlu, status, message, success``;
+        ``y_events`` are the states before resets. At a reset ``t`` holds its time twice where ``t_eval``
+        is not given. New: ``y_events_after``, the states after; ``kinds``, for every event
+        'crossing', 'touch', 'jump' or 'accumulation'; ``modes``, before and after; ``outcome``
+        and ``statistics``, whose ``evidence`` counts why steps were taken to hold no event.
+
+    An exception of ``fun`` or of an event arrives unchanged; its ``ricochet_run`` is the `Run` so
+    far.
+    """
+    if isinstance(method, type):
+        method = method.__name__
+    if method in _WITHOUT:
+        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853': ricochet "
+                         f"integrates non-stiff phases, {_WITHOUT[method]}")
+    if method not in _METHODS:
+        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853'")
+    try:
+        t0, t1 = map(float, t_span)
+    except (TypeError, ValueError):
+        raise ValueError(f"t_span: found {t_span!r}, expected two numbers") from None
+    start = state_from(y0, "y0")
+    if args is not None:
+        try:
+            args = tuple(args)
+        except TypeError:
+            raise TypeError(f"Supplied 'args' cannot be unpacked. Found {args!r}, expected a "
+                            f"tuple; of one argument: args=({args!r},)") from None
+    given = _options(options, t0, t1, len(start))
+    given["method"] = _METHODS[method]
+    samples = _sample_times(t_eval, t0, t1)
+    if samples is None:
+        given["record_steps"] = True
+    else:
+        given["sample_times"] = samples.tolist()
+    if dense_output:
+        given["dense"] = True
+
+    if isinstance(fun, (System, Ready)):
+        if events is not None:
+            raise ValueError("events: found some beside a system, expected them as its guards")
+        source, modes = source_of(fun, args)
+        count = len(_guard_names(fun))
+        watched = True
+    else:
+        guards, is_list = _guards(events, t0, start, args or ())
+        count = len(guards)
+        watched = is_list
+        if vectorized and not isinstance(fun, Compiled):
+            pointwise = fun
+
+            def fun(t, y, *further):
+                return np.asarray(pointwise(t, y[:, None], *further)).ravel()
+        modes = None
+        source = _ricochet.callback_system(dict(
+            name="solve_ivp", flow=fun, args=args, guards=guards))
+    if t0 == t1:
+        return _nothing(t0, start, samples, dense_output, count if watched else None)
+    run = _ricochet.integrate(source, start, given, modes)
+    return _result(run, count if watched else None, dense_output)
+
+
+def _guard_names(system):
+    if isinstance(system, Ready):
+        return {"thermostat": range(2), "stick-slip": range(3),
+                "coulomb-oscillator": range(3)}.get(system._name, range(1))
+    return system._guard_list()
+
+
+def _options(options, t0, t1, components):
+    options = dict(options)
+    for name in _IMPLICIT_OPTIONS:
+        if name in options:
+            warn(f"{name} has no effect for an explicit method", stacklevel=3)
+            del options[name]
+    rtol = np.asarray(options.pop("rtol", 1e-3), dtype=float)
+    rtol = float(rtol.min())
+    if rtol < 100 * _EPS:
+        warn(f"At least one element of rtol, {rtol}, is too small; {100 * _EPS} is taken",
+             stacklevel=3)
+        rtol = 100 * _EPS
+    given = {"t_start": t0, "t_end": t1, "rtol": rtol}
+    atol = options.pop("atol", 1e-6)
+    if np.any(np.asarray(atol, dtype=float) < 0):
+        raise ValueError(f"atol: found {atol}, expected numbers that are not negative")
+    set_tolerance(given, atol, components)
+    max_step = options.pop("max_step", None)
+    if max_step is not None:
+        if not max_step > 0:
+            raise ValueError(f"max_step: found {max_step}, expected a positive number")
+        given["h_max"] = float(max_step)
+    first_step = options.pop("first_step", None)
+    if first_step is not None:
+        if not 0 < first_step <= abs(t1 - t0):
+            raise ValueError(f"first_step: found {first_step}, expected a number in "
+                             f"(0, {abs(t1 - t0)}]")
+        given["step"] = float(first_step)
+    for name in ("t_start", "t_end", "method", "mode", "sample_times", "record_steps", "dense"):
+        if name in options:
+            if name == "mode":
+                given["mode"] = options.pop(name)
+            else:
+                raise TypeError(f"solve_ivp: found the option {name!r}, expected its name in "
+                                "SciPy")
+    given.update(options)
+    return given
+
+
+def _sample_times(t_eval, t0, t1):
+    if t_eval is None:
+        return None
+    times = np.asarray(t_eval, dtype=float)
+    if times.ndim != 1:
+        raise ValueError(f"t_eval: found {times.ndim} dimensions, expected 1")
+    outside = times[~((times >= min(t0, t1)) & (times <= max(t0, t1)))]
+    if outside.size:
+        raise ValueError(f"t_eval: found {outside[0]}, expected times within t_span, {t0} to {t1}")
+    steps = np.diff(times)
+    if np.any(steps <= 0 if t1 > t0 else steps >= 0):
+        raise ValueError("t_eval: found times out of order, expected them as the run meets them")
+    return times
+
+
+def _guards(events, t0, start, args):
+    """Dictionaries of guards, and whether there are events at all."""
+    if events is None:
+        return [], False
+    if callable(events) or isinstance(events, (Guard, Compiled)):
+        events = (events,)
+    y = np.array(start)
+    out = []
+    for index, event in enumerate(events):
+        if isinstance(event, Guard):
+            out.append(event._specification(index))
+            continue
+        if not callable(event) and not isinstance(event, Compiled):
+            raise TypeError(f"events: found a {type(event).__name__}, expected functions (t, y)")
+        direction = getattr(event, "direction", 0)
+        terminal = getattr(event, "terminal", False)
+        terminal = 0 if terminal is None else terminal
+        if int(terminal) != terminal or terminal < 0:
+            raise ValueError(f"terminal: found {terminal!r}, expected a bool or a whole number")
+        reset = getattr(event, "reset", None)
+        unilateral = bool(getattr(event, "unilateral", False))
+        if unilateral and direction == 0:
+            direction = -1
+        name = getattr(event, "name", None) or getattr(event, "__name__", None)
+        guard = Guard(event, name=name if isinstance(name, str) else None, direction=direction,
+                      reset=reset, rest=getattr(event, "rest", None),
+                      rate=getattr(event, "rate", None), unilateral=unilateral,
+                      stop_after=int(terminal))
+        specification = guard._specification(index)
+        if not isinstance(event, Compiled):
+            try:
+                first = event(t0, y.copy(), *args)
+            except Exception:  # the run meets it again, and hands it on
+                first = None
+            specification["boolean"] = isinstance(first, (bool, np.bool_))
+        out.append(specification)
+    return out, True
+
+
+def _result(run, count, dense_output):
+    result = OdeResult(t=run.times, y=run.states.T, sol=run.solution if dense_output else None,
+                       t_events=None, y_events=None)
+    statistics = run.statistics
+    result.update(nfev=statistics.flow_calls, njev=0, nlu=0,
+                  status={"reached_end": 0, "stopped_by_event": 1}.get(run.outcome, -1),
+                  message=_MESSAGES.get(run.outcome, run.message), success=run.success)
+    result.update(y_events_after=None, kinds=None, modes=None)
+    if count is not None:
+        events = run.events
+        guards = events["guard"]
+        chosen = [np.flatnonzero(guards == index) for index in range(count)]
+        result.t_events = [events["t"][which] for which in chosen]
+        for name, field in (("y_events", "before"), ("y_events_after", "after")):
+            states = events[field]
+            result[name] = [states[which] if which.size else np.empty(0) for which in chosen]
+        kinds = events["kind"]
+        result.kinds = [[_KINDS[kind] for kind in kinds[which].tolist()] for which in chosen]
+        result.modes = [np.column_stack((events["mode_before"][which],
+                                         events["mode_after"][which]))
+                        if run.modes else np.zeros((which.size, 2), np.uint32)
+                        for which in chosen]
+    result.update(outcome=run.outcome, statistics=statistics, guard=run.guard, run=run)
+    return result
+
+
+def _nothing(t, y, samples, dense_output, count):
+    """The result over no time."""
+    t_out = np.array([t]) if samples is None else samples
+    nobody = None if count is None else [np.empty(0) for _ in range(count)]
+    return OdeResult(t=t_out, y=np.tile(np.array(y)[:, None], (1, t_out.size)),
+                     sol=_Constant(t, y) if dense_output else None, t_events=nobody,
+                     y_events=nobody, nfev=0, njev=0, nlu=0, status=0,
+                     message=_MESSAGES["reached_end"], success=True, y_events_after=nobody,
+                     kinds=None if count is None else [[] for _ in range(count)],
+                     modes=nobody, outcome="reached_end", statistics=None, guard=None, run=None)

@@ -1,0 +1,58 @@
+"""Pictures of runs, where matplotlib is installed."""
+
+import numpy as np
+
+
+def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None):
+    """Draws the states of a run over time, with its events as dots.
+
+    Parameters
+    ----------
+    run : Run or the result of `solve_ivp`
+        With states: made with ``sample_times`` or ``record_steps``.
+    components : sequence of int
+        Which to draw; by default all.
+    labels : sequence of str
+        What they are called.
+    phase : (int, int)
+        Draws the second component over the first instead.
+    events : bool
+        Whether events are marked, before and after their resets.
+    ax : matplotlib.axes.Axes
+        Where; by default the current one.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    try:
+        from matplotlib import pyplot
+    except ImportError:
+        raise ImportError("ricochet.plot needs matplotlib, which was not found") from None
+    run = getattr(run, "run", None) or run
+    t, x = run.times, run.states
+    if t.size == 0:
+        raise ValueError("plot: found a run without states, expected one with sample_times or "
+                         "record_steps=True")
+    ax = pyplot.gca() if ax is None else ax
+    # Where a reset has taken place a line is not drawn through.
+    jumps = np.flatnonzero(np.diff(t) == 0) + 1
+    t = np.insert(t, jumps, np.nan)
+    x = np.insert(x, jumps, np.nan, axis=0)
+    marks = run.events if events else run.events[:0]
+    components = range(x.shape[1]) if components is None else components
+    labels = [f"x[{c}]" for c in components] if labels is None else labels
+    if phase is not None:
+        first, second = phase
+        line, = ax.plot(x[:, first], x[:, second])
+        for side in ("before", "after"):
+            ax.plot(marks[side][:, first], marks[side][:, second], ".", color=line.get_color())
+        return ax
+    for c, label in zip(components, labels):
+        line, = ax.plot(t, x[:, c], label=label)
+        for side in ("before", "after"):
+            ax.plot(marks["t"], marks[side][:, c], ".", color=line.get_color())
+    ax.set_xlabel("t")
+    if len(labels) > 1:
+        ax.legend()
+    return ax

@@ -1,0 +1,166 @@
+"""Running systems."""
+
+from enum import IntEnum
+from math import floor, log2
+
+import numpy as np
+
+from . import _ricochet
+from ._ready import Ready
+from ._system import System
+
+
+class Kind(IntEnum):
+    """What happened at an event: the field ``kind`` of ``run.events``."""
+
+    CROSSING = 0      #: the guard changed sign
+    TOUCH = 1         #: it reached its surface and turned back
+    TIME = 2          #: a time event
+    ACCUMULATION = 3  #: the limit of infinitely many events
+    MODE = 4
+    STICK = 5
+    SLIP = 6
+    JUMP = 7          #: the guard changed sign without a zero
+
+
+def state_from(given, what):
+    """A start as a list of numbers."""
+    if type(given) in (list, tuple) and given and all(type(x) in (float, int) for x in given):
+        return list(given)
+    array = np.asarray(given)
+    if np.iscomplexobj(array):
+        raise ValueError(f"{what}: found complex numbers, expected real ones: write real and "
+                         "imaginary parts as components")
+    if array.ndim != 1:
+        raise ValueError(f"{what}: found {array.ndim} dimensions, expected 1")
+    if array.size == 0:
+        raise ValueError(f"{what}: found no components, expected at least one")
+    try:
+        return array.astype(float).tolist()
+    except (TypeError, ValueError):
+        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
+
+
+def set_tolerance(options, atol, components):
+    """``atol`` as one number, and a unit for each component where it has many."""
+    array = np.asarray(atol, dtype=float)
+    if array.ndim == 0:
+        options["atol"] = float(array)
+        return
+    if array.shape != (components,):
+        raise ValueError(f"atol: found shape {array.shape}, expected a number or "
+                         f"({components},)")
+    if not np.all(np.isfinite(array)) or np.any(array < 0):
+        raise ValueError("atol: found a number that is negative or not finite")
+    least = array[array > 0].min() if np.any(array > 0) else 0.0
+    options["atol"] = float(least)
+    if np.all(array == least):
+        return
+    # Powers of two, rounded down: the scaling is exact, and no component gets a larger
+    # tolerance than was asked for.
+    options["scale"] = [2.0 ** floor(log2(a / least)) if a > 0 else 2.0 ** -200 for a in array]
+
+
+def source_of(system, args=None):
+    """The system in C++, and its list of modes."""
+    if isinstance(system, Ready):
+        if args:
+            raise TypeError("args: found some for a ready system, expected none")
+        return system._source, None
+    if isinstance(system, System):
+        return system._source(args), system._mode_list()
+    raise TypeError(f"system: found a {type(system).__name__}, expected a ricochet.System or a "
+                    "ready system")
+
+
+def prepare(system, x0, t_end, options, args=None):
+    """What the functions of C++ take."""
+    source, modes = source_of(system, args)
+    x0 = state_from(x0, "x0")
+    options = dict(options, t_end=float(t_end))
+    if "mode" in options:
+        names = modes if modes is not None else getattr(system, "modes", None)
+        if names is not None and options["mode"] not in range(len(names)):
+            if options["mode"] not in names:
+                raise ValueError(f"mode: found {options['mode']!r}, expected one of {names}")
+            options["mode"] = list(names).index(options["mode"])
+        elif names is not None and options["mode"] in names:
+            options["mode"] = list(names).index(options["mode"])
+    elif isinstance(modes, list) and not modes:
+        raise ValueError("modes: found none, expected at least one")
+    if not isinstance(options.get("atol", 0), (float, int)):
+        set_tolerance(options, options["atol"], len(x0))
+    samples = options.get("sample_times")
+    if samples is not None:
+        options["sample_times"] = np.asarray(samples, dtype=float).ravel().tolist()
+    else:
+        options.pop("sample_times", None)
+    if options.pop("record_steps", False):
+        options["dense"] = True
+        options["record_steps"] = samples is None
+    return source, x0, options, modes
+
+
+def integrate(system, x0, t_end, **options):
+    """Integrates a system from ``x0`` at ``t_start`` to ``t_end``.
+
+    Parameters
+    ----------
+    system : System or a ready one
+    x0 : array_like, shape (n,)
+    t_end : float
+        Before ``t_start``: backward in time.
+    t_start : float
+        Default 0.
+    mode
+        The mode at the start; by default the first, or that of the ready system.
+    method : str
+        ``"dopri5"`` (default), ``"fehlberg78"``, ``"cash-karp54"``, ``"rk4"``, ``"euler"``; the
+        last two have no error estimate and need ``fixed=True``.
+    fixed : bool
+        Steps of length ``step`` instead of error control.
+    rtol, atol : float
+        1e-8, 1e-10. ``atol`` may have one number for each component: then the states are counted in
+        units that are powers of two, and a component has between half of what was asked for
+        and all of it.
+    sample_times : array_like
+        Where ``run.times`` and ``run.states`` are wanted.
+    record_steps : bool
+        Keep the whole solution, for ``run.solution``, and, without ``sample_times``, the ends of
+        all steps, both sides of resets, in ``run.times`` and ``run.states``.
+    detector : str
+        ``"extremum"`` (default), ``"ends"``, ``"bernstein"`` or ``"planned"``.
+    locator : str
+        ``"newton"`` (default), ``"bisection"`` or ``"toms748"``.
+    step, h_min, h_max, event_tolerance, event_rtol, event_window, look_inside, stop_at_event,
+    record_events, event_states, max_steps, stall_steps
+        As in C++.
+
+    Returns
+    -------
+    Run
+
+    An exception of a function of the system arrives unchanged; its ``ricochet_run`` is the `Run` so
+    far.
+    """
+    source, x0, options, modes = prepare(system, x0, t_end, options)
+    return _ricochet.integrate(source, x0, options, modes)
+
+
+class Simulation(_ricochet.Simulation):
+    """A run that is driven by hand; arguments as for `integrate`.
+
+    One thread at a time: a second one gets a RuntimeError, as does a function of the system that
+    asks the simulation that has called it.
+    """
+
+    def __init__(self, system, x0, t_end, **options):
+        if options.pop("record_steps", False):
+            options["dense"] = True
+        source, x0, options, modes = prepare(system, x0, t_end, options)
+        super().__init__(source, x0, options, modes)
+
+    def __iter__(self):
+        """The times and states of all events and sample times to come."""
+        while self.advance():
+            yield self.t, self.x

@@ -1,0 +1,255 @@
+"""Hybrid systems, as classes or from functions."""
+
+from bisect import bisect_left, bisect_right
+from math import inf
+from types import MethodType
+
+from . import _ricochet
+from ._compiled import Compiled
+
+
+class Guard:
+    """A scalar function whose change of sign is an event.
+
+    Parameters
+    ----------
+    value : function (t, x) -> float
+        Positive inside the mode. Of a system with modes this and all the following functions
+        take the mode first.
+    name : str
+        What messages call it; by default the name of the function.
+    direction : -1, 0 or 1
+        -1 (default): falling through zero, as a motion leaves the mode; 1: rising; 0: either.
+    reset : function (t, x) -> x
+        The state after the event; with modes a mode, or a tuple (mode, x). Without it the event is
+        only recorded.
+    rest : function (t, x) -> x
+        What becomes of the motion where infinitely many events accumulate.
+    rate : function (t, x, dxdt) -> float
+        dg/dt along the flow; by default a difference, for two more calls of ``value``.
+    enabled : function (t, x) -> bool
+        Whether a crossing here and now is an event.
+    in_modes : sequence of modes
+        Where the guard is looked at; by default in every mode.
+    unilateral : bool
+        The guard bounds the motion: it is never negative. Needs a reset.
+    boolean : bool
+        Only the sign means anything.
+    degree : int
+        Of the guard as a polynomial in time and state, for ``detector="bernstein"``.
+    touch : float
+        ``|g|`` at a turning point that counts as a touch.
+    stop_after : int
+        The run ends with this many events; 0: never.
+    speed_bound, acceleration_bound, lower_bound, upper_bound : functions (t, x) -> float
+        With ``lipschitz``, for ``detector="planned"``.
+
+    In a class ``guard`` makes one of a method, whose ``reset``, ``rest`` and further functions are
+    methods decorated with ``@name.reset`` and so on, as those of a ``property`` are.
+    """
+
+    def __init__(self, value=None, *, name=None, direction=-1, reset=None, rest=None, rate=None,
+                 enabled=None, in_modes=None, unilateral=False, boolean=False, degree=0,
+                 touch=0.0, stop_after=0, speed_bound=None, acceleration_bound=None,
+                 lower_bound=None, upper_bound=None, lipschitz=1.0, resets=True):
+        self._functions = dict(value=value, rate=rate, reset=reset, rest=rest, enabled=enabled,
+                               speed_bound=speed_bound, acceleration_bound=acceleration_bound,
+                               lower_bound=lower_bound, upper_bound=upper_bound)
+        self._numbers = dict(direction=direction, in_modes=in_modes, unilateral=unilateral,
+                             boolean=boolean, degree=degree, touch=touch, stop_after=stop_after,
+                             lipschitz=lipschitz, resets=resets)
+        self.name = name
+
+    def __set_name__(self, owner, name):
+        if self.name is None:
+            self.name = name
+
+    def _with(self, what, function):
+        copy = Guard(name=self.name)
+        copy._functions = {**self._functions, what: function}
+        copy._numbers = dict(self._numbers)
+        return copy
+
+    def rate(self, function):
+        """Decorates the method that gives dg/dt along the flow."""
+        return self._with("rate", function)
+
+    def reset(self, function):
+        """Decorates the method that gives the state after the event."""
+        return self._with("reset", function)
+
+    def rest(self, function):
+        """Decorates the method that gives the state where events accumulate."""
+        return self._with("rest", function)
+
+    def enabled(self, function):
+        """Decorates the method that says whether a crossing is an event."""
+        return self._with("enabled", function)
+
+    def speed_bound(self, function):
+        """Decorates the method that bounds how fast the guard changes."""
+        return self._with("speed_bound", function)
+
+    def acceleration_bound(self, function):
+        """Decorates the method that bounds how fast that speed grows."""
+        return self._with("acceleration_bound", function)
+
+    def lower_bound(self, function):
+        """Decorates the method that bounds the guard from below."""
+        return self._with("lower_bound", function)
+
+    def upper_bound(self, function):
+        """Decorates the method that bounds the guard from above."""
+        return self._with("upper_bound", function)
+
+    def _specification(self, index, owner=None):
+        out = dict(self._numbers)
+        for what, function in self._functions.items():
+            if owner is not None and function is not None and not isinstance(function, Compiled):
+                function = MethodType(function, owner)
+            out[what] = function
+        name = self.name or getattr(self._functions["value"], "__name__", None)
+        out["name"] = str(index) if name in (None, "<lambda>") else name
+        if out["in_modes"] is not None:
+            if isinstance(out["in_modes"], str):
+                out["in_modes"] = [out["in_modes"]]
+            out["in_modes"] = list(out["in_modes"])
+        for what in ("degree", "stop_after"):
+            if out[what] == 0:
+                continue
+            if out[what] != int(out[what]) or out[what] < 0:
+                raise ValueError(f"guard {out['name']}: {what}: found {out[what]!r}, expected a "
+                                 "whole number that is not negative")
+        return out
+
+    def __repr__(self):
+        return f"Guard({self.name!r})"
+
+
+def guard(value=None, **options):
+    """Makes a `Guard` of a method: ``@guard`` or ``@guard(unilateral=True)``."""
+    if value is not None:
+        return Guard(value, **options)
+    return lambda function: Guard(function, **options)
+
+
+_KNOWN = ("flow", "guard", "reset", "rest", "guard_rate", "unilateral", "direction", "modes",
+          "name", "guards", "guard_values", "reset_set", "time_events", "next_time_event",
+          "previous_time_event", "time_reset", "changes_dimension")
+
+
+class System:
+    """A hybrid system: a subclass with the methods below, or an instance made from functions.
+
+    flow(t, x) -> dx/dt
+        The smooth motion. ``x`` is an array that may be kept.
+    guard(t, x), reset(t, x), rest(t, x), guard_rate(t, x, dxdt)
+        Of a system with one guard, with the attributes ``unilateral`` and ``direction``; for
+        more there is `Guard`.
+    guards
+        A sequence of `Guard`; those that a class makes with ``@guard`` come first.
+    modes
+        A number, a sequence of names, or an Enum. Every function takes the mode before ``t``, as
+        it is written there, and a reset returns a mode, or a tuple (mode, x).
+    guard_values(t, x) -> numbers
+        All guards at once, instead of their own functions.
+    reset_set(t, x, fired) -> x
+        The reset of all guards that fired together, instead of their own: ``fired`` is a list of
+        their numbers, with ``"time"`` at its end where a time event belongs to it.
+    time_events
+        Known times of events; or next_time_event(t), the first after ``t`` or None, and for runs
+        backward in time previous_time_event(t).
+    time_reset(t, x) -> x
+        What happens at these times.
+    changes_dimension
+        Whether resets may shorten the state without a change of mode.
+    """
+
+    flow = None
+    guards = ()
+    modes = None
+    name = None
+    guard_values = None
+    reset_set = None
+    time_events = None
+    next_time_event = None
+    previous_time_event = None
+    time_reset = None
+    changes_dimension = False
+
+    def __init__(self, flow=None, guards=None, **members):
+        if flow is not None:
+            self.flow = flow
+        if guards is not None:
+            self.guards = guards
+        for name, value in members.items():
+            if name not in _KNOWN:
+                raise TypeError(f"System: found a member {name!r}, expected some of "
+                                + ", ".join(_KNOWN))
+            setattr(self, name, value)
+
+    def __init_subclass__(cls, unchecked_names=False, **options):
+        super().__init_subclass__(**options)
+        if unchecked_names:
+            return
+        for name, member in vars(cls).items():
+            if name.startswith("_") or name in _KNOWN or isinstance(member, Guard):
+                continue
+            if callable(member):
+                from difflib import get_close_matches
+                meant = get_close_matches(name.lower(), _KNOWN, 1, 0.85)
+                if meant:
+                    raise TypeError(f"{cls.__name__}: found a method {name!r}, expected "
+                                    f"{meant[0]!r}; if it means what it says, declare "
+                                    "class ...(System, unchecked_names=True)")
+
+    def _mode_list(self):
+        modes = self.modes
+        if modes is None:
+            return None
+        if isinstance(modes, int):
+            return list(range(modes))
+        return list(modes)
+
+    def _guard_list(self):
+        out = []
+        if getattr(self, "guard", None) is not None:
+            single = Guard(self.guard, name="guard", reset=getattr(self, "reset", None),
+                           rest=getattr(self, "rest", None),
+                           rate=getattr(self, "guard_rate", None),
+                           unilateral=getattr(self, "unilateral", False),
+                           direction=getattr(self, "direction", -1))
+            out.append(single._specification(0))
+        found = {}
+        for cls in reversed(type(self).__mro__):
+            for name, member in vars(cls).items():
+                if isinstance(member, Guard):
+                    found[name] = member
+        for member in found.values():
+            out.append(member._specification(len(out), self))
+        for member in self.guards:
+            if not isinstance(member, Guard):
+                member = Guard(member)
+            out.append(member._specification(len(out)))
+        return out
+
+    def _source(self, args=None):
+        if not callable(self.flow) and not isinstance(self.flow, Compiled):
+            raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
+        following, preceding = self.next_time_event, self.previous_time_event
+        if self.time_events is not None:
+            times = sorted(float(t) for t in self.time_events)
+            if following is None:
+                def following(t, *_):
+                    k = bisect_right(times, t)
+                    return times[k] if k < len(times) else inf
+            if preceding is None:
+                def preceding(t, *_):
+                    k = bisect_left(times, t)
+                    return times[k - 1] if k > 0 else -inf
+        return _ricochet.callback_system(dict(
+            name=self.name or type(self).__name__, flow=self.flow, args=args,
+            modes=self._mode_list(), guards=self._guard_list(),
+            guard_values=self.guard_values, reset_set=self.reset_set,
+            next_time_event=following, previous_time_event=preceding,
+            time_reset=self.time_reset, changes_dimension=self.changes_dimension))

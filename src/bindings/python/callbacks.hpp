@@ -1,0 +1,77 @@
+// A system made of functions of Python, or of addresses of compiled ones.
+#pragma once
+
+#include "python_error.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "source.hpp"
+
+namespace ricochet::python {
+
+/// A function of the user's: an object to be called, or the address of a compiled function, which
+/// is called without the interpreter, with `user` as its last argument.
+struct Function {
+    Ref object;
+    void* address = nullptr;
+    void* user = nullptr;
+
+    Function() = default;
+    /// None is no function. An object that has `_ricochet_address` is a compiled one.
+    explicit Function(PyObject* given);
+
+    explicit operator bool() const noexcept { return object || address; }
+};
+
+// Compiled functions, by what they stand for. A reset returns the next mode.
+using CompiledFlow = void (*)(std::uint32_t mode, double t, const double* x, double* dxdt,
+                              std::size_t n, void* user);
+using CompiledGuard = double (*)(std::uint32_t mode, double t, const double* x, std::size_t n,
+                                 void* user);
+using CompiledRate = double (*)(std::uint32_t mode, double t, const double* x, const double* dxdt,
+                                std::size_t n, void* user);
+using CompiledReset = std::uint32_t (*)(std::uint32_t mode, double t, double* x, std::size_t n,
+                                        void* user);
+
+struct CallbackGuard {
+    std::string name;
+    GuardInfo info;
+    Function value, rate, reset, rest, enabled;
+    Function speed_bound, acceleration_bound, lower_bound, upper_bound;
+    double lipschitz = 1;
+    std::vector<bool> in_mode;  ///< empty: in every mode
+};
+
+class CallbackSource final : public Source {
+public:
+    /// @param specification  a dictionary that `System` in Python makes
+    /// @throws PythonError if something in it is missing, or of another type
+    explicit CallbackSource(PyObject* specification);
+
+    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0,
+                                                const Request& request) const override;
+    [[nodiscard]] std::vector<std::string> mode_names() const override;
+    [[nodiscard]] std::vector<std::string> guard_names() const override;
+
+private:
+    friend class CallbackDoor;
+
+    void read_guard(PyObject* specification);
+    void fill_table();
+
+    std::string name_;
+    Function flow_, guard_values_, reset_set_;
+    Function next_time_event_, previous_time_event_, time_reset_;
+    std::vector<CallbackGuard> guards_;
+    std::vector<Ref> arguments_;    ///< further ones, of every function
+    Ref mode_list_, mode_numbers_;  ///< null without modes; what modes are called, and back
+    std::size_t mode_count_ = 0;
+    bool moded_ = false;
+    bool free_ = false;  ///< no function of it needs the interpreter
+    detail::SystemTable<State> table_;
+};
+
+}  // namespace ricochet::python

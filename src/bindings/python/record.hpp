@@ -1,0 +1,134 @@
+// What a run has computed, as memory that NumPy can look at without a copy.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "request.hpp"
+#include "ricochet/integrate/run.hpp"
+
+namespace ricochet::python {
+
+/// One event up to its states, which follow it: `before`, then `after`, each of as many doubles
+/// as the widest state of the run has.
+struct EventHead {
+    double t;
+    std::int64_t guard;  ///< -1: none
+    double bracket[2];
+    double slope;
+    double error;
+    std::uint32_t mode_before;
+    std::uint32_t mode_after;
+    std::uint8_t kind;
+    bool late;
+    std::uint8_t unused[6];
+};
+static_assert(sizeof(EventHead) == 64);
+
+struct Record {
+    Outcome outcome = Outcome::reached_end;
+    double t = 0;
+    std::vector<double> x;
+    Mode mode = 0;
+    std::int64_t guard = -1;
+    std::int64_t other_guard = -1;
+    Statistics statistics;
+    std::size_t width = 0;  ///< components of the widest state; narrower ones end in NaN
+    std::size_t event_count = 0;
+    std::vector<double> events;  ///< heads with their states, in units of 8 bytes
+    std::vector<double> times;
+    std::vector<double> states;                 ///< row after row of `width`
+    std::shared_ptr<Solution<State>> solution;  ///< null: not kept
+    std::vector<double> scale;                  ///< of the states in `solution`
+    std::string wrong_bound;                    ///< what is known of one, as a sentence
+
+    [[nodiscard]] std::size_t event_stride() const noexcept
+    {
+        return sizeof(EventHead) / sizeof(double) + 2 * width;
+    }
+};
+
+/// Writes x, times `scale`, to `out`, and NaN up to `width`.
+template <class X>
+void put_state(const X& x, const std::vector<double>& scale, std::size_t width, double* out)
+{
+    for (std::size_t i = 0; i < width; ++i) {
+        const bool scaled = i < scale.size();
+        out[i] = i >= x.size() ? std::numeric_limits<double>::quiet_NaN()
+                 : scaled      ? x[i] * scale[i]
+                               : x[i];
+    }
+}
+
+/// @param times, states  at the ends of steps, where they are to be kept; else those of the
+///                       trajectory are
+template <class X>
+[[nodiscard]] Record record_of(Run<X>&& run, const std::vector<double>& scale,
+                               const Trajectory<X>* steps = nullptr)
+{
+    Record out;
+    const Trajectory<X>& kept = steps ? *steps : run.trajectory;
+    const auto signed_guard = [](std::size_t guard) { return static_cast<std::int64_t>(guard); };
+    out.outcome = run.outcome;
+    out.t = run.t;
+    out.width = run.x.size();
+    for (const Event<X>& event : run.events) {
+        out.width = std::max({out.width, event.before.size(), event.after.size()});
+    }
+    for (const X& x : kept.x) out.width = std::max(out.width, x.size());
+    out.x.resize(run.x.size());
+    put_state(run.x, scale, out.x.size(), out.x.data());
+    out.mode = run.mode;
+    out.guard = signed_guard(run.guard);
+    out.other_guard = signed_guard(run.other_guard);
+    out.statistics = run.statistics;
+    out.event_count = run.events.size();
+    out.events.resize(out.event_count * out.event_stride());
+    double* at = out.events.data();
+    for (const Event<X>& event : run.events) {
+        const EventHead head{.t = event.t,
+                             .guard = signed_guard(event.guard),
+                             .bracket = {event.bracket.lo, event.bracket.hi},
+                             .slope = event.slope,
+                             .error = event.error,
+                             .mode_before = event.mode_before,
+                             .mode_after = event.mode_after,
+                             .kind = static_cast<std::uint8_t>(event.kind),
+                             .late = event.late,
+                             .unused = {}};
+        std::memcpy(at, &head, sizeof head);
+        double* states = at + sizeof(EventHead) / sizeof(double);
+        put_state(event.before, scale, out.width, states);
+        put_state(event.after, scale, out.width, states + out.width);
+        at += out.event_stride();
+    }
+    out.times = kept.t;
+    out.states.resize(kept.x.size() * out.width);
+    for (std::size_t i = 0; i < kept.x.size(); ++i) {
+        put_state(kept.x[i], scale, out.width, out.states.data() + i * out.width);
+    }
+    if constexpr (std::is_same_v<X, State>) {
+        if (!run.solution.empty()) {
+            out.solution = std::make_shared<Solution<State>>(std::move(run.solution));
+        }
+    }
+    out.scale = scale;
+    if (run.wrong_bound) {
+        const auto& wrong = *run.wrong_bound;
+        out.wrong_bound = "at t = " + std::to_string(wrong.t) + " the guard is " +
+                          std::to_string(wrong.value) + ", and " +
+                          (wrong.lower_bound   ? "its lower bound "
+                           : wrong.upper_bound ? "its upper bound "
+                                               : "it may have changed by ") +
+                          std::to_string(wrong.allowed);
+    }
+    return out;
+}
+
+}  // namespace ricochet::python

@@ -1,0 +1,86 @@
+#include "request.hpp"
+
+#include <span>
+#include <stdexcept>
+#include <string>
+
+#include "ricochet/detail/finders.hpp"
+#include "ricochet/detail/kernels.hpp"
+#include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/toms748.hpp"
+
+namespace ricochet::python {
+
+namespace {
+
+/// In the place of a system in the tables of detectors, which ask it for nothing but bounds, and
+/// for these through the table of the run.
+struct SomeSystem {
+    void flow(double /*t*/, const State& /*x*/, State& /*dxdt*/) const {}
+    [[nodiscard]] double guard(double /*t*/, const State& /*x*/) const { return 1; }
+    [[nodiscard]] double speed_bound(double /*t*/, const State& /*x*/) const { return 0; }
+};
+
+template <class Detector>
+void detect_by(detail::RunSetup<State>& setup)
+{
+    static const Detector detector{};
+    setup.detector = detail::DetectorTableOf<Detector, SomeSystem, State>::make(detector);
+    setup.detecting = &detector;
+}
+
+template <class Locator>
+void locate_by(detail::RunSetup<State>& setup)
+{
+    static const Locator locator{};
+    setup.locator = detail::locator_table<Locator>();
+    setup.locating = &locator;
+}
+
+[[noreturn]] void refuse(const char* option, std::string_view given, const char* expected)
+{
+    throw std::invalid_argument(std::string(option) + ": found '" + std::string(given) +
+                                "', expected " + expected);
+}
+
+}  // namespace
+
+detail::RunSetup<State> setup_for(const Request& request)
+{
+    detail::RunSetup<State> setup;
+    setup.kernel = &detail::kernel_by_name<State>(request.method);
+    setup.method_by_name = true;
+    setup.error_controlled = !request.fixed;
+    setup.stepping = request.fixed ? detail::written_type<FixedStep<MethodByName>>()
+                                   : detail::written_type<ErrorControlled<MethodByName>>();
+    const std::string_view detector = request.detector;
+    if (detector == "extremum") {
+        detect_by<Extremum>(setup);
+    } else if (detector == "ends") {
+        detect_by<Ends>(setup);
+    } else if (detector == "bernstein") {
+        detect_by<Bernstein>(setup);
+    } else if (detector == "planned") {
+        detect_by<Planned<>>(setup);
+    } else {
+        refuse("detector", detector, "'extremum', 'ends', 'bernstein' or 'planned'");
+    }
+    const std::string_view locator = request.locator;
+    if (locator == "newton") {
+        locate_by<Newton>(setup);
+    } else if (locator == "bisection") {
+        locate_by<Bisection>(setup);
+    } else if (locator == "toms748") {
+        locate_by<Toms748>(setup);
+    } else {
+        refuse("locator", locator, "'newton', 'bisection' or 'toms748'");
+    }
+    return setup;
+}
+
+}  // namespace ricochet::python

@@ -1,0 +1,94 @@
+// A system, whatever it is made of, at the door of a run.
+#pragma once
+
+#include "python_error.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "record.hpp"
+#include "request.hpp"
+
+namespace ricochet::python {
+
+/// Lets Python treat signals, such as an interrupt, while a run goes on without the interpreter.
+///
+/// `tick` is called by the functions of a system. Every few milliseconds it takes the
+/// interpreter for long enough to have signals handled; where a handler raises an exception the
+/// run is cancelled, and ends after the step in progress.
+class SignalWatch {
+public:
+    void tick() noexcept
+    {
+        if (--ticks_left_ == 0) [[unlikely]]
+            look();
+    }
+    [[nodiscard]] const std::atomic<bool>* cancelled() const noexcept { return &cancelled_; }
+    /// What a handler has raised.
+    [[nodiscard]] const std::optional<PythonError>& raised() const noexcept { return raised_; }
+
+private:
+    using Clock = std::chrono::steady_clock;
+
+    void look() noexcept;
+
+    std::uint32_t ticks_left_ = 16;
+    std::uint32_t ticks_between_ = 16;
+    std::atomic<bool> cancelled_ = false;
+    Clock::time_point looked_{};
+    Clock::time_point handled_{};
+    std::optional<PythonError> raised_;
+};
+
+/// A system at the door of one run.
+class RunDoor {
+public:
+    RunDoor() = default;
+    RunDoor(const RunDoor&) = delete;
+    RunDoor& operator=(const RunDoor&) = delete;
+    virtual ~RunDoor() = default;
+
+    [[nodiscard]] virtual const detail::SystemTable<State>& table() const noexcept = 0;
+    [[nodiscard]] virtual void* door() noexcept = 0;
+    /// Whether no function of it needs the interpreter.
+    [[nodiscard]] virtual bool is_free() const noexcept = 0;
+
+    [[nodiscard]] SignalWatch& watch() noexcept { return watch_; }
+
+protected:
+    SignalWatch watch_;
+};
+
+class Source {
+public:
+    Source() = default;
+    Source(const Source&) = delete;
+    Source& operator=(const Source&) = delete;
+    virtual ~Source() = default;
+
+    /// The system at the door of a run, which the source outlives.
+    /// @throws std::invalid_argument for a start or a request that it cannot serve.
+    [[nodiscard]] virtual std::unique_ptr<RunDoor> open(const State& x0,
+                                                        const Request& request) const = 0;
+
+    /// The whole run by a loop made for this system, if there is one for such a request. Does not
+    /// need the interpreter.
+    [[nodiscard]] virtual std::optional<Record> run_whole(const State& /*x0*/,
+                                                          const Request& /*request*/,
+                                                          SignalWatch& /*watch*/) const
+    {
+        return std::nullopt;
+    }
+
+    /// What the modes are called, empty where they are numbers.
+    [[nodiscard]] virtual std::vector<std::string> mode_names() const = 0;
+    [[nodiscard]] virtual std::vector<std::string> guard_names() const = 0;
+    [[nodiscard]] virtual Mode start_mode() const noexcept { return 0; }
+};
+
+}  // namespace ricochet::python

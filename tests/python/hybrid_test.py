@@ -1,0 +1,376 @@
+"""Resets, modes, ready systems, simulations, results."""
+
+import copy
+import enum
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import ricochet
+from ricochet import Kind
+
+
+def ball_events(restitution=0.9, **more):
+    def floor(t, y):
+        return y[0]
+
+    floor.reset = lambda t, y: [0.0, -restitution * y[1]]
+    floor.direction = -1
+    for name, value in more.items():
+        setattr(floor, name, value)
+    return floor
+
+
+def fall(t, y):
+    return [y[1], -9.81]
+
+
+class Ball(ricochet.System):
+    unilateral = True
+    restitution = 0.5
+
+    def flow(self, t, x):
+        return [x[1], -9.81]
+
+    def guard(self, t, x):
+        return x[0]
+
+    def reset(self, t, x):
+        return [0.0, -self.restitution * x[1]]
+
+    def rest(self, t, x):
+        return np.zeros(2)
+
+
+def test_impacts_by_callbacks_are_those_of_the_closed_form():
+    ready = ricochet.BouncingBall()
+    exact = [ready.impact_time(n, 10.0) for n in range(13)]
+    result = ricochet.solve_ivp(fall, (0, 20.5), [10.0, 0.0], events=ball_events(), rtol=1e-10,
+                                atol=1e-10)
+    assert np.abs(result.t_events[0] - exact).max() < 4e-14
+    assert result.y_events[0].shape == result.y_events_after[0].shape == (13, 2)
+    np.testing.assert_allclose(result.y_events_after[0][:, 1], -0.9 * result.y_events[0][:, 1])
+    assert result.kinds == [["crossing"] * 13]
+    assert result.statistics.evidence.checked > 0
+    # Both sides of every reset are shown.
+    assert np.count_nonzero(np.diff(result.t) == 0) == 13
+    run = ricochet.integrate(ready, [10.0, 0.0], 20.5, rtol=1e-10)
+    assert np.abs(run.events["t"] - exact).max() < 4e-14
+
+
+def test_a_ball_that_comes_to_rest():
+    exact = ricochet.BouncingBall(restitution=0.5).zeno_time(1.0)
+    floor = ball_events(0.5, rest=lambda t, y: [0.0, 0.0], unilateral=True, name="floor")
+    result = ricochet.solve_ivp(fall, (0, 10), [1.0, 0.0], events=floor, t_eval=[5.0])
+    assert result.kinds[0][-1] == "accumulation" and np.array_equal(result.y[:, -1], [0, 0])
+    run = ricochet.integrate(Ball(), [1.0, 0.0], 10.0)
+    assert run.outcome == "reached_end" and run.events["kind"][-1] == Kind.ACCUMULATION
+    assert run.events["t"][-1] == pytest.approx(exact, abs=1e-12)
+    without = ricochet.solve_ivp(fall, (0, 10), [1.0, 0.0], events=ball_events(0.5))
+    assert without.status == -1 and without.outcome == "zeno" and without.message
+
+
+def test_python_and_cpp_give_the_same_bits():
+    # With the guard's rate in closed form, as in C++, both take the same steps.
+    class Same(Ball):
+        restitution = 0.9
+
+        def guard_rate(self, t, x, dxdt):
+            return dxdt[0]
+
+        def reset(self, t, x):
+            return [0.0, x[1] * -0.9]
+
+    ready = ricochet.integrate(ricochet.BouncingBall(), [10.0, 0.0], 20.5)
+    own = ricochet.integrate(Same(), [10.0, 0.0], 20.5)
+    assert np.array_equal(ready.events["t"], own.events["t"])
+    assert np.array_equal(ready.events["before"], own.events["before"])
+
+
+class Room(enum.Enum):
+    OFF = 0
+    ON = 1
+
+
+class Thermostat(ricochet.System):
+    modes = Room
+
+    def flow(self, mode, t, x):
+        return [-0.1 * (x[0] - (0.0 if mode is Room.OFF else 30.0))]
+
+    @ricochet.guard(in_modes=[Room.OFF])
+    def too_cold(self, mode, t, x):
+        return x[0] - 18
+
+    @too_cold.reset
+    def too_cold(self, mode, t, x):
+        return Room.ON
+
+    @ricochet.guard(in_modes=[Room.ON])
+    def too_warm(self, mode, t, x):
+        return 22 - x[0]
+
+    @too_warm.reset
+    def too_warm(self, mode, t, x):
+        return Room.OFF, x
+
+
+def test_modes_of_a_thermostat():
+    ready = ricochet.Thermostat()
+    exact = [ready.switch_time(n) for n in range(16)]
+    own = ricochet.integrate(Thermostat(), [20.0], 48.0, mode=Room.OFF)
+    theirs = ricochet.integrate(ready, [20.0], 48.0, mode="off")
+    for run, on in ((own, Room.ON), (theirs, "on")):
+        np.testing.assert_allclose(run.events["t"], exact[:len(run.events)], rtol=1e-8)
+        assert len(run.events) == 16
+        assert run.events["mode_after"].tolist() == [1, 0] * 8
+        assert run.mode == (Room.OFF if on is Room.ON else "off")
+    assert own.guard_names == ["too_cold", "too_warm"]
+    result = ricochet.solve_ivp(Thermostat(), (0, 48), [20.0], rtol=1e-8)
+    assert result.modes[0].tolist() == [[0, 1]] * 8
+
+
+def test_systems_from_functions_time_events_and_sets():
+    # A capacitor that is charged at known times and discharged at a threshold, both at once
+    # at t = 2.
+    fired = []
+
+    def together(t, x, numbers):
+        fired.append((t, numbers))
+        return [0.0]
+
+    system = ricochet.System(lambda t, x: [1.0], name="capacitor", time_events=[1, 2, 4],
+                             guards=[ricochet.Guard(lambda t, x: 2.0 - x[0], name="full"),
+                                     ricochet.Guard(lambda t, x: 2.0 - x[0], name="again")],
+                             reset_set=together)
+    run = ricochet.integrate(system, [0.0], 5.0)
+    assert run.outcome == "reached_end"
+    assert fired[0] == (2.0, [0, 1, "time"]) or fired[0] == (2.0, [0, 1])
+    assert Kind.TIME in run.events["kind"]
+    timed = ricochet.System(lambda t, x: [1.0], time_events=[1, 3],
+                            time_reset=lambda t, x: [x[0] + 10])
+    assert ricochet.integrate(timed, [0.0], 5.0).x[0] == pytest.approx(25)
+    assert ricochet.integrate(timed, [0.0], 0.0, t_start=5.0).x[0] == pytest.approx(15)
+
+
+def test_states_that_change_their_length():
+    class Growing(ricochet.System):
+        def flow(self, t, x):
+            return np.ones(len(x))
+
+        @ricochet.guard(direction=1)
+        def whole(self, t, x):
+            return x[0] - 1
+
+        @whole.reset
+        def whole(self, t, x):
+            return [x[0] - 1, 0.0, *x[1:]]
+
+    system = Growing(changes_dimension=True)
+    run = ricochet.integrate(system, [0.0], 3.5, record_steps=True)
+    assert run.x == pytest.approx([0.5, 0.5, 1.5, 2.5])
+    assert run.events["before"].shape == (3, 4) and np.isnan(run.events["before"][0, 1:]).all()
+    assert len(run.solution(1.5)) == 2
+
+
+def test_joint_guards_and_planned_checks():
+    class Box(ricochet.System):
+        guards = [ricochet.Guard(name=n) for n in ("floor", "wall")]
+
+        def flow(self, t, x):
+            return [x[1], -1.0]
+
+        def guard_values(self, t, x):
+            return np.array([x[0], 5.0 - x[0]])
+
+    run = ricochet.integrate(Box(), [1.0, 0.0], 3.0)
+    assert run.events["guard"].tolist() == [0]
+    assert run.events["t"][0] == pytest.approx(math.sqrt(2), abs=1e-12)
+
+    def planned(**options):
+        bounded = ricochet.Guard(lambda t, x: x[0], reset=lambda t, x: [0.0, -0.9 * x[1]],
+                                 speed_bound=lambda t, x: abs(x[1]),
+                                 acceleration_bound=lambda t, x: 9.81)
+        system = ricochet.System(fall, [bounded])
+        return ricochet.integrate(system, [10.0, 0.0], 15.0, method="rk4", fixed=True, step=0.01,
+                                  **options)
+
+    sparse, dense = planned(detector="planned"), planned()
+    assert np.array_equal(sparse.events["t"], dense.events["t"])
+    assert sparse.statistics.guard_calls < dense.statistics.guard_calls / 4
+    assert sparse.statistics.evidence.proved > 0
+
+
+def test_ready_systems_agree_with_what_is_known():
+    impact = ricochet.ImpactOscillator()
+    run = ricochet.integrate(impact, impact.start, 100.0, rtol=1e-11, atol=1e-12)
+    exact = impact.impacts(100.0)
+    assert len(exact) == len(run.events)
+    np.testing.assert_allclose(run.events["t"], exact, atol=1e-7)
+    pendulum = ricochet.Pendulum(length=2.0)
+    run = ricochet.integrate(pendulum, [-0.5, 0.0], 10.0, method="fehlberg78", rtol=1e-12)
+    half = pendulum.half_period(-0.5)
+    np.testing.assert_allclose(run.events["t"], half * np.arange(1, len(run.events) + 1), rtol=1e-9)
+    coulomb = ricochet.CoulombOscillator()
+    run = ricochet.integrate(coulomb, coulomb.start, 20.0)
+    assert run.mode == "stick"
+    assert run.x[0] == pytest.approx(coulomb.turning_point(3), abs=1e-6)
+    slip = ricochet.StickSlip()
+    run = ricochet.integrate(slip, slip.start, slip.period, rtol=1e-11, atol=1e-12)
+    assert run.events["t"][-1] == pytest.approx(slip.period, abs=1e-8)
+    assert slip.weakening == 3.0 and slip.parameters["mass"] == 1.0
+    assert repr(pickle.loads(pickle.dumps(slip))) == repr(slip)
+
+
+def test_results_are_views_and_survive_what_they_came_from():
+    run = ricochet.integrate(ricochet.BouncingBall(), [10.0, 0.0], 20.5, record_steps=True)
+    events = run.events
+    assert events.base is not None and not events.flags.writeable
+    assert np.shares_memory(events, run.events) and np.shares_memory(run.states, run.states)
+    with pytest.raises(ValueError):
+        events["t"][0] = 1
+    kept = events["t"].copy()
+    del run
+    assert np.array_equal(events["t"], kept)
+
+
+def test_pickled_results_are_the_same():
+    run = ricochet.integrate(Ball(), [1.0, 0.0], 2.0, record_steps=True)
+    for again in (pickle.loads(pickle.dumps(run)), copy.deepcopy(run)):
+        assert again.events.tobytes() == run.events.tobytes()
+        assert np.array_equal(again.states, run.states) and again.outcome == run.outcome
+        assert vars(again.statistics) == vars(run.statistics)
+        t = np.linspace(0, 2, 33)
+        assert np.array_equal(again.solution(t), run.solution(t))
+    result = ricochet.solve_ivp(fall, (0, 5), [1.0, 0.0], events=ball_events(), dense_output=True)
+    again = pickle.loads(pickle.dumps(result))
+    assert np.array_equal(again.sol(t), result.sol(t)) and again.kinds == result.kinds
+
+
+def test_what_a_callback_keeps_does_not_change():
+    kept = []
+
+    def flow(t, y):
+        kept.append((t, y, y.copy(), y[::2]))
+        return [y[1], -9.81]
+
+    ricochet.solve_ivp(flow, (0, 1), [1.0, 0.0])
+    for _, y, then, part in kept:
+        assert np.array_equal(y, then) and np.array_equal(part, then[::2])
+
+
+def test_a_simulation_by_hand():
+    ball = Ball()
+    ball.restitution = 0.9
+    simulation = ricochet.Simulation(ball, [10.0, 0.0], 20.5)
+    times = []
+    while simulation.advance():
+        times.append(simulation.t)
+        if len(times) == 4:
+            snapshot = pickle.loads(pickle.dumps(simulation.save()))
+    run = simulation.finish()
+    assert run.events["t"].tolist()[:len(times)] == times[:13]
+    other = ricochet.Simulation(ball, [10.0, 0.0], 20.5)
+    other.restore(ricochet.Snapshot.from_text(snapshot.text))
+    assert other.t == times[3]
+    rest = other.run_to_end()
+    assert np.array_equal(rest.events["t"], run.events["t"][4:])
+    assert np.array_equal(rest.x, run.x)
+    ready = ricochet.Simulation(ricochet.StickSlip(), [1.0, 0.2], 30.0, sample_times=[1, 2])
+    modes = {ready.mode for _ in ready}
+    assert modes == {"stick", "slip-left"}
+    steps = 0
+    stepped = ricochet.Simulation(ricochet.Pendulum(), [0.1, 0.0], 1.0)
+    while stepped.step():
+        steps += 1
+    assert steps > 3 and stepped.ended and not stepped.step()
+    assert stepped.run.t == 1.0
+
+
+def test_pictures(tmp_path):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    run = ricochet.integrate(Ball(), [1.0, 0.0], 2.0, record_steps=True)
+    ax = ricochet.plot(run, labels=["height", "velocity"])
+    assert np.isnan(ax.lines[0].get_xdata()).any()
+    ricochet.plot(run, phase=(0, 1), ax=pyplot.subplots()[1])
+    pyplot.close("all")
+    with pytest.raises(ValueError, match="without states"):
+        ricochet.plot(ricochet.integrate(Ball(), [1.0, 0.0], 2.0))
+
+
+# --- compiled functions ---
+
+SOURCE = """
+#include <stdint.h>
+#include <stddef.h>
+void flow(uint32_t mode, double t, const double *x, double *dxdt, size_t n, void *user)
+{ (void)mode; (void)t; (void)n; dxdt[0] = x[1]; dxdt[1] = -*(const double *)user; }
+double height(uint32_t mode, double t, const double *x, size_t n, void *user)
+{ (void)mode; (void)t; (void)n; (void)user; return x[0]; }
+double rate(uint32_t mode, double t, const double *x, const double *dxdt, size_t n, void *user)
+{ (void)mode; (void)t; (void)x; (void)n; (void)user; return dxdt[0]; }
+uint32_t bounce(uint32_t mode, double t, double *x, size_t n, void *user)
+{ (void)t; (void)n; (void)user; x[0] = 0; x[1] *= -0.9; return mode; }
+"""
+
+
+def compiled_ball(flow, height, rate, bounce):
+    guard = ricochet.Guard(ricochet.Compiled(height), rate=ricochet.Compiled(rate),
+                           reset=ricochet.Compiled(bounce), name="floor", unilateral=True)
+    return ricochet.System(flow, [guard])
+
+
+def expect_ball(system):
+    run = ricochet.integrate(system, [10.0, 0.0], 20.5)
+    ready = ricochet.integrate(ricochet.BouncingBall(), [10.0, 0.0], 20.5)
+    assert np.array_equal(run.events["t"], ready.events["t"])
+
+
+def test_functions_of_ctypes(tmp_path):
+    import ctypes
+    import shutil
+    import subprocess
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no compiler of C was found")
+    (tmp_path / "ball.c").write_text(SOURCE)
+    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", tmp_path / "ball.so",
+                    tmp_path / "ball.c"], check=True)
+    library = ctypes.CDLL(str(tmp_path / "ball.so"))
+    gravity = np.array([9.81])
+    flow = ricochet.Compiled(library.flow, user=gravity)
+    expect_ball(compiled_ball(flow, library.height, library.rate, library.bounce))
+    result = ricochet.solve_ivp(ricochet.Compiled(library.flow, gravity), (0, 1), [10.0, 0.0],
+                                events=ricochet.Compiled(library.height), atol=[1e-6, 1e-3])
+    assert result.y[0, -1] == pytest.approx(10 - 9.81 / 2, rel=1e-9)
+
+
+def test_functions_of_cffi():
+    cffi = pytest.importorskip("cffi")
+    ffi = cffi.FFI()
+    gravity = ffi.new("double *", 9.81)
+
+    @ffi.callback(ricochet.C_FLOW)
+    def flow(mode, t, x, dxdt, n, user):
+        dxdt[0], dxdt[1] = x[1], -ffi.cast("double *", user)[0]
+
+    result = ricochet.solve_ivp(ricochet.Compiled(flow, gravity), (0, 1), [10.0, 0.0])
+    assert result.y[0, -1] == pytest.approx(10 - 9.81 / 2, rel=1e-9)
+
+
+def test_functions_of_numba():
+    numba = pytest.importorskip("numba")
+    from numba import types as n
+
+    @numba.cfunc(n.void(n.uint32, n.float64, n.CPointer(n.float64), n.CPointer(n.float64),
+                        n.uintp, n.voidptr))
+    def flow(mode, t, x, dxdt, size, user):
+        dxdt[0] = x[1]
+        dxdt[1] = -9.81
+
+    result = ricochet.solve_ivp(ricochet.Compiled(flow), (0, 1), [10.0, 0.0])
+    assert result.y[0, -1] == pytest.approx(10 - 9.81 / 2, rel=1e-9)

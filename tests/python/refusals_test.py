@@ -1,0 +1,388 @@
+"""Wrong input, callbacks that fail, interrupts, threads: a defined error each."""
+
+import _thread
+import math
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import ricochet
+
+
+def decay(t, y):
+    return -y
+
+
+def fall(t, y):
+    return [y[1], -9.81]
+
+
+# --- arguments ---
+
+@pytest.mark.parametrize("y0, error", [
+    ([], ValueError), ([[1.0, 2.0]], ValueError), (1.0, ValueError), ([1j], ValueError),
+    (["a"], (TypeError, ValueError)), ([None], (TypeError, ValueError)), ([math.nan], ValueError),
+    ([math.inf], ValueError), ({"a": 1}, (TypeError, ValueError))])
+def test_starts_that_are_none(y0, error):
+    with pytest.raises(error):
+        ricochet.solve_ivp(decay, (0, 1), y0)
+    with pytest.raises(error):
+        ricochet.integrate(ricochet.System(decay), y0, 1.0)
+
+
+@pytest.mark.parametrize("options, error, words", [
+    ({"method": "RK23"}, ValueError, "RK45"), ({"method": "Radau"}, ValueError, "implicit"),
+    ({"method": "BDF"}, ValueError, "implicit"), ({"method": "LSODA"}, ValueError, "implicit"),
+    ({"method": "rk"}, ValueError, "'rk'"), ({"method": 3}, ValueError, "3"),
+    ({"t_eval": [0.5, 2.0]}, ValueError, "2.0"), ({"t_eval": [-1.0]}, ValueError, "-1.0"),
+    ({"t_eval": [0.5, 0.2]}, ValueError, "order"), ({"t_eval": [[0.5]]}, ValueError, "dimensions"),
+    ({"t_eval": [math.nan]}, ValueError, "nan"), ({"rtol": math.nan}, ValueError, "rtol"),
+    ({"atol": -1}, ValueError, "atol"),
+    ({"atol": [1, 2]}, ValueError, "shape"), ({"atol": [math.nan]}, ValueError, "atol"),
+    ({"max_step": 0}, ValueError, "max_step"), ({"max_step": -1}, ValueError, "max_step"),
+    ({"first_step": 0}, ValueError, "first_step"), ({"first_step": 5}, ValueError, "first_step"),
+    ({"args": 3}, TypeError, "args"), ({"events": 3}, TypeError, "int"),
+    ({"events": [3]}, TypeError, "int"), ({"rtoll": 1}, TypeError, "rtoll"),
+    ({"record_steps": 1}, TypeError, "record_steps"), ({"detector": "x"}, ValueError, "detector"),
+    ({"max_steps": "many"}, TypeError, "max_steps"), ({"max_steps": -1}, TypeError, "max_steps"),
+])
+def test_options_that_are_none(options, error, words):
+    with pytest.raises(error, match=words):
+        ricochet.solve_ivp(decay, (0, 1), [1.0], **options)
+
+
+@pytest.mark.parametrize("span", [(0,), 5, (0, 1, 2), ("a", "b"), (0, math.nan), (0, math.inf)])
+def test_spans_that_are_none(span):
+    with pytest.raises(ValueError):
+        ricochet.solve_ivp(decay, span, [1.0])
+
+
+def test_functions_that_are_none():
+    with pytest.raises(TypeError, match="int"):
+        ricochet.solve_ivp(3, (0, 1), [1.0])
+    with pytest.raises(TypeError, match="flow"):
+        ricochet.integrate(ricochet.System(), [1.0], 1.0)
+    with pytest.raises(TypeError, match="ricochet.System"):
+        ricochet.integrate(decay, [1.0], 1.0)
+    with pytest.raises(TypeError, match="gravty"):
+        ricochet.BouncingBall(gravty=1.0)
+    with pytest.raises(ValueError, match="restitution"):
+        ricochet.BouncingBall(restitution=1.2)
+    with pytest.raises(ValueError, match="components"):
+        ricochet.integrate(ricochet.BouncingBall(), [1.0], 1.0)
+    with pytest.raises(TypeError, match="t_endd"):
+        ricochet.integrate(ricochet.BouncingBall(), [1.0, 0.0], 1.0, t_endd=2.0)
+    with pytest.raises(ValueError, match="step"):
+        ricochet.integrate(ricochet.BouncingBall(), [1.0, 0.0], 1.0, method="rk4", fixed=True)
+    with pytest.raises(ValueError, match="estimate"):
+        ricochet.integrate(ricochet.BouncingBall(), [1.0, 0.0], 1.0, method="rk4")
+    with pytest.raises(ValueError, match="mode"):
+        ricochet.integrate(ricochet.Thermostat(), [20.0], 1.0, mode="hot")
+    with pytest.raises(ValueError, match="mode"):
+        ricochet.integrate(ricochet.Thermostat(), [20.0], 1.0, mode=7)
+    with pytest.raises(TypeError, match="guards_value"):
+        ricochet.System(decay, guards_value=1)
+    with pytest.raises(TypeError, match="resett"):
+        class Misspelt(ricochet.System):
+            def resett(self, t, x):
+                return x
+    with pytest.raises(ValueError, match="no mode|does not have"):
+        ricochet.integrate(ricochet.System(lambda m, t, x: x, [ricochet.Guard(
+            lambda m, t, x: 1.0, in_modes=["c"])], modes=("a", "b")), [1.0], 1.0)
+    with pytest.raises(TypeError, match="pointer"):
+        ricochet.Compiled("flow")
+    with pytest.raises(ValueError, match="null"):
+        ricochet.Compiled(0)
+    with pytest.raises(ValueError, match="unilateral|reset"):
+        ricochet.integrate(ricochet.System(fall, [ricochet.Guard(
+            lambda t, x: x[0], unilateral=True)]), [1.0, 0.0], 1.0)
+    with pytest.raises(ValueError, match="snapshot|text|checksum"):
+        ricochet.Snapshot.from_text("nothing")
+
+
+# --- what callbacks return ---
+
+@pytest.mark.parametrize("result, error", [
+    (None, TypeError), ([1.0], ValueError), ([1.0, 2.0, 3.0], ValueError), (3.0, ValueError),
+    (np.ones((1, 2)), ValueError), (np.ones((2, 2)), ValueError), ("ab", TypeError),
+    (["a", "b"], TypeError), ([1j, 0], TypeError), (np.array([1j, 0]), TypeError),
+    ([None, 1.0], TypeError), ([[1.0], 2.0], (TypeError, ValueError)), (object(), TypeError),
+    ([], ValueError)])
+def test_flows_that_return_something_else(result, error):
+    with pytest.raises(error, match="flow returned"):
+        ricochet.solve_ivp(lambda t, y: result, (0, 1), [1.0, 2.0])
+
+    def reset(t, y):
+        return result
+
+    def event(t, y):
+        return y[0] - 0.5
+
+    event.reset = reset
+    with pytest.raises(error, match="reset of event returned") as raised:
+        ricochet.solve_ivp(lambda t, y: [-1.0, 0.0], (0, 1), [1.0, 2.0], events=event)
+    assert raised.value.ricochet_run.t <= 0.5
+
+
+@pytest.mark.parametrize("result", [
+    np.arange(2), np.array([1, 2], dtype=np.float32), np.arange(8.0)[::4], (1, True),
+    [np.float64(1), np.int32(2)], np.asfortranarray([1.0, 2.0]), range(2),
+    np.array([1.0, 2.0], dtype=object), np.array([1.0, 2.0]).astype(">f8")])
+def test_flows_that_return_any_two_numbers(result):
+    expected = 1.0 + np.asarray(result, dtype=float)
+    found = ricochet.solve_ivp(lambda t, y: result, (0, 1), [1.0, 1.0]).y[:, -1]
+    np.testing.assert_allclose(found, expected)
+    start = np.array([1.0, 9.0, 1.0, 9.0])[::2]
+    np.testing.assert_allclose(
+        ricochet.solve_ivp(lambda t, y: result, (0, 1), start).y[:, -1], expected)
+
+
+@pytest.mark.parametrize("result", [None, "a", 1j, np.complex128(1j), [1.0, 2.0], np.ones(2)])
+def test_events_that_return_something_else(result):
+    with pytest.raises(TypeError, match="returned .* expected a number"):
+        ricochet.solve_ivp(decay, (0, 1), [1.0], events=lambda t, y: result)
+
+
+def test_events_that_return_arrays_of_one_and_truths():
+    result = ricochet.solve_ivp(lambda t, y: [-1.0], (0, 1), [1.0], max_step=0.1,
+                                events=[lambda t, y: y - 0.5, lambda t, y: bool(y[0] > 0.25),
+                                        lambda t, y: y[0] > 0.25])
+    assert result.t_events[0] == pytest.approx([0.5])
+    assert result.t_events[1] == pytest.approx([0.75])
+    assert result.t_events[2] == pytest.approx([0.75])
+
+
+def test_modes_that_there_are_not():
+    def system(result):
+        return ricochet.System(lambda mode, t, x: [-1.0], [ricochet.Guard(
+            lambda mode, t, x: x[0], reset=lambda mode, t, x: result, name="g")], modes=("a", "b"))
+
+    for result in ("c", None, 0, ("c", [1.0]), ("b", [1.0], 3), ("b", None), [1.0], ["b"]):
+        with pytest.raises((ValueError, TypeError), match="reset of g"):
+            ricochet.integrate(system(result), [0.5], 1.0)
+    assert ricochet.integrate(system("b"), [0.5], 1.0).mode == "b"
+
+
+def test_numbers_that_are_none():
+    found = ricochet.solve_ivp(lambda t, y: [math.nan if t > 0.5 else 1.0], (0, 1), [1.0])
+    assert found.status == -1 and found.outcome == "non_finite" and not found.success
+    assert found.t[-1] <= 0.5
+
+    def event(t, y):
+        return y[0] - 1.25
+
+    event.reset = lambda t, y: [math.nan]
+    found = ricochet.solve_ivp(lambda t, y: [1.0], (0, 1), [1.0], events=event)
+    assert found.status == -1 and found.outcome == "non_finite"
+    with pytest.raises(ValueError, match="guard|finite"):
+        ricochet.solve_ivp(decay, (0, 1), [1.0], events=lambda t, y: math.nan)
+
+
+# --- exceptions ---
+
+class Mine(Exception):
+    pass
+
+
+@pytest.mark.parametrize("method", ["dopri5", "fehlberg78"])
+@pytest.mark.parametrize("where", ["flow", "guard", "reset", "rest", "enabled", "rate"])
+def test_an_exception_at_any_call_arrives_as_it_is(where, method):
+    # Raised at the first call, the second, ... until a run has none left: wherever in the
+    # library that is, nothing is lost and nothing crashes.
+    calls = 0
+    fatal = 0
+    thrown = Mine("unchanged")
+
+    def count(name):
+        nonlocal calls
+        if name == where:
+            calls += 1
+            if calls == fatal:
+                raise thrown
+
+    class Ball(ricochet.System):
+        def flow(self, t, x):
+            count("flow")
+            at_rest = x[0] == 0 and x[1] == 0
+            return [x[1], 0.0 if at_rest else -9.81 - 0.1 * x[1], 1.0]
+
+        @ricochet.guard(unilateral=True)
+        def floor(self, t, x):
+            count("guard")
+            return x[0]
+
+        @floor.reset
+        def floor(self, t, x):
+            count("reset")
+            return [0.0, -0.4 * x[1], x[2]]
+
+        @floor.rest
+        def floor(self, t, x):
+            count("rest")
+            return [0.0, 0.0, x[2]]
+
+        @floor.enabled
+        def floor(self, t, x):
+            count("enabled")
+            return True
+
+        if where == "rate":
+            @floor.rate
+            def floor(self, t, x, dxdt):
+                count("rate")
+                return dxdt[0]
+
+        @ricochet.guard(direction=0)
+        def middle(self, t, x):
+            return x[2] - 0.3
+
+    ball = Ball()
+    while True:
+        calls, fatal = 0, fatal + 1 + fatal // 20
+        try:
+            run = ricochet.integrate(ball, [0.5, 0.0, 0.0], 1.0, method=method,
+                                     sample_times=[0.25, 0.5])
+        except Mine as error:
+            assert error is thrown
+            so_far = error.ricochet_run
+            assert 0 <= so_far.t <= 1 and so_far.outcome == "cancelled"
+            assert so_far.events.size == 0 or so_far.events["t"].max() <= so_far.t + 1e-9
+        else:
+            break
+    assert fatal > 1 and run.outcome == "reached_end"
+
+
+def test_a_simulation_ends_with_an_exception():
+    def flow(t, x):
+        if t > 0.5:
+            raise Mine
+        return [1.0]
+
+    simulation = ricochet.Simulation(ricochet.System(flow), [0.0], 1.0, h_max=0.1)
+    with pytest.raises(Mine) as raised:
+        while simulation.step():
+            pass
+    assert 0.3 < raised.value.ricochet_run.t <= 0.5
+    assert simulation.ended and not simulation.step() and not simulation.advance()
+    assert simulation.finish().t == raised.value.ricochet_run.t
+
+
+# --- interrupts ---
+
+def slow_ready():
+    # Some hours of impacts.
+    return ricochet.integrate(ricochet.ImpactOscillator(), [0.0, 0.0], 1e12, rtol=1e-10,
+                              record_events=False)
+
+
+def slow_quiet():
+    return ricochet.integrate(ricochet.Pendulum(), [0.1, 0.0], 1e12, h_max=1e-3,
+                              record_events=False)
+
+
+def slow_simulation():
+    simulation = ricochet.Simulation(ricochet.ImpactOscillator(wall=1e9), [0.0, 0.0], 1e12)
+    simulation.advance()
+
+
+def slow_callbacks():
+    ricochet.solve_ivp(lambda t, y: [y[1], -y[0]], (0, 1e12), [1.0, 0.0], max_step=1e-3,
+                       t_eval=[])
+
+
+@pytest.mark.parametrize("run", [slow_ready, slow_quiet, slow_simulation, slow_callbacks])
+def test_an_interrupt_ends_a_run_within_a_tenth_of_a_second(run):
+    sent = None
+
+    def send():
+        nonlocal sent
+        time.sleep(0.2)
+        sent = time.perf_counter()
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt) as raised:
+        run()
+    took = time.perf_counter() - sent
+    thread.join()
+    # A loaded machine may let the thread of the test wait for as long again.
+    assert took < 0.3
+    assert raised.value.ricochet_run.t > 0
+
+
+# --- threads ---
+
+def test_other_threads_go_on_while_a_ready_system_runs():
+    counted = 0
+    done = False
+
+    def count():
+        nonlocal counted
+        while not done:
+            counted += 1
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = counted
+    ricochet.integrate(ricochet.ImpactOscillator(), [0.0, 0.0], 1e9, max_steps=500_000,
+                       record_events=False)
+    during = counted - before
+    done = True
+    thread.join()
+    assert during > 10_000
+
+
+def test_two_threads_on_one_simulation():
+    simulation = ricochet.Simulation(ricochet.ImpactOscillator(), [0.0, 0.0], 1e9,
+                                     max_steps=500_000, record_events=False)
+    errors = []
+    thread = threading.Thread(target=lambda: simulation.run_to_end())
+    thread.start()
+    time.sleep(0.05)
+    for use in (simulation.step, simulation.save, lambda: simulation.t, lambda: simulation.x,
+                simulation.finish):
+        if thread.is_alive():
+            try:
+                use()
+            except RuntimeError as error:
+                errors.append(str(error))
+    thread.join()
+    assert not errors or all("in use" in error for error in errors)
+    # For certain: a callback that asks the simulation which has called it.
+    asked = []
+
+    def flow(t, x):
+        try:
+            asked.append(own.step())
+        except NameError:
+            pass  # at the start
+        except RuntimeError as error:
+            asked.append(str(error))
+        return [1.0]
+
+    own = ricochet.Simulation(ricochet.System(flow), [0.0], 1.0)
+    own.step()
+    assert asked and all("in use" in str(answer) for answer in asked)
+
+
+def test_one_system_in_many_threads():
+    system = ricochet.System(fall, [ricochet.Guard(
+        lambda t, x: x[0], reset=lambda t, x: [0.0, -0.9 * x[1]])])
+    expected = ricochet.integrate(system, [10.0, 0.0], 15.0).events["t"]
+    found = [None] * 4
+
+    def run(k):
+        found[k] = ricochet.integrate(system, [10.0, 0.0], 15.0).events["t"]
+
+    threads = [threading.Thread(target=run, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for times in found:
+        assert np.array_equal(times, expected)
