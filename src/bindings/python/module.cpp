@@ -30,7 +30,7 @@ namespace ricochet::python {
 
 namespace {
 
-using Core = detail::Core<State>;
+using Loop = detail::AnyLoop<State>;
 
 // --- what is asked ---
 
@@ -356,10 +356,10 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
 
 /// Goes to the end; the state at the end of every step into `steps` if there is one, both sides of
 /// a reset.
-void drive(Core& core, Trajectory<State>* steps)
+void drive(Loop& loop, Trajectory<State>* steps)
 {
     if (!steps) {
-        while (!core.ended()) core.advance_once(true);
+        while (!loop.ended()) loop.advance_once(true);
         return;
     }
     const auto push = [&](double t, const State& x) {
@@ -369,20 +369,20 @@ void drive(Core& core, Trajectory<State>* steps)
         steps->t.push_back(t);
         steps->x.push_back(x);
     };
-    push(core.t(), core.x());
-    std::size_t seen = core.run().events.size();
-    while (!core.ended()) {
-        core.step();
-        const auto& events = core.run().events;
+    push(loop.t(), loop.x());
+    std::size_t seen = loop.run().events.size();
+    while (!loop.ended()) {
+        loop.step();
+        const auto& events = loop.run().events;
         for (; seen < events.size(); ++seen) {
             const auto& event = events[seen];
-            if (event.t == core.t() && event.before != event.after) {
+            if (event.t == loop.t() && event.before != event.after) {
                 push(event.t, event.before);
                 seen = events.size();
                 break;
             }
         }
-        push(core.t(), core.x());
+        push(loop.t(), loop.x());
     }
 }
 
@@ -459,16 +459,16 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
     setup.door = door->door();
     Trajectory<State> steps;
     Trajectory<State>* const kept = request.record_steps ? &steps : nullptr;
-    std::optional<Core> core;
+    std::unique_ptr<Loop> loop;
     try {
-        core.emplace(setup, scaled(x0, request.scale), request.options);
-        work_freely(door->is_free(), [&] { drive(*core, kept); });
+        loop = detail::make_loop(setup, scaled(x0, request.scale), request.options);
+        work_freely(door->is_free(), [&] { drive(*loop, kept); });
     } catch (const PythonError& error) {
         out.record =
-            core ? record_of(core->finish(), request.scale, kept) : start_of(x0, request.options);
+            loop ? record_of(loop->finish(), request.scale, kept) : start_of(x0, request.options);
         raise_with(error, std::move(out));
     }
-    out.record = record_of(core->finish(), request.scale, kept);
+    out.record = record_of(loop->finish(), request.scale, kept);
     if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
     return out;
 }
@@ -491,7 +491,7 @@ public:
         setup.system = &door_->table();
         setup.door = door_->door();
         try {
-            core_.emplace(setup, scaled(x0, request_.scale), request_.options);
+            loop_ = detail::make_loop(setup, scaled(x0, request_.scale), request_.options);
         } catch (const PythonError& error) {
             PyRun run = names_;
             run.record = start_of(x0, request_.options);
@@ -501,17 +501,17 @@ public:
 
     bool step()
     {
-        return use([&] { return core_->step(); });
+        return use([&] { return loop_->step(); });
     }
     bool advance()
     {
-        return use([&] { return core_->advance(); });
+        return use([&] { return loop_->advance(); });
     }
     [[nodiscard]] PyRun run_to_end()
     {
         use([&] {
-            core_->show_all();
-            while (!core_->ended()) core_->advance_once(true);
+            loop_->show_all();
+            while (!loop_->ended()) loop_->advance_once(true);
             return true;
         });
         return finish();
@@ -521,7 +521,7 @@ public:
         const Turn turn(*this);
         if (!finished_) {
             finished_.emplace(names_);
-            finished_->record = record_of(core_->finish(), request_.scale);
+            finished_->record = record_of(loop_->finish(), request_.scale);
         }
         return *finished_;
     }
@@ -529,24 +529,24 @@ public:
     [[nodiscard]] double t()
     {
         const Turn turn(*this);
-        return core_->t();
+        return loop_->t();
     }
     [[nodiscard]] py::array x()
     {
         const Turn turn(*this);
-        State x = core_->x();
+        State x = loop_->x();
         put_state(State(x), request_.scale, x.size(), x.data());
         return py::array_t<double>(static_cast<py::ssize_t>(x.size()), x.data());
     }
     [[nodiscard]] py::object mode()
     {
         const Turn turn(*this);
-        return names_.mode_named(core_->mode());
+        return names_.mode_named(loop_->mode());
     }
     [[nodiscard]] bool ended()
     {
         const Turn turn(*this);
-        return core_->ended();
+        return loop_->ended();
     }
     /// What has been computed so far.
     [[nodiscard]] PyRun so_far()
@@ -554,11 +554,11 @@ public:
         const Turn turn(*this);
         if (finished_) return *finished_;
         PyRun out = names_;
-        Run<State> run = core_->run();
-        run.t = core_->t();
-        run.x = core_->x();
-        run.mode = core_->mode();
-        if (!core_->ended()) run.outcome = Outcome::cancelled;
+        Run<State> run = loop_->run();
+        run.t = loop_->t();
+        run.x = loop_->x();
+        run.mode = loop_->mode();
+        if (!loop_->ended()) run.outcome = Outcome::cancelled;
         out.record = record_of(std::move(run), request_.scale);
         return out;
     }
@@ -566,13 +566,13 @@ public:
     [[nodiscard]] Snapshot save()
     {
         const Turn turn(*this);
-        return core_->save();
+        return loop_->save();
     }
     void restore(const Snapshot& snapshot)
     {
         const Turn turn(*this);
         if (finished_) throw std::runtime_error("Simulation: found finished, expected going on");
-        core_->restore(snapshot);
+        loop_->restore(snapshot);
     }
 
 private:
@@ -613,7 +613,7 @@ private:
     [[noreturn]] void end_with(const PythonError& error)
     {
         finished_.emplace(names_);
-        finished_->record = record_of(core_->finish(), request_.scale);
+        finished_->record = record_of(loop_->finish(), request_.scale);
         raise_with(error, PyRun(*finished_));
     }
 
@@ -621,7 +621,7 @@ private:
     Request request_;
     PyRun names_;
     std::unique_ptr<RunDoor> door_;
-    std::optional<Core> core_;
+    std::unique_ptr<Loop> loop_;
     std::optional<PyRun> finished_;
     std::atomic<bool> in_use_ = false;
 };
