@@ -42,7 +42,8 @@ void require_memory(std::size_t dimension)
         throw std::bad_alloc();
     }
     const std::size_t bytes = dimension * arrays * sizeof(double);
-    void* volatile room = ::operator new(bytes);  // volatile: not left out as of no use
+    void* volatile room = ::operator new(bytes, std::nothrow);  // volatile: not left out
+    if (!room) throw std::bad_alloc();
     ::operator delete(room);
 }
 
