@@ -295,7 +295,7 @@ def test_pictures(tmp_path):
     matplotlib.use("Agg")
     from matplotlib import pyplot
     run = ricochet.integrate(Ball(), [1.0, 0.0], 2.0, record_steps=True)
-    ax = ricochet.plot(run, labels=["height", "velocity"])
+    ax = ricochet.plot(run, labels=["height", "velocity"], ax=pyplot.subplots()[1])
     assert np.isnan(ax.lines[0].get_xdata()).any()
     ricochet.plot(run, phase=(0, 1), ax=pyplot.subplots()[1])
     pyplot.close("all")
