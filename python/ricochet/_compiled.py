@@ -50,11 +50,9 @@ def _address(pointer):
     if hasattr(pointer, "__array_interface__"):
         return pointer.__array_interface__["data"][0]
     ctypes = sys.modules.get("ctypes")
-    if ctypes is not None:
-        try:
-            return ctypes.cast(pointer, ctypes.c_void_p).value or 0
-        except (ctypes.ArgumentError, TypeError):
-            pass
+    if ctypes is not None and isinstance(
+            pointer, (ctypes._SimpleCData, ctypes._Pointer, ctypes.Array, ctypes._CFuncPtr)):
+        return ctypes.cast(pointer, ctypes.c_void_p).value or 0
     backend = sys.modules.get("_cffi_backend")
     if backend is not None and isinstance(pointer, backend._CDataBase):
         return int(backend.FFI().cast("uintptr_t", pointer))

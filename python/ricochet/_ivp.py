@@ -7,7 +7,7 @@ import numpy as np
 from . import _ricochet
 from ._compiled import Compiled
 from ._ready import Ready
-from ._run import Kind, set_tolerance, source_of, state_from
+from ._run import Kind, set_mode, set_tolerance, source_of, state_from
 from ._system import Guard, System
 
 _METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78"}
@@ -129,7 +129,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         if events is not None:
             raise ValueError("events: found some beside a system, expected them as its guards")
         source, modes = source_of(fun, args)
-        count = len(_guard_names(fun))
+        set_mode(given, fun, modes)
+        count = source.guard_count
         watched = True
     else:
         guards, is_list = _guards(events, t0, start, args or ())
@@ -147,13 +148,6 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         return _nothing(t0, start, samples, dense_output, count if watched else None)
     run = _ricochet.integrate(source, start, given, modes)
     return _result(run, count if watched else None, dense_output)
-
-
-def _guard_names(system):
-    if isinstance(system, Ready):
-        return {"thermostat": range(2), "stick-slip": range(3),
-                "coulomb-oscillator": range(3)}.get(system._name, range(1))
-    return system._guard_list()
 
 
 def _options(options, t0, t1, components):

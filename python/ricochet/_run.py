@@ -61,6 +61,18 @@ def set_tolerance(options, atol, components):
     options["scale"] = [2.0 ** floor(log2(a / least)) if a > 0 else 2.0 ** -200 for a in array]
 
 
+def set_mode(options, system, modes):
+    """The mode at the start as a number."""
+    names = modes if modes is not None else getattr(system, "modes", None)
+    if names is None or "mode" not in options:
+        return
+    given = options["mode"]
+    if given in names:
+        options["mode"] = list(names).index(given)
+    elif not isinstance(given, int) or given not in range(len(names)):
+        raise ValueError(f"mode: found {given!r}, expected one of {list(names)}")
+
+
 def source_of(system, args=None):
     """The system in C++, and its list of modes."""
     if isinstance(system, Ready):
@@ -78,16 +90,7 @@ def prepare(system, x0, t_end, options, args=None):
     source, modes = source_of(system, args)
     x0 = state_from(x0, "x0")
     options = dict(options, t_end=float(t_end))
-    if "mode" in options:
-        names = modes if modes is not None else getattr(system, "modes", None)
-        if names is not None and options["mode"] not in range(len(names)):
-            if options["mode"] not in names:
-                raise ValueError(f"mode: found {options['mode']!r}, expected one of {names}")
-            options["mode"] = list(names).index(options["mode"])
-        elif names is not None and options["mode"] in names:
-            options["mode"] = list(names).index(options["mode"])
-    elif isinstance(modes, list) and not modes:
-        raise ValueError("modes: found none, expected at least one")
+    set_mode(options, system, modes)
     if not isinstance(options.get("atol", 0), (float, int)):
         set_tolerance(options, options["atol"], len(x0))
     samples = options.get("sample_times")

@@ -128,8 +128,9 @@ def test_modes_of_a_thermostat():
         assert run.events["mode_after"].tolist() == [1, 0] * 8
         assert run.mode == (Room.OFF if on is Room.ON else "off")
     assert own.guard_names == ["too_cold", "too_warm"]
-    result = ricochet.solve_ivp(Thermostat(), (0, 48), [20.0], rtol=1e-8)
-    assert result.modes[0].tolist() == [[0, 1]] * 8
+    for system, mode in ((Thermostat(), Room.OFF), (ready, "off"), (ready, 0)):
+        result = ricochet.solve_ivp(system, (0, 48), [20.0], rtol=1e-8, mode=mode)
+        assert result.modes[0].tolist() == [[0, 1]] * 8 and len(result.t_events) == 2
 
 
 def test_systems_from_functions_time_events_and_sets():
@@ -294,7 +295,7 @@ def test_pictures(tmp_path):
     matplotlib.use("Agg")
     from matplotlib import pyplot
     run = ricochet.integrate(Ball(), [1.0, 0.0], 2.0, record_steps=True)
-    ax = ricochet.plot(run, labels=["height", "velocity"])
+    ax = ricochet.plot(run, labels=["height", "velocity"], ax=pyplot.subplots()[1])
     assert np.isnan(ax.lines[0].get_xdata()).any()
     ricochet.plot(run, phase=(0, 1), ax=pyplot.subplots()[1])
     pyplot.close("all")

@@ -93,8 +93,10 @@ def test_functions_that_are_none():
     with pytest.raises(ValueError, match="no mode|does not have"):
         ricochet.integrate(ricochet.System(lambda m, t, x: x, [ricochet.Guard(
             lambda m, t, x: 1.0, in_modes=["c"])], modes=("a", "b")), [1.0], 1.0)
-    with pytest.raises(TypeError, match="pointer"):
-        ricochet.Compiled("flow")
+    import ctypes  # which would take a text for a pointer to its letters
+    for wrong in ("flow", b"flow", 1.5, None, decay, ctypes):
+        with pytest.raises(TypeError, match="pointer"):
+            ricochet.Compiled(wrong)
     with pytest.raises(ValueError, match="null"):
         ricochet.Compiled(0)
     with pytest.raises(ValueError, match="unilateral|reset"):

@@ -792,7 +792,9 @@ PYBIND11_MODULE(_ricochet, module)
             error.restore();
         }
     });
-    py::class_<Source, std::shared_ptr<Source>>(module, "Source");
+    py::class_<Source, std::shared_ptr<Source>>(module, "Source")
+        .def_property_readonly("guard_count",
+                               [](const Source& self) { return self.guard_names().size(); });
     bind_results(module);
     module.def("ready_system", [](const std::string& name, const std::vector<double>& parameters) {
         return ready_system(name, parameters);
