@@ -1,0 +1,112 @@
+// Internal: what it declares may change without notice.
+//
+// What the integrators of SUNDIALS have in common: steps taken one by one, with dense output.
+#pragma once
+
+#include <sundials/sundials_nvector.h>
+
+#include <cstdlib>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include "ricochet/hosts/detail/step_ends.hpp"
+#include "ricochet/hosts/run.hpp"
+
+namespace ricochet::hosts::detail {
+
+static_assert(std::is_same_v<realtype, double>, "ricochet: SUNDIALS computes in another precision");
+
+/// `Calls` are those of the integrator: evolve(t_stop, t, x), dky(t, k, x), reinit(t, x), and
+/// rate(t, x, dxdt); each returns a flag.
+template <class Calls>
+class SundialsHost : public StepEnds {
+public:
+    /// Initialises the integrator once more, at (t, x).
+    /// @param scale  [s] length of the first step, roughly
+    SundialsHost(Calls calls, double t, N_Vector x, double scale)
+        : StepEnds(t, {N_VGetArrayPointer(x), static_cast<std::size_t>(N_VGetLength(x))}, scale),
+          calls_(calls),
+          x_(N_VCloneEmpty(x), N_VDestroy),
+          dxdt_(N_VCloneEmpty(x), N_VDestroy)
+    {
+        go_on_from(t, x1_, true);
+    }
+
+    /// Takes a step, or after a cut that has changed nothing shows what is left of the last one.
+    void step(double t_stop)
+    {
+        begin_step();
+        if (end_ > t0_) {
+            t1_ = end_;
+            require(calls_.dky(t1_, 0, view(x_, x1_)));
+        } else {
+            do {  // a step may be too short to be seen in the time
+                require(calls_.evolve(t_stop, t1_, view(x_, x1_)));
+            } while (t1_ == t0_);
+            begin_ = t0_;
+            end_ = t1_;
+            scale_ = h();
+            require(calls_.dky(t0_, 0, view(x_, gap_)));
+            for (std::size_t i = 0; i < gap_.size(); ++i) gap_[i] = x0_[i] - gap_[i];
+        }
+        require(calls_.dky(t1_, 1, view(x_, rate1_)));
+    }
+
+    /// The dense output, with what it misses the start of the step by spread over the step: else a
+    /// guard that starts on its surface may start behind it.
+    void interpolate(double s, std::span<double> x) const
+    {
+        const double t = output(s, 0, x);
+        const double part = (end_ - t) / (end_ - begin_);
+        for (std::size_t i = 0; i < x.size(); ++i) x[i] += part * gap_[i];
+    }
+    void interpolate_rate(double s, std::span<double> dxdt) const
+    {
+        output(s, 1, dxdt);
+        for (std::size_t i = 0; i < dxdt.size(); ++i) dxdt[i] -= gap_[i] / (end_ - begin_);
+    }
+
+    /// The method starts anew only where something has changed.
+    /// @throws std::invalid_argument for another dimension
+    void go_on_from(double t, std::span<const double> x, bool changed)
+    {
+        if (x.size() != x1_.size()) {
+            throw std::invalid_argument(std::string(Calls::name) + ": cannot change the dimension");
+        }
+        go_to(t, x);
+        if (!changed) return require(calls_.dky(t, 1, view(x_, rate1_)));
+        end_ = t;
+        require(calls_.reinit(t, view(x_, x1_)));
+        require(calls_.rate(t, view(x_, x1_), view(dxdt_, rate1_)));
+    }
+
+private:
+    using View = std::shared_ptr<std::remove_pointer_t<N_Vector>>;
+
+    [[nodiscard]] static N_Vector view(const View& vector, std::span<double> of)
+    {
+        N_VSetArrayPointer(of.data(), vector.get());
+        return vector.get();
+    }
+    double output(double s, int k, std::span<double> x) const
+    {
+        const double t = t0_ + s < end_ ? t0_ + s : end_;
+        require(calls_.dky(t, k, view(x_, x)));
+        return t;
+    }
+    /// @throws std::runtime_error
+    static void require(int flag)
+    {
+        if (flag >= 0) return;
+        throw std::runtime_error(std::string(Calls::name) + ": returned " + std::to_string(flag));
+    }
+
+    Calls calls_;
+    View x_, dxdt_;
+    double begin_ = 0, end_ = 0;  ///< [s] of the last step of the integrator
+    std::vector<double> gap_ = x1_;
+};
+
+}  // namespace ricochet::hosts::detail
