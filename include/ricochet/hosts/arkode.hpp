@@ -26,6 +26,7 @@ struct ErkCalls {
         return flag < 0 ? flag : ERKStepEvolve(memory, t_stop, x, &t, ARK_ONE_STEP);
     }
     int dky(double t, int k, N_Vector x) const { return ERKStepGetDky(memory, t, k, x); }
+    [[nodiscard]] static int order() { return ARK_INTERP_MAX_DEGREE; }
     int reinit(double t, N_Vector x) const { return ERKStepReInit(memory, flow, t, x); }
     int rate(double t, N_Vector x, N_Vector dxdt) const
     {
@@ -45,6 +46,7 @@ struct ArkCalls {
         return flag < 0 ? flag : ARKStepEvolve(memory, t_stop, x, &t, ARK_ONE_STEP);
     }
     int dky(double t, int k, N_Vector x) const { return ARKStepGetDky(memory, t, k, x); }
+    [[nodiscard]] static int order() { return ARK_INTERP_MAX_DEGREE; }
     int reinit(double t, N_Vector x) const { return ARKStepReInit(memory, slow, fast, t, x); }
     int rate(double t, N_Vector x, N_Vector dxdt) const
     {

@@ -28,6 +28,12 @@ struct CvodeCalls {
         return flag < 0 ? flag : CVode(memory, t_stop, x, &t, CV_ONE_STEP);
     }
     int dky(double t, int k, N_Vector x) const { return CVodeGetDky(memory, t, k, x); }
+    [[nodiscard]] int order() const
+    {
+        int order = 0;
+        CVodeGetLastOrder(memory, &order);
+        return order;
+    }
     int reinit(double t, N_Vector x) const { return CVodeReInit(memory, t, x); }
     int rate(double t, N_Vector x, N_Vector dxdt) const
     {

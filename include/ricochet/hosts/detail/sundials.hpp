@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "ricochet/hosts/detail/step_ends.hpp"
 #include "ricochet/hosts/run.hpp"
@@ -19,7 +20,7 @@ namespace ricochet::hosts::detail {
 static_assert(std::is_same_v<realtype, double>, "ricochet: SUNDIALS computes in another precision");
 
 /// `Calls` are those of the integrator: evolve(t_stop, t, x), dky(t, k, x), reinit(t, x), and
-/// rate(t, x, dxdt); each returns a flag.
+/// rate(t, x, dxdt), which return flags; and order(), of its dense output in the last step.
 template <class Calls>
 class SundialsHost : public StepEnds {
 public:
@@ -45,27 +46,22 @@ public:
             do {  // a step may be too short to be seen in the time
                 require(calls_.evolve(t_stop, t1_, view(x_, x1_)));
             } while (t1_ == t0_);
-            begin_ = t0_;
             end_ = t1_;
             scale_ = h();
-            require(calls_.dky(t0_, 0, view(x_, gap_)));
-            for (std::size_t i = 0; i < gap_.size(); ++i) gap_[i] = x0_[i] - gap_[i];
+            cubic_ = std::exchange(first_, false) || calls_.order() <= 3;
         }
         require(calls_.dky(t1_, 1, view(x_, rate1_)));
     }
 
-    /// The dense output, with what it misses the start of the step by spread over the step: else a
-    /// guard that starts on its surface may start behind it.
+    /// The dense output where it is of a higher order than the cubic through both ends; and that
+    /// in the first step, which is so short that t0 + s loses much by rounding.
     void interpolate(double s, std::span<double> x) const
     {
-        const double t = output(s, 0, x);
-        const double part = (end_ - t) / (end_ - begin_);
-        for (std::size_t i = 0; i < x.size(); ++i) x[i] += part * gap_[i];
+        cubic_ ? cubic().interpolate(s, x) : output(s, 0, x);
     }
     void interpolate_rate(double s, std::span<double> dxdt) const
     {
-        output(s, 1, dxdt);
-        for (std::size_t i = 0; i < dxdt.size(); ++i) dxdt[i] -= gap_[i] / (end_ - begin_);
+        cubic_ ? cubic().interpolate_rate(s, dxdt) : output(s, 1, dxdt);
     }
 
     /// The method starts anew only where something has changed.
@@ -78,6 +74,7 @@ public:
         go_to(t, x);
         if (!changed) return require(calls_.dky(t, 1, view(x_, rate1_)));
         end_ = t;
+        first_ = true;
         require(calls_.reinit(t, view(x_, x1_)));
         require(calls_.rate(t, view(x_, x1_), view(dxdt_, rate1_)));
     }
@@ -90,11 +87,10 @@ private:
         N_VSetArrayPointer(of.data(), vector.get());
         return vector.get();
     }
-    double output(double s, int k, std::span<double> x) const
+    [[nodiscard]] HermiteStep cubic() const { return {{t0_, 0}, h(), x0_, x1_, rate0_, rate1_}; }
+    void output(double s, int k, std::span<double> x) const
     {
-        const double t = t0_ + s < end_ ? t0_ + s : end_;
-        require(calls_.dky(t, k, view(x_, x)));
-        return t;
+        require(calls_.dky(t0_ + s < end_ ? t0_ + s : end_, k, view(x_, x)));
     }
     /// @throws std::runtime_error
     static void require(int flag)
@@ -105,8 +101,9 @@ private:
 
     Calls calls_;
     View x_, dxdt_;
-    double begin_ = 0, end_ = 0;  ///< [s] of the last step of the integrator
-    std::vector<double> gap_ = x1_;
+    double end_ = 0;      ///< [s] of the last step of the integrator
+    bool first_ = true;   ///< the next step is the first since the method started
+    bool cubic_ = false;  ///< of the last step
 };
 
 }  // namespace ricochet::hosts::detail
