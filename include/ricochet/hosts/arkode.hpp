@@ -22,9 +22,9 @@ struct ErkCalls {
 
     int evolve(double t_stop, double& t, N_Vector x) const
     {
-        const int flag = ERKStepSetStopTime(memory, t_stop);
-        return flag < 0 ? flag : ERKStepEvolve(memory, t_stop, x, &t, ARK_ONE_STEP);
+        return ERKStepEvolve(memory, t_stop, x, &t, ARK_ONE_STEP);
     }
+    int set_stop(double t) const { return ERKStepSetStopTime(memory, t); }
     int dky(double t, int k, N_Vector x) const { return ERKStepGetDky(memory, t, k, x); }
     [[nodiscard]] static int order() { return ARK_INTERP_MAX_DEGREE; }
     int reinit(double t, N_Vector x) const { return ERKStepReInit(memory, flow, t, x); }
@@ -42,9 +42,9 @@ struct ArkCalls {
 
     int evolve(double t_stop, double& t, N_Vector x) const
     {
-        const int flag = ARKStepSetStopTime(memory, t_stop);
-        return flag < 0 ? flag : ARKStepEvolve(memory, t_stop, x, &t, ARK_ONE_STEP);
+        return ARKStepEvolve(memory, t_stop, x, &t, ARK_ONE_STEP);
     }
+    int set_stop(double t) const { return ARKStepSetStopTime(memory, t); }
     int dky(double t, int k, N_Vector x) const { return ARKStepGetDky(memory, t, k, x); }
     [[nodiscard]] static int order() { return ARK_INTERP_MAX_DEGREE; }
     int reinit(double t, N_Vector x) const { return ARKStepReInit(memory, slow, fast, t, x); }

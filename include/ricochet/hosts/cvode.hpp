@@ -24,9 +24,9 @@ struct CvodeCalls {
 
     int evolve(double t_stop, double& t, N_Vector x) const
     {
-        const int flag = CVodeSetStopTime(memory, t_stop);
-        return flag < 0 ? flag : CVode(memory, t_stop, x, &t, CV_ONE_STEP);
+        return CVode(memory, t_stop, x, &t, CV_ONE_STEP);
     }
+    int set_stop(double t) const { return CVodeSetStopTime(memory, t); }
     int dky(double t, int k, N_Vector x) const { return CVodeGetDky(memory, t, k, x); }
     [[nodiscard]] int order() const
     {

@@ -6,6 +6,7 @@
 #include <sundials/sundials_nvector.h>
 
 #include <cstdlib>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -19,8 +20,8 @@ namespace ricochet::hosts::detail {
 
 static_assert(std::is_same_v<realtype, double>, "ricochet: SUNDIALS computes in another precision");
 
-/// `Calls` are those of the integrator: evolve(t_stop, t, x), dky(t, k, x), reinit(t, x), and
-/// rate(t, x, dxdt), which return flags; and order(), of its dense output in the last step.
+/// `Calls` are those of the integrator: set_stop(t), evolve(t_stop, t, x), dky(t, k, x), reinit(t,
+/// x), and rate(t, x, dxdt), which return flags; and order(), of its dense output in the last step.
 template <class Calls>
 class SundialsHost : public StepEnds {
 public:
@@ -43,6 +44,7 @@ public:
             t1_ = end_;
             require(calls_.dky(t1_, 0, view(x_, x1_)));
         } else {
+            if (std::exchange(stop_, t_stop) != t_stop) require(calls_.set_stop(t_stop));
             do {  // a step may be too short to be seen in the time
                 require(calls_.evolve(t_stop, t1_, view(x_, x1_)));
             } while (t1_ == t0_);
@@ -75,6 +77,7 @@ public:
         if (!changed) return require(calls_.dky(t, 1, view(x_, rate1_)));
         end_ = t;
         first_ = true;
+        stop_ = std::numeric_limits<double>::quiet_NaN();
         require(calls_.reinit(t, view(x_, x1_)));
         require(calls_.rate(t, view(x_, x1_), view(dxdt_, rate1_)));
     }
@@ -101,6 +104,7 @@ private:
 
     Calls calls_;
     View x_, dxdt_;
+    double stop_ = std::numeric_limits<double>::quiet_NaN();  ///< [s] as it has been told
     double end_ = 0;      ///< [s] of the last step of the integrator
     bool first_ = true;   ///< the next step is the first since the method started
     bool cubic_ = false;  ///< of the last step
