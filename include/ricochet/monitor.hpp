@@ -37,27 +37,40 @@ namespace ricochet {
 /// arrays of n doubles. Offsets s lie in [0, h], and rates are with respect to them: those of the
 /// path that `interpolate` follows.
 template <class S>
-concept HostStep = requires(const S& step, double s, std::span<double> x) {
+concept HostStep = requires(const S& step, double s, std::span<double> x)
+{
     Instant{step.t0()};  // [s]; or an Instant, of a host that keeps what its sum of times loses
-    { step.h() } -> std::convertible_to<double>;  // [s]
-    { step.x0() } -> std::convertible_to<std::span<const double>>;
-    { step.x1() } -> std::convertible_to<std::span<const double>>;
-    { step.rate0() } -> std::convertible_to<std::span<const double>>;
-    { step.rate1() } -> std::convertible_to<std::span<const double>>;
+    {
+        step.h()
+        } -> std::convertible_to<double>;  // [s]
+    {
+        step.x0()
+        } -> std::convertible_to<std::span<const double>>;
+    {
+        step.x1()
+        } -> std::convertible_to<std::span<const double>>;
+    {
+        step.rate0()
+        } -> std::convertible_to<std::span<const double>>;
+    {
+        step.rate1()
+        } -> std::convertible_to<std::span<const double>>;
     step.interpolate(s, x);  // x(t0 + s)
 };
 
 /// A host that knows the derivative of its interpolant; else it is a difference over 1e-4 h, and
 /// events near tangency are found less finely.
 template <class S>
-concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt) {
+concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt)
+{
     step.interpolate_rate(s, dxdt);
 };
 
 /// A host that can take its step again with another length, as exactly as the whole one. Events
 /// are then located on this map.
 template <class S>
-concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> x) {
+concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> x)
+{
     step.restep(s, x);
 };
 
@@ -82,10 +95,9 @@ public:
     {
         const double u = s / h_;
         const double bent = u * u * (3 - 2 * u);
-        const double from = s * (1 - u) * (1 - u);
-        const double to = s * u * (u - 1);
+        const double turned = s * u * (u - 1);
         for (std::size_t i = 0; i < x.size(); ++i) {
-            x[i] = x0_[i] + (bent * (x1_[i] - x0_[i]) + (from * rate0_[i] + to * rate1_[i]));
+            x[i] = x0_[i] + (s * rate0_[i] + (bent * departure(i) + turned * turn(i)));
         }
     }
 
@@ -93,14 +105,20 @@ public:
     {
         const double u = s / h_;
         const double bent = 6 * u * (1 - u) / h_;
-        const double from = (1 - u) * (1 - 3 * u);
-        const double to = u * (3 * u - 2);
+        const double turned = u * (3 * u - 2);
         for (std::size_t i = 0; i < dxdt.size(); ++i) {
-            dxdt[i] = bent * (x1_[i] - x0_[i]) + (from * rate0_[i] + to * rate1_[i]);
+            dxdt[i] = rate0_[i] + (bent * departure(i) + turned * turn(i));
         }
     }
 
 private:
+    /// From the tangent at the start, exact where the motion is straight.
+    [[nodiscard]] double departure(std::size_t i) const noexcept
+    {
+        return (x1_[i] - x0_[i]) - h_ * rate0_[i];
+    }
+    [[nodiscard]] double turn(std::size_t i) const noexcept { return rate1_[i] - rate0_[i]; }
+
     Instant t0_;
     double h_;
     std::span<const double> x0_, x1_, rate0_, rate1_;
@@ -130,9 +148,6 @@ template <class System, class X, class Detector = Extremum, class Locator = Newt
 requires Flowing<System, X> && StateVector<X>
 class EventMonitor {
     static_assert(detail::check_declarations<System, X>());
-    static_assert(!puts_off_checks<Detector, System, X>(),
-                  "ricochet: EventMonitor examines every step; expected a detector that puts off no "
-                  "checks, such as Extremum");
 
 public:
     /// What `cut` and `events` show states as: contiguous doubles.
@@ -218,6 +233,19 @@ public:
 
     /// The next time event [s], beyond which no step goes; infinite where there is none.
     [[nodiscard]] double must_stop_at() const noexcept { return monitor_->must_stop_at(); }
+
+    /// Up to this time [s] no guard needs a look, by the bounds that the system declares or a gate
+    /// (`Planned`, `Certified`, ...): the host may go there in steps that it does not show, by
+    /// `skip_to`. Where nothing is known it is the time in hand.
+    [[nodiscard]] double quiet_until() const noexcept { return monitor_->quiet_until(); }
+
+    /// The host has gone on to t, at most `quiet_until` and before the next time event, in one step
+    /// or several; x and its rate are those there.
+    /// @throws std::logic_error beyond that
+    void skip_to(const Instant& t, std::span<const double> x, std::span<const double> dxdt)
+    {
+        monitor_->skip_to(t, taken(x), checked(dxdt, x.size()));
+    }
 
     /// The side of its surface that a guard is on.
     /// @throws std::out_of_range

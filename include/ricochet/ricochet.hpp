@@ -28,4 +28,5 @@
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/newton.hpp"
 #include "ricochet/locate/toms748.hpp"
+#include "ricochet/monitor.hpp"
 #include "ricochet/nn/safetensors.hpp"

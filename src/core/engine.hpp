@@ -26,6 +26,7 @@
 #include "core/guard_bank.hpp"
 #include "core/merged_resets.hpp"
 #include "core/metering.hpp"
+#include "core/planner.hpp"
 #include "core/step.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/refusals.hpp"
@@ -50,9 +51,10 @@ protected:
           guarded_(system_->guarded),
           resets_any_(system_->resets()),
           timed_(system_->timed()),
+          puts_off_(setup.detector.puts_off),
           predicts_(setup.detector.clears != nullptr),
           options_(options),
-          meter_(setup.detector.puts_off ? nullptr : setup.detector.metering),
+          meter_(puts_off_ ? nullptr : setup.detector.metering),
           resolution_(options),
           backward_(options.t_end < options.t_start),
           step_(system_, *setup.kernel, options.t_start, x0, options.mode, backward_),
@@ -60,6 +62,7 @@ protected:
           search_(x0, bank_.size(), finders_, resolution_),
           resets_(x0)
     {
+        if (puts_off_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
     }
 
     // --- set-up ---
@@ -177,7 +180,8 @@ protected:
                       search_.before());
     }
 
-    /// Whether the event leaves everything as it was, and no host wants to know, so that the step can stand.
+    /// Whether the event leaves everything as it was, and no host wants to know, so that the step
+    /// can stand.
     [[nodiscard]] bool changes_nothing();
 
     /// Whether this event of the guard, not yet counted, ends the run.
@@ -185,19 +189,48 @@ protected:
 
     void go_on_past_members();
 
-    // --- applying ---
+    // --- checks that are deferred ---
 
-    struct Firing {
-        bool located = false;  ///< inside the current step, else at its start
-        bool on_time = false;  ///< with a time event
-    };
+    void name_wrong_bound()
+    {
+        run_.wrong_bound = planner_->wrong();
+        end(Outcome::wrong_bound, run_.wrong_bound->guard);
+    }
+
+    void count_put_off(std::size_t steps) noexcept
+    {
+        run_.statistics.checks_put_off += steps;
+        add_evidence(finders_.detector.put_off, steps);
+    }
+
+    /// Samples all guards at the start of the step in hand, every one of which is looked at.
+    void watch_all()
+    {
+        if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
+        watching_ = newly_armed_ = true;
+        planner_->look_back(run_.statistics);
+    }
+
+    /// After the guards have been armed.
+    void begin_plan()
+    {
+        newly_armed_ = watching_ = false;
+        planner_->begin(step_, bank_);
+    }
+
+    /// Whether one of the guards in doubt deserves a search in the step in hand.
+    [[nodiscard]] bool judges_suspicious();
+
+    // --- applying ---
 
     /// The set that was found cuts the step short: applies it.
     void cut_short();
 
     /// The members fire: the step is placed at `search_.before()` made `resets_.after()`. Unless
     /// the run has ended, `settle` is due.
-    void apply(const Firing& how);
+    /// @param located  inside the current step, else at its start
+    /// @param on_time  with a time event
+    void apply(bool located, bool on_time);
 
     /// How far from its surface a guard that has just fired may be. A guard with declared
     /// bounds may be expensive, and is not asked for what its location says as well.
@@ -365,6 +398,7 @@ protected:
     bool guarded_;     ///< has guards, if only none of them yet
     bool resets_any_;  ///< has resets
     bool timed_;
+    bool puts_off_;
     bool predicts_;
     Options options_;
     Metering meter_;
@@ -373,6 +407,7 @@ protected:
     Step<X> step_;
     GuardBank<X, single> bank_;
     EventSearch<X, single> search_;
+    std::optional<Planner<X, single>> planner_;
     double h_next_ = 0;        ///< [s] length of the next step, roughly
     double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
@@ -382,12 +417,13 @@ protected:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
-    bool asked_ = false;  ///< a network, about the step in hand
+    bool asked_ = false;        ///< a network, about the step in hand
     bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
     Instant set_instant_;  ///< of the members, in a step that holds them
     Mode mode_before_ = 0;
-    Firing firing_;  ///< of the set in hand
+    bool located_ = false;  ///< the set in hand lies inside the step, else at its start
+    bool on_time_ = false;  ///< and happens with a time event
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;
     int level_ = 0;  ///< of sets at this instant

@@ -9,7 +9,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::cut_short()
 {
     const double s = search_.at();
-    const double t = firing_.on_time ? time_event_ : time_of_set();
+    const double t = on_time_ ? time_event_ : time_of_set();
     for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
     note_crossings_to_set();
     mode_before_ = step_.mode();
@@ -17,24 +17,25 @@ inline void EventEngine<X, single>::cut_short()
     ++run_.statistics.steps;
     count_refined();
     record_notes(s);
-    apply(firing_);
+    apply(true, on_time_);
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::apply(const Firing& how)
+inline void EventEngine<X, single>::apply(bool located, bool on_time)
 {
-    const Instant at = how.located ? set_instant_ : step_.instant(0, 0);
-    const double t = how.on_time ? time_event_ : at.value;
-    firing_ = how;
+    const Instant at = located ? set_instant_ : step_.instant(0, 0);
+    const double t = on_time ? time_event_ : at.value;
+    located_ = located;
+    on_time_ = on_time;
     mode_before_ = step_.mode();
-    if (how.on_time) record_time_event(t);
-    for (const std::size_t i : search_.members()) record_crossing(i, t, how.located);
+    if (on_time) record_time_event(t);
+    for (const std::size_t i : search_.members()) record_crossing(i, t, located);
     if (!goes_on()) {
         step_.restart(at, search_.before(), step_.mode());
         return;
     }
     step_.restart(at, resets_.after(), resets_.mode());
-    if (how.on_time) step_.hold(t);
+    if (on_time) step_.hold(t);
     if (stops_) return end(Outcome::stopped_by_event, first_member());
     pending_ = Pending::settle;
 }
@@ -98,7 +99,7 @@ inline void EventEngine<X, single>::apply_time_event()
     transform(true);
     resting_ =
         resting_ && resets_.mode() == step_.mode() && same_state(resets_.after(), step_.x0());
-    apply({.located = false, .on_time = true});
+    apply(false, true);
 }
 
 }  // namespace ricochet::detail

@@ -103,10 +103,10 @@ inline bool EventEngine<X, single>::find(bool cleared)
         if (search_.late()) ++run_.statistics.late_events;
         dismiss_members();
         if (search_.members().empty()) continue;
-        firing_ = {.located = true, .on_time = time_event_due_ && search_.at() == step_.h()};
+        on_time_ = time_event_due_ && search_.at() == step_.h();
         set_instant_ = step_.instant(search_.at(), search_.at_remainder());
-        transform(firing_.on_time);
-        if (firing_.on_time || !changes_nothing()) return true;
+        transform(on_time_);
+        if (on_time_ || !changes_nothing()) return true;
         go_on_past_members();
     }
     note_crossings(step_.h());
@@ -178,6 +178,18 @@ inline void EventEngine<X, single>::go_on_past_members()
         search_.note(i, bank_[i].side);
         search_.pass(step_, bank_, i, calls());
     }
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::judges_suspicious()
+{
+    planner_->wake(step_, bank_, run_.statistics, last_h_);
+    for (const std::size_t i : planner_->judged()) {
+        if (bank_.suspicious(i, step_.h())) return true;
+    }
+    run_.statistics.evidence.add(finders_.detector.evidence);
+    for (const std::size_t i : planner_->judged()) bank_.leave_plateau(i);
+    return false;
 }
 
 }  // namespace ricochet::detail

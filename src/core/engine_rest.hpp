@@ -15,7 +15,7 @@ inline bool EventEngine<X, single>::rest_members()
         const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
         const double tolerance = resolution_.tolerance(step_.start().value);
         const bool resetting = resets_any_ && bank_[i].info.resets;
-        if (resetting && firing_.located) intervals.blame(search_.where(i).error);
+        if (resetting && located_) intervals.blame(search_.where(i).error);
         if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
             come_to_rest(i, stalls ? 0 : intervals.remainder(), intervals.error());
             rested = true;

@@ -13,7 +13,7 @@ inline bool EventEngine<X, single>::settle()
         case Pending::hold: return false;
         case Pending::settle:
             if (guarded_ && !resting_ && !rest_members()) arm_all();
-            if (firing_.on_time && !ended_) find_time_event();
+            if (on_time_ && !ended_) find_time_event();
             break;
         case Pending::arm_stuck:
             arm_all();
@@ -40,7 +40,7 @@ inline bool EventEngine<X, single>::apply_next_set()
     transform(false);
     stuck_ = stuck_member();
     if (stuck_ == no_guard) {
-        apply({});
+        apply(false, false);
         return !ended_;
     }
     if (bank_.g0(stuck_) < -bank_[stuck_].band) {
@@ -253,8 +253,7 @@ inline void EventEngine<X, single>::refuse_bad_guards()
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         GuardRecord& record = bank_[i];
         const GuardInfo& info = record.info;
-        record.acting =
-            (resets_any_ && info.resets) || info.stop_after > 0 ||
+        record.acting = (resets_any_ && info.resets) || info.stop_after > 0 ||
                         options_.stop_at_event || cuts_at_all_;
         if (info.unilateral && !(resets_any_ && info.resets)) {
             throw_no_reset(i, info.name);

@@ -14,6 +14,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/event_hit.hpp"
 #include "core/guard_bank.hpp"
 #include "core/step.hpp"
 #include "ricochet/detail/detector_table.hpp"
@@ -26,91 +27,6 @@
 #include "ricochet/locate/newton.hpp"
 
 namespace ricochet::detail {
-
-/// How finely events are told apart, at a time.
-class EventResolution {
-public:
-    explicit EventResolution(const Options& options) noexcept
-        : absolute_(options.event_tolerance),
-          relative_(options.event_rtol),
-          window_(options.event_window)
-    {
-    }
-
-    /// Width [s] of a bracket that is narrow enough.
-    [[nodiscard]] double tolerance(double t) const noexcept
-    {
-        return absolute_ + relative_ * std::fabs(t);
-    }
-
-    /// Whether events are located to neighbouring doubles, wherever they are.
-    [[nodiscard]] bool is_finest() const noexcept { return absolute_ == 0 && relative_ == 0; }
-
-    /// Events no further apart [s] cannot be told apart.
-    [[nodiscard]] double blur(double t) const noexcept
-    {
-        return std::max(tolerance(t), 4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
-    }
-
-    /// Events no further apart [s] happen together.
-    [[nodiscard]] double window(double t) const noexcept { return std::max(blur(t), window_); }
-
-private:
-    double absolute_, relative_, window_;
-};
-
-/// An event that changes nothing, found inside a step.
-struct Note {
-    std::size_t guard;
-    EventKind kind;
-    Side side;  ///< that the guard left
-    Location where;
-};
-
-/// Drops the notes beyond the offset s, and sorts the others by time.
-void sort_notes_until(double s, std::vector<Note>& notes);
-
-/// How a guard changes its sign at a place that a locator found.
-[[nodiscard]] inline EventKind kind_of(const Location& where) noexcept
-{
-    return where.jump ? EventKind::jump : EventKind::crossing;
-}
-
-/// A guard that acts, found to leave its side inside a step.
-struct Hit {
-    std::size_t guard = 0;
-    Side side = Side::plateau;  ///< that it leaves
-    Finding finding;
-    double guess = 0;  ///< [s] offset
-    bool located = false;
-    Location where;
-};
-
-/// The detector and the locator of a run.
-template <class X>
-struct Finders {
-    const DetectorTable<X>& detector;
-    const void* detecting;
-    const LocatorTable& locator;
-    const void* locating;
-
-    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const
-    {
-        return detector.examine(detecting, path, watch);
-    }
-    [[nodiscard]] Location locate(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
-                                  double tolerance) const
-    {
-        return locator.locate(locating, path, lo.s, lo.value, lo.rate, hi.s, hi.value, hi.rate,
-                              tolerance);
-    }
-    [[nodiscard]] bool leaves_plainly(double sign, const GuardSample& start, const GuardSample& end,
-                                      double touch) const
-    {
-        return detector.leaves_plainly(sign, start.s, start.value, start.rate, end.s, end.value,
-                                       end.rate, touch);
-    }
-};
 
 template <class X, bool single>
 class EventSearch {
@@ -591,105 +507,23 @@ private:
 
     /// The first set among several candidates.
     [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank,
-                                  const EventResolution& resolution, std::uint64_t& calls)
-    {
-        for (const std::size_t i : bank.suspects()) {
-            if (!bank[i].acting || !bank.still_suspicious(i, step.h())) continue;
-            examine(step, bank, i, calls);
-        }
-        if (hits_.empty()) return false;
-        close_set(step, bank, resolution, calls);
-        if (members_.size() == 1) locate_alone(step, bank, resolution, calls);
-        return true;
-    }
+                                  const EventResolution& resolution, std::uint64_t& calls);
 
     /// Locates the only member of the set, and keeps the state at its root.
     void locate_alone(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
-                      std::uint64_t& calls)
-    {
-        Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
-            return candidate.guard == members_[0];
-        });
-        const auto guard = bank.view(hit.guard, step.mode(), calls);
-        Probe probe(guard, step, space_);
-        probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank, hit.guard, resolution);
-        at_ = hit.where.root;
-        at_remainder_ = hit.where.root_remainder;
-        assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
-    }
+                      std::uint64_t& calls);
 
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is whoever lies in the window.
     void close_set(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
-                   std::uint64_t& calls)
-    {
-        double first = std::numeric_limits<double>::infinity();
-        for (Hit& hit : hits_) {
-            hit.guess = guess(hit.finding);
-            first = std::min(first, hit.guess);
-        }
-        for (Hit& hit : hits_) {
-            if (hit.guess == first) locate(step, bank, hit, resolution, calls);
-        }
-        double limit = window_end(step, resolution);
-        for (bool changed = true; changed;) {
-            changed = false;
-            const double at = std::min(limit, step.h());
-            bool placed = false;
-            for (Hit& hit : hits_) {
-                if (hit.located) continue;
-                if (hit.finding.hi.s > at) {
-                    if (!placed) step.restep(at, before_);
-                    placed = true;
-                    const auto guard = bank.view(hit.guard, step.mode(), calls);
-                    if (!has_left(hit.side, guard.value(step.time(at), before_))) continue;
-                }
-                locate(step, bank, hit, resolution, calls);
-                changed = true;
-            }
-            limit = window_end(step, resolution);
-        }
-        for (Hit& hit : hits_) {
-            if (hit.located && hit.where.root <= limit) members_.push_back(hit.guard);
-        }
-    }
+                   std::uint64_t& calls);
 
     [[nodiscard]] double window_end(const CurrentStep& step,
-                                    const EventResolution& resolution) noexcept
-    {
-        double first = std::numeric_limits<double>::infinity();
-        for (const Hit& hit : hits_) {
-            if (hit.located) first = std::min(first, hit.where.root);
-        }
-        return first + resolution.window(step.time(first));
-    }
+                                    const EventResolution& resolution) noexcept;
 
     /// The set happens at its latest root, or at the time event that it belongs to.
     void settle_place(const CurrentStep& step, const EventResolution& resolution,
-                      bool time_event_due)
-    {
-        if (members_.size() > 1) {
-            at_ = 0;
-            for (const Hit& hit : hits_) {
-                if (hit.located &&
-                    std::find(members_.begin(), members_.end(), hit.guard) != members_.end()) {
-                    at_ = std::max(at_, hit.where.root);
-                }
-            }
-            at_remainder_ = 0;
-            if (at_ == 0) {
-                assign(before_, step.x0());
-            } else {
-                step.restep(at_, before_);
-            }
-        }
-        if (time_event_due && at_ + resolution.window(step.time(at_)) >= step.h()) {
-            at_ = step.h();
-            at_remainder_ = 0;
-            assign(before_, step.x1());
-        }
-    }
+                      bool time_event_due);
 
     const Finders<X>* finders_;
     ProbeSpace<X> space_;

@@ -6,6 +6,7 @@
 #include "core/engine_record.hpp"
 #include "core/engine_rest.hpp"
 #include "core/engine_settle.hpp"
+#include "core/event_sets.hpp"
 #include "core/large_kernel.hpp"
 #include "core/loop_events.hpp"
 #include "core/loop_output.hpp"
@@ -15,6 +16,8 @@
 #include "core/loop_setup.hpp"
 #include "core/loop_steps.hpp"
 #include "core/monitor_loop.hpp"
+#include "core/planner_checks.hpp"
+#include "core/planner_close.hpp"
 #include "ricochet/detail/kernels.hpp"
 
 namespace ricochet::detail {

@@ -25,7 +25,6 @@
 
 #include "core/engine.hpp"
 #include "core/initial_step.hpp"
-#include "core/planner.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/step_control.hpp"
 
@@ -39,10 +38,8 @@ public:
     /// Keeps a reference to `setup`.
     Loop(const RunSetup<X>& setup, const X& x0, const Options& options)
         : Engine(setup, x0, checked(setup, options, x0)),
-          puts_off_(setup.detector.puts_off),
           components_(static_cast<std::size_t>(x0.size()))
     {
-        if (puts_off_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
         h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
         if (error_controlled_) {
             if (step_.error_order() == 0) throw_no_error_estimate();
@@ -144,7 +141,7 @@ private:
     using Engine::ended_;
     using Engine::error_controlled_;
     using Engine::finders_;
-    using Engine::firing_;
+    using Engine::on_time_;
     using Engine::guarded_;
     using Engine::h_next_;
     using Engine::infinity;
@@ -152,6 +149,8 @@ private:
     using Engine::meter_;
     using Engine::newly_armed_;
     using Engine::options_;
+    using Engine::planner_;
+    using Engine::puts_off_;
     using Engine::resolution_;
     using Engine::resting_;
     using Engine::run_;
@@ -162,7 +161,6 @@ private:
     using Engine::time_event_;
     using Engine::time_event_due_;
     using Engine::timed_;
-    using Engine::watching_;
 
     // --- set-up ---
 
@@ -249,18 +247,6 @@ private:
 
     /// The exact detector looks at the step in hand, for the guards in doubt.
     void judge();
-
-    void name_wrong_bound()
-    {
-        run_.wrong_bound = planner_->wrong();
-        end(Outcome::wrong_bound, run_.wrong_bound->guard);
-    }
-
-    void count_put_off(std::size_t steps) noexcept
-    {
-        run_.statistics.checks_put_off += steps;
-        this->add_evidence(finders_.detector.put_off, steps);
-    }
 
     /// Takes back the whole stretch, without having looked, and goes on carefully.
     void take_back()
@@ -385,9 +371,7 @@ private:
 
     static constexpr ErrorRule rule_{};
 
-    bool puts_off_;
     std::size_t components_;  ///< of the state at the start
-    std::optional<Planner<X, single>> planner_;
     double first_step_ = 0;    ///< [s]
     double flight_start_ = 0;  ///< [s] time of the last event
     double longest_step_ = 0;  ///< [s] after it

@@ -25,7 +25,7 @@ bool Loop<X, single>::search(bool cleared)
     if (!this->find(cleared)) return ended_;
     emit_samples(search_.at());
     record_step(search_.at());
-    limit_next_step(firing_.on_time ? time_event_ : this->time_of_set());
+    limit_next_step(on_time_ ? time_event_ : this->time_of_set());
     this->cut_short();
     this->settle_all();
     return true;

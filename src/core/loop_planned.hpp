@@ -8,9 +8,7 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline void Loop<X, single>::advance_with_check(double remaining)
 {
-    if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
-    watching_ = newly_armed_ = true;
-    planner_->look_back(run_.statistics);
+    this->watch_all();
     if (!take_step(remaining)) return;
     if (handle_events()) return;
     pass();
@@ -20,10 +18,7 @@ template <class X, bool single>
 inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& how)
 {
     if (planner_->steps_aside()) return advance_with_check(remaining);
-    if (newly_armed_) {
-        newly_armed_ = watching_ = false;
-        planner_->begin(step_, bank_);
-    }
+    if (newly_armed_) this->begin_plan();
     const double proposed = h_next_;
     const std::uint64_t rejected = run_.statistics.rejected;
     if (!take_step(remaining)) {
@@ -39,8 +34,8 @@ inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& ho
     const double ends = backward_ ? -t : t;
     if (planner_->covers(ends)) {
         planner_->sample_sleeper(step_, bank_, run_.statistics);
-        if (planner_->wrong()) return name_wrong_bound();
-        count_put_off(1);
+        if (planner_->wrong()) return this->name_wrong_bound();
+        this->count_put_off(1);
         return pass();
     }
     remember_step(proposed, rejected);
@@ -82,14 +77,14 @@ inline void Loop<X, single>::close_stretch()
     const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
     if (planner_->wrong()) {
         if (doubt != Planner<X, single>::none && doubt + 1 < steps) take_back_to(doubt);
-        return name_wrong_bound();
+        return this->name_wrong_bound();
     }
     if (doubt == Planner<X, single>::none) {
-        count_put_off(steps);
+        this->count_put_off(steps);
         planner_->steps().clear();
         return pass();
     }
-    count_put_off(doubt);
+    this->count_put_off(doubt);
     if (doubt + 1 < steps) return take_back_to(doubt);
     planner_->steps().clear();
     judge();
@@ -98,19 +93,9 @@ inline void Loop<X, single>::close_stretch()
 template <class X, bool single>
 inline void Loop<X, single>::judge()
 {
-    planner_->wake(step_, bank_, run_.statistics, last_h_);
-    bool suspicious = false;
-    for (const std::size_t i : planner_->judged()) {
-        suspicious = suspicious || bank_.suspicious(i, step_.h());
-    }
-    if (suspicious) {
-        if (search(false)) return;
-    } else {
-        run_.statistics.evidence.add(finders_.detector.evidence);
-        for (const std::size_t i : planner_->judged()) bank_.leave_plateau(i);
-    }
+    if (this->judges_suspicious() && search(false)) return;
     planner_->settle(step_, bank_);
-    if (planner_->wrong()) return name_wrong_bound();
+    if (planner_->wrong()) return this->name_wrong_bound();
     pass();
 }
 

@@ -91,7 +91,7 @@ inline void Loop<X, single>::reach_end()
 {
     if (puts_off_) {
         planner_->look_last(step_, bank_, run_.statistics);
-        if (planner_->wrong()) return name_wrong_bound();
+        if (planner_->wrong()) return this->name_wrong_bound();
     }
     end(Outcome::reached_end);
 }

@@ -36,11 +36,19 @@ void throw_beyond_time_event(double event, double end)
         end, event));
 }
 
+void throw_not_quiet(double until, double found)
+{
+    throw std::logic_error(
+        fmt::format("EventMonitor: found `skip_to` {:.17g} s; expected a time up to {:.17g} s, see "
+                    "`quiet_until`, and steps beyond",
+                    found, until));
+}
+
 void throw_no_length(std::string_view what, double found)
 {
-    throw std::invalid_argument(fmt::format(
-        "EventMonitor: found {} s for {}; expected a finite time, and lengths above 0", found,
-        what));
+    throw std::invalid_argument(
+        fmt::format("EventMonitor: found {} s for {}; expected a finite time, and lengths above 0",
+                    found, what));
 }
 
 void throw_wrong_size(std::size_t expected, std::size_t found)

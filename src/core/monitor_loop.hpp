@@ -19,6 +19,8 @@ namespace ricochet::detail {
 [[noreturn]] void throw_state_moved(std::size_t component, double expected, double found);
 /// @throws std::logic_error: the step goes beyond a time event.
 [[noreturn]] void throw_beyond_time_event(double event, double end);
+/// @throws std::logic_error: guards have to be looked at before.
+[[noreturn]] void throw_not_quiet(double until, double found);
 /// @throws std::invalid_argument: a length, time or scale that is none.
 [[noreturn]] void throw_no_length(std::string_view what, double found);
 
@@ -39,8 +41,7 @@ class MonitorLoop : public AnyMonitor<X>, private EventEngine<X, single> {
 
 public:
     /// Keeps a reference to `setup`.
-    MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options,
-                bool cuts_at_all)
+    MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options, bool cuts_at_all)
         : Engine(setup, like, options)
     {
         this->cuts_at_all_ = cuts_at_all;
@@ -48,6 +49,9 @@ public:
             throw_without_events();
         }
         if (guarded_) this->refuse_bad_guards();
+        if (setup.detector.check) {
+            setup.detector.check(setup.detecting, setup.door, like, 0, Engine::infinity);
+        }
         cut_.before = cut_.after = like;
         cut_.fired.reserve(std::max<std::size_t>(bank_.size(), 1));
     }
@@ -85,19 +89,14 @@ public:
         h_next_ = step.h;
         time_event_due_ = false;
         if (timed_) heed_time_event();
-        bool cleared = false;
-        if (this->deserves_search(cleared)) {
-            const std::size_t broken = bank_.first_not_finite();
-            if (broken != no_guard) {
-                this->end(Outcome::non_finite, broken);
-                step_.restart(step_.start(), step_.x0(), step_.mode());
-                return Verdict::ended;
-            }
-            if (this->find(cleared)) {
-                cut_.s = search_.at();
-                this->cut_short();
-                return show_set();
-            }
+        if (holds_set()) {
+            cut_.s = search_.at();
+            this->cut_short();
+            return show_set();
+        }
+        if (ended_) {
+            step_.restart(step_.start(), step_.x0(), step_.mode());
+            return Verdict::ended;
         }
         step_.accept_shown();
         ++run_.statistics.steps;
@@ -151,6 +150,28 @@ public:
     [[nodiscard]] const X& x() const noexcept override { return step_.x0(); }
     [[nodiscard]] Mode mode() const noexcept override { return step_.mode(); }
     [[nodiscard]] double must_stop_at() const noexcept override { return time_event_; }
+    [[nodiscard]] double quiet_until() const noexcept override
+    {
+        if (!guarded_) return backward_ ? -Engine::infinity : Engine::infinity;
+        const bool planned = puts_off_ && started_ && !ended_ && !resting_ && !newly_armed_ &&
+                             this->pending_ == Pending::nothing;
+        return planned ? clock(planner_->limit()) : step_.start().value;
+    }
+
+    void skip_to(const Instant& t, const X& x, const double* dxdt) override
+    {
+        require_turn("skip_to");
+        if (clock(t.value) < clock(step_.start().value)) throw_gap(step_.start().value, t.value);
+        if (!(clock(t.value) <= clock(quiet_until()))) throw_not_quiet(quiet_until(), t.value);
+        if (timed_ && !lies_before(t.value, time_event_)) {
+            throw_beyond_time_event(time_event_, t.value);
+        }
+        step_.restart(t, x, step_.mode());
+        place_rate(dxdt);
+        ++run_.statistics.steps;
+        this->count_put_off(1);
+    }
+
     [[nodiscard]] Side side(std::size_t guard) const override
     {
         if (guard >= bank_.size()) throw_no_such_guard(guard, bank_.size());
@@ -188,6 +209,7 @@ public:
         this->pending_ = Pending::nothing;
         started_ = true;
         if (guarded_) search_.begin(step_.x0());
+        if (puts_off_) planner_->restore(bank_);
     }
 
 private:
@@ -197,7 +219,10 @@ private:
     using Engine::finders_;
     using Engine::guarded_;
     using Engine::h_next_;
+    using Engine::newly_armed_;
     using Engine::options_;
+    using Engine::planner_;
+    using Engine::puts_off_;
     using Engine::resting_;
     using Engine::run_;
     using Engine::search_;
@@ -238,8 +263,7 @@ private:
     {
         require_length("the length of a step", step.h);
         const double gap = std::fabs(step_.until(step.start.value));
-        const double ulp =
-            std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
         if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(step_.start().value, step.start.value);
         const X& x = step_.x0();
         for_each_component(x, [&](auto i) {
@@ -263,6 +287,52 @@ private:
         return backward_ ? t > end : t < end;
     }
 
+    // --- looking ---
+
+    /// Whether a set of events cuts the step short. False, too, if the run has ended.
+    [[nodiscard]] bool holds_set()
+    {
+        if (puts_off_ && !planner_->steps_aside()) return holds_set_by_plan();
+        if (puts_off_) this->watch_all();
+        bool cleared = false;
+        return this->deserves_search(cleared) && finds(cleared);
+    }
+
+    [[nodiscard]] bool finds(bool cleared)
+    {
+        const std::size_t broken = bank_.first_not_finite();
+        if (broken == no_guard) return this->find(cleared);
+        this->end(Outcome::non_finite, broken);
+        return false;
+    }
+
+    /// A stretch is a single step: a host does not go back.
+    [[nodiscard]] bool holds_set_by_plan()
+    {
+        if (newly_armed_) this->begin_plan();
+        const double end = clock(step_.time(step_.h()));
+        bool found = false;
+        if (planner_->covers(end)) {
+            planner_->sample_sleeper(step_, bank_, run_.statistics);
+            this->count_put_off(1);
+        } else {
+            step_.store(planner_->steps().add().start);
+            planner_->overrun(end);
+            const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
+            planner_->steps().clear();
+            if (doubt == Planner<X, single>::none) {
+                this->count_put_off(1);
+            } else if (!planner_->wrong()) {
+                found = this->judges_suspicious() && finds(false);
+                if (!found && !ended_) planner_->settle(step_, bank_);
+            }
+        }
+        if (planner_->wrong()) this->name_wrong_bound();
+        return found && !ended_;
+    }
+
+    [[nodiscard]] double clock(double t) const noexcept { return backward_ ? -t : t; }
+
     // --- sets ---
 
     void place_rate(const double* dxdt)
@@ -278,7 +348,9 @@ private:
         assign(cut_.before, step_.x0());
         cut_.mode_before = step_.mode();
         if (!this->settle()) {
-            return ended_ ? Verdict::ended : resting_ ? Verdict::rests : Verdict::stands;
+            if (ended_) return Verdict::ended;
+            if (puts_off_ && !resting_) this->begin_plan();
+            return resting_ ? Verdict::rests : Verdict::stands;
         }
         cut_.s = 0;
         return show_set();
@@ -295,7 +367,7 @@ private:
         }
         assign(cut_.after, step_.x0());
         cut_.mode_after = step_.mode();
-        cut_.on_time = !cut_.accumulation && this->firing_.on_time;
+        cut_.on_time = !cut_.accumulation && this->on_time_;
         cut_.state_changed = !same_state(cut_.before, cut_.after);
         cut_.fired.assign(search_.members().begin(), search_.members().end());
         std::sort(cut_.fired.begin(), cut_.fired.end());
@@ -341,6 +413,11 @@ private:
         visit(ended_);
         visit(run_.outcome);
         this->visit_guards(visit);
+        if (puts_off_) {
+            visit(this->last_h_);
+            visit(newly_armed_);
+            planner_->visit(visit);
+        }
     }
 
     Cut<X> cut_;

@@ -95,6 +95,9 @@ public:
     /// Whether nothing need be looked at until the time `end`.
     [[nodiscard]] bool covers(double end) const noexcept { return end <= limit_; }
 
+    /// Until when nothing need be looked at.
+    [[nodiscard]] double limit() const noexcept { return limit_; }
+
     /// Whether planning is known to cost more than it saves, so that the exact detector is to
     /// look at every step. Stretches are closed first.
     [[nodiscard]] bool steps_aside() const noexcept { return meter_.checks() && !in_stretch(); }
@@ -524,156 +527,36 @@ private:
 
     /// Closes what guard i owes; returns the first step that could not be, or `none`.
     [[nodiscard]] std::size_t close_one(std::size_t i, const Step<X>& step, Bank& bank,
-                                        Statistics& counts, double h_next)
-    {
-        LastLook& known = looks_[i];
-        if (never_sleeps(bank[i]) || known.unclear) return steps_.size() - 1;
-        Look from = last_look(i);
-        Look end;
-        if (bound_at(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
-            detector_->sure(self_, end.bound, band(bank, i, end.value, end.value)) >= h_next) {
-            if (detector_->checks_bounds && ++lower_bounds_used_ % 8 == 0) {
-                (void)look_at(i, steps_.size(), step, bank, counts);
-            }
-            note(i, known, end, step.mode(), bank);
-            return none;
-        }
-        end = look_at(i, steps_.size(), step, bank, counts);
-        const std::size_t failed =
-            narrow(i, from, known.first, steps_.size(), end, step, bank, counts);
-        const bool moved = from.time != known.time || failed == none;
-        const double rate = known.rate;
-        if (failed != none) remember(known, place(failed + 1, step).time, failing_value_);
-        if (moved) note(i, known, failed == none ? end : from, step.mode(), bank);
-        if (!moved) known.rate = rate;
-        return failed;
-    }
+                                        Statistics& counts, double h_next);
 
     /// Whether guard i stays clear between a look `from`, whose cover reaches the start of
     /// tentative step `lo`, and the look `end` at the start of step `hi`. If not, returns the
     /// first step that is in doubt, with `from` moved to its start.
     [[nodiscard]] std::size_t narrow(std::size_t i, Look& from, std::size_t lo, std::size_t hi,
                                      const Look& end, const Step<X>& step, const Bank& bank,
-                                     Statistics& counts)
-    {
-        if (closes(bank, i, from, end)) {
-            check_change(i, from, end, bank);
-            from = end;
-            return none;
-        }
-        if (hi - lo == 1) {
-            failing_value_ = end.value;
-            if (from.exact && from.time == place(lo, step).time) return lo;
-            if (Look start;
-                bound_at(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
-                from = end;
-                return none;
-            }
-            const Look start = look_at(i, lo, step, bank, counts);
-            check_covered(i, from, start, bank);
-            from = start;
-            if (!closes(bank, i, start, end)) return lo;
-            check_change(i, start, end, bank);
-            from = end;
-            return none;
-        }
-        const std::size_t middle = lo + (hi - lo) / 2;
-        const Look half = look_at(i, middle, step, bank, counts);
-        const std::size_t failed = narrow(i, from, lo, middle, half, step, bank, counts);
-        return failed != none ? failed : narrow(i, from, middle, hi, end, step, bank, counts);
-    }
+                                     Statistics& counts);
 
     // --- are the bounds true? ---
 
-    void check_change(std::size_t i, const Look& from, const Look& to, const Bank& bank)
-    {
-        if (!bounded_ || !detector_->checks_bounds || !from.exact || !to.exact) return;
-        if (bank[i].info.boolean) return;  // its values are those of a sign
-        blame_change(i, from, to, bank);
-    }
+    void check_change(std::size_t i, const Look& from, const Look& to, const Bank& bank);
 
     /// The guard was covered from one look to the other. That it is nevertheless across its
     /// surface is seen without asking for it.
-    void check_covered(std::size_t i, const Look& from, const Look& to, const Bank& bank)
-    {
-        if (!bounded_) return;
-        if (to.bound.distance <= 0 && from.time < to.time) blame_change(i, from, to, bank);
-        check_change(i, from, to, bank);
-    }
+    void check_covered(std::size_t i, const Look& from, const Look& to, const Bank& bank);
 
-    void blame_change(std::size_t i, const Look& from, const Look& to, const Bank& bank)
-    {
-        const double tau = to.time - from.time;
-        const double allowed = (1 + detector_->margin) * largest_change(from.bound, to.bound, tau) +
-                               2 * band(bank, i, from.value, to.value);
-        const double change = to.value - from.value;
-        const bool wrong = from.exact ? std::fabs(change) > allowed : change < -allowed;
-        if (wrong && !wrong_) blame(i, from, to, allowed);
-    }
+    void blame_change(std::size_t i, const Look& from, const Look& to, const Bank& bank);
 
-    void blame(std::size_t i, const Look& from, const Look& to, double allowed)
-    {
-        wrong_ = {.guard = i,
-                  .lower_bound = false,
-                  .upper_bound = false,
-                  .t = to.t,
-                  .x = *to.x,
-                  .value = to.value,
-                  .since = clock(from.time),
-                  .value_then = from.value,
-                  .allowed = allowed};
-    }
+    void blame(std::size_t i, const Look& from, const Look& to, double allowed);
 
     /// A guard that sleeps cannot be beyond its surface, whatever bounds say of it there.
     void watch_sleeper(std::size_t i, double t, const X& x, Mode mode, const Bank& bank,
-                       Statistics& counts)
-    {
-        if (wrong_ || !bank[i].enabled || never_sleeps(bank[i])) return;
-        const Look from = last_look(i);
-        Look now{.time = clock(t), .t = t, .x = &x};
-        if (!(now.time > from.time)) return;
-        now.value = value_at(i, now.time, t, x, mode, bank, counts);
-        now.bound = bound(i, now, mode, bank[i].side);
-        const double tau = now.time - from.time;
-        if (detector_->checks_bounds) check_bound(i, now, mode, bank);
-        if (wrong_) return;
-        if (now.bound.distance < -band(bank, i, from.value, now.value)) {
-            blame(i, from, now, (from.bound.speed + 0.5 * from.bound.acceleration * tau) * tau);
-        } else {
-            check_change(i, from, now, bank);
-        }
-    }
+                       Statistics& counts);
 
     /// Whether an exact value contradicts the bound that would have stood in for it. Beyond the
     /// surface a bound may well have ended at 0.
-    void check_bound(std::size_t i, const Look& look, Mode mode, const Bank& bank)
-    {
-        if (!bounded_) return;
-        void* const door = system_.door();
-        if (system_->lower_bound && bank[i].side == Side::above) {
-            check_against(system_->lower_bound(door, i, mode, look.t, *look.x), i, look, bank);
-        }
-        if (system_->upper_bound && bank[i].side == Side::below) {
-            check_against(system_->upper_bound(door, i, mode, look.t, *look.x), i, look, bank);
-        }
-    }
+    void check_bound(std::size_t i, const Look& look, Mode mode, const Bank& bank);
 
-    void check_against(double bound, std::size_t i, const Look& look, const Bank& bank)
-    {
-        const double sign = sign_of(bank[i].side);
-        if (wrong_) return;
-        const double reach = band(bank, i, look.value, 0);
-        if (!(sign * bound > std::max(sign * look.value, 0.0) + reach)) return;
-        wrong_ = {.guard = i,
-                  .lower_bound = sign > 0,
-                  .upper_bound = sign < 0,
-                  .t = look.t,
-                  .x = *look.x,
-                  .value = look.value,
-                  .since = look.t,
-                  .value_then = look.value,
-                  .allowed = bound};
-    }
+    void check_against(double bound, std::size_t i, const Look& look, const Bank& bank);
 
     SystemAt<X> system_;
     const DetectorTable<X>* detector_;

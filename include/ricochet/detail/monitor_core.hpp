@@ -65,6 +65,8 @@ public:
     [[nodiscard]] virtual const X& x() const noexcept = 0;
     [[nodiscard]] virtual Mode mode() const noexcept = 0;
     [[nodiscard]] virtual double must_stop_at() const noexcept = 0;
+    [[nodiscard]] virtual double quiet_until() const noexcept = 0;
+    virtual void skip_to(const Instant& t, const X& x, const double* dxdt) = 0;
     [[nodiscard]] virtual Side side(std::size_t guard) const = 0;
     /// What has been recorded so far; its time and state are those of the last `start`.
     [[nodiscard]] virtual const Run<X>& run() const noexcept = 0;
@@ -78,8 +80,7 @@ public:
 /// @throws std::invalid_argument, as `EventMonitor`
 template <class X>
 [[nodiscard]] std::unique_ptr<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
-                                                          const Options& options,
-                                                          bool cuts_at_all);
+                                                          const Options& options, bool cuts_at_all);
 
 }  // namespace detail
 

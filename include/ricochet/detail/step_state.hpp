@@ -68,8 +68,6 @@ struct StepState {
     /// Of the system, for kernels that do not have it inlined; see `SystemTable::flow`.
     bool (*flow)(void* door, Mode mode, double t, const X& x, X& dxdt) = nullptr;
 
-    const HostStepTable* host = nullptr;  ///< the step in hand, where a host has taken it
-
     Instant start;
     Mode mode = 0;
     bool backward = false;  ///< time runs backward, and offsets and rates with it
@@ -94,6 +92,8 @@ struct StepState {
     X middle;  ///< w there, where `has_middle`
     mutable bool has_middle = false;
     mutable std::size_t asked_alone = 0;  ///< components of the middle, by views
+
+    const HostStepTable* host = nullptr;  ///< the step in hand, where a host has taken it
 
     [[nodiscard]] double in_time(double s) const noexcept { return backward ? -s : s; }
     [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }

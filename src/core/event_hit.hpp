@@ -1,0 +1,102 @@
+// What a search for events works with: how finely it looks, and what it finds.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "ricochet/detail/detector_table.hpp"
+#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/integrate/options.hpp"
+
+namespace ricochet::detail {
+
+/// How finely events are told apart, at a time.
+class EventResolution {
+public:
+    explicit EventResolution(const Options& options) noexcept
+        : absolute_(options.event_tolerance),
+          relative_(options.event_rtol),
+          window_(options.event_window)
+    {
+    }
+
+    /// Width [s] of a bracket that is narrow enough.
+    [[nodiscard]] double tolerance(double t) const noexcept
+    {
+        return absolute_ + relative_ * std::fabs(t);
+    }
+
+    /// Whether events are located to neighbouring doubles, wherever they are.
+    [[nodiscard]] bool is_finest() const noexcept { return absolute_ == 0 && relative_ == 0; }
+
+    /// Events no further apart [s] cannot be told apart.
+    [[nodiscard]] double blur(double t) const noexcept
+    {
+        return std::max(tolerance(t), 4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
+    }
+
+    /// Events no further apart [s] happen together.
+    [[nodiscard]] double window(double t) const noexcept { return std::max(blur(t), window_); }
+
+private:
+    double absolute_, relative_, window_;
+};
+
+/// An event that changes nothing, found inside a step.
+struct Note {
+    std::size_t guard;
+    EventKind kind;
+    Side side;  ///< that the guard left
+    Location where;
+};
+
+/// Drops the notes beyond the offset s, and sorts the others by time.
+void sort_notes_until(double s, std::vector<Note>& notes);
+
+/// How a guard changes its sign at a place that a locator found.
+[[nodiscard]] inline EventKind kind_of(const Location& where) noexcept
+{
+    return where.jump ? EventKind::jump : EventKind::crossing;
+}
+
+/// A guard that acts, found to leave its side inside a step.
+struct Hit {
+    std::size_t guard = 0;
+    Side side = Side::plateau;  ///< that it leaves
+    Finding finding;
+    double guess = 0;  ///< [s] offset
+    bool located = false;
+    Location where;
+};
+
+/// The detector and the locator of a run.
+template <class X>
+struct Finders {
+    const DetectorTable<X>& detector;
+    const void* detecting;
+    const LocatorTable& locator;
+    const void* locating;
+
+    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const
+    {
+        return detector.examine(detecting, path, watch);
+    }
+    [[nodiscard]] Location locate(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
+                                  double tolerance) const
+    {
+        return locator.locate(locating, path, lo.s, lo.value, lo.rate, hi.s, hi.value, hi.rate,
+                              tolerance);
+    }
+    [[nodiscard]] bool leaves_plainly(double sign, const GuardSample& start, const GuardSample& end,
+                                      double touch) const
+    {
+        return detector.leaves_plainly(sign, start.s, start.value, start.rate, end.s, end.value,
+                                       end.rate, touch);
+    }
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,124 @@
+// What is known of the guards of a system, one record for each.
+#pragma once
+
+#include <array>
+#include <boost/container/small_vector.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+#include "ricochet/detail/detector_table.hpp"
+#include "ricochet/detail/finding.hpp"
+#include "ricochet/detail/shrinking_intervals.hpp"
+#include "ricochet/detail/system_table.hpp"
+#include "ricochet/hybrid/event.hpp"
+
+namespace ricochet::detail {
+
+/// A T for the one guard of a system that has one.
+template <class T>
+class ForTheGuard : public std::array<T, 1> {
+public:
+    explicit ForTheGuard(std::size_t /*guards*/ = 1) : std::array<T, 1>{} {}
+    void resize(std::size_t /*guards*/) noexcept {}
+    void swap(ForTheGuard& other) noexcept { std::swap((*this)[0], other[0]); }
+};
+
+/// A T for every guard; of a few guards without an allocation. Most systems have one guard, and
+/// for them the loop is compiled with that known.
+template <class T, bool single>
+using PerGuard = std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, 8>>;
+
+/// As many elements as there are guards, at most.
+template <class T, bool single>
+class GuardList {
+public:
+    explicit GuardList(std::size_t guards) : items_(guards) {}
+    void clear() noexcept { size_ = 0; }
+    void shrink(std::size_t size) noexcept { size_ = size; }
+    void push_back(const T& item) noexcept { items_[size_++] = item; }
+    [[nodiscard]] T& add() noexcept { return items_[size_++]; }
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+    [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+    [[nodiscard]] T& operator[](std::size_t i) noexcept { return items_[i]; }
+    [[nodiscard]] const T& operator[](std::size_t i) const noexcept { return items_[i]; }
+    [[nodiscard]] T* begin() noexcept { return items_.data(); }
+    [[nodiscard]] T* end() noexcept { return items_.data() + size_; }
+    [[nodiscard]] const T* begin() const noexcept { return items_.data(); }
+    [[nodiscard]] const T* end() const noexcept { return items_.data() + size_; }
+    [[nodiscard]] std::span<const T> span() const noexcept { return {items_.data(), size_}; }
+
+private:
+    PerGuard<T, single> items_;
+    std::size_t size_ = 0;
+};
+
+/// What is known of a guard beside its values.
+struct GuardRecord {
+    GuardInfo info;
+    bool enabled = true;
+    bool newly_enabled = false;
+    bool fired = false;
+    bool turned = false;   ///< its last reset has sent it back from the surface
+    double departure = 0;  ///< [1/s] its rate after the last reset
+    /// [s] scale of that rate; NaN where it is not that of the state in hand.
+    double rated_over = std::numeric_limits<double>::quiet_NaN();
+    bool again = false;            ///< it is back inside the window of its last event
+    Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
+    bool acting = false;           ///< resets, or may end the run; else a notification
+    bool asleep = false;           ///< its check is put off: nothing in the bank is of this step
+    Side side = Side::plateau;
+    Side next = Side::plateau;  ///< at the end of the step, if it stands
+    bool jumped = false;        ///< its last event was a jump
+    bool departs = false;       ///< the smooth phase in hand started at its event, or enabled it
+    double band = 0;            ///< |g| where it fired: it counts as being on its surface
+    bool estimated = false;     ///< the band is what location left, not a value of the guard
+    double from = 0;            ///< [s] offset in the step up to which it has been looked at
+    std::uint64_t events = 0;
+    double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
+    Side last_side = Side::plateau;                          ///< the side it left then
+    ShrinkingIntervals intervals;
+};
+
+[[nodiscard]] constexpr double sign_of(Side side) noexcept
+{
+    return side == Side::above ? 1 : side == Side::below ? -1 : 0;
+}
+
+/// What a detector asks of all guards, of a system with bounds or without.
+struct BankRules {
+    Screening screening = Screening::ends;
+    bool uses_rates = false;
+    bool puts_off = false;
+    /// Whether the scale of a guard is that of its largest value so far: for detectors that do
+    /// not ask for the rounding of the state, so that neighbouring steps agree on what a touch
+    /// is.
+    bool remembers = false;
+    /// Whether brackets are not narrowed below the rounding of the sizes that smooth phases
+    /// started with: those of guards with declared bounds, which may be expensive.
+    bool coarse = false;
+    /// Whether guards can be looked at inside a step.
+    bool looks = false;
+    bool (*suspects)(double, double, double, double, double, double) = nullptr;
+
+    /// Whether sizes are kept from step to step.
+    [[nodiscard]] bool keeps_sizes() const noexcept { return remembers || coarse; }
+
+    template <class X>
+    [[nodiscard]] static BankRules of(const DetectorTable<X>& detector, const SystemAt<X>& system)
+    {
+        const bool bounded = system->bounded;
+        return {.screening = detector.screening,
+                .uses_rates = detector.uses_rates,
+                .puts_off = detector.puts_off,
+                .remembers = detector.uses_rates && !detector.looks_inside && !bounded,
+                .coarse = detector.uses_rates && bounded,
+                .looks = detector.looks_inside && !bounded,
+                .suspects = detector.suspects};
+    }
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,106 @@
+// Whether the bounds that a plan relies on are true.
+#pragma once
+
+#include "core/planner.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+inline void Planner<X, single>::check_change(std::size_t i, const Look& from, const Look& to,
+                                             const Bank& bank)
+{
+    if (!bounded_ || !detector_->checks_bounds || !from.exact || !to.exact) return;
+    if (bank[i].info.boolean) return;  // its values are those of a sign
+    blame_change(i, from, to, bank);
+}
+
+template <class X, bool single>
+inline void Planner<X, single>::check_covered(std::size_t i, const Look& from, const Look& to,
+                                              const Bank& bank)
+{
+    if (!bounded_) return;
+    if (to.bound.distance <= 0 && from.time < to.time) blame_change(i, from, to, bank);
+    check_change(i, from, to, bank);
+}
+
+template <class X, bool single>
+inline void Planner<X, single>::blame_change(std::size_t i, const Look& from, const Look& to,
+                                             const Bank& bank)
+{
+    const double tau = to.time - from.time;
+    const double allowed = (1 + detector_->margin) * largest_change(from.bound, to.bound, tau) +
+                           2 * band(bank, i, from.value, to.value);
+    const double change = to.value - from.value;
+    const bool wrong = from.exact ? std::fabs(change) > allowed : change < -allowed;
+    if (wrong && !wrong_) blame(i, from, to, allowed);
+}
+
+template <class X, bool single>
+inline void Planner<X, single>::blame(std::size_t i, const Look& from, const Look& to,
+                                      double allowed)
+{
+    wrong_ = {.guard = i,
+              .lower_bound = false,
+              .upper_bound = false,
+              .t = to.t,
+              .x = *to.x,
+              .value = to.value,
+              .since = clock(from.time),
+              .value_then = from.value,
+              .allowed = allowed};
+}
+
+template <class X, bool single>
+inline void Planner<X, single>::watch_sleeper(std::size_t i, double t, const X& x, Mode mode,
+                                              const Bank& bank, Statistics& counts)
+{
+    if (wrong_ || !bank[i].enabled || never_sleeps(bank[i])) return;
+    const Look from = last_look(i);
+    Look now{.time = clock(t), .t = t, .x = &x};
+    if (!(now.time > from.time)) return;
+    now.value = value_at(i, now.time, t, x, mode, bank, counts);
+    now.bound = bound(i, now, mode, bank[i].side);
+    const double tau = now.time - from.time;
+    if (detector_->checks_bounds) check_bound(i, now, mode, bank);
+    if (wrong_) return;
+    if (now.bound.distance < -band(bank, i, from.value, now.value)) {
+        blame(i, from, now, (from.bound.speed + 0.5 * from.bound.acceleration * tau) * tau);
+    } else {
+        check_change(i, from, now, bank);
+    }
+}
+
+template <class X, bool single>
+inline void Planner<X, single>::check_bound(std::size_t i, const Look& look, Mode mode,
+                                            const Bank& bank)
+{
+    if (!bounded_) return;
+    void* const door = system_.door();
+    if (system_->lower_bound && bank[i].side == Side::above) {
+        check_against(system_->lower_bound(door, i, mode, look.t, *look.x), i, look, bank);
+    }
+    if (system_->upper_bound && bank[i].side == Side::below) {
+        check_against(system_->upper_bound(door, i, mode, look.t, *look.x), i, look, bank);
+    }
+}
+
+template <class X, bool single>
+inline void Planner<X, single>::check_against(double bound, std::size_t i, const Look& look,
+                                              const Bank& bank)
+{
+    const double sign = sign_of(bank[i].side);
+    if (wrong_) return;
+    const double reach = band(bank, i, look.value, 0);
+    if (!(sign * bound > std::max(sign * look.value, 0.0) + reach)) return;
+    wrong_ = {.guard = i,
+              .lower_bound = sign > 0,
+              .upper_bound = sign < 0,
+              .t = look.t,
+              .x = *look.x,
+              .value = look.value,
+              .since = look.t,
+              .value_then = look.value,
+              .allowed = bound};
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,143 @@
+// All guards of a system, evaluated at a state.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/guard_record.hpp"
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/guard_view.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+class SampledGuards {
+protected:
+    using Doubles = PerGuard<double, single>;
+
+    SampledGuards(const SystemAt<X>& system, const BankRules& rules, bool backward)
+        : system_(system), rules_(rules), backward_(backward)
+    {
+        const std::size_t count = system->guard_count(system.door());
+        behind_.resize(count);
+        records_.resize(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            records_[i].info = system->info(system.door(), i);
+        }
+        heed_enabled();
+    }
+
+public:
+    [[nodiscard]] std::size_t size() const noexcept { return single ? 1 : records_.size(); }
+    [[nodiscard]] GuardRecord& operator[](std::size_t i) noexcept { return records_[i]; }
+    [[nodiscard]] const GuardRecord& operator[](std::size_t i) const noexcept
+    {
+        return records_[i];
+    }
+
+    [[nodiscard]] CoreGuard<X> view(std::size_t i, Mode mode, std::uint64_t& calls) const noexcept
+    {
+        return {system_, calls, i, mode, records_[i].info, backward_};
+    }
+
+    /// The rate of guard i, as `sample` computes it.
+    [[nodiscard]] double rate_of(std::size_t i, Mode mode, double t, const X& x, const X& dxdt,
+                                 double scale, std::uint64_t& calls)
+    {
+        if (records_[i].info.boolean || !rules_.uses_rates) return 0;
+        if (!system_->rates) return view(i, mode, calls).rate(t, x, dxdt, scale);
+        rates_together(mode, t, x, dxdt, behind_);
+        return behind_[i];
+    }
+
+    /// Some guards may have been enabled or disabled.
+    void heed_enabled() noexcept
+    {
+        selective_ = false;
+        for (std::size_t i = 0; i < size(); ++i) {
+            selective_ = selective_ || records_[i].info.boolean || !records_[i].enabled;
+        }
+    }
+
+protected:
+    void sample(Mode mode, double t, const X& x, const X& dxdt, double scale, std::uint64_t& calls,
+                Doubles& g, Doubles& rates)
+    {
+        if (single && system_->point && rules_.uses_rates && !selective_) {
+            const GuardPoint at = view(0, mode, calls).point(t, x, dxdt, scale);
+            g[0] = at.value;
+            rates[0] = at.rate;
+            return;
+        }
+        sample_values(mode, t, x, calls, g);
+        sample_rates(mode, t, x, dxdt, scale, calls, rates);
+    }
+
+    void sample_values(Mode mode, double t, const X& x, std::uint64_t& calls, Doubles& g)
+    {
+        if (size() == 0) return;
+        system_->guards(system_.door(), mode, t, x, all(g));
+        calls += size();
+    }
+
+    void sample_rates(Mode mode, double t, const X& x, const X& dxdt, double scale,
+                      std::uint64_t& calls, Doubles& rates)
+    {
+        if (!rules_.uses_rates || size() == 0) return;
+        if (system_->rates) return rates_together(mode, t, x, dxdt, rates);
+        if (system_->each_rate && !selective_ && !backward_) {
+            return system_->each_rate(system_.door(), mode, t, x, dxdt, all(rates));
+        }
+        if (!system_->each_rate && !system_->guard_alone) {
+            difference(mode, t, x, dxdt, scale, rates);
+            calls += 2 * size();
+            return;
+        }
+        for (std::size_t i = 0; i < size(); ++i) {
+            rates[i] = records_[i].info.boolean || !records_[i].enabled
+                           ? 0
+                           : view(i, mode, calls).rate(t, x, dxdt, scale);
+        }
+    }
+
+    /// Rates of all guards at once from the system.
+    void rates_together(Mode mode, double t, const X& x, const X& dxdt, Doubles& rates)
+    {
+        if (!backward_) return system_->rates(system_.door(), mode, t, x, dxdt, all(rates));
+        system_->rates(system_.door(), mode, t, x, negated(dxdt), all(rates));
+        for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
+    }
+
+    /// Rates of all guards at once by the central difference along the flow.
+    void difference(Mode mode, double t, const X& x, const X& dxdt, double scale, Doubles& rates)
+    {
+        const double delta = 1e-5 * scale;
+        const double ahead = backward_ ? -delta : delta;
+        if (there_.size() != x.size()) there_ = x;
+        detail::move(there_, x, delta, dxdt);
+        system_->guards(system_.door(), mode, t + ahead, there_, all(rates));
+        detail::move(there_, x, -delta, dxdt);
+        system_->guards(system_.door(), mode, t - ahead, there_, all(behind_));
+        for (std::size_t i = 0; i < size(); ++i) {
+            rates[i] = records_[i].info.boolean ? 0 : (rates[i] - behind_[i]) / (2 * delta);
+        }
+    }
+
+    SystemAt<X> system_;
+    BankRules rules_;
+    bool backward_;
+    bool selective_ = false;  ///< whether any guard is disabled or has no rate
+    PerGuard<GuardRecord, single> records_{};
+
+private:
+    [[nodiscard]] std::span<double> all(Doubles& numbers) const noexcept
+    {
+        return {numbers.data(), size()};
+    }
+
+    Doubles behind_{};
+    X there_{};
+};
+
+}  // namespace ricochet::detail

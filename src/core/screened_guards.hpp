@@ -1,0 +1,393 @@
+// Which guards of a system deserve a search in a step, by what is known of them at its ends and
+// inside.
+//
+// What every step needs of every guard lies in plain arrays, so that a hundred guards
+// are screened in one loop.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "core/sampled_guards.hpp"
+#include "core/step.hpp"
+#include "core/wide.hpp"
+#include "ricochet/detail/cubic_look.hpp"
+#include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/hybrid/event.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+class ScreenedGuards : public SampledGuards<X, single> {
+    using Guards = SampledGuards<X, single>;
+
+protected:
+    using typename Guards::Doubles;
+
+    ScreenedGuards(const SystemAt<X>& system, const BankRules& rules, bool backward)
+        : Guards(system, rules, backward), suspects_(size()), marks_(size())
+    {
+        if (rules.looks) {
+            for (auto* numbers : {&inside_, &further_, &worst_}) numbers->resize(size());
+        }
+        for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_}) numbers->resize(size());
+        for (const GuardRecord& record : records_) bands_ = bands_ || record.info.touch > 0;
+    }
+
+public:
+    using Guards::size;
+
+    /// Evaluates all guards inside a step, at its state `x` there.
+    void sample_inside(const Step<X>& step, const X& x, std::uint64_t& calls)
+    {
+        sample_values(step.mode(), step.time(CubicLook::inside * step.h()), x, calls, inside_);
+        looked_ = Looked::inside;
+        marked_ = false;
+    }
+
+    /// And once more, at the part `CubicLook::further` of the step where the state is `x`.
+    void sample_further(const Step<X>& step, const X& x, std::uint64_t& calls)
+    {
+        const double s = CubicLook::further * step.h();
+        sample_values(step.mode(), step.time(s), x, calls, further_);
+        looked_ = Looked::further;
+    }
+
+    /// And once more, at the part `u` of the step, one of `CubicLook::places`.
+    void sample_place(const Step<X>& step, double u, const X& x, std::uint64_t& calls)
+    {
+        sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
+        const double h = step.h();
+        const bool first = looked_ != Looked::everywhere;
+        for (std::size_t i = 0; i < size(); ++i) {
+            const double e = cubic(i, h).deviation(u, further_[i]);
+            worst_[i] = !first && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
+        }
+        looked_ = Looked::everywhere;
+    }
+
+    [[nodiscard]] bool looked_everywhere() const noexcept { return looked_ == Looked::everywhere; }
+
+    /// Whether any guard deserves a second evaluation inside the step, or a search.
+    [[nodiscard]] bool doubtful(double h) noexcept
+    {
+        if (looked() && !waiting_ && !bands_) {
+            if (are_few()) {
+                return with_screen([&](auto screen) __attribute__((always_inline)) {
+                    return any_of(in_doubt(screen, h));
+                });
+            }
+            mark(h);
+            return !marks_.empty();
+        }
+        return suspicious(h);
+    }
+
+    /// Whether a second evaluation inside the step can change what is thought of a guard: not
+    /// where the first met the cubic to nine digits, which is no coincidence.
+    [[nodiscard]] bool needs_second_look(double h) const noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            const CubicLook look = cubic(i, h);
+            const double e = look.deviation(CubicLook::inside, inside_[i]);
+            if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
+        }
+        return false;
+    }
+
+    /// Whether any guard deserves a search.
+    [[nodiscard]] bool suspicious(double h) noexcept
+    {
+        if (waiting_ && leaves_plateau()) return true;
+        screen(h);
+        return !suspects_.empty();
+    }
+
+    /// The guards that deserve a search, in ascending order, as `begin_search` found them.
+    [[nodiscard]] std::span<const std::size_t> suspects() const noexcept
+    {
+        return suspects_.span();
+    }
+
+    /// Whether guard i may leave its side inside the step without its ends telling.
+    [[nodiscard]] bool hides(std::size_t i, double h) const noexcept
+    {
+        const CubicLook look = cubic(i, h);
+        return !(look.lowest(sign_[i]) > CubicLook::most * deviation(look, i));
+    }
+
+    /// Whether guard i is in the step what the cubic through its ends says, as far as it has
+    /// been evaluated.
+    [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
+    {
+        if (!looked()) return true;
+        const CubicLook look = cubic(i, h);
+        return 0x1p16 * deviation(look, i) <= look.size();
+    }
+
+    /// Whether the guards have been evaluated inside the step.
+    [[nodiscard]] bool looked() const noexcept { return looked_ != Looked::not_at_all; }
+
+    /// Of one of the `suspects`: it is one still, after what the search has found so far.
+    [[nodiscard]] bool still_suspicious(std::size_t i, double h) const noexcept
+    {
+        return as_screened_ || suspicious(i, h);
+    }
+
+    [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
+    {
+        if (sign_[i] == 0) return false;
+        const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
+        const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
+            return screen.suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
+        });
+        return suspected || !is_finite(g1_[i]) || (looked() && hides(i, h));
+    }
+
+    /// The first guard that is not finite at the end of the step, or `no_guard`.
+    [[nodiscard]] std::size_t first_not_finite() const noexcept
+    {
+        if (!any_of([this](std::size_t i)
+                        __attribute__((always_inline)) { return !is_finite(g1_[i]); })) {
+            return no_guard;
+        }
+        for (std::size_t i = 0; i < size(); ++i) {
+            const bool idle = !records_[i].enabled || records_[i].asleep;
+            if (!idle && !std::isfinite(g1_[i])) return i;
+        }
+        return no_guard;
+    }
+
+    /// Whether guard i, on a plateau, has its event in the step, or is no number at its end.
+    [[nodiscard]] bool leaves_plateau(std::size_t i) const noexcept
+    {
+        const GuardRecord& record = records_[i];
+        if (record.side != Side::plateau || !record.enabled || record.asleep) return false;
+        if (!std::isfinite(g1_[i])) return true;
+        return record.awaited != Side::plateau && side_of(g1_[i]) == opposite(record.awaited) &&
+               counts(record.awaited, record.info.crossing);
+    }
+
+protected:
+    using Guards::records_;
+    using Guards::rules_;
+    using Guards::sample_values;
+
+    /// Where in the step in hand the guards have been evaluated.
+    enum class Looked : std::uint8_t { not_at_all, inside, further, everywhere };
+
+    [[gnu::noinline]] bool leaves_plateau() const noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (leaves_plateau(i)) return true;
+        }
+        return false;
+    }
+
+    struct OwnScreen {
+        bool (*suspects)(double, double, double, double, double, double);
+    };
+
+    /// Calls `use` with the detector's own way of screening, inlined.
+    template <class Use>
+    [[gnu::always_inline]] auto with_screen(const Use& use) const
+    {
+        switch (rules_.screening) {
+            case Screening::ends: return use(Ends{});
+            case Screening::extremum: return use(Extremum{});
+            case Screening::every: return use(Bernstein{});
+            case Screening::own: break;
+        }
+        return use(OwnScreen{rules_.suspects});
+    }
+
+    /// Guards that are screened together: where one of them is suspected, each is looked at.
+    static constexpr std::size_t block = 16;
+    [[nodiscard]] bool are_few() const noexcept { return size() < block; }
+
+    /// Whether `condition`, which has no branches, holds for a guard.
+    template <class Condition>
+    [[nodiscard, gnu::always_inline]] bool any_of(const Condition& condition) const noexcept
+    {
+        double any = 0;  // a double, so that the loop is vectorised
+        for (std::size_t i = 0; i < size(); ++i) any = condition(i) ? 1.0 : any;
+        return any != 0;
+    }
+
+    /// Calls `visit(i)` for the guards for which `condition`, which has no branches, holds, in
+    /// ascending order.
+    template <class Condition, class Visit>
+    [[gnu::always_inline]] void for_each_that(const Condition& condition,
+                                              const Visit& visit) const noexcept
+    {
+        std::size_t first = 0;
+        for (; first + block <= size(); first += block) {
+            std::array<double, block> holds;  // doubles, so that the loop is vectorised
+            double any = 0;
+            for (std::size_t k = 0; k < block; ++k) {
+                holds[k] = condition(first + k) ? 1.0 : 0.0;
+                any = holds[k] != 0 ? 1.0 : any;
+            }
+            if (any == 0) continue;
+            for (std::size_t k = 0; k < block; ++k) {
+                if (holds[k] != 0) visit(first + k);
+            }
+        }
+        for (; first < size(); ++first) {
+            if (condition(first)) visit(first);
+        }
+    }
+
+    [[nodiscard, gnu::always_inline]] CubicLook cubic(std::size_t i, double h) const noexcept
+    {
+        return {g0_[i], rate0_[i], g1_[i], rate1_[i], h};
+    }
+
+    /// Whether the ends of the step tell of guard i that it deserves a search.
+    template <class Screen>
+    [[nodiscard, gnu::always_inline]] auto shows(const Screen& screen, double h) const noexcept
+    {
+        return [ this, screen, h ](std::size_t i) __attribute__((always_inline))
+        {
+            const bool suspected =
+                screen.suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            const bool armed = sign_[i] != 0;
+            return suspected & armed;
+        };
+    }
+
+    /// Whether guard i may leave its side where a deviation is `factor` times as large as at
+    /// the part `u`, where the guards are `values`.
+    [[nodiscard, gnu::always_inline]] auto strays(double h, double u, double factor,
+                                                  const Doubles& values) const noexcept
+    {
+        return [ this, h, u, factor, &values ](std::size_t i) __attribute__((always_inline))
+        {
+            const CubicLook look = cubic(i, h);
+            const bool clear = look.lowest(sign_[i]) > factor * look.deviation(u, values[i]);
+            const bool armed = sign_[i] != 0;
+            return !clear & armed;
+        };
+    }
+
+    /// Whether guard i deserves a second evaluation inside the step, or a search.
+    template <class Screen>
+    [[nodiscard, gnu::always_inline]] auto in_doubt(const Screen& screen, double h) const noexcept
+    {
+        return [
+            shows = shows(screen, h),
+            strays = strays(h, CubicLook::inside, CubicLook::doubt, inside_)
+        ](std::size_t i) __attribute__((always_inline))
+        {
+            const bool shown = shows(i);
+            const bool strayed = strays(i);
+            return shown | strayed;
+        };
+    }
+
+    /// The step in hand is another, or what is known of its guards.
+    void forget_screening() noexcept { screened_ = marked_ = false; }
+
+    /// Finds the guards in doubt.
+    RICOCHET_WIDE void mark(double h) noexcept
+    {
+        marks_.clear();
+        marked_ = true;
+        with_screen([&](auto screen) __attribute__((always_inline)) {
+            for_each_that(in_doubt(screen, h), [this](std::size_t i) { marks_.push_back(i); });
+        });
+    }
+
+    /// Finds the guards that deserve a search.
+    [[gnu::noinline]] void screen(double h) noexcept
+    {
+        suspects_.clear();
+        screened_ = as_screened_ = true;
+        if (are_few() || bands_) {
+            for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
+            return;
+        }
+        if (looked()) {
+            // One that deserves a search is in doubt, or deviates elsewhere.
+            if (!marked_) mark(h);
+            if (looked_ == Looked::inside)
+                return screen_marked(h, [](std::size_t) { return false; });
+            if (looked_ == Looked::further) {
+                return screen_marked(h, strays(h, CubicLook::further, CubicLook::most, further_));
+            }
+            return screen_marked(
+                h, [ this, h ](std::size_t i) __attribute__((always_inline)) {
+                    const bool clear = cubic(i, h).lowest(sign_[i]) > CubicLook::most * worst_[i];
+                    const bool armed = sign_[i] != 0;
+                    return !clear & armed;
+                });
+        }
+        marks_.clear();
+        with_screen([&](auto screen) __attribute__((always_inline)) {
+            const auto condition =
+                [ this, shows = shows(screen, h) ](std::size_t i) __attribute__((always_inline))
+            {
+                const bool shown = shows(i);
+                const bool armed = sign_[i] != 0;
+                const bool lost = !is_finite(g1_[i]);
+                return shown | (lost & armed);
+            };
+            if (any_of(condition)) screen_marked(h, condition);
+        });
+    }
+
+    /// Looks at each guard that is marked, or for which `condition` holds.
+    template <class Condition>
+    [[gnu::always_inline]] void screen_marked(double h, const Condition& condition) noexcept
+    {
+        const std::size_t* mark = marks_.begin();
+        const std::size_t* const end = marks_.end();
+        for_each_that(condition, [&](std::size_t i) {
+            for (; mark != end && *mark <= i; ++mark) {
+                if (*mark < i) add_if_suspicious(*mark, h);
+            }
+            add_if_suspicious(i, h);
+        });
+        for (; mark != end; ++mark) add_if_suspicious(*mark, h);
+    }
+
+    void add_if_suspicious(std::size_t i, double h) noexcept
+    {
+        if (suspicious(i, h)) suspects_.push_back(i);
+    }
+
+    [[nodiscard]] static constexpr bool is_finite(double g) noexcept
+    {
+        return std::fabs(g) <= std::numeric_limits<double>::max();
+    }
+
+    /// The largest deviation of guard i from the cubic through its ends that was seen.
+    [[nodiscard]] double deviation(const CubicLook& look, std::size_t i) const noexcept
+    {
+        const double e = look.deviation(CubicLook::inside, inside_[i]);
+        if (looked_ == Looked::inside) return e;
+        const double other =
+            looked_everywhere() ? worst_[i] : look.deviation(CubicLook::further, further_[i]);
+        return other <= e ? e : other;  // NaN stays
+    }
+
+    bool waiting_ = false;      ///< whether any guard may be on a plateau
+    bool bands_ = false;        ///< whether any guard declares one
+    bool screened_ = false;     ///< whether `suspects_` is of the step in hand
+    bool as_screened_ = false;  ///< and no guard has changed since
+    Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{};
+    Looked looked_ = Looked::not_at_all;
+    bool marked_ = false;  ///< whether `marks_` is of the step in hand
+    Doubles inside_{}, further_{};
+    Doubles worst_{};  ///< of further looks
+    GuardList<std::size_t, single> suspects_;
+    GuardList<std::size_t, single> marks_;  ///< guards in doubt
+};
+
+}  // namespace ricochet::detail
