@@ -16,9 +16,9 @@ struct Measured {
     std::vector<std::string> details{};  ///< printed below it
 };
 
-inline constexpr std::array<std::string_view, 10> topics = {
-    "ball",      "core",  "network", "events",   "guards",
-    "nonsmooth", "steps", "fault",   "friction", "files"};
+inline constexpr std::array<std::string_view, 11> topics = {
+    "ball",  "core",  "network",  "events", "guards", "nonsmooth",
+    "steps", "fault", "friction", "files",  "hosts"};
 
 struct Check {
     std::string_view topic;  ///< one of `topics`
@@ -34,6 +34,9 @@ struct Check {
 
 /// The compiled core: what a step, a pointer and an impact in a large state cost.
 [[nodiscard]] std::vector<Check> core_checks();
+
+/// The monitor in other people's integrators; none without SUNDIALS.
+[[nodiscard]] std::vector<Check> host_checks();
 
 /// The network: kernels, models, training, gate.
 [[nodiscard]] std::vector<Check> network_checks();

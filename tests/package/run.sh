@@ -45,7 +45,8 @@ if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_P
     exit 1
 fi
 grep -q learn "$work/log"
-[ ! -e "$work/core/include/ricochet/learn" ] && [ ! -e "$work/core/include/ricochet/faults" ]
+for room in learn faults hosts; do [ ! -e "$work/core/include/ricochet/$room" ]; done
+[ -e "$work/whole/include/ricochet/hosts/run.hpp" ]
 echo "the core alone: no other component is installed or found"
 "$work/whole/bin/ricochet" simulate bouncing-ball --step 0.01 --detector network --json >/dev/null
 "$work/whole/bin/ricochet" simulate fault --json >/dev/null
