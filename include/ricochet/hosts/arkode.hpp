@@ -26,7 +26,6 @@ struct ErkCalls {
     }
     int set_stop(double t) const { return ERKStepSetStopTime(memory, t); }
     int dky(double t, int k, N_Vector x) const { return ERKStepGetDky(memory, t, k, x); }
-    [[nodiscard]] static int order() { return ARK_INTERP_MAX_DEGREE; }
     int reinit(double t, N_Vector x) const { return ERKStepReInit(memory, flow, t, x); }
     int rate(double t, N_Vector x, N_Vector dxdt) const
     {
@@ -46,7 +45,6 @@ struct ArkCalls {
     }
     int set_stop(double t) const { return ARKStepSetStopTime(memory, t); }
     int dky(double t, int k, N_Vector x) const { return ARKStepGetDky(memory, t, k, x); }
-    [[nodiscard]] static int order() { return ARK_INTERP_MAX_DEGREE; }
     int reinit(double t, N_Vector x) const { return ARKStepReInit(memory, slow, fast, t, x); }
     int rate(double t, N_Vector x, N_Vector dxdt) const
     {

@@ -21,7 +21,8 @@ namespace ricochet::hosts::detail {
 static_assert(std::is_same_v<realtype, double>, "ricochet: SUNDIALS computes in another precision");
 
 /// `Calls` are those of the integrator: set_stop(t), evolve(t_stop, t, x), dky(t, k, x), reinit(t,
-/// x), and rate(t, x, dxdt), which return flags; and order(), of its dense output in the last step.
+/// x), and rate(t, x, dxdt), which return flags; and order(), of its dense output in the last step,
+/// if it varies.
 template <class Calls>
 class SundialsHost : public StepEnds {
 public:
@@ -50,7 +51,8 @@ public:
             } while (t1_ == t0_);
             end_ = t1_;
             scale_ = h();
-            cubic_ = std::exchange(first_, false) || calls_.order() <= 3;
+            cubic_ = std::exchange(first_, false);
+            if constexpr (requires { calls_.order(); }) cubic_ = cubic_ || calls_.order() <= 3;
         }
         require(calls_.dky(t1_, 1, view(x_, rate1_)));
     }
