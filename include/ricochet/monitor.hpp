@@ -191,15 +191,17 @@ public:
     template <HostStep S>
     [[nodiscard]] Verdict examine(const S& step)
     {
-        const std::size_t n = monitor_->x().size();
-        detail::HostStepTable table{.start = Instant{step.t0()},
+        const std::size_t n = dimension();
+        const Instant start{step.t0()};
+        detail::HostStepTable table{.t = start.value,
                                     .h = step.h(),
                                     .x0 = checked(step.x0(), n),
                                     .x1 = checked(step.x1(), n),
                                     .rate0 = checked(step.rate0(), n),
                                     .rate1 = checked(step.rate1(), n),
                                     .host = &step,
-                                    .interpolate = &interpolate<S>};
+                                    .interpolate = &interpolate<S>,
+                                    .t_remainder = start.remainder};
         if constexpr (RatedHostStep<S>) table.rate = &interpolate_rate<S>;
         if constexpr (RepeatableHostStep<S>) table.restep = &restep<S>;
         return monitor_->examine(table);
@@ -338,6 +340,12 @@ private:
     static void restep(const void* step, double s, double* x, std::size_t n)
     {
         static_cast<const S*>(step)->restep(s, std::span<double>(x, n));
+    }
+
+    [[nodiscard]] std::size_t dimension() const noexcept
+    {
+        if constexpr (detail::fixed_size<State>() > 0) return room_.size();
+        return monitor_->x().size();
     }
 
     [[nodiscard]] static const double* checked(std::span<const double> x, std::size_t n)

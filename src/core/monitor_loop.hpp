@@ -262,9 +262,9 @@ private:
     void require_next(const HostStepTable& step) const
     {
         require_length("the length of a step", step.h);
-        const double gap = std::fabs(step_.until(step.start.value));
+        const double gap = std::fabs(step_.until(step.t));
         const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
-        if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(step_.start().value, step.start.value);
+        if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(step_.start().value, step.t);
         const X& x = step_.x0();
         for_each_component(x, [&](auto i) {
             const auto c = static_cast<std::size_t>(i);

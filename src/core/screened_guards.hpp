@@ -381,7 +381,8 @@ protected:
     bool bands_ = false;        ///< whether any guard declares one
     bool screened_ = false;     ///< whether `suspects_` is of the step in hand
     bool as_screened_ = false;  ///< and no guard has changed since
-    Doubles sign_{}, g0_{}, rate0_{}, g1_{}, rate1_{};
+    // A value does not lie beside its rate: both are written one by one, see `HostStepTable`.
+    Doubles sign_{}, g0_{}, g1_{}, rate0_{}, rate1_{};
     Looked looked_ = Looked::not_at_all;
     bool marked_ = false;  ///< whether `marks_` is of the step in hand
     Doubles inside_{}, further_{};

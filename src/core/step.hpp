@@ -224,7 +224,7 @@ public:
     {
         StepState<X>& of = state_;
         of.host = &host;
-        of.start = host.start;
+        of.start = host.start();
         of.h = host.h;
         for_components([&](auto i) {
             const auto c = static_cast<std::size_t>(i);

@@ -16,9 +16,9 @@ struct Measured {
     std::vector<std::string> details{};  ///< printed below it
 };
 
-inline constexpr std::array<std::string_view, 11> topics = {
+inline constexpr std::array<std::string_view, 12> topics = {
     "ball",  "core",  "network",  "events", "guards", "nonsmooth",
-    "steps", "fault", "friction", "files",  "c"};
+    "steps", "fault", "friction", "files",  "c",     "hosts"};
 
 struct Check {
     std::string_view topic;  ///< one of `topics`
@@ -37,6 +37,9 @@ struct Check {
 
 /// The interface for C; none where it is not built.
 [[nodiscard]] std::vector<Check> c_checks();
+
+/// The monitor in other people's integrators; none without SUNDIALS.
+[[nodiscard]] std::vector<Check> host_checks();
 
 /// The network: kernels, models, training, gate.
 [[nodiscard]] std::vector<Check> network_checks();

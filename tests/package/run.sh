@@ -45,10 +45,11 @@ if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_P
     exit 1
 fi
 grep -q learn "$work/log"
-for room in learn faults nonsmooth sensitivity systems/sliding_mode.hpp; do
+for room in learn faults hosts nonsmooth sensitivity systems/sliding_mode.hpp; do
     [ -e "$work/whole/include/ricochet/$room" ]
     [ ! -e "$work/core/include/ricochet/$room" ]
 done
+[ -e "$work/whole/include/ricochet/hosts/run.hpp" ]
 echo "the core alone: no other component is installed or found"
 "$work/whole/bin/ricochet" simulate bouncing-ball --step 0.01 --detector network --json >/dev/null
 "$work/whole/bin/ricochet" simulate fault --json >/dev/null

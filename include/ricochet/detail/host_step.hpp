@@ -10,8 +10,11 @@
 namespace ricochet::detail {
 
 /// Arrays have as many elements as the state. Rates are with respect to the offset s in [0, h].
+///
+/// Time and remainder lie apart: a compiler that copies both at once, right after they have been
+/// written one by one, has the processor wait for them.
 struct HostStepTable {
-    Instant start;
+    double t = 0;  ///< [s] at the start
     double h = 0;  ///< [s]
     const double* x0 = nullptr;
     const double* x1 = nullptr;
@@ -24,6 +27,9 @@ struct HostStepTable {
     void (*rate)(const void* host, double s, double* dxdt, std::size_t n) = nullptr;
     /// The host's own map from the start of the step. Null: `interpolate` is as good.
     void (*restep)(const void* host, double s, double* x, std::size_t n) = nullptr;
+    double t_remainder = 0;  ///< [s] of the start
+
+    [[nodiscard]] Instant start() const noexcept { return {t, t_remainder}; }
 };
 
 }  // namespace ricochet::detail

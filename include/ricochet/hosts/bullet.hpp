@@ -1,0 +1,52 @@
+// A rigid body of Bullet as a host: the world goes on in steps of a fixed length, and events are
+// located by putting the body back and taking the step again, shorter.
+//
+//     hosts::BulletBody host({&world, &body}, t, 0.01);
+//
+// Bullet computes in single precision unless it is built otherwise, and events are as precise.
+// Steps taken again see gravity, not the forces that the program has applied for one step.
+#pragma once
+
+#include <btBulletDynamicsCommon.h>
+
+#include <algorithm>
+#include <array>
+
+#include "ricochet/hosts/detail/body_step.hpp"
+
+namespace ricochet::hosts {
+
+/// A body in its world.
+struct BulletEngine {
+    btDynamicsWorld* world;
+    btRigidBody* body;
+
+    struct Body {
+        std::array<double, 6> x{};
+        btTransform place{};
+        btVector3 spin{};
+    };
+    [[nodiscard]] Body read() const
+    {
+        Body at{{}, body->getWorldTransform(), body->getAngularVelocity()};
+        for (int i = 0; i < 3; ++i) {
+            at.x[std::size_t(i)] = at.place.getOrigin()[i];
+            at.x[std::size_t(3 + i)] = body->getLinearVelocity()[i];
+        }
+        return at;
+    }
+    void write(Body at) const
+    {
+        at.place.setOrigin({btScalar(at.x[0]), btScalar(at.x[1]), btScalar(at.x[2])});
+        body->setCenterOfMassTransform(at.place);
+        body->setLinearVelocity({btScalar(at.x[3]), btScalar(at.x[4]), btScalar(at.x[5])});
+        body->setAngularVelocity(at.spin);
+    }
+    void advance(double s) const { world->stepSimulation(btScalar(s), 0); }
+    [[nodiscard]] double gravity(std::size_t i) const { return body->getGravity()[int(i)]; }
+};
+
+/// x = (position [m], velocity [m/s]) of the body's centre of mass. The rotation goes with it.
+using BulletBody = detail::BodyStep<BulletEngine>;
+
+}  // namespace ricochet::hosts

@@ -1,0 +1,63 @@
+// The loop of a host and a monitor, for the adapters in this directory.
+//
+// A host holds the step that it took last, and is a `HostStep` itself. Besides:
+//
+//     t(), x(), rate()     where it is: time [s], state and its rate
+//     scale()              [s] length of its next step, roughly
+//     step(t_stop)         takes a step that does not pass t_stop
+//     go_on_from(t, x, changed)
+//                          goes to time t in its last step, or after it, with the state x;
+//                          `changed`: which its motion so far does not lead to, or another mode
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ricochet/monitor.hpp"
+
+namespace ricochet::hosts {
+
+/// Moves `host` from where it is to t_end, through all events; `at_cut` is called with every cut,
+/// before the host goes on from it.
+/// @return `stands` at t_end, `rests` there, or `ended`; `monitor.outcome()` says why
+template <class Host, class Monitor, class AtCut>
+Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mode mode = 0)
+{
+    const auto settled = [&](Verdict verdict) {
+        while (verdict == Verdict::cut) {
+            const auto& cut = monitor.cut();
+            at_cut(cut);
+            host.go_on_from(cut.t.value, cut.after,
+                            cut.state_changed || cut.mode_after != cut.mode_before);
+            // A host of single precision has rounded it.
+            verdict = std::ranges::equal(host.x(), cut.after)
+                          ? monitor.resume(host.rate(), host.scale())
+                          : monitor.resume(host.x(), cut.mode_after, host.rate(), host.scale());
+        }
+        return verdict;
+    };
+    // Closer to its end a method has no room for a step.
+    const double rounding = 8 * std::numeric_limits<double>::epsilon() * std::fabs(t_end);
+    Verdict verdict = settled(monitor.start({host.t()}, host.x(), host.rate(), host.scale(), mode));
+    while (verdict != Verdict::ended && t_end - host.t() > rounding) {
+        const double stop = std::min(t_end, monitor.must_stop_at());
+        if (verdict == Verdict::rests) {
+            verdict = monitor.hold(stop);
+            host.go_on_from(stop, host.x(), true);
+            verdict = settled(verdict);
+        } else {
+            host.step(stop);
+            verdict = settled(monitor.examine(host));
+        }
+    }
+    return verdict;
+}
+
+template <class Host, class Monitor>
+Verdict run(Host& host, Monitor& monitor, double t_end)
+{
+    return run(host, monitor, t_end, [](const auto& /*cut*/) {});
+}
+
+}  // namespace ricochet::hosts

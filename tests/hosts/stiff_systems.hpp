@@ -1,0 +1,82 @@
+// Stiff hybrid systems, which explicit methods crawl through.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet::hosts_test {
+
+/// Robertson's reaction with a valve: it opens where the first species has fallen to 0.5 and
+/// closes where it is back at 0.7. What flows in of the first flows out of the third.
+struct RobertsonValve {
+    using State = std::array<double, 3>;
+    enum : Mode { closed, open };
+    static constexpr std::size_t mode_count = 2;
+    static constexpr std::size_t guard_count = 2;
+    static constexpr double inflow = 0.02;  ///< [1/s]
+
+    void flow(Mode mode, double /*t*/, const State& y, State& rate) const
+    {
+        const double slow = 0.04 * y[0];
+        const double back = 1e4 * y[1] * y[2];
+        const double fast = 3e7 * y[1] * y[1];
+        const double in = mode == open ? inflow : 0;
+        rate = {in - slow + back, slow - back - fast, fast - in};
+    }
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, Mode /*mode*/, double /*t*/, const X& y) const
+    {
+        return which == closed ? y[0] - 0.5 : 0.7 - y[0];
+    }
+    [[nodiscard]] bool enabled(std::size_t which, Mode mode) const { return which == mode; }
+    [[nodiscard]] Mode reset(std::size_t which, Mode /*mode*/, double /*t*/, State& /*y*/) const
+    {
+        return which == closed ? open : closed;
+    }
+};
+
+/// A buck converter, 24 V to about 12 V, with a switch of 10 kHz and a diode, each of 0.1 Ohm, and
+/// 1 nF at the node between them: rates of 1e10/s, a million times those of the switch.
+struct BuckConverter {
+    using State = std::array<double, 3>;  ///< current [A], output [V], node [V]
+    enum : Mode { switched_on = 1, conducts = 2 };
+    static constexpr std::size_t mode_count = 4;
+    static constexpr std::size_t guard_count = 2;
+    static constexpr double half_period = 5e-5;  ///< [s]
+
+    void flow(Mode mode, double /*t*/, const State& x, State& dxdt) const
+    {
+        const double resistance = 0.1;
+        const double through_switch = mode & switched_on ? (24 - x[2]) / resistance : 0;
+        const double through_diode = mode & conducts ? -x[2] / resistance : 0;
+        dxdt = {(x[2] - x[1]) / 5e-4, (x[0] - x[1] / 5) / 1e-4,
+                (through_switch + through_diode - x[0] - x[2] / 1e5) / 1e-9};
+    }
+    /// The diode conducts while the node is below ground.
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, Mode /*mode*/, double /*t*/, const X& x) const
+    {
+        return which == 0 ? x[2] : -x[2];
+    }
+    [[nodiscard]] bool enabled(std::size_t which, Mode mode) const
+    {
+        return (which == 1) == ((mode & conducts) != 0);
+    }
+    [[nodiscard]] Mode reset(std::size_t which, Mode mode, double /*t*/, State& /*x*/) const
+    {
+        return which == 0 ? mode | conducts : mode & ~Mode{conducts};
+    }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        return (std::floor(t / half_period + 1e-6) + 1) * half_period;
+    }
+    [[nodiscard]] Mode time_reset(Mode mode, double /*t*/, State& /*x*/) const
+    {
+        return mode ^ switched_on;
+    }
+};
+
+}  // namespace ricochet::hosts_test
