@@ -184,6 +184,7 @@ private:
     using Engine::time_event_;
     using Engine::time_event_due_;
     using Engine::timed_;
+    using Engine::watching_;
 
     // --- set-up ---
 
@@ -208,16 +209,11 @@ private:
     /// as it was at the start of the step if the run is kept resumable.
     void advance_one(const Advance& how)
     {
-        if (!mark_) return advance_from_here(how);
-        mark_step();
-        try {
-            advance_from_here(how);
-        } catch (...) {
-            go_back_to_mark();
-            throw;
-        }
+        if (mark_) return advance_resumably(how);
+        advance_from_here(how);
     }
-    void advance_from_here(const Advance& how);
+    [[gnu::noinline]] void advance_resumably(const Advance& how);
+    [[gnu::always_inline]] void advance_from_here(const Advance& how);
 
     // --- where exceptions lead back to ---
 
@@ -275,7 +271,8 @@ private:
     /// Goes on until a step deserves a look, and deals with it. False: there is none. An exception
     /// leads back to where the run or, after it, the step in hand has started.
     bool run_quietly();
-    void end_quiet_run(const QuietRun& quiet);
+    [[gnu::noinline]] void end_quiet_run_resumably(const QuietRun& quiet);
+    [[gnu::always_inline]] void end_quiet_run(const QuietRun& quiet);
 
     /// Whether the run may go on after as many steps; decides when it is asked next.
     [[gnu::noinline]] bool may_take_more_steps();

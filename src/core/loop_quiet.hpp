@@ -29,17 +29,10 @@ inline bool Loop<X, single>::run_quietly()
     counts.guard_calls += quiet.guard_calls;
     if (bank_.size() > 0) this->add_evidence(finders_.detector.evidence, quiet.steps);
     if (quiet.why == QuietEnd::due) return false;
-    if (!mark_) {
+    if (mark_) {
+        end_quiet_run_resumably(quiet);
+    } else {
         end_quiet_run(quiet);
-        return true;
-    }
-    mark_step();
-    if (error_controlled_) mark_->h_next = step_.h();
-    try {
-        end_quiet_run(quiet);
-    } catch (...) {
-        go_back_to_mark();
-        throw;
     }
     return true;
 }

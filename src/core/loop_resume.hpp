@@ -10,6 +10,31 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
+void Loop<X, single>::advance_resumably(const Advance& how)
+{
+    mark_step();
+    try {
+        advance_from_here(how);
+    } catch (...) {
+        go_back_to_mark();
+        throw;
+    }
+}
+
+template <class X, bool single>
+void Loop<X, single>::end_quiet_run_resumably(const QuietRun& quiet)
+{
+    mark_step();
+    if (error_controlled_) mark_->h_next = step_.h();
+    try {
+        end_quiet_run(quiet);
+    } catch (...) {
+        go_back_to_mark();
+        throw;
+    }
+}
+
+template <class X, bool single>
 inline void Loop<X, single>::mark_step() noexcept
 {
     mark_->everything = false;
