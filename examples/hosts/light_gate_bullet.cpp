@@ -71,7 +71,7 @@ int main()
     btDiscreteDynamicsWorld world(&dispatcher, &broadphase, &solver, &configuration);
     world.setGravity({0, 0, btScalar(-9.81)});
     btSphereShape shape(btScalar(0.1));
-    btRigidBody body({1, nullptr, &shape});
+    btRigidBody body(btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape));
     world.addRigidBody(&body);
     body.setLinearVelocity({0, 0, 6});
 

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "hosts/host_systems.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
 namespace ricochet::hosts_test {
@@ -135,10 +136,25 @@ TYPED_TEST_P(InHost, TimeEventsAreMet)
     }
 }
 
+TYPED_TEST_P(InHost, BoundsSpareAnExpensiveGuard)
+{
+    const Corridor::State x0{1, 0.7, 0, 1};
+    const Corridor watched;
+    const auto exact = run<TypeParam>(watched, x0, 60);
+    const Corridor spared;
+    const auto result = run<TypeParam, Planned<>>(spared, x0, 60);
+    ASSERT_EQ(exact.cuts.size(), 2u);
+    ASSERT_EQ(result.cuts.size(), exact.cuts.size());
+    for (std::size_t k = 0; k < exact.cuts.size(); ++k) {
+        EXPECT_NEAR(result.cuts[k].t.value, exact.cuts[k].t.value, 1e-10);
+    }
+    EXPECT_LT(3 * spared.calls, watched.calls);
+}
+
 REGISTER_TYPED_TEST_SUITE_P(InHost, TheBallHasItsThirteenImpacts, StickSlipChangesItsModes,
                             EqualBallsFireTogether, ImpactsAccumulateAndTheBallRests,
                             PairsOfCrossingsAtACrestAreFound, CrestsBelowTheSurfaceAreNoEvents,
                             AStartOnTheSurfaceIsNoEvent, PlateausEndAsInARunOfTheLibrary,
-                            TimeEventsAreMet);
+                            TimeEventsAreMet, BoundsSpareAnExpensiveGuard);
 
 }  // namespace ricochet::hosts_test

@@ -145,6 +145,28 @@ struct Dosed {
     void time_reset(double /*t*/, State& x) const { x[0] += 1; }
 };
 
+/// A body between two walls, whose distance from them changes no faster than it moves; and sin 5 t
+/// beside it, so that steps are short.
+struct Corridor {
+    using State = std::array<double, 4>;
+    static constexpr bool unilateral = true;
+    mutable long calls = 0;
+
+    void flow(double /*t*/, const State& x, State& dxdt) const
+    {
+        dxdt = {x[1], 0, 5 * x[3], -5 * x[2]};
+    }
+    [[nodiscard]] double guard(double /*t*/, const State& x) const
+    {
+        ++calls;
+        return 10 - std::fabs(x[0]);
+    }
+    void reset(double /*t*/, State& x) const { x[1] = -x[1]; }
+    [[nodiscard]] double lipschitz() const { return 1; }
+    [[nodiscard]] double speed_bound(double /*t*/, const State& x) const { return std::fabs(x[1]); }
+    [[nodiscard]] double acceleration_bound(double /*t*/, const State& /*x*/) const { return 0; }
+};
+
 // --- runs ---
 
 template <class System>
@@ -164,12 +186,12 @@ struct Result {
     }
 };
 
-template <class Maker, class System>
+template <class Maker, class Detector = Extremum, class System>
 Result<System> run(const System& system, const typename System::State& x0, double t_end,
                    const Tolerances& tolerances = {}, Mode mode = 0)
 {
     typename Maker::template Of<System> made(system, mode, x0, tolerances);
-    EventMonitor monitor(system, x0);
+    EventMonitor monitor(system, x0, {}, Detector{});
     Result<System> result;
     const auto at_cut = [&](const auto& cut) {
         mode = cut.mode_after;
