@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "core/engine.hpp"
 #include "ricochet/detail/monitor_core.hpp"
@@ -86,6 +87,7 @@ public:
         require_turn("examine");
         require_next(step);
         step_.show(step);
+        if (std::exchange(departs_, false)) step_.align_start();
         h_next_ = step.h;
         time_event_due_ = false;
         if (timed_) heed_time_event();
@@ -345,6 +347,7 @@ private:
     /// Arms the guards; a set that follows at once is a cut of its own.
     Verdict go_on()
     {
+        departs_ = true;
         assign(cut_.before, step_.x0());
         cut_.mode_before = step_.mode();
         if (!this->settle()) {
@@ -410,6 +413,7 @@ private:
         visit(h_next_);
         visit(time_event_);
         visit(resting_);
+        visit(departs_);
         visit(ended_);
         visit(run_.outcome);
         this->visit_guards(visit);
@@ -422,6 +426,7 @@ private:
 
     Cut<X> cut_;
     bool started_ = false;
+    bool departs_ = false;  ///< guards have been armed at the start of the next step
     StepStart<X> place_;
 };
 

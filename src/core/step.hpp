@@ -224,6 +224,7 @@ public:
     {
         StepState<X>& of = state_;
         of.host = &host;
+        aligned_ = false;
         of.start = host.start();
         of.h = host.h;
         for_components([&](auto i) {
@@ -232,6 +233,22 @@ public:
             of.rate0[i] = host.rate0[c];
             of.rate1[i] = host.rate1[c];
         });
+    }
+
+    /// An interpolant need not begin at the state of the start to the last bit. Where a guard starts
+    /// on its surface that would put it behind: the difference is taken out, all of it at the
+    /// start and none at the end.
+    void align_start() const
+    {
+        StepState<X>& of = state_;
+        of.host->interpolate(of.host->host, 0, of.at.data(), of.x0.size());
+        assign(defect_, of.at);
+        bool differs = false;
+        for_components([&](auto i) {
+            defect_[i] = of.x0[i] - of.at[i];
+            differs = differs || defect_[i] != 0;
+        });
+        aligned_ = differs;
     }
 
     /// As `accept`, of a step that a host has taken.
@@ -371,13 +388,16 @@ private:
     {
         const HostStepTable& host = *state_.host;
         host.interpolate(host.host, s, x.data(), state_.x0.size());
+        if (!aligned_) return;
+        const double left = 1 - s / host.h;
+        for_components([&](auto i) { x[i] += left * defect_[i]; });
     }
 
     void restep_on_host(double s, X& x) const
     {
         const HostStepTable& host = *state_.host;
-        const auto place = host.restep ? host.restep : host.interpolate;
-        place(host.host, s, x.data(), state_.x0.size());
+        if (!host.restep) return interpolate_on_host(s, x);
+        host.restep(host.host, s, x.data(), state_.x0.size());
     }
 
     /// Over a ten-thousandth of the step the rounding and the bend of a difference are alike.
@@ -471,6 +491,8 @@ private:
     mutable X unused_rate_, end_slope_;
     mutable std::array<X, 2> inner_w_, inner_rate_;  ///< `middle` stands for the first
     mutable std::uint64_t resteps_ = 0;
+    mutable X defect_{};  ///< of a host's interpolant at the start
+    mutable bool aligned_ = false;
 };
 
 }  // namespace ricochet::detail

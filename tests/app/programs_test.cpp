@@ -34,7 +34,7 @@ TEST_F(App, AProgramThatIsNotThereIsNamed)
 {
     const fs::path alone = work() / "ricochet";
     fs::copy_file(RICOCHET_APP, alone);
-    for (const std::string& words : {"train bouncing-ball --out x", "certify x", "simulate fault",
+    for (const char* const words : {"train bouncing-ball --out x", "certify x", "simulate fault",
                                      "simulate spring-slider", "simulate stick-slip",
                                      "compare sliding-mode", "compare step-control"}) {
         const std::string command =

@@ -241,6 +241,58 @@ TEST(Monitor, PairsOfCrossingsInOneStepAreFoundDownToRounding)
     }
 }
 
+/// A ball whose host's interpolant misses the start of each step by a rounding or more.
+struct Missing {
+    Instant t;
+    double length;
+    X a, b, ra, rb;
+    double miss;
+    [[nodiscard]] const Instant& t0() const { return t; }
+    [[nodiscard]] double h() const { return length; }
+    [[nodiscard]] std::span<const double> x0() const { return a; }
+    [[nodiscard]] std::span<const double> x1() const { return b; }
+    [[nodiscard]] std::span<const double> rate0() const { return ra; }
+    [[nodiscard]] std::span<const double> rate1() const { return rb; }
+    void interpolate(double s, std::span<double> x) const
+    {
+        x[0] = a[0] + s * (a[1] - 4.905 * s) - miss;
+        x[1] = a[1] - 9.81 * s;
+    }
+};
+
+TEST(Monitor, AnInterpolantThatMissesTheStartLosesNothing)
+{
+    for (const double miss : {6e-15, 1e-12, -1e-12}) {
+        const BouncingBall ball;
+        EventMonitor monitor(ball, X{});
+        Instant t;
+        X x{10, 0};
+        ASSERT_EQ(monitor.start(t, x, X{0, -9.81}, 0.1), Verdict::stands);
+        std::size_t impacts = 0;
+        while (t.value < 20.45) {
+            const double h = impacts > 0 && x[0] == 0 ? 1e-7 : 0.1;  // careful after an impact
+            const X end{x[0] + h * (x[1] - 4.905 * h), x[1] - 9.81 * h};
+            const Missing step{t, h, x, end, {x[1], -9.81}, {end[1], -9.81}, miss};
+            const Verdict verdict = monitor.examine(step);
+            if (verdict == Verdict::stands) {
+                t = t.after(h);
+                x = end;
+                continue;
+            }
+            ASSERT_EQ(verdict, Verdict::cut) << impacts;
+            ASSERT_FALSE(monitor.cut().accumulation) << impacts;
+            const double exact = ball.impact_time(static_cast<int>(impacts), 10);
+            // By the miss of every flight so far, at 3 m/s or more.
+            EXPECT_NEAR(monitor.cut().t.value, exact, 20 * std::fabs(miss) + 1e-13);
+            ++impacts;
+            t = monitor.cut().t;
+            x = monitor.cut().after;
+            ASSERT_EQ(monitor.resume(X{x[1], -9.81}, 0.1), Verdict::stands) << impacts;
+        }
+        EXPECT_EQ(impacts, 13u) << miss;
+    }
+}
+
 /// Guard 0 lifts the second component over the surface of guard 1.
 struct Chain {
     std::size_t guard_count = 2;
