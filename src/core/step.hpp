@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
@@ -235,9 +236,11 @@ public:
         });
     }
 
-    /// An interpolant need not begin at the state of the start to the last bit. Where a guard starts
-    /// on its surface that would put it behind: the difference is taken out, all of it at the
-    /// start and none at the end.
+    /// An interpolant need not begin at the state of the start to the last bit, and one that is
+    /// asked for times is a staircase where offsets are shorter than the time resolves. Where a
+    /// guard starts on its surface either would put it behind. So the difference is taken out, all
+    /// of it at the start and none at the end, and the first unit in the last place of the time
+    /// is straight.
     void align_start() const
     {
         StepState<X>& of = state_;
@@ -249,6 +252,8 @@ public:
             differs = differs || defect_[i] != 0;
         });
         aligned_ = differs;
+        const double t = std::fabs(of.start.value);
+        straight_ = std::nextafter(t, std::numeric_limits<double>::infinity()) - t;
     }
 
     /// As `accept`, of a step that a host has taken.
@@ -387,6 +392,7 @@ private:
     void interpolate_on_host(double s, X& x) const
     {
         const HostStepTable& host = *state_.host;
+        if (aligned_ && s < straight_) return detail::move(x, state_.x0, s, state_.rate0);
         host.interpolate(host.host, s, x.data(), state_.x0.size());
         if (!aligned_) return;
         const double left = 1 - s / host.h;
@@ -493,6 +499,7 @@ private:
     mutable std::uint64_t resteps_ = 0;
     mutable X defect_{};  ///< of a host's interpolant at the start
     mutable bool aligned_ = false;
+    mutable double straight_ = 0;  ///< [s] from the start
 };
 
 }  // namespace ricochet::detail
