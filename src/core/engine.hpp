@@ -232,6 +232,12 @@ protected:
     /// @param on_time  with a time event
     void apply(bool located, bool on_time);
 
+    void place_set(const Instant& at) noexcept
+    {
+        set_time_ = at.value;
+        set_remainder_ = at.remainder;
+    }
+
     /// How far from its surface a guard that has just fired may be. A guard with declared
     /// bounds may be expensive, and is not asked for what its location says as well.
     void find_band(std::size_t i, double t);
@@ -242,7 +248,7 @@ protected:
         return std::fabs(bank_.view(i, mode_before_, calls()).value(t, search_.before()));
     }
 
-    [[nodiscard]] double time_of_set() const noexcept { return set_instant_.value; }
+    [[nodiscard]] double time_of_set() const noexcept { return set_time_; }
 
     [[nodiscard]] std::size_t first_member()
     {
@@ -420,12 +426,15 @@ protected:
     bool asked_ = false;        ///< a network, about the step in hand
     bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
-    Instant set_instant_;  ///< of the members, in a step that holds them
+    /// [s] of the set in hand. Time and remainder lie apart: copied at once, right after they have
+    /// been written one by one, they would have the processor wait.
+    double set_time_ = 0;
     Mode mode_before_ = 0;
     bool located_ = false;  ///< the set in hand lies inside the step, else at its start
     bool on_time_ = false;  ///< and happens with a time event
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;
+    double set_remainder_ = 0;
     int level_ = 0;  ///< of sets at this instant
     Run<X> run_;
 };

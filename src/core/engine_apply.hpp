@@ -23,7 +23,7 @@ inline void EventEngine<X, single>::cut_short()
 template <class X, bool single>
 inline void EventEngine<X, single>::apply(bool located, bool on_time)
 {
-    const Instant at = located ? set_instant_ : step_.instant(0, 0);
+    const Instant at = located ? Instant{set_time_, set_remainder_} : step_.instant(0, 0);
     const double t = on_time ? time_event_ : at.value;
     located_ = located;
     on_time_ = on_time;

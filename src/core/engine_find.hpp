@@ -104,7 +104,7 @@ inline bool EventEngine<X, single>::find(bool cleared)
         dismiss_members();
         if (search_.members().empty()) continue;
         on_time_ = time_event_due_ && search_.at() == step_.h();
-        set_instant_ = step_.instant(search_.at(), search_.at_remainder());
+        place_set(step_.instant(search_.at(), search_.at_remainder()));
         transform(on_time_);
         if (on_time_ || !changes_nothing()) return true;
         go_on_past_members();

@@ -36,7 +36,7 @@ inline bool EventEngine<X, single>::apply_next_set()
     search_.begin(step_.x0());
     assign(search_.before(), step_.x0());
     search_.stay_at_start();
-    set_instant_ = step_.instant(0, 0);
+    place_set(step_.instant(0, 0));
     transform(false);
     stuck_ = stuck_member();
     if (stuck_ == no_guard) {
