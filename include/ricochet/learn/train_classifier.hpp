@@ -1,0 +1,332 @@
+// Training of a network that predicts the events of any system with one guard, from its own runs.
+//
+//     ClassifierTraining training;
+//     training.step = 0.01;
+//     const auto starts = learn::from_box(State{-1, -2}, State{0.5, 2});
+//     const TrainedClassifier trained =
+//         learn::train_classifier(system, starts, FixedStep<Rk4>{}, {}, training);
+//     if (trained.misses_none()) store_model(path, trained.model);
+//     std::puts(trained.trial.describe().c_str());
+//     integrate(system, x0, options, FixedStep<Rk4>{}, Network(trained.model));
+//
+// After Saunders, Steyer and Kuether (SAND2023-06682C, eqs. 4 to 6), who sample a known event
+// surface: here the surface is where the events of runs lie. From there states are taken backward
+// in time, and labelled by a step of the method forward. The network sees the state alone, so that
+// flow and guard are to depend on nothing else.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detail/surface.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/network.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/learn/classifier.hpp"
+#include "ricochet/learn/train_gate.hpp"
+
+namespace ricochet::learn {
+
+struct ClassifierTraining {
+    double step = 0;         ///< [s] of the fixed steps that it is for, positive
+    double run_length = 10;  ///< [s] of a run; the next one starts somewhere else
+
+    std::size_t surface_points = 2000;     ///< events of the runs, from which states are taken
+    std::size_t states = 100'000;          ///< for training and testing, half of them events
+    std::size_t fresh_states = 40'000;     ///< for the report, from other runs
+    std::size_t trial_events = 1000;       ///< of the runs on which its cost is measured
+    std::size_t most_steps = 100'000'000;  ///< of each of these sets of runs
+    double margin = 0.05;  ///< clear states nearer to the boundary are not trained on
+    double widened = 0.1;  ///< the domain is the box of the runs, wider by this share on each side
+    std::uint64_t seed = 1;
+    TrainingOptions training{};  ///< its seed is replaced by the one above
+};
+
+/// The same runs by the exact detector `Ends` and by the network.
+struct ClassifierTrial {
+    std::uint64_t events = 0;  ///< of the exact runs
+    std::uint64_t missed = 0;  ///< of these by the network: seen a step late, or never
+    std::uint64_t steps = 0;
+    std::uint64_t exact_calls = 0;    ///< of the guard
+    std::uint64_t network_calls = 0;  ///< of the guard, by the runs with the network
+    double exact_seconds = 0;         ///< of processor time
+    double network_seconds = 0;
+
+    /// Whether the network saves time.
+    [[nodiscard]] bool pays() const noexcept { return network_seconds < exact_seconds; }
+
+    /// One sentence: "looking at the end of every step is faster: with the network ...".
+    [[nodiscard]] std::string describe() const;
+};
+
+struct TrainedClassifier {
+    Model model;
+    Report report;
+    ClassifierTrial trial;
+
+    [[nodiscard]] bool misses_none() const noexcept { return Trained{model, report}.misses_none(); }
+};
+
+namespace detail {
+
+/// @throws std::invalid_argument naming the option.
+void check(const ClassifierTraining& training);
+/// @throws std::invalid_argument: the runs hold no event.
+[[noreturn]] void throw_no_surface(std::uint64_t steps);
+/// @throws std::invalid_argument: a network sees at most as many components.
+[[noreturn]] void throw_too_many_components(std::size_t found, std::size_t most);
+
+/// The event surface of a system as its runs have met it; see `SurfaceProblem`. Times are counted
+/// in steps.
+template <class System, class X, class Method>
+class MetSurface {
+public:
+    struct State {
+        double t;  ///< [s]
+        X x;
+        Mode mode;
+        double armed;  ///< 1 where the guard falls, -1 where it rises
+        double back;   ///< [steps] to the event before
+    };
+
+    MetSurface(const System& system, double step) : system_(&system), step_(step) {}
+
+    void add(const State& at) { points_.push_back(at); }
+    [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
+    void visit(const X& x)
+    {
+        if (box_.empty()) box_.assign(static_cast<std::size_t>(x.size()), Interval{x[0], x[0]});
+        for (std::size_t i = 0; i < box_.size(); ++i) {
+            const double component = x[static_cast<decltype(x.size())>(i)];
+            if (first_) box_[i] = {component, component};
+            box_[i].lower = std::min(box_[i].lower, component);
+            box_[i].upper = std::max(box_[i].upper, component);
+        }
+        first_ = false;
+    }
+    void widen(double share)
+    {
+        for (Interval& side : box_) {
+            const double width = side.upper - side.lower;
+            side.lower -= share * width;
+            side.upper += share * width;
+        }
+    }
+    [[nodiscard]] const std::vector<Interval>& box() const noexcept { return box_; }
+    void set_box(const std::vector<Interval>& box) { box_ = box; }
+
+    // --- as the sampler knows it ---
+
+    [[nodiscard]] State surface(Random& random) const
+    {
+        return points_[random.below(points_.size())];
+    }
+    [[nodiscard]] double guard(const State& at) const
+    {
+        return at.armed * ricochet::detail::call_guard(*system_, 0, at.mode, at.t, at.x);
+    }
+    [[nodiscard]] double horizon(const State& at) const { return at.back; }
+    [[nodiscard]] double magnitude(const State& at, double steps) const
+    {
+        const double here = guard(at);
+        return std::fabs(here) + std::fabs(guard((*this)(at, steps)) - here) +
+               std::numeric_limits<double>::min();
+    }
+    [[nodiscard]] bool inside(const State& at) const
+    {
+        for (std::size_t i = 0; i < box_.size(); ++i) {
+            const double component = at.x[static_cast<decltype(at.x.size())>(i)];
+            if (!(component >= box_[i].lower && component <= box_[i].upper)) return false;
+        }
+        return true;
+    }
+    [[nodiscard]] std::vector<Column> columns() const
+    {
+        std::vector<Column> out;
+        for (std::size_t i = 0; i < box_.size(); ++i) {
+            out.push_back({"x[" + std::to_string(i) + "]", "1"});
+        }
+        return out;
+    }
+    void features(const State& at, double* out) const
+    {
+        for (std::size_t i = 0; i < box_.size(); ++i) {
+            out[i] = at.x[static_cast<decltype(at.x.size())>(i)];
+        }
+    }
+
+    /// The method's map over so many steps, of either sign, without events.
+    [[nodiscard]] State operator()(const State& at, double steps) const
+    {
+        if (steps == 0) return at;
+        const double span = steps * step_;
+        const double parts = std::ceil(std::fabs(steps) * (1 - 1e-12));
+        const FlowOnly<System, X> flow{system_, at.mode};
+        const Options options{
+            .t_start = at.t, .t_end = at.t + span, .step = std::fabs(span) / std::max(parts, 1.0)};
+        State out = at;
+        Run<X> run = integrate(flow, at.x, options, FixedStep<Method>{});
+        out.t = run.t;
+        out.x = std::move(run.x);
+        return out;
+    }
+
+private:
+    const System* system_;
+    double step_;
+    std::vector<State> points_;
+    std::vector<Interval> box_;
+    bool first_ = true;
+};
+
+}  // namespace detail
+
+/// Samples runs of `system`, trains a network on them, assesses it on states of other runs, and
+/// measures what it costs beside the exact detector, on runs of the same starts. The callback is
+/// that of `train`.
+///
+/// @param options  event settings of the runs; times and the step come from `training`
+/// @throws std::invalid_argument if an option is outside its range, no run can be started, or the
+///         runs hold no event; and as `train`.
+template <class System, class X, class Method>
+requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
+    train_classifier(const System& system, const Starts<X>& starts,
+                     const FixedStep<Method>& /*stepping*/, const Options& options,
+                     const ClassifierTraining& training, const ProgressCallback& progress = {})
+{
+    using Surface = detail::MetSurface<System, X, Method>;
+    detail::check(training);
+    Options run_options = options;
+    run_options.step = training.step;
+    run_options.sample_times.clear();
+    run_options.record_steps = false;
+    run_options.record_events = true;
+
+    const auto start = [&](Random& random) {
+        std::string why = "no start was dealt out";
+        for (int attempt = 0; attempt < 1000; ++attempt) {
+            const RunStart<X> from = starts(random);
+            run_options.t_start = from.t;
+            run_options.t_end = from.t + training.run_length;
+            run_options.mode = from.mode;
+            try {
+                (void)Simulation(system, from.x, run_options, FixedStep<Method>{}, Ends{});
+                return from;
+            } catch (const std::invalid_argument& error) {
+                why = error.what();
+            }
+        }
+        detail::throw_no_start(why);
+    };
+
+    const auto meet = [&](std::uint64_t seed) {
+        Surface surface(system, training.step);
+        Random random(seed);
+        std::uint64_t steps = 0;
+        while (surface.size() < training.surface_points && steps < training.most_steps) {
+            const RunStart<X> from = start(random);
+            const std::size_t components = static_cast<std::size_t>(from.x.size());
+            if (components > Network::max_features) {
+                detail::throw_too_many_components(components, Network::max_features);
+            }
+            Simulation run(system, from.x, run_options, FixedStep<Method>{});
+            double last = from.t;
+            std::size_t seen = 0;
+            while (run.step()) {
+                surface.visit(run.x());
+                const auto& events = run.run().events;
+                for (; seen < events.size(); ++seen) {
+                    const auto& event = events[seen];
+                    if (!changes_sign(event.kind)) continue;
+                    const double back = (event.t - last) / training.step;
+                    last = event.t;
+                    if (!(back > 1e-3)) continue;
+                    surface.add({.t = event.t,
+                                 .x = event.before,
+                                 .mode = event.mode_before,
+                                 .armed = event.slope > 0 ? -1.0 : 1.0,
+                                 .back = back});
+                }
+            }
+            steps += run.run().statistics.steps + 1;
+            if (surface.size() == 0 && steps > 2'000'000) break;
+        }
+        if (surface.size() == 0) detail::throw_no_surface(steps);
+        surface.widen(training.widened);
+        return surface;
+    };
+    const auto sample = [&](const Surface& surface, std::size_t states, std::uint64_t seed,
+                            bool keep_band) {
+        return sample_surface(surface, surface,
+                              {.step = 1,
+                               .events = states / 2,
+                               .clear = states / 2,
+                               .margin = training.margin,
+                               .keep_band = keep_band,
+                               .longest = 50,
+                               .beyond_share = 0,
+                               .seed = seed});
+    };
+
+    const Surface surface = meet(training.seed);
+    const SurfaceSample seen = sample(surface, training.states, training.seed, false);
+    TrainingOptions how = training.training;
+    how.seed = training.seed;
+    Trained trained = train(seen.data, how, progress);
+    TrainedClassifier out{.model = std::move(trained.model), .report = trained.report, .trial = {}};
+    if constexpr (requires { std::string_view(system.name); }) out.model.system = system.name;
+    out.model.recipe = name(Recipe::state);
+    out.model.domain = surface.box();
+    out.model.step_min = out.model.step_max = training.step;
+    out.report.band = seen.band;
+    if (out.report.outcome == TrainingOutcome::diverged) return out;
+
+    Surface other = meet(training.seed + 1'000'003);
+    other.set_box(surface.box());
+    const SurfaceSample fresh = sample(other, training.fresh_states, training.seed + 1000, true);
+    out.report.fresh = assess(out.model, fresh.data, training.margin);
+    if (!out.misses_none() && out.report.outcome == TrainingOutcome::finished) {
+        out.report.outcome = TrainingOutcome::misses_remain;
+    }
+
+    const Network network(out.model);
+    Random random(training.seed + 2'000'003);
+    const auto time = [](double& seconds, const auto& run) {
+        const double before = detail::processor_seconds();
+        auto result = run();
+        seconds += detail::processor_seconds() - before;
+        return result;
+    };
+    ClassifierTrial& trial = out.trial;
+    run_options.record_events = false;
+    while (trial.events < training.trial_events && trial.steps < training.most_steps) {
+        const RunStart<X> from = start(random);
+        const auto exact = time(trial.exact_seconds, [&] {
+            return integrate(system, from.x, run_options, FixedStep<Method>{}, Ends{});
+        });
+        const auto predicted = time(trial.network_seconds, [&] {
+            return integrate(system, from.x, run_options, FixedStep<Method>{}, network);
+        });
+        trial.events += exact.statistics.events;
+        trial.steps += exact.statistics.steps + 1;
+        trial.exact_calls += exact.statistics.guard_calls;
+        trial.network_calls += predicted.statistics.guard_calls;
+        const std::uint64_t late = predicted.statistics.late_events;
+        const std::uint64_t lost = exact.statistics.events > predicted.statistics.events
+                                       ? exact.statistics.events - predicted.statistics.events
+                                       : 0;
+        trial.missed += std::max(late, lost);
+    }
+    return out;
+}
+
+}  // namespace ricochet::learn

@@ -1,0 +1,116 @@
+#include "ricochet/learn/train_classifier.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "ricochet/systems/bouncing_ball.hpp"
+
+namespace ricochet::learn {
+namespace {
+
+using X = std::array<double, 2>;
+
+/// A pendulum that bounces off a wall on its right.
+struct WallPendulum {
+    using State = X;
+    static constexpr const char* name = "wall-pendulum";
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81 * std::sin(x[0])}; }
+    [[nodiscard]] double guard(double, const X& x) const { return 0.3 - x[0]; }
+    void reset(double, X& x) const { x[1] *= -0.95; }
+};
+
+ClassifierTraining small_training()
+{
+    ClassifierTraining training;
+    training.step = 0.02;
+    training.surface_points = 400;
+    training.states = 10'000;
+    training.fresh_states = 6'000;
+    training.trial_events = 200;
+    training.training.hidden = {16, 16};
+    training.training.iterations = 3000;
+    return training;
+}
+
+TEST(TrainClassifier, AnySystemGetsANetworkFromItsOwnRuns)
+{
+    const WallPendulum system;
+    const auto starts = from_box(X{-1, -2}, X{0.25, 2});
+    const TrainedClassifier trained =
+        train_classifier(system, starts, FixedStep<Rk4>{}, {}, small_training());
+    EXPECT_EQ(trained.model.system, "wall-pendulum");
+    EXPECT_EQ(trained.model.recipe, "state");
+    EXPECT_EQ(trained.model.step_min, 0.02);
+    ASSERT_TRUE(trained.report.fresh.has_value());
+    // It has learned something: nearly all events are foreseen, and most clear states are cleared.
+    const Assessment& fresh = *trained.report.fresh;
+    EXPECT_LT(fresh.miss_bound, 0.02);
+    EXPECT_GT(fresh.cleared_share, 0.7);
+    EXPECT_GE(trained.trial.events, 200u);
+    EXPECT_LT(trained.trial.network_calls, trained.trial.exact_calls / 2);
+    EXPECT_LE(50 * trained.trial.missed, trained.trial.events);
+    // The guard is a subtraction: no network pays, and the trial says so.
+    EXPECT_FALSE(trained.trial.pays());
+    EXPECT_NE(trained.trial.describe().find("is faster"), std::string::npos)
+        << trained.trial.describe();
+}
+
+TEST(TrainClassifier, TheSameSeedGivesTheSameNetwork)
+{
+    const BouncingBall ball;
+    ClassifierTraining training = small_training();
+    training.training.iterations = 200;
+    training.states = 2000;
+    training.fresh_states = 200;
+    training.trial_events = 20;
+    const auto starts = from_box(X{0.1, -5}, X{10, 5});
+    const auto one = train_classifier(ball, starts, FixedStep<Rk4>{}, {}, training);
+    const auto two = train_classifier(ball, starts, FixedStep<Rk4>{}, {}, training);
+    ASSERT_EQ(one.model.layers.size(), two.model.layers.size());
+    for (std::size_t k = 0; k < one.model.layers.size(); ++k) {
+        EXPECT_EQ(one.model.layers[k].weight, two.model.layers[k].weight);
+    }
+    EXPECT_EQ(one.trial.missed, two.trial.missed);
+}
+
+TEST(TrainClassifier, RefusesWhatCannotBeTrained)
+{
+    const BouncingBall ball;
+    const auto starts = from_box(X{0.1, -5}, X{10, 5});
+    const auto refused = [&](const ClassifierTraining& training, const char* word) {
+        try {
+            (void)train_classifier(ball, starts, FixedStep<Rk4>{}, {}, training);
+            ADD_FAILURE() << word;
+        } catch (const std::invalid_argument& error) {
+            EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+        }
+    };
+    ClassifierTraining training = small_training();
+    training.step = 0;
+    refused(training, "step");
+    training = small_training();
+    training.run_length = 0.001;
+    refused(training, "run_length");
+    training = small_training();
+    training.margin = 1;
+    refused(training, "margin");
+    training = small_training();
+    training.states = 3;
+    refused(training, "states");
+    struct Quiet {
+        void flow(double, const X&, X& dxdt) const { dxdt = {0, 0}; }
+        [[nodiscard]] double guard(double, const X& x) const { return 100 + x[0]; }
+    };
+    training = small_training();
+    training.most_steps = 10'000;
+    EXPECT_THROW(
+        (void)train_classifier(Quiet{}, from_box(X{0, 0}, X{1, 1}), FixedStep<Rk4>{}, {}, training),
+        std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ricochet::learn
