@@ -85,7 +85,9 @@ template <class X, bool single>
 inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, bool located)
 {
     stops_ = (stops_ && i != first_member()) || ends_run(i);
-    count_event(i, t, bank_[i].side);
+    // At the start of a step the guard has been armed on the side that it has been carried to.
+    const Side side = bank_[i].side;
+    count_event(i, t, located ? side : opposite(side));
     if (!options_.record_events) return;
     const Location where = located ? search_.where(i) : Location{};
     record({.t = t,

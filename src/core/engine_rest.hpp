@@ -114,7 +114,8 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::stays_on_surface(std::size_t i)
 {
     const auto guard = bank_.view(i, step_.mode(), calls());
-    const double span = step_.until(options_.t_end);
+    const double left = step_.until(options_.t_end);
+    const double span = std::isfinite(left) ? left : 1e6 * h_next_;  // a host has no end
     const double rounding = rounding_of(i);
     const double g = guard.value(step_.time(0), step_.x0());
     for (const double part : {0.001, 0.0381966, 0.381966, 1.0}) {

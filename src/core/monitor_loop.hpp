@@ -79,35 +79,15 @@ public:
         bank_.forget();
         if (guarded_) this->arm_at_start();
         started_ = true;
-        return go_on();
+        return or_start_anew([&] { return go_on(); });
     }
 
     Verdict examine(const HostStepTable& step) override
     {
         require_turn("examine");
         require_next(step);
-        step_.show(step);
-        if (std::exchange(departs_, false)) step_.align_start();
-        h_next_ = step.h;
-        time_event_due_ = false;
-        if (timed_) heed_time_event();
-        if (holds_set()) {
-            cut_.s = search_.at();
-            this->cut_short();
-            return show_set();
-        }
-        if (ended_) {
-            step_.restart(step_.start(), step_.x0(), step_.mode());
-            return Verdict::ended;
-        }
-        step_.accept_shown();
-        ++run_.statistics.steps;
-        this->last_h_ = step.h;
-        if (!time_event_due_) return Verdict::stands;
-        cut_.s = step.h;
-        step_.hold(time_event_);
-        this->apply_time_event();
-        return show_set();
+        time_event_due_ = timed_ && ends_at_time_event(step);
+        return or_start_anew([&] { return look_at(step); });
     }
 
     Verdict resume(const double* dxdt, double scale) override
@@ -116,9 +96,11 @@ public:
             throw_out_of_turn("resume", "it after a verdict `cut` alone");
         }
         require_length("the scale of `resume`", scale);
-        place_rate(dxdt);
-        h_next_ = scale;
-        return go_on();
+        return or_start_anew([&] {
+            place_rate(dxdt);
+            h_next_ = scale;
+            return go_on();
+        });
     }
 
     Verdict resume(const X& after, Mode mode, const double* dxdt, double scale) override
@@ -127,6 +109,7 @@ public:
             throw_out_of_turn("resume", "it after a verdict `cut` alone");
         }
         require_finite(step_.start(), after);
+        require_length("the scale of `resume`", scale);
         const std::size_t modes = system_.modes();
         if (modes > 0 && mode >= modes) throw_unknown_mode(mode, modes);
         step_.restart(step_.start(), after, mode);
@@ -136,15 +119,18 @@ public:
     Verdict hold(double t) override
     {
         if (!resting_ || ended_) throw_out_of_turn("hold", "it after a verdict `rests` alone");
-        if (!(t > step_.start().value) != backward_) throw_no_length("the time of `hold`", t);
+        if (!lies_before(step_.start().value, t)) throw_no_length("the time of `hold`", t);
         const bool due = timed_ && !lies_before(t, time_event_);
         if (due && t != time_event_) throw_beyond_time_event(time_event_, t);
         step_.hold(t);
         if (!due) return Verdict::rests;
-        cut_.s = 0;
-        step_.refresh();
-        this->apply_time_event();
-        return show_set();
+        return or_start_anew([&] {
+            cut_.s = 0;
+            this->level_ = 0;
+            step_.refresh();
+            this->apply_time_event();
+            return show_set();
+        });
     }
 
     [[nodiscard]] const Cut<X>& cut() const noexcept override { return cut_; }
@@ -167,6 +153,10 @@ public:
         if (!(clock(t.value) <= clock(quiet_until()))) throw_not_quiet(quiet_until(), t.value);
         if (timed_ && !lies_before(t.value, time_event_)) {
             throw_beyond_time_event(time_event_, t.value);
+        }
+        require_finite(t, x);
+        if (quiet_until() == step_.start().value && !same_state(x, step_.x0())) {
+            throw_not_quiet(quiet_until(), t.value);
         }
         step_.restart(t, x, step_.mode());
         place_rate(dxdt);
@@ -274,14 +264,15 @@ private:
         });
     }
 
-    void heed_time_event()
+    [[nodiscard]] bool ends_at_time_event(const HostStepTable& step) const
     {
-        const double end = step_.time(step_.h());
-        const double ahead = step_.until(time_event_);
+        const Instant start = step.start();
+        const double end = start.after(backward_ ? -step.h : step.h).value;
+        const double ahead = backward_ ? -start.until(time_event_) : start.until(time_event_);
         const double rounding =
-            8 * std::numeric_limits<double>::epsilon() * std::fabs(end) + 1e-12 * step_.h();
-        if (ahead < step_.h() - rounding) throw_beyond_time_event(time_event_, end);
-        time_event_due_ = ahead <= step_.h() + rounding;
+            8 * std::numeric_limits<double>::epsilon() * std::fabs(end) + 1e-12 * step.h;
+        if (ahead < step.h - rounding) throw_beyond_time_event(time_event_, end);
+        return ahead <= step.h + rounding;
     }
 
     [[nodiscard]] bool lies_before(double t, double end) const noexcept
@@ -290,6 +281,46 @@ private:
     }
 
     // --- looking ---
+
+    /// An exception from a function of the system, or from a host's interpolant, leaves guards half
+    /// looked at or half armed: then no call but `start` and `restore` goes on.
+    template <class Function>
+    Verdict or_start_anew(const Function& function)
+    {
+        try {
+            return function();
+        } catch (...) {
+            started_ = resting_ = false;
+            this->pending_ = Pending::nothing;
+            step_.restart(step_.start(), step_.x0(), step_.mode());
+            throw;
+        }
+    }
+
+    [[nodiscard]] Verdict look_at(const HostStepTable& step)
+    {
+        step_.show(step);
+        if (std::exchange(departs_, false)) step_.align_start();
+        h_next_ = step.h;
+        this->level_ = 0;
+        if (holds_set()) {
+            cut_.s = search_.at();
+            this->cut_short();
+            return show_set();
+        }
+        if (ended_) {
+            step_.restart(step_.start(), step_.x0(), step_.mode());
+            return Verdict::ended;
+        }
+        step_.accept_shown();
+        ++run_.statistics.steps;
+        this->last_h_ = step.h;
+        if (!time_event_due_) return Verdict::stands;
+        cut_.s = step.h;
+        step_.hold(time_event_);
+        this->apply_time_event();
+        return show_set();
+    }
 
     /// Whether a set of events cuts the step short. False, too, if the run has ended.
     [[nodiscard]] bool holds_set()
@@ -396,7 +427,8 @@ private:
                     place_.rate.size() == place_.x.size(),
                 "the number of components");
         require(std::isfinite(place_.t.value) && std::isfinite(place_.t.remainder), "the time");
-        require(all_finite(place_.x), "the state");
+        require(all_finite(place_.x) && all_finite(place_.remainder), "the state");
+        require(!timed_ || lies_before(place_.t.value, time_event_), "the next time event");
         require(h_next_ > 0 && std::isfinite(h_next_), "the scale");
         const std::size_t modes = system_.modes();
         require(modes == 0 || place_.mode < modes, "the mode");

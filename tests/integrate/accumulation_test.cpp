@@ -78,6 +78,30 @@ struct BallOnHighFloor {
     void reset(double, X& x) const { x = {floor, -restitution * x[1]}; }
 };
 
+/// Once per second guard 0 lifts the second component over the surface of guard 1, whose reset puts
+/// it back. Between these the second component stands still.
+struct Counter {
+    std::size_t guard_count = 2;
+    void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const X& x) const { return 1 - x[which]; }
+    void reset(std::size_t which, double, X& x) const
+    {
+        if (which == 0) {
+            x = {0, 2};
+        } else {
+            x[1] = 0;
+        }
+    }
+};
+
+TEST(Accumulation, AGuardThatAnotherResetCarriesAcrossOncePerSecondDoesNotAccumulate)
+{
+    const Counter system;
+    const auto run = integrate(system, X{0, 0}, {.t_end = 20.5});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.events.size(), 40u);
+}
+
 TEST(Accumulation, ImpactsThatAreLocatedLateDoNotFlutter)
 {
     // Each impact is late by up to the tolerance and put back on the floor: the intervals stop

@@ -321,6 +321,31 @@ TEST(Monitor, AResetThatCarriesAGuardAcrossIsASecondCutAtTheSameInstant)
     EXPECT_EQ(run.x[1], -1);
 }
 
+/// A counter: once per second guard 0 lifts the second component over the surface of guard 1.
+struct Counter {
+    std::size_t guard_count = 2;
+    void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const X& x) const { return 1 - x[which]; }
+    void reset(std::size_t which, double, X& x) const
+    {
+        if (which == 0) {
+            x = {0, 2};
+        } else {
+            x[1] = 0;
+        }
+    }
+};
+
+TEST(Monitor, SetsAreCountedAnewAtEveryInstant)
+{
+    // Two sets at each of 150 instants: no cascade is longer than two.
+    const Counter system;
+    EventMonitor monitor(system, X{});
+    const auto run = drive(system, monitor, X{0, 0}, 150.5, 0.25);
+    EXPECT_EQ(run.verdict, Verdict::stands) << describe(run.outcome);
+    EXPECT_EQ(run.events.size(), 300u);
+}
+
 /// A clock that strikes every second, and a guard.
 struct Clock {
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], 0}; }
@@ -370,6 +395,26 @@ TEST(Monitor, AMotionAtRestIsHeldUntilATimeEvent)
     EXPECT_EQ(rests, 3u);
     EXPECT_EQ(run.verdict, Verdict::rests);
     EXPECT_EQ(run.x, (X{0, 0}));
+}
+
+/// A ball on a floor whose height is only known at finite times.
+struct LateFloor : Struck {
+    mutable bool asked_at_infinity = false;
+    [[nodiscard]] double guard(double t, const X& x) const
+    {
+        asked_at_infinity = asked_at_infinity || !std::isfinite(t);
+        return x[0];
+    }
+    [[nodiscard]] double next_time_event(double) const { return inf; }
+};
+
+TEST(Monitor, AGuardIsNotAskedAtTheEndOfTime)
+{
+    const LateFloor system;
+    EventMonitor monitor(system, X{});
+    const auto run = drive(system, monitor, X{1, 0}, 12, 0.1);
+    EXPECT_EQ(run.verdict, Verdict::rests);
+    EXPECT_FALSE(system.asked_at_infinity);
 }
 
 TEST(Monitor, AHostMayMakeTheStateAfterAnEventItself)
@@ -620,6 +665,65 @@ TEST(MonitorRefusals, StepsOutOfTurn)
     EXPECT_THROW((void)monitor.save(), std::logic_error);
     EXPECT_EQ(monitor.resume(0.1), Verdict::stands);
     EXPECT_THROW((void)monitor.resume(0.1), std::logic_error);
+}
+
+/// A counter whose functions fail at a call of choice.
+struct Failing : Counter {
+    mutable int left = -1;
+    [[nodiscard]] double guard(std::size_t which, double t, const X& x) const
+    {
+        if (left >= 0 && left-- == 0) throw std::runtime_error("no value");
+        return Counter::guard(which, t, x);
+    }
+};
+
+TEST(MonitorRefusals, AfterAnExceptionTheGuardsAreArmedAnew)
+{
+    // Half armed, guard 1 would be lost: it has been carried across its surface.
+    for (int calls = 0; calls < 4; ++calls) {
+        const Failing system;
+        EventMonitor monitor(system, X{});
+        Rk4Host<Failing, 2> host(system, 0, X{0.5, 0});
+        ASSERT_EQ(monitor.start(Instant{0}, host.x(), host.rate(), 1), Verdict::stands);
+        ASSERT_EQ(monitor.examine(Rk4Host<Failing, 2>::Step(host, 1)), Verdict::cut);
+        host.restart(monitor.cut().t, monitor.cut().after, 0);
+        system.left = calls;
+        EXPECT_THROW((void)monitor.resume(host.rate(), 1), std::runtime_error) << calls;
+        EXPECT_THROW((void)monitor.resume(host.rate(), 1), std::logic_error);
+        const Rk4Host<Failing, 2>::Step step(host, 0.25);
+        EXPECT_THROW((void)monitor.examine(step), std::logic_error);
+        EXPECT_THROW((void)monitor.save(), std::logic_error);
+        ASSERT_EQ(monitor.start(Instant{0}, X{0, 0}, X{1, 0}, 1), Verdict::stands);
+        system.left = 0;
+        const Rk4Host<Failing, 2> fresh(system, 0, X{0, 0});
+        const Rk4Host<Failing, 2>::Step first(fresh, 0.25);
+        EXPECT_THROW((void)monitor.examine(first), std::runtime_error);
+        EXPECT_THROW((void)monitor.examine(first), std::logic_error);
+    }
+}
+
+TEST(MonitorRefusals, ASkipThatGoesNowhere)
+{
+    const BouncingBall ball;
+    EventMonitor monitor(ball, X{});
+    ASSERT_EQ(monitor.start(Instant{0}, X{10, 0}, X{0, -1}, 0.1), Verdict::stands);
+    EXPECT_THROW(monitor.skip_to(Instant{0}, X{-3, 0}, X{0, -1}), std::logic_error);
+    EXPECT_THROW(monitor.skip_to(Instant{0}, X{nan, 0}, X{0, -1}), std::invalid_argument);
+    EXPECT_EQ(monitor.x()[0], 10);
+}
+
+TEST(MonitorRefusals, SnapshotsThatWouldLoseTheNextTimeEvent)
+{
+    const Clock system;
+    EventMonitor monitor(system, X{});
+    ASSERT_EQ(monitor.start(Instant{0.5}, X{0, 0}, X{0, 0}, 0.1), Verdict::stands);
+    const Snapshot saved = monitor.save();
+    for (const double wrong : {nan, 0.25, -inf}) {
+        Snapshot broken = saved;
+        broken.numbers[9] = wrong;  // after the time, three states of two components and the scale
+        EXPECT_THROW(monitor.restore(broken), std::invalid_argument) << wrong;
+        EXPECT_EQ(monitor.must_stop_at(), 1);
+    }
 }
 
 TEST(MonitorRefusals, AMessageSaysWhatWasFoundAndExpected)
