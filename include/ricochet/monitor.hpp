@@ -142,9 +142,9 @@ struct MonitorOptions {
 /// The system is one for `Simulation`; its flow is asked for where a guard starts on its surface
 /// without a rate, and where the host does not give the rate after an event.
 ///
-/// An exception from a function of the system or from a host's interpolant passes through unchanged.
-/// The monitor then waits for `start` or `restore`, and refuses all else: what it had found in the
-/// step in hand is half done.
+/// An exception from a function of the system or from a host's interpolant passes through
+/// unchanged. The monitor then waits for `start` or `restore`, and refuses all else: what it had
+/// found in the step in hand is half done.
 ///
 /// After construction nothing is allocated for up to 8 guards and states of fixed size, but what is
 /// recorded, and what a reset of several guards at once merges.

@@ -241,8 +241,8 @@ TEST(Monitor, PairsOfCrossingsInOneStepAreFoundDownToRounding)
     }
 }
 
-/// A step of a ball in a host that asks its interpolant for times, counted from the end of the step,
-/// as a multistep method does: in short steps it is a staircase that misses its start.
+/// A step of a ball in a host that asks its interpolant for times, counted from the end of the
+/// step, as a multistep method does: in short steps it is a staircase that misses its start.
 struct ByTime {
     double t, length;
     X a, b, ra, rb;
@@ -659,7 +659,8 @@ TEST(MonitorRefusals, StepsOutOfTurn)
     EXPECT_EQ(monitor.examine(Shown{}), Verdict::stands);
     EXPECT_EQ(monitor.t().value, 0.1);
     // A host that forgets to resume.
-    const Shown falls{.t = 0.1, .a = {10, -0.1}, .b = {-1, -0.2}, .ra = {-110, -1}, .rb = {-110, -1}};
+    const Shown falls{
+        .t = 0.1, .a = {10, -0.1}, .b = {-1, -0.2}, .ra = {-110, -1}, .rb = {-110, -1}};
     ASSERT_EQ(monitor.examine(falls), Verdict::cut);
     EXPECT_THROW((void)monitor.examine(falls), std::logic_error);
     EXPECT_THROW((void)monitor.save(), std::logic_error);
