@@ -36,7 +36,7 @@ for compiler in "$@"; do
 done
 last=${!#}
 consume "$last" "all components" -DCMAKE_PREFIX_PATH="$work/whole" \
-    -DRICOCHET_COMPONENTS="nonsmooth;sensitivity;faults;learn" -- nonsmooth sensitivity faults learn
+    -DRICOCHET_COMPONENTS="nonsmooth;sensitivity;faults;learn;hosts" -- nonsmooth sensitivity faults learn
 consume "$last" "add_subdirectory" -DRICOCHET_SOURCE="$source" -- consumer
 
 if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_PATH="$work/core" \
