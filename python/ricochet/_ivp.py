@@ -1,5 +1,6 @@
 """Initial value problems with SciPy's arguments and SciPy's result."""
 
+from difflib import get_close_matches
 from warnings import warn
 
 import numpy as np
@@ -150,6 +151,17 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     return _result(run, count if watched else None, dense_output)
 
 
+def _refuse_near_names(event):
+    """What is nearly an attribute of an event is one misspelt: SciPy ignores it."""
+    known = ("terminal", "direction", "reset", "rest", "rate", "unilateral", "name")
+    for found in getattr(event, "__dict__", ()):
+        if found in known or found.startswith("_"):
+            continue
+        meant = get_close_matches(found.lower(), known, 1, 0.8)
+        if meant:
+            raise ValueError(f"event: found an attribute {found!r}, expected {meant[0]!r}")
+
+
 def _options(options, t0, t1, components):
     options = dict(options)
     for name in _IMPLICIT_OPTIONS:
@@ -218,6 +230,7 @@ def _guards(events, t0, start, args):
             continue
         if not callable(event) and not isinstance(event, Compiled):
             raise TypeError(f"events: found a {type(event).__name__}, expected functions (t, y)")
+        _refuse_near_names(event)
         direction = getattr(event, "direction", 0)
         terminal = getattr(event, "terminal", False)
         terminal = 0 if terminal is None else terminal

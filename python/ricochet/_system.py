@@ -197,7 +197,7 @@ class System:
                 continue
             if callable(member):
                 from difflib import get_close_matches
-                meant = get_close_matches(name.lower(), _KNOWN, 1, 0.85)
+                meant = get_close_matches(name.lower(), _KNOWN, 1, 0.8)
                 if meant:
                     raise TypeError(f"{cls.__name__}: found a method {name!r}, expected "
                                     f"{meant[0]!r}; if it means what it says, declare "

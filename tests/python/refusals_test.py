@@ -148,6 +148,17 @@ def test_events_that_return_something_else(result):
         ricochet.solve_ivp(decay, (0, 1), [1.0], events=lambda t, y: result)
 
 
+@pytest.mark.parametrize("name", ["Reset", "terminl", "direciton", "rset", "unilatral"])
+def test_attributes_that_are_misspelt(name):
+    def event(t, y):
+        return y[0]
+
+    setattr(event, name, 1)
+    event.weight = 3  # of no concern
+    with pytest.raises(ValueError, match=f"found an attribute '{name}', expected"):
+        ricochet.solve_ivp(lambda t, y: [-1.0], (0, 1), [0.5], events=event)
+
+
 def test_events_that_return_arrays_of_one_and_truths():
     result = ricochet.solve_ivp(lambda t, y: [-1.0], (0, 1), [1.0], max_step=0.1,
                                 events=[lambda t, y: y - 0.5, lambda t, y: bool(y[0] > 0.25),

@@ -678,6 +678,12 @@ void bind_results(py::module_& module)
     };
     py::class_<PyRun, std::shared_ptr<PyRun>>(
         module, "Run", "What a run has computed; its arrays are views of it.")
+        .def("__repr__",
+             [](const PyRun& self) {
+                 return "<Run: " + std::string(name(self.record.outcome)) + " at t = " +
+                        py::str(py::float_(self.record.t)).cast<std::string>() + ", " +
+                        std::to_string(self.record.statistics.events) + " events>";
+             })
         .def_property_readonly(
             "outcome", [](const PyRun& self) { return std::string(name(self.record.outcome)); },
             "How the run ended, e.g. 'reached_end' or 'zeno'.")
