@@ -304,12 +304,13 @@ TEST_F(Robust, EveryIntegratorCanBeInterrupted)
 
 TEST_F(Robust, ComparisonsKeepTheMethodsThatWereRun)
 {
-    // The whole comparison of a fast system takes a quarter of a second.
-    constexpr Milliseconds soon(10);
+    // The whole comparison takes three tenths of a second, the start of the program a few
+    // milliseconds, or more on a busy machine.
+    constexpr Milliseconds soon(60);
     expect_kept({"compare", "bouncing-ball", "--json", "--csv", "a.csv"}, SIGINT, "interrupted",
                 soon);
     EXPECT_TRUE(content(work() / "a.csv").ends_with("\n# incomplete: interrupted\n"));
-    expect_kept({"compare", "sliding-mode", "--json"}, SIGTERM, "asked to terminate", soon);
+    expect_kept({"compare", "stick-slip", "--json"}, SIGTERM, "asked to terminate", soon);
 }
 
 TEST_F(Robust, CompareStepControlShowsHowFarItIs)
