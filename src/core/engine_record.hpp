@@ -22,7 +22,8 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         GuardRecord& record = bank_[i];
         if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
         const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
-        const bool with_set = !record.info.boolean && at.s > record.from &&
+        const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays
+        const bool with_set = !record.info.boolean && !rests && at.s > record.from &&
                               search_.crosses_with_set(step_, bank_, i, at, resolution_);
         GuardSample last = at;
         // On the side that it comes from, until it crosses.

@@ -53,6 +53,30 @@ TEST(HardEvents, AGuardThatArrivesAndStaysHasItsEventWhereverTheStepsFall)
     }
 }
 
+/// Rises to zero at t = 1 and stays there, which is no fall; beside it a guard that falls at t = 2.
+struct RisingToZero {
+    std::size_t guard_count = 2;
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const { return {.resets = which == 1}; }
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+    [[nodiscard]] double guard(std::size_t which, double, const X1& x) const
+    {
+        return which == 1 ? 2 - x[0] : x[0] < 1 ? x[0] - 1 : 0;
+    }
+    void reset(std::size_t, double, X1& x) const { x[0] -= 0.5; }
+};
+
+TEST(HardEvents, AGuardThatRisesToAPlateauDoesNotFall)
+{
+    const RisingToZero system;
+    for (int i = 1; i < 150; ++i) {
+        const auto run =
+            integrate(system, X1{0}, {.t_end = 2.4, .step = 0.01 * i}, FixedStep<Rk4>{});
+        ASSERT_EQ(run.events.size(), 1u) << 0.01 * i << ", at " << run.events[0].t;
+        EXPECT_EQ(run.events[0].guard, 1u);
+        EXPECT_NEAR(run.events[0].t, 2, 1e-12);
+    }
+}
+
 /// Guard 0 puts the second component on the surface of guard 1, where it stays until the
 /// first reaches 2. State (clock, height, events of guard 1).
 struct SetDown {
