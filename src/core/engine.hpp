@@ -1,5 +1,5 @@
-// The events of a motion, whoever moves it: which set comes first in a step, what its resets make
-// of the state, and on which side every guard goes on.
+// The events of a motion, computed here or by a host: which set comes first in a step, what its
+// resets make of the state, and on which side every guard goes on.
 //
 //     find      the first set of events in the step in hand, and the state x⁻ there
 //     apply     the resets of its members: x⁻ becomes x⁺, the mode may change

@@ -120,7 +120,7 @@ inline void EventEngine<X, single>::arm_all()
     }
     search_.members().clear();
     if (system_->moded) enable_guards();
-    bank_.await_nobody();
+    bank_.await_none();
     newly_armed_ = true;
     watching_ = false;
     last_h_ = h_next_;

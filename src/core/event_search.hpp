@@ -514,7 +514,7 @@ private:
                       std::uint64_t& calls);
 
     /// Locates candidates until every one that has left its side by the end of the
-    /// window is located; the set is whoever lies in the window.
+    /// window is located; the set is those that lie in the window.
     void close_set(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
                    std::uint64_t& calls);
 

@@ -308,7 +308,7 @@ public:
         records_[i].awaited = side;
         waiting_ = true;
     }
-    void await_nobody() noexcept { waiting_ = false; }
+    void await_none() noexcept { waiting_ = false; }
     [[nodiscard]] bool waiting() const noexcept { return waiting_; }
 
 private:

@@ -69,7 +69,7 @@ struct GuardRecord {
     bool again = false;            ///< it is back inside the window of its last event
     Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
     bool acting = false;           ///< resets, or may end the run; else a notification
-    bool asleep = false;           ///< its check is put off: nothing in the bank is of this step
+    bool asleep = false;           ///< its check is deferred: nothing in the bank is of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     bool jumped = false;        ///< its last event was a jump

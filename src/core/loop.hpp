@@ -465,7 +465,7 @@ private:
     bool showing_sample_ = false;
     Mode sample_mode_ = 0;
     StepStart<X> place_;
-    std::unique_ptr<Mark> mark_;  ///< null: nobody will go on after an exception
+    std::unique_ptr<Mark> mark_;  ///< null: the run does not go on after an exception
     bool replans_ = false;        ///< all deadlines of guards are to be found anew
 };
 

@@ -147,8 +147,8 @@ public:
     [[nodiscard]] bool hopes(double end) const noexcept { return end <= hoped_; }
 
     /// Looks at every guard that owes one, at the end of the step in hand and wherever that
-    /// leaves a doubt. Returns the first step that could not be closed, or `none`; whoever
-    /// is to be judged in it if it is the step in hand is in `judged`.
+    /// leaves a doubt. Returns the first step that could not be closed, or `none`; the guards
+    /// to be judged in it, if it is the step in hand, are in `judged`.
     [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts,
                                     double h_next)
     {

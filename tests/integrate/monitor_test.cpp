@@ -169,7 +169,7 @@ TEST(Monitor, AccumulatingImpactsComeToRest)
     EXPECT_NEAR(static_cast<double>(run.events.size()), static_cast<double>(own.events.size()), 3);
 }
 
-/// A ball that nobody brings to rest.
+/// A ball without a rest rule.
 struct Restless {
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
     [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
