@@ -18,7 +18,12 @@ template <class CurrentStep>
     const int order = step.error_order() + 1;
     const auto& x = step.x0();
     const auto& dxdt = step.rate0();
-    const auto scale = [&](auto i) { return options.atol + options.rtol * std::fabs(x[i]); };
+    const auto scale = [&](auto i) {
+        const auto c = static_cast<std::size_t>(i);
+        const double atol =
+            options.component_atol.empty() ? options.atol : options.component_atol[c];
+        return atol + options.rtol * std::fabs(x[i]);
+    };
     double size = 0;
     double speed = 0;
     for_each_component(x, [&](auto i) {

@@ -152,6 +152,7 @@ class LargeKernel {
         double* const x1 = step.x1.data();
         double* const rate1 = step.rate1.data();
         double* const remainder1 = step.large.remainder1.data();
+        const double* const each = step.component_atol;
         std::array<const double*, last + 1> k{};
         for (std::size_t j = 0; j < last; ++j) k[j] = step.stages[j].data();
         const auto some = [&](std::size_t i, auto& worst, auto& lost) __attribute__((always_inline))
@@ -186,8 +187,9 @@ class LargeKernel {
                     }));
                 const V size0 = magnitude(start);
                 const V size1 = magnitude(end);
-                V ratio = error / (atol + rtol * (size0 > size1 ? size0 : size1));
-                if (atol == 0) ratio = error == 0 ? V{} : ratio;
+                const V at_zero = each ? load<V>(each + i) : V{} + atol;
+                V ratio = error / (at_zero + rtol * (size0 > size1 ? size0 : size1));
+                if (each || atol == 0) ratio = error == 0 ? V{} : ratio;
                 worst = ratio > worst ? ratio : worst;
                 lost += 0 * ratio;
             }

@@ -44,6 +44,7 @@ public:
         h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
         if (error_controlled_) {
             if (step_.error_order() == 0) throw_no_error_estimate();
+            step_.measure_with(options_.component_atol, options_.atol);
             if (options_.step == 0) h_next_ = initial_step(step_, options_);
             h_next_ = std::min(h_next_, options_.h_max);
         }

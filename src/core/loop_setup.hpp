@@ -16,6 +16,11 @@ inline const Options& Loop<X, single>::checked(const RunSetup<X>& setup, const O
             throw_start_not_finite(static_cast<std::size_t>(i), x0[i]);
         }
     });
+    const std::size_t tolerances = options.component_atol.size();
+    const auto components = static_cast<std::size_t>(x0.size());
+    if (setup.error_controlled && tolerances > 0 && tolerances != components) {
+        throw_wrong_tolerances(components, tolerances);
+    }
     return options;
 }
 

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
@@ -57,6 +59,15 @@ public:
     {
         const Instant at = state_.start.after(state_.in_time(s));
         return remainder == 0 ? at : at.after(state_.in_time(remainder));
+    }
+
+    /// @param each  absolute tolerances of the components, in the place of one for all; or none
+    /// @param other  of components that a reset adds
+    void measure_with(std::vector<double> each, double other)
+    {
+        component_atol_ = std::move(each);
+        atol_ = other;
+        place_tolerances();
     }
 
     /// Seconds from the start to time t, positive if it lies ahead.
@@ -440,10 +451,18 @@ private:
         state.flow_fits = state_.flow_fits;
         state.flow_calls = state_.flow_calls;
         state_ = std::move(state);
+        place_tolerances();
         unused_rate_ = end_slope_ = state_.zero;
         inner_w_.fill(state_.zero);
         inner_rate_.fill(state_.zero);
         if (kernel_->renew) kernel_->renew(system_.door());
+    }
+
+    void place_tolerances()
+    {
+        if (component_atol_.empty()) return;
+        component_atol_.resize(state_.x0.size(), atol_);
+        state_.component_atol = component_atol_.data();
     }
 
     /// w(s) on the method's own interpolant.
@@ -494,6 +513,8 @@ private:
     SystemAt<X> system_;
     const StepKernel<X>* kernel_;
     mutable StepState<X> state_;
+    std::vector<double> component_atol_;
+    double atol_ = 0;
     mutable X unused_rate_, end_slope_;
     mutable std::array<X, 2> inner_w_, inner_rate_;  ///< `middle` stands for the first
     mutable std::uint64_t resteps_ = 0;

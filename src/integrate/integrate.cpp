@@ -19,6 +19,14 @@ std::string guard_called(std::size_t which, std::string_view name)
 
 }  // namespace
 
+void throw_wrong_tolerances(std::size_t components, std::size_t tolerances)
+{
+    throw std::invalid_argument(
+        fmt::format("integrate: component_atol must have one number for each of the {} components "
+                    "of the start, got {}",
+                    components, tolerances));
+}
+
 void throw_start_empty()
 {
     throw std::invalid_argument("integrate: the start must have components, got none");

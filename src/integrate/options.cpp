@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "../checks/require.hpp"
@@ -31,7 +32,14 @@ void validate(const Options& options, bool step_required)
                 "step must be positive, or zero to have it estimated", o.step);
         require(std::isfinite(o.rtol) && o.rtol >= 0, "rtol must be zero or positive", o.rtol);
         require(std::isfinite(o.atol) && o.atol >= 0, "atol must be zero or positive", o.atol);
-        require(o.rtol > 0 || o.atol > 0, "rtol must be positive where atol is zero", o.rtol);
+        for (const double atol : o.component_atol) {
+            require(std::isfinite(atol) && atol >= 0,
+                    "every component_atol must be zero or positive", atol);
+        }
+        const bool any_zero =
+            o.component_atol.empty() ? o.atol == 0 : std::ranges::count(o.component_atol, 0.0) > 0;
+        require(o.rtol > 0 || !any_zero, "rtol must be positive where an absolute one is zero",
+                o.rtol);
         require(std::isfinite(o.h_min) && o.h_min >= 0, "h_min must be zero or positive", o.h_min);
         require(o.h_max > o.h_min, "h_max must be above h_min", o.h_max);
     }

@@ -63,6 +63,9 @@ HandOverOptions hand_over_options(const Options& options)
     constexpr detail::Refuse refuse{"integrate"};
     if (options.stop_at_event) refuse("a run that may be handed over has no stop_at_event");
     if (options.record_steps) refuse("a run that may be handed over has no record_steps");
+    if (!options.component_atol.empty()) {
+        refuse("a run that may be handed over has one atol for all components");
+    }
     if (options.t_end < options.t_start) {
         refuse("a run that may be handed over has no backward direction");
     }

@@ -234,17 +234,29 @@ class KernelOf {
         return error == 0 ? 0 : ratio;
     }
 
+    /// @param atol  of a component
+    template <class Atol>
     [[gnu::always_inline]] static double worst_ratio(const Y& x0, const Y& x1, const Y& errors,
-                                                     double rtol, double atol) noexcept
+                                                     double rtol, const Atol& atol) noexcept
     {
         double worst = 0;
         double lost = 0;
         for_each_component(x0, [&](auto i) {
-            const double ratio = ratio_of(errors[i], x0[i], x1[i], rtol, atol);
+            const double ratio = ratio_of(errors[i], x0[i], x1[i], rtol, atol(i));
             worst = ratio > worst ? ratio : worst;
             lost += 0 * ratio;  // NaN where it is not finite
         });
         return worst + lost;
+    }
+
+    [[gnu::always_inline]] static double worst_ratio(const State& step, const Y& x0, const Y& x1,
+                                                     const Y& errors, double rtol,
+                                                     double atol) noexcept
+    {
+        if (const double* const each = step.component_atol) {
+            return worst_ratio(x0, x1, errors, rtol, [&](auto i) { return each[i]; });
+        }
+        return worst_ratio(x0, x1, errors, rtol, [&](auto) { return atol; });
     }
 
     /// Takes a step. The largest ratio of error, 0 without an estimate; NaN if it is not finite.
@@ -268,7 +280,7 @@ class KernelOf {
             store(step, k, w, rate, x1, rate1);
             caller.leave(step);
             if (!finite) return std::numeric_limits<double>::quiet_NaN();
-            return with_error ? worst_ratio(x0, x1, error, rtol, atol) : 0;
+            return with_error ? worst_ratio(step, x0, x1, error, rtol, atol) : 0;
         } else {
             const X x0 = converted(step.x0);
             const X rate0 = converted(step.rate0);
@@ -285,7 +297,7 @@ class KernelOf {
             find_remainder(step, h);
             caller.leave(step);
             if (!finite) return std::numeric_limits<double>::quiet_NaN();
-            return with_error ? worst_ratio(x0, x1, error, rtol, atol) : 0;
+            return with_error ? worst_ratio(step, x0, x1, error, rtol, atol) : 0;
         }
     }
 
@@ -445,7 +457,7 @@ class KernelOf {
                     if (!finite) run.why = QuietEnd::failed;
                     break;
                 }
-                run.error = finite ? worst_ratio(x0, x1, error, run.rtol, run.atol)
+                run.error = finite ? worst_ratio(step, x0, x1, error, run.rtol, run.atol)
                                    : std::numeric_limits<double>::quiet_NaN();
                 if (rule.accepts(run.error)) {
                     next =

@@ -12,6 +12,8 @@ namespace ricochet::detail {
 [[noreturn]] void throw_start_empty();
 /// @throws std::invalid_argument: the start is not finite.
 [[noreturn]] void throw_start_not_finite(std::size_t component, double value);
+/// @throws std::invalid_argument: not as many absolute tolerances as components.
+[[noreturn]] void throw_wrong_tolerances(std::size_t components, std::size_t tolerances);
 /// @throws std::invalid_argument: the start is behind a unilateral guard.
 [[noreturn]] void throw_start_outside_mode(std::size_t which, std::string_view name, double t,
                                            double guard);

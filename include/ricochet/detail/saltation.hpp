@@ -32,11 +32,11 @@
 #include <optional>
 #include <vector>
 
+#include "ricochet/detail/linearization.hpp"
+#include "ricochet/detail/undefined.hpp"
 #include "ricochet/hybrid/event.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/options.hpp"
-#include "ricochet/detail/linearization.hpp"
-#include "ricochet/detail/undefined.hpp"
 
 namespace ricochet::detail {
 
@@ -88,6 +88,7 @@ public:
           initial_(initial),
           rtol_(std::max(options.rtol, 64 * std::numeric_limits<double>::epsilon())),
           atol_(options.atol),
+          component_atol_(options.component_atol),
           event_tolerance_(std::max(options.event_tolerance, options.event_window)),
           event_rtol_(options.event_rtol)
     {
@@ -254,6 +255,13 @@ private:
         return event_tolerance_ + (event_rtol_ + 16 * epsilon) * std::fabs(t);
     }
 
+    template <class Index>
+    [[nodiscard]] double atol_of(Index i) const noexcept
+    {
+        const auto c = static_cast<std::size_t>(i);
+        return c < component_atol_.size() ? component_atol_[c] : atol_;
+    }
+
     [[nodiscard]] bool coincides(const LastEvent& last, double t) const noexcept
     {
         return last.any && at_one_time(last.t, t);
@@ -271,7 +279,7 @@ private:
             unit[i] = 1;
             const double along = linearization_.guard_along(which, m.mode, m.t, m.x, unit);
             unit[i] = 0;
-            slope.blur += std::fabs(along) * (atol_ + rtol_ * std::fabs(m.x[i]));
+            slope.blur += std::fabs(along) * (atol_of(i) + rtol_ * std::fabs(m.x[i]));
         });
         slope.blur += std::fabs(slope.rate) * window(m.t);
         return slope;
@@ -454,6 +462,7 @@ private:
     std::size_t initial_;
     double rtol_;
     double atol_;
+    std::vector<double> component_atol_;
     double event_tolerance_;
     double event_rtol_;
 };

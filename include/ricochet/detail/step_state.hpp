@@ -79,6 +79,8 @@ struct StepState {
     X w, w_rate1;  ///< at the end; the rate only where the method gives it
     X x1, rate1;
     X error, at;
+    const double* component_atol =
+        nullptr;  ///< one for each component, in the place of one for all
 
     /// Of the step in hand, and of the last step that was repeated to an inner time.
     std::array<X, most_kept_stages> stages{};

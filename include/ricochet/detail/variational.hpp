@@ -11,6 +11,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <span>
@@ -18,13 +19,14 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/scratch.hpp"
-#include "ricochet/hybrid/system.hpp"
-#include "ricochet/integrate/options.hpp"
 #include "ricochet/detail/directions.hpp"
 #include "ricochet/detail/linearization.hpp"
+#include "ricochet/detail/refusals.hpp"
 #include "ricochet/detail/saltation.hpp"
+#include "ricochet/detail/scratch.hpp"
 #include "ricochet/detail/undefined.hpp"
+#include "ricochet/hybrid/system.hpp"
+#include "ricochet/integrate/options.hpp"
 
 namespace ricochet {
 
@@ -95,6 +97,20 @@ public:
 
     /// Where its runs start.
     [[nodiscard]] const State& start() const noexcept { return start_; }
+
+    /// Those of the components, for their derivatives too; empty where one holds for all.
+    [[nodiscard]] std::vector<double> tolerances(const Options& options) const
+    {
+        const std::vector<double>& each = options.component_atol;
+        if (each.empty()) return {};
+        const std::size_t n = components(start_);
+        if (each.size() != n) detail::throw_wrong_tolerances(n, each.size());
+        std::vector<double> out(start_.size(), options.atol);
+        for (std::size_t column = 0; column <= columns(); ++column) {
+            std::ranges::copy(each, out.begin() + static_cast<std::ptrdiff_t>(column * (n + 1)));
+        }
+        return out;
+    }
 
     // --- the parts of its state ---
 

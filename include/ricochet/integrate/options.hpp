@@ -25,6 +25,9 @@ struct Options {
     /// component stays below atol + rtol |x|. Ignored by fixed steps.
     double rtol = 1e-8;
     double atol = 1e-10;
+    /// One for each component of the start, in the place of `atol`; of components that a reset
+    /// adds it is `atol`.
+    std::vector<double> component_atol{};
     double h_min = 0;  ///< 0: a few units in the last place of the time
     double h_max = std::numeric_limits<double>::infinity();
 

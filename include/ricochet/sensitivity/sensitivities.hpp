@@ -241,6 +241,7 @@ requires Flowing<System, X> && StateVector<X>
     detail::check_declarations<System, X>();
     const Variational<System, X> variational(system, x0, directions, options);
     Options all = options;
+    all.component_atol = variational.tolerances(options);
     all.record_events = true;
     all.event_states = true;
     all.record_steps = false;
