@@ -12,6 +12,7 @@
 #include "files.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
+#include "joined.hpp"
 #include "json_text.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
@@ -203,7 +204,7 @@ void add_verdict(const std::vector<Method>& methods, bool fixed_step,
     if (!asked.empty()) {
         sentences.push_back(fmt::format("{}: a step takes {} with ends; asking first: {}.",
                                         ends.stepping, duration(per_step(ends)),
-                                        fmt::join(asked, ", ")));
+                                        joined(asked, ", ")));
     }
     if (network != nullptr) {
         sentences.push_back(
@@ -307,7 +308,7 @@ std::string to_text(const SystemEntry& system, const std::vector<double>& exact,
     if (!system.published.empty()) {
         out += fmt::format("paper: {}.\n", system.published.front().source);
     }
-    return out + fmt::format("{}\n", fmt::join(verdict(methods), "\n"));
+    return out + fmt::format("{}\n", joined(verdict(methods), "\n"));
 }
 
 Json json(const std::vector<double>& exact, const Accuracy& accuracy)
@@ -402,7 +403,7 @@ int compare(const CompareRequest& request)
         if (!system.any_parameters) {
             throw BadInput(fmt::format(
                 "the event times of {} are known of its default parameters only, got --set {}",
-                system.name, fmt::join(request.set, " ")));
+                system.name, joined(request.set, " ")));
         }
         system.published.clear();  // of the defaults
     }

@@ -1,4 +1,5 @@
 #include "input.hpp"
+#include "joined.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -17,7 +18,7 @@ BadInput unknown(std::string_view what, std::string_view given,
         return BadInput(fmt::format("unknown {} '{}'; there is none", what, shortened(given)));
     }
     return BadInput(fmt::format("unknown {} '{}'; known {} {}", what, shortened(given),
-                                known.size() == 1 ? "is" : "are", fmt::join(known, ", ")));
+                                known.size() == 1 ? "is" : "are", joined(known, ", ")));
 }
 
 std::string printable(std::string_view text)

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "input.hpp"
+#include "joined.hpp"
 #include "json_text.hpp"
 #include "model_lookup.hpp"
 #include "policy_advice.hpp"
@@ -164,7 +165,7 @@ Inspection look_at(const fs::path& file)
 
 std::string numbers(const std::vector<double>& values)
 {
-    return fmt::format("({})", fmt::join(values, ", "));
+    return fmt::format("({})", joined(values, ", "));
 }
 
 /// Why the certificate does not hold; empty if it does.
@@ -232,11 +233,10 @@ std::string to_text(const Inspection& found)
     for (const auto& [name, value] : model.parameters) {
         parameters.push_back(fmt::format("{} = {}", printable(name), value));
     }
-    line("system",
-         fmt::format("{}{}, {}", printable(model.system),
-                     system_of(model) == nullptr ? unknown_here : "",
-                     parameters.empty() ? "whatever its parameters"
-                                        : fmt::format("{}", fmt::join(parameters, ", "))));
+    line("system", fmt::format("{}{}, {}", printable(model.system),
+                               system_of(model) == nullptr ? unknown_here : "",
+                               parameters.empty() ? "whatever its parameters"
+                                                  : fmt::format("{}", joined(parameters, ", "))));
     if (!is_policy(model)) {
         line("steps", model.step_min == model.step_max
                           ? fmt::format("{} s only", model.step_min)

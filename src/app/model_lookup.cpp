@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "input.hpp"
+#include "joined.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
@@ -28,8 +29,7 @@ fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates
         if (fs::exists(file, ignored)) return file;
         looked.push_back(file.string());
     }
-    throw BadInput(
-        fmt::format("model '{}' not found; looked for {}", name, fmt::join(looked, ", ")));
+    throw BadInput(fmt::format("model '{}' not found; looked for {}", name, joined(looked, ", ")));
 }
 
 /// Why what `model` computes is not an event of `system`; empty if it may be.
@@ -210,7 +210,7 @@ FoundModel suitable_model(const SystemEntry& system, const RunSettings& settings
         reasons.push_back(
             fmt::format("'{}' {}", own.file, why.empty() ? "is not trained for this start" : why));
     }
-    throw BadInput(fmt::format("no model for {} suits: {}", system.name, fmt::join(reasons, "; ")));
+    throw BadInput(fmt::format("no model for {} suits: {}", system.name, joined(reasons, "; ")));
 }
 
 }  // namespace ricochet::app

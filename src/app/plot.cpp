@@ -17,6 +17,7 @@
 
 #include "files.hpp"
 #include "input.hpp"
+#include "joined.hpp"
 #include "report.hpp"
 
 extern char** environ;
@@ -42,7 +43,7 @@ std::string flights(const SystemEntry& system, const PlainRun& run)
     std::string out;
     for (const Row& row : rows(system, run)) {
         if (row.event.starts_with("after")) out += '\n';
-        out += fmt::format("{} {}\n", row.t, fmt::join(row.x, " "));
+        out += fmt::format("{} {}\n", row.t, joined(row.x, " "));
     }
     return out;
 }
@@ -52,8 +53,8 @@ std::string jumps(const PlainRun& run)
 {
     std::string out;
     for (const auto& event : run.events) {
-        out += fmt::format("{0} {1}\n{0} {2}\n\n", event.t, fmt::join(event.before, " "),
-                           fmt::join(event.after, " "));
+        out += fmt::format("{0} {1}\n{0} {2}\n\n", event.t, joined(event.before, " "),
+                           joined(event.after, " "));
     }
     return out;
 }
@@ -63,7 +64,7 @@ std::string marks(const PlainRun& run)
 {
     std::string out;
     for (const auto& event : run.events) {
-        out += fmt::format("{} {}\n", event.t, fmt::join(event.after, " "));
+        out += fmt::format("{} {}\n", event.t, joined(event.after, " "));
     }
     return out;
 }
@@ -131,7 +132,7 @@ std::string script(const SystemEntry& system, const RunSettings& settings, const
                                 column, single_quoted(event)));
             }
         }
-        out += fmt::format("plot {}\n", fmt::join(curves, ", \\\n     "));
+        out += fmt::format("plot {}\n", joined(curves, ", \\\n     "));
     }
     return out + "unset multiplot\n";
 }

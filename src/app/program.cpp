@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "joined.hpp"
 #include "options.hpp"
 #include "report.hpp"
 #include "ricochet/nn/safetensors.hpp"
@@ -80,8 +81,8 @@ void check_command(const CLI::App& app, int count, char** arguments)
     for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
     const std::vector<std::string_view> known(names.begin(), names.end());
     if (count < 2) {
-        throw BadInput(fmt::format("a command is needed, one of {}; --help tells more",
-                                   fmt::join(known, ", ")));
+        throw BadInput(
+            fmt::format("a command is needed, one of {}; --help tells more", joined(known, ", ")));
     }
     const std::string first = arguments[1];
     if (first.starts_with('-')) return;

@@ -9,6 +9,7 @@
 
 #include "files.hpp"
 #include "interrupt.hpp"
+#include "joined.hpp"
 #include "json_text.hpp"
 #include "set_valued.hpp"
 #include "timing.hpp"
@@ -196,7 +197,7 @@ std::string title(const SystemEntry& system, const RunSettings& settings)
         parts.push_back(fmt::format("{} {}", system.parameters[i].name,
                                     with_unit(settings.parameters[i], system.parameters[i].unit)));
     }
-    return fmt::format("{}{}{}", system.name, parts.empty() ? "" : ": ", fmt::join(parts, ", "));
+    return fmt::format("{}{}{}", system.name, parts.empty() ? "" : ": ", joined(parts, ", "));
 }
 
 std::string to_json(const SystemEntry& system, const RunSettings& settings, const TimedRun& timed,
@@ -258,7 +259,7 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
         state.push_back(fmt::format("mode {}", system.modes.at(run.mode)));
     }
     out += fmt::format("{} at t = {} s, {}\n", ricochet::name(run.outcome), run.t,
-                       fmt::join(state, ", "));
+                       joined(state, ", "));
     if (run.outcome != Outcome::reached_end) {
         std::string guard =
             run.guard == no_guard ? "" : fmt::format("guard {}", system.guards.at(run.guard).name);
@@ -293,7 +294,7 @@ std::string to_csv(const SystemEntry& system, const PlainRun& run)
     out += ",event\n";
     for (Row& row : rows(system, run)) {
         for (double& value : row.x) value = unsigned_zero(value);
-        out += fmt::format("{},{},{}\n", unsigned_zero(row.t), fmt::join(row.x, ","), row.event);
+        out += fmt::format("{},{},{}\n", unsigned_zero(row.t), joined(row.x, ","), row.event);
     }
     if (run.outcome == Outcome::cancelled) out += incomplete_line();
     return out;

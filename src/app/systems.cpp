@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "joined.hpp"
 #include "json_text.hpp"
 #include "registry.hpp"
 #include "report.hpp"
@@ -40,11 +41,11 @@ Json json(const SystemEntry& system)
     }
     Json guards = Json::array();
     for (const GuardLabel& guard : system.guards) guards.push_back(guard.name);
-    return {{"name", system.name},       {"description", system.description},
-            {"source", system.source},
-            {"parameters", parameters},  {"state", state},
-            {"guards", guards},          {"modes", system.modes},
-            {"t_start", system.t_start}, {"t_end", system.t_end}};
+    return {{"name", system.name},     {"description", system.description},
+            {"source", system.source}, {"parameters", parameters},
+            {"state", state},          {"guards", guards},
+            {"modes", system.modes},   {"t_start", system.t_start},
+            {"t_end", system.t_end}};
 }
 
 std::string text(const SystemEntry& system)
@@ -56,7 +57,7 @@ std::string text(const SystemEntry& system)
                            unit, to_string(parameter.range), parameter.meaning);
     }
     if (!system.modes.empty()) {
-        out += fmt::format("    {:<15} {}\n", "modes", fmt::join(system.modes, ", "));
+        out += fmt::format("    {:<15} {}\n", "modes", joined(system.modes, ", "));
     }
     if (system.t_start != 0) {
         out += fmt::format("    {:<15} {:>6} s     default start of a run\n", "t-start",
@@ -71,9 +72,10 @@ std::string known_solution(const SystemEntry& system)
 {
     if (!system.known_solution.empty()) return std::string(system.known_solution);
     if (system.exact_events != nullptr) {
-        return fmt::format("event times {}{}",
-                           system.numerical_reference ? "computed to higher accuracy" : "in closed form",
-                           system.any_parameters ? "" : ", for the default parameters");
+        return fmt::format(
+            "event times {}{}",
+            system.numerical_reference ? "computed to higher accuracy" : "in closed form",
+            system.any_parameters ? "" : ", for the default parameters");
     }
     return "";
 }
@@ -86,17 +88,17 @@ std::string markdown(const SystemEntry& system)
     for (const Component& x : system.state) {
         state.push_back(fmt::format("{} [{}], {}", x.name, x.unit, x.meaning));
     }
-    out += fmt::format("- state: {}\n", fmt::join(state, "; "));
+    out += fmt::format("- state: {}\n", joined(state, "; "));
     std::vector<std::string> guards;
     for (const GuardLabel& guard : system.guards) {
         guards.push_back(guard.name == guard.event
                              ? std::string(guard.name)
                              : fmt::format("{} ({})", guard.name, guard.event));
     }
-    if (!guards.empty()) out += fmt::format("- guards: {}\n", fmt::join(guards, ", "));
-    if (!system.modes.empty()) out += fmt::format("- modes: {}\n", fmt::join(system.modes, ", "));
+    if (!guards.empty()) out += fmt::format("- guards: {}\n", joined(guards, ", "));
+    if (!system.modes.empty()) out += fmt::format("- modes: {}\n", joined(system.modes, ", "));
     if (!system.integrators.empty()) {
-        out += fmt::format("- integrators: {}\n", fmt::join(system.integrators, ", "));
+        out += fmt::format("- integrators: {}\n", joined(system.integrators, ", "));
     }
     if (const std::string known = known_solution(system); !known.empty()) {
         out += fmt::format("- known: {}\n", known);
@@ -116,7 +118,8 @@ std::string markdown()
 {
     std::string out =
         "# The systems of the command line\n\n"
-        "Written by `ricochet systems --markdown` from the descriptors of the systems; a test holds "
+        "Written by `ricochet systems --markdown` from the descriptors of the systems; a test "
+        "holds "
         "this page to them. `ricochet simulate NAME --set parameter=value` runs one, `ricochet "
         "compare NAME` beside its known solution.\n";
     for (const SystemEntry& system : systems()) out += '\n' + markdown(system);

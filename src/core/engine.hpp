@@ -36,6 +36,12 @@
 
 namespace ricochet::detail {
 
+/// False, as the compiler knows.
+struct Never {
+    constexpr explicit Never(bool) noexcept {}
+    constexpr operator bool() const noexcept { return false; }
+};
+
 template <class X, bool single>
 class EventEngine {
 protected:
@@ -404,7 +410,7 @@ protected:
     bool guarded_;     ///< has guards, if only none of them yet
     bool resets_any_;  ///< has resets
     bool timed_;
-    bool puts_off_;
+    std::conditional_t<single, Never, bool> puts_off_;  ///< a plan is for the loop of any number
     bool predicts_;
     Options options_;
     Metering meter_;

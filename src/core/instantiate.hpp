@@ -23,11 +23,12 @@
 
 namespace ricochet::detail {
 
-/// Whether the run of a system is one of a loop for a single guard.
+/// Whether the run of a system is one of the loop for a single guard that is never put off.
 template <class X>
 [[nodiscard]] bool has_single_guard(const RunSetup<X>& setup)
 {
-    return fixed_size<X>() > 0 && setup.system->guard_count(setup.door) == 1;
+    return fixed_size<X>() > 0 && !setup.detector.puts_off &&
+           setup.system->guard_count(setup.door) == 1;
 }
 
 /// A loop with its setup, which goes on after exceptions from the system.

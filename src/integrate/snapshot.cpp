@@ -185,9 +185,9 @@ std::vector<RunProperty> properties_of_run(const RunParts& parts, const Options&
     if (parts.error_controlled) {
         out.push_back({"rtol", text(o.rtol)});
         out.push_back({"atol", text(o.atol)});
-        if (!o.component_atol.empty()) {
-            out.push_back({"component_atol", fmt::format("{}", fmt::join(o.component_atol, " "))});
-        }
+        std::string each;
+        for (const double atol : o.component_atol) each += text(atol) + ' ';
+        if (!each.empty()) out.push_back({"component_atol", each});
         out.push_back({"h_min", text(o.h_min)});
         out.push_back({"h_max", text(o.h_max)});
     } else {

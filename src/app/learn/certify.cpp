@@ -12,6 +12,7 @@
 #include "guard_problems.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
+#include "joined.hpp"
 #include "json_text.hpp"
 #include "keep_model.hpp"
 #include "model_lookup.hpp"
@@ -104,7 +105,7 @@ learn::GuardProblem problem_of(const Model& model, const fs::path& file)
     throw refuse(
         fmt::format("is for the system '{}'; those that bound how much their guard can "
                     "change are {}",
-                    model.system, fmt::join(known, ", ")));
+                    model.system, joined(known, ", ")));
 }
 
 std::string to_text(const learn::CertifyReport& report)
@@ -116,7 +117,7 @@ std::string to_text(const learn::CertifyReport& report)
                            level.unproved.size());
     }
     if (!report.counterexample.empty()) {
-        out += fmt::format("counterexample: ({})\n", fmt::join(report.counterexample, ", "));
+        out += fmt::format("counterexample: ({})\n", joined(report.counterexample, ", "));
     }
     return out + fmt::format("{}\n", learn::describe(report.outcome));
 }

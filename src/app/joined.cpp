@@ -1,0 +1,38 @@
+#include "joined.hpp"
+
+#include <fmt/format.h>
+
+namespace ricochet::app {
+
+namespace {
+
+template <class Parts>
+std::string join(const Parts& parts, std::string_view separator)
+{
+    std::string out;
+    std::string_view before;
+    for (const auto& part : parts) {
+        out += fmt::format("{}{}", before, part);
+        before = separator;
+    }
+    return out;
+}
+
+}  // namespace
+
+std::string joined(const std::vector<std::string>& parts, std::string_view separator)
+{
+    return join(parts, separator);
+}
+
+std::string joined(const std::vector<std::string_view>& parts, std::string_view separator)
+{
+    return join(parts, separator);
+}
+
+std::string joined(std::span<const double> numbers, std::string_view separator)
+{
+    return join(numbers, separator);
+}
+
+}  // namespace ricochet::app
