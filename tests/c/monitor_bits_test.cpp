@@ -35,10 +35,7 @@ struct Balls {
             dxdt[i + 1] = -9.81;
         }
     }
-    [[nodiscard]] double guard(std::size_t which, double, const X& x) const
-    {
-        return x[2 * which];
-    }
+    [[nodiscard]] double guard(std::size_t which, double, const X& x) const { return x[2 * which]; }
     void reset(std::size_t which, double, X& x) const
     {
         x[2 * which] = 0;
@@ -77,7 +74,10 @@ struct Clock {
 };
 
 template <class System>
-concept Timed = requires(const System& system) { system.next_time_event(0.0); };
+concept Timed = requires(const System& system)
+{
+    system.next_time_event(0.0);
+};
 
 /// A system of C++ as callbacks.
 template <class System>
@@ -100,8 +100,8 @@ class Callbacks {
         write(rate, dxdt);
         return 0;
     }
-    static int guard(void* user, std::size_t which, rc_mode, double t, const double* x,
-                     std::size_t, double* g)
+    static int guard(void* user, std::size_t which, rc_mode, double t, const double* x, std::size_t,
+                     double* g)
     {
         *g = at(user).guard(which, t, read(x));
         return 0;
@@ -188,8 +188,8 @@ public:
     Verdict examine(const Step& step, bool restep)
     {
         if (restep) return monitor_.examine(step);
-        return monitor_.examine(HermiteStep(step.t0(), step.h(), step.x0(), step.x1(),
-                                            step.rate0(), step.rate1()));
+        return monitor_.examine(
+            HermiteStep(step.t0(), step.h(), step.x0(), step.x1(), step.rate0(), step.rate1()));
     }
     Verdict resume(const X& rate, double h) { return monitor_.resume(rate, h); }
     Verdict hold(double t) { return monitor_.hold(t); }
@@ -268,7 +268,8 @@ public:
 
     Verdict start(const X& x, const X& rate, double h)
     {
-        CHECK_STATUS(RC_OK, rc_monitor_start(monitor_, 0, x.data(), rate.data(), n, 0, h, &answer_));
+        CHECK_STATUS(RC_OK,
+                     rc_monitor_start(monitor_, 0, x.data(), rate.data(), n, 0, h, &answer_));
         return verdict();
     }
     template <class Step>
@@ -414,8 +415,7 @@ Told drive(System& system, Monitor&& monitor, const typename System::X& x0, doub
 /// NaN is equal to itself: a slope that was not computed.
 bool same_bits(const Story& a, const Story& b)
 {
-    return a.size() == b.size() &&
-           std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
 template <class System>

@@ -26,7 +26,8 @@ static inline void host_flow(const struct host* host, const double* x, double* d
 
 static inline void host_place(const struct host* host, double s, double* x)
 {
-    double at[most_components], k2[most_components], k3[most_components], k4[most_components];
+    double at[most_components] = {0}, k2[most_components], k3[most_components];
+    double k4[most_components];
     const size_t n = host->system->dimension;
     size_t i;
     for (i = 0; i < n; ++i) at[i] = host->x[i] + s / 2 * host->rate[i];

@@ -218,9 +218,8 @@ const char* rc_outcome_text(rc_outcome_code outcome)
 
 rc_status rc_get_statistics(rc_simulation* simulation, rc_statistics* statistics)
 {
-    return with(simulation, [&](rc_simulation& at) {
-        write_statistics(statistics, at.run->counts());
-    });
+    return with(simulation,
+                [&](rc_simulation& at) { write_statistics(statistics, at.run->counts()); });
 }
 
 size_t rc_event_count(rc_simulation* simulation)
