@@ -2,9 +2,10 @@
  *
  *     rc_system        the functions of a system, as pointers, and what is said of its guards
  *     rc_simulation    a run of it, taken in steps, from event to event, or to the end
+ *     rc_monitor       its events in the steps of an integrator of the program's own
  *
  * Link with the shared library ricochet_c (`ricochet::c` in CMake, `ricochet-c` in pkg-config).
- * C99; the same from C++. docs/c.md is the guide, examples/c/bouncing_ball.c a whole program.
+ * C99; the same from C++. docs/c.md is the guide, examples/c/ has whole programs.
  *
  * Times are in seconds. A state is an array of n doubles, where n is the dimension of the system.
  *
@@ -17,11 +18,11 @@
  * A library that is newer than the program takes the fields it does not find as zero, or an
  * option at its default; an older one refuses the struct as RC_WRONG_SIZE.
  *
- * Threads. One simulation belongs to one thread at a time: a call while another is in progress,
- * from another thread or from a callback, is refused as RC_BUSY; `rc_cancel` is the exception.
- * Different simulations may run at once, also of one system, if its callbacks allow it.
+ * Threads. One simulation, or monitor, belongs to one thread at a time: a call while another is in
+ * progress, from another thread or from a callback, is refused as RC_BUSY; `rc_cancel` is the
+ * exception. Different ones may run at once, also of one system, if its callbacks allow it.
  *
- * Handles. A handle that is null, freed or of the other kind is refused as RC_BAD_HANDLE. A freed
+ * Handles. A handle that is null, freed or of another kind is refused as RC_BAD_HANDLE. A freed
  * handle is recognised for certain in debug builds of the library, which keep its memory.
  */
 #ifndef RICOCHET_RICOCHET_H
@@ -48,10 +49,11 @@ typedef enum rc_status {
     RC_INVALID = 1,    /**< an argument, an option or the system is not as it has to be */
     RC_CALLBACK = 2,   /**< a callback returned a number other than 0, see rc_callback_error */
     RC_NO_MEMORY = 3,  /**< nothing has changed */
-    RC_BUSY = 4,       /**< the simulation is in another call, of a thread or around a callback */
+    RC_BUSY = 4,       /**< the handle is in another call, of a thread or around a callback */
     RC_BAD_HANDLE = 5, /**< null, freed, or of another kind */
     RC_WRONG_SIZE = 6, /**< a struct of a newer header than the library, or of none */
-    RC_INTERNAL = 7    /**< a defect of the library, or an exception from a callback */
+    RC_INTERNAL = 7,   /**< a defect of the library, or an exception from a callback */
+    RC_OUT_OF_TURN = 8 /**< not what the monitor expects next; nothing has changed */
 } rc_status;
 
 /** The last failure in this thread as a sentence that says what was given and what was expected;
@@ -311,7 +313,8 @@ typedef struct rc_callback_error {
     size_t size;          /**< sizeof(rc_callback_error), filled in by the caller */
     int32_t code;         /**< what it returned; 0: none has failed */
     uint32_t reserved;    /**< 0 */
-    const char* callback; /**< its name in rc_callbacks, e.g. "flow"; null: none has failed */
+    const char* callback; /**< its name in rc_callbacks, e.g. "flow", or in rc_host_step; null:
+                               none has failed */
     size_t guard;         /**< that it was called for, else RC_NO_GUARD */
     double t;             /**< [s] that it was called with; NaN: none */
 } rc_callback_error;
@@ -424,6 +427,204 @@ RC_API rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size);
  *  with the same options, but for its end, its sample times and what it records. What was
  *  recorded stays. RC_INVALID names what does not agree; then nothing has changed. */
 RC_API rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t size);
+
+/* --- monitors ---------------------------------------------------------------------------- */
+
+/** The events of a motion that the program, the host, integrates by itself. It shows every step
+ *  that its integrator has accepted, in order, each beginning where the last one ended; steps that
+ *  it rejects are never shown. Steps are half-open, (t0, t0 + h]. The monitor changes nothing of
+ *  the host:
+ *
+ *      rc_monitor_start(monitor, t, x, dxdt, n, 0, h, &verdict);
+ *      while (verdict == RC_STANDS && t < t_end) {
+ *          step, to rc_monitor_must_stop_at(monitor) at most
+ *          rc_monitor_examine(monitor, &step, &verdict);
+ *          if (verdict == RC_STANDS) go on from the end of the step
+ *          while (verdict == RC_CUT) {
+ *              rc_monitor_cut(monitor, &cut);
+ *              go on from cut.t and cut.after
+ *              rc_monitor_resume(monitor, dxdt, n, h, &verdict);
+ *          }
+ *      }
+ *
+ *  What happens at an event is what a run does that takes the same steps. */
+typedef struct rc_monitor rc_monitor;
+
+/** Options of a monitor. Fill them by rc_monitor_options_default, then change what is to be
+ *  changed. */
+typedef struct rc_monitor_options {
+    size_t size;            /**< sizeof(rc_monitor_options) */
+    double event_tolerance; /**< [s] of the bracket of an event, 0: neighbouring doubles */
+    double event_rtol;      /**< added to it per second of |t|, 0 */
+    double event_window;    /**< [s] within which events happen together, 0 */
+    int32_t detector;       /**< an rc_detector, RC_EXTREMUM */
+    int32_t locator;        /**< an rc_locator, RC_NEWTON */
+    int32_t look_inside;    /**< 1: RC_EXTREMUM evaluates the guards once inside each step */
+    int32_t record_events;  /**< 1; 0: events are counted, not kept */
+    int32_t event_states;   /**< 1; as in rc_options */
+    int32_t backward;       /**< 0; 1: the host's time runs backward */
+    int32_t cut_at_all; /**< 0; 1: every crossing ends its step, whether the system has a reset for
+                           it or not: for hosts that change the state themselves */
+    int32_t reserved;   /**< 0 */
+    const char* gate;   /**< path of the model of the detectors that ask one, else null */
+} rc_monitor_options;
+
+/** Fills in the defaults; `size` is sizeof(rc_monitor_options). RC_WRONG_SIZE. */
+RC_API rc_status rc_monitor_options_default(rc_monitor_options* options, size_t size);
+
+/** What a host is to do next. */
+typedef enum rc_verdict {
+    RC_NO_VERDICT = -1, /**< the call has failed, see its status */
+    RC_STANDS = 0,      /**< the step stands: go on from its end */
+    RC_CUT = 1,   /**< it ends at a set of events: go on from `after` of rc_cut, and resume */
+    RC_RESTS = 2, /**< the motion has come to rest: keep the state, and hold */
+    RC_ENDED = 3  /**< the run is over, rc_monitor_outcome says why */
+} rc_verdict;
+
+/** Computes n doubles at the offset s [s] in [0, h] from the start of a step. Returns 0, or an
+ *  error of the host's own. */
+typedef int (*rc_offset_fn)(void* user, double s, double* x, size_t n);
+
+/** A step that a host has accepted, from t0 to t0 + h, or t0 - h backward. It is read during the
+ *  call that it is handed to. Rates are with respect to offsets: those of the path that
+ *  `interpolate` follows, backward in time -x'. */
+typedef struct rc_host_step {
+    size_t size;         /**< sizeof(rc_host_step) */
+    size_t n;            /**< finite doubles in each array, the dimension of the system */
+    double t0;           /**< [s] */
+    double t0_remainder; /**< [s] what the host's sum of times has lost, if it keeps that, else 0 */
+    double h;            /**< [s] above 0 */
+    const double* x0;    /**< the states at its start, */
+    const double* x1;    /**< and at its end */
+    const double* rate0; /**< the rates at its start, */
+    const double* rate1; /**< and at its end */
+    void* user;          /**< handed to the three below */
+    rc_offset_fn interpolate;      /**< the state; null: the cubic through both ends */
+    rc_offset_fn interpolate_rate; /**< its derivative; null: a difference over 1e-4 h, and events
+                                      near tangency are found less finely */
+    rc_offset_fn restep; /**< the state by a step of length s from the start, as exact as the whole
+                            one: events are located on it; null: on `interpolate` */
+} rc_host_step;
+
+/** A set of events that ends a step, at the same instant for all its guards. */
+typedef struct rc_cut {
+    size_t size;          /**< sizeof(rc_cut), filled in by the caller */
+    double s;             /**< [s] offset in the step shown last; 0 where the set follows another */
+    double t;             /**< [s] */
+    double t_remainder;   /**< [s] what rounding took from t */
+    const double* before; /**< n doubles, until the next call that may be a cut */
+    const double* after;  /**< n doubles, as long */
+    const size_t* fired;  /**< the guards, ascending, as long; of an accumulation the one at rest */
+    size_t fired_count;
+    rc_mode mode_before;
+    rc_mode mode_after;
+    int32_t on_time;       /**< 1: with a time event */
+    int32_t accumulation;  /**< 1: `after` is what `rest` makes of the limit, `t` its time */
+    int32_t state_changed; /**< 0: the host need not start anew */
+    int32_t reserved;      /**< 0 */
+} rc_cut;
+
+/** Makes a monitor of the events of `system`; it has to be started. Null for `options`: the
+ *  defaults. `*monitor` is null after a failure. The flow is only asked where the host gives no
+ *  rate, and where a guard starts on its surface without one. RC_INVALID with the option in
+ *  question, or for a system without events; RC_NO_MEMORY, RC_BAD_HANDLE, RC_WRONG_SIZE. */
+RC_API rc_status rc_monitor_new(const rc_system* system, const rc_monitor_options* options,
+                                rc_monitor** monitor);
+
+/** Frees it, with all that was handed out of it. Null is allowed; RC_BUSY while it is in use, and
+ *  then nothing is freed. */
+RC_API rc_status rc_monitor_free(rc_monitor* monitor);
+
+/* The calls below take arrays of `n` finite doubles, where n is the dimension of the system, and
+ * copy them. Rates are as in rc_host_step; null for `dxdt`: the system's flow is asked. `scale` [s] is
+ * roughly the length of the next step. After RC_INVALID and RC_OUT_OF_TURN nothing has changed,
+ * and the right call may follow. After any other failure, such as RC_CALLBACK, what has been found
+ * in the step in hand is half done, and the monitor waits for rc_monitor_start or
+ * rc_monitor_restore. */
+
+/** Arms all guards at a state that no event has led to: at the start, and after whatever a host
+ *  does to the state by itself. May be a cut at once. RC_INVALID for a start that is not finite,
+ *  or behind a surface that bounds the motion; then a start has to follow. */
+RC_API rc_status rc_monitor_start(rc_monitor* monitor, double t, const double* x,
+                                  const double* dxdt, size_t n, rc_mode mode, double scale,
+                                  rc_verdict* verdict);
+
+/** Looks for events in the next step. RC_OUT_OF_TURN for a step that does not begin where the last
+ *  one ended, that goes beyond a time event, or before a cut was resumed. */
+RC_API rc_status rc_monitor_examine(rc_monitor* monitor, const rc_host_step* step,
+                                    rc_verdict* verdict);
+
+/** After a cut, once the host has gone to `after`: arms all guards with the rate there. May be a
+ *  cut again: guards that a reset has carried across their surfaces, at the same instant, or a
+ *  motion that comes to rest. */
+RC_API rc_status rc_monitor_resume(rc_monitor* monitor, const double* dxdt, size_t n, double scale,
+                                   rc_verdict* verdict);
+/** The same from a state of the host's own making in the place of `after`. */
+RC_API rc_status rc_monitor_resume_at(rc_monitor* monitor, const double* x, const double* dxdt,
+                                      size_t n, rc_mode mode, double scale, rc_verdict* verdict);
+
+/** After RC_RESTS: the state has been kept until t [s], rc_monitor_must_stop_at at most. At a time
+ *  event a cut. */
+RC_API rc_status rc_monitor_hold(rc_monitor* monitor, double t, rc_verdict* verdict);
+
+/** The last set of events. RC_OUT_OF_TURN if there has been none since the start. */
+RC_API rc_status rc_monitor_cut(rc_monitor* monitor, rc_cut* cut);
+
+/** Where the next step begins [s], and into `remainder`, which may be null, what rounding took
+ *  from it; NaN before the start, and for a handle that cannot be used. */
+RC_API double rc_monitor_time(rc_monitor* monitor, double* remainder);
+/** The state there, n doubles, until the next call that starts, advances, restores or frees the
+ *  monitor; null before the start, and for a handle that cannot be used. */
+RC_API const double* rc_monitor_state(rc_monitor* monitor);
+/** The mode there; UINT32_MAX before the start, and for a handle that cannot be used. */
+RC_API rc_mode rc_monitor_mode(rc_monitor* monitor);
+
+/** The next time event [s], beyond which no step goes; infinite where there is none; NaN before the
+ *  start, and for a handle that cannot be used. */
+RC_API double rc_monitor_must_stop_at(rc_monitor* monitor);
+/** Up to this time [s] no guard needs a look, by the bounds that the system has or by a gate: the
+ *  host may go there in steps that it does not show, by rc_monitor_skip_to. Where nothing is known
+ *  it is the time in hand; NaN before the start, and for a handle that cannot be used. */
+RC_API double rc_monitor_quiet_until(rc_monitor* monitor);
+/** The host has gone on to t, at most rc_monitor_quiet_until and before the next time event, in one
+ *  step or several; x and its rate, which must be given, are those there. RC_OUT_OF_TURN beyond. */
+RC_API rc_status rc_monitor_skip_to(rc_monitor* monitor, double t, const double* x,
+                                    const double* dxdt, size_t n);
+
+/** Where a guard is. */
+typedef enum rc_side {
+    RC_BELOW = -1,  /**< it is negative */
+    RC_PLATEAU = 0, /**< zero, and not known where it goes */
+    RC_ABOVE = 1    /**< it is positive, inside the mode */
+} rc_side;
+
+/** The side of its surface that guard `which` is on. RC_INVALID if there is none, RC_OUT_OF_TURN
+ *  before the start. */
+RC_API rc_status rc_monitor_side(rc_monitor* monitor, size_t which, rc_side* side);
+
+/** How the run ended; RC_RUNNING before, and for a handle that cannot be used;
+ *  RC_STOPPED_BY_CALLBACK where it waits for a start after a callback that failed. */
+RC_API rc_outcome_code rc_monitor_outcome(rc_monitor* monitor);
+/** The guard that ended the run, or RC_NO_GUARD. */
+RC_API size_t rc_monitor_guard(rc_monitor* monitor);
+/** As rc_callback_failure, of this monitor; null: of this thread. */
+RC_API rc_status rc_monitor_callback_failure(rc_monitor* monitor, rc_callback_error* error);
+/** As rc_get_statistics; calls of the flow are the host's, and not counted. */
+RC_API rc_status rc_monitor_statistics(rc_monitor* monitor, rc_statistics* statistics);
+
+/** Number of events recorded since rc_monitor_clear_events; 0 for a handle that cannot be used. */
+RC_API size_t rc_monitor_event_count(rc_monitor* monitor);
+/** Event `index`, in the order in which they happened. RC_INVALID if there is none. */
+RC_API rc_status rc_monitor_event_at(rc_monitor* monitor, size_t index, rc_event* event);
+/** Forgets the events recorded so far. */
+RC_API rc_status rc_monitor_clear_events(rc_monitor* monitor);
+
+/** As rc_save, between two steps: all that the future of the monitor depends on; the host saves
+ *  what its own depends on. RC_OUT_OF_TURN before the start, before a cut was resumed, and after
+ *  the end. */
+RC_API rc_status rc_monitor_save(rc_monitor* monitor, void* bytes, size_t* size);
+/** As rc_restore, of the same or of another monitor of the same system with the same options. */
+RC_API rc_status rc_monitor_restore(rc_monitor* monitor, const void* bytes, size_t size);
 
 #ifdef __cplusplus
 }

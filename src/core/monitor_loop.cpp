@@ -5,16 +5,18 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "core/out_of_turn.hpp"
+
 namespace ricochet::detail {
 
 void throw_out_of_turn(std::string_view call, std::string_view expected)
 {
-    throw std::logic_error(fmt::format("EventMonitor: found `{}`; expected {}", call, expected));
+    throw OutOfTurn(fmt::format("EventMonitor: found `{}`; expected {}", call, expected));
 }
 
 void throw_gap(double expected, double found)
 {
-    throw std::logic_error(fmt::format(
+    throw OutOfTurn(fmt::format(
         "EventMonitor: found a step that begins at {:.17g} s; expected one that begins where the "
         "last one ended, at {:.17g} s, or `start` after a gap",
         found, expected));
@@ -22,7 +24,7 @@ void throw_gap(double expected, double found)
 
 void throw_state_moved(std::size_t component, double expected, double found)
 {
-    throw std::logic_error(fmt::format(
+    throw OutOfTurn(fmt::format(
         "EventMonitor: found a step with x0[{}] = {:.17g}; expected {:.17g}, as the last one "
         "ended, or `start` after the host has moved the state",
         component, found, expected));
@@ -30,7 +32,7 @@ void throw_state_moved(std::size_t component, double expected, double found)
 
 void throw_beyond_time_event(double event, double end)
 {
-    throw std::logic_error(fmt::format(
+    throw OutOfTurn(fmt::format(
         "EventMonitor: found a step that ends at {:.17g} s; expected no step beyond the time "
         "event at {:.17g} s, see `must_stop_at`",
         end, event));
@@ -38,7 +40,7 @@ void throw_beyond_time_event(double event, double end)
 
 void throw_not_quiet(double until, double found)
 {
-    throw std::logic_error(
+    throw OutOfTurn(
         fmt::format("EventMonitor: found `skip_to` {:.17g} s; expected a time up to {:.17g} s, see "
                     "`quiet_until`, and steps beyond",
                     found, until));

@@ -119,4 +119,53 @@ struct first_event {
     double error;
 };
 
+struct first_monitor_options {
+    size_t size;
+    double event_tolerance;
+    double event_rtol;
+    double event_window;
+    int32_t detector;
+    int32_t locator;
+    int32_t look_inside;
+    int32_t record_events;
+    int32_t event_states;
+    int32_t backward;
+    int32_t cut_at_all;
+    int32_t reserved;
+    const char* gate;
+};
+
+struct first_host_step {
+    size_t size;
+    size_t n;
+    double t0;
+    double t0_remainder;
+    double h;
+    const double* x0;
+    const double* x1;
+    const double* rate0;
+    const double* rate1;
+    void* user;
+    int (*interpolate)(void*, double, double*, size_t);
+    int (*interpolate_rate)(void*, double, double*, size_t);
+    int (*restep)(void*, double, double*, size_t);
+};
+
+struct first_cut {
+    size_t size;
+    double s;
+    double t;
+    double t_remainder;
+    const double* before;
+    const double* after;
+    const size_t* fired;
+    size_t fired_count;
+    uint32_t mode_before;
+    uint32_t mode_after;
+    int32_t on_time;
+    int32_t accumulation;
+    int32_t state_changed;
+    int32_t reserved;
+};
+
 #endif

@@ -40,6 +40,50 @@ static void runs_a_program_of_the_first_release(void)
     rc_system_free(system);
 }
 
+static int fall_by(void* user, double s, double* x, size_t n)
+{
+    (void)user, (void)n;
+    x[0] = 10 - 9.81 / 2 * s * s;
+    x[1] = -9.81 * s;
+    return 0;
+}
+
+static void runs_a_host_of_the_first_release(void)
+{
+    const rc_callbacks callbacks = ball_callbacks();
+    const double start[2] = {10, 0}, end[2] = {10 - 9.81 * 2, -9.81 * 2};
+    const double rate0[2] = {0, -9.81}, rate1[2] = {-9.81 * 2, -9.81};
+    struct first_monitor_options options;
+    struct first_host_step step;
+    struct first_cut cut;
+    rc_system* system;
+    rc_monitor* monitor;
+    rc_verdict verdict;
+    CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
+    CHECK_STATUS(RC_OK, rc_monitor_options_default((rc_monitor_options*)&options, sizeof options));
+    CHECK(options.size == sizeof options && options.look_inside == 1 && options.gate == NULL);
+    CHECK_STATUS(RC_OK, rc_monitor_new(system, (const rc_monitor_options*)&options, &monitor));
+    rc_system_free(system);
+    CHECK_STATUS(RC_OK, rc_monitor_start(monitor, 0, start, rate0, 2, 0, 2, &verdict));
+    memset(&step, 0, sizeof step);
+    step.size = sizeof step;
+    step.n = 2;
+    step.h = 2;
+    step.x0 = start;
+    step.x1 = end;
+    step.rate0 = rate0;
+    step.rate1 = rate1;
+    step.interpolate = fall_by;
+    CHECK_STATUS(RC_OK, rc_monitor_examine(monitor, (const rc_host_step*)&step, &verdict));
+    CHECK(verdict == RC_CUT);
+    cut.size = sizeof cut;
+    CHECK_STATUS(RC_OK, rc_monitor_cut(monitor, (rc_cut*)&cut));
+    CHECK(cut.size == sizeof cut && fabs(cut.t - sqrt(2 * 10 / 9.81)) < 1e-14);
+    CHECK(cut.fired_count == 1 && cut.fired[0] == 0 && cut.state_changed == 1);
+    CHECK(cut.after[1] == -0.9 * cut.before[1] && cut.mode_after == 0);
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+}
+
 static void takes_missing_fields_at_their_defaults(void)
 {
     const double start[2] = {10, 0};
@@ -71,6 +115,7 @@ static void takes_missing_fields_at_their_defaults(void)
 int main(void)
 {
     runs_a_program_of_the_first_release();
+    runs_a_host_of_the_first_release();
     takes_missing_fields_at_their_defaults();
     return 0;
 }

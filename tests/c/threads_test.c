@@ -71,6 +71,70 @@ static void refuses_a_second_thread(void)
     CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
 }
 
+/* --- monitors --- */
+
+static const double start_of_fall[2] = {10, 0};
+
+/* Waits in its callback until it may go on. */
+static int waiting_step(void* user, double s, double* x, size_t n)
+{
+    (void)user, (void)n;
+    set(&inside);
+    while (!get(&go_on)) sched_yield();
+    x[0] = 10 - 9.81 / 2 * s * s;
+    x[1] = -9.81 * s;
+    return 0;
+}
+
+static void* examine_it(void* monitor)
+{
+    static const double end[2] = {10 - 9.81 * 2, -9.81 * 2};
+    static const double rate0[2] = {0, -9.81}, rate1[2] = {-9.81 * 2, -9.81};
+    rc_host_step step;
+    rc_verdict verdict;
+    memset(&step, 0, sizeof step);
+    step.size = sizeof step;
+    step.n = 2;
+    step.h = 2;
+    step.x0 = start_of_fall, step.x1 = end, step.rate0 = rate0, step.rate1 = rate1;
+    step.restep = waiting_step;
+    CHECK_STATUS(RC_OK, rc_monitor_examine(monitor, &step, &verdict));
+    CHECK(verdict == RC_CUT);
+    return NULL;
+}
+
+static void refuses_a_second_thread_at_a_monitor(void)
+{
+    const rc_callbacks callbacks = ball_callbacks();
+    rc_system* system;
+    rc_monitor* monitor;
+    rc_verdict verdict;
+    rc_cut cut;
+    pthread_t thread;
+    size_t size = 0;
+    cut.size = sizeof cut;
+    inside = go_on = 0;
+    CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
+    CHECK_STATUS(RC_OK, rc_monitor_new(system, NULL, &monitor));
+    rc_system_free(system);
+    CHECK_STATUS(RC_OK, rc_monitor_start(monitor, 0, start_of_fall, NULL, 2, 0, 2, &verdict));
+    CHECK(pthread_create(&thread, NULL, examine_it, monitor) == 0);
+    while (!get(&inside)) sched_yield();
+    CHECK_REFUSED(RC_BUSY, rc_monitor_resume(monitor, NULL, 0, 1, &verdict),
+                  "rc_monitor: found it in use by another call");
+    CHECK(verdict == RC_NO_VERDICT);
+    CHECK_STATUS(RC_BUSY, rc_monitor_start(monitor, 0, start_of_fall, NULL, 2, 0, 2, &verdict));
+    CHECK_STATUS(RC_BUSY, rc_monitor_cut(monitor, &cut));
+    CHECK_STATUS(RC_BUSY, rc_monitor_save(monitor, NULL, &size));
+    CHECK_STATUS(RC_BUSY, rc_monitor_free(monitor));
+    CHECK(rc_monitor_state(monitor) == NULL && rc_monitor_event_count(monitor) == 0);
+    set(&go_on);
+    CHECK(pthread_join(thread, NULL) == 0);
+    CHECK_STATUS(RC_OK, rc_monitor_cut(monitor, &cut)); /* the next thread may use it */
+    CHECK(cut.fired_count == 1);
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+}
+
 enum { threads = 4 };
 
 static void runs_simulations_of_one_system_at_once(void)
@@ -117,6 +181,7 @@ static void keeps_a_message_for_each_thread(void)
 int main(void)
 {
     refuses_a_second_thread();
+    refuses_a_second_thread_at_a_monitor();
     runs_simulations_of_one_system_at_once();
     keeps_a_message_for_each_thread();
     return 0;

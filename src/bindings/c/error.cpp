@@ -8,6 +8,8 @@
 #include <new>
 #include <stdexcept>
 
+#include "core/out_of_turn.hpp"
+
 namespace ricochet::c {
 
 namespace {
@@ -50,6 +52,9 @@ rc_status status_of_exception() noexcept
     } catch (const Refusal& refusal) {
         set_message(refusal.what());
         return refusal.status();
+    } catch (const detail::OutOfTurn& refused) {
+        set_message(refused.what());
+        return RC_OUT_OF_TURN;
     } catch (const std::bad_alloc&) {
         set_message("there is not enough memory");
         return RC_NO_MEMORY;
@@ -91,6 +96,7 @@ const char* rc_status_name(rc_status status)
         case RC_BAD_HANDLE: return "RC_BAD_HANDLE";
         case RC_WRONG_SIZE: return "RC_WRONG_SIZE";
         case RC_INTERNAL: return "RC_INTERNAL";
+        case RC_OUT_OF_TURN: return "RC_OUT_OF_TURN";
         default: return "unknown";
     }
 }

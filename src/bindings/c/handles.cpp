@@ -16,6 +16,17 @@ namespace ricochet::c {
 
 namespace {
 
+[[nodiscard]] std::string name_of(Kind kind)
+{
+    switch (kind) {
+        case Kind::system: return "rc_system";
+        case Kind::simulation: return "rc_simulation";
+        case Kind::monitor: return "rc_monitor";
+        case Kind::freed: break;
+    }
+    return "handle";
+}
+
 #if RICOCHET_KEEP_FREED_HANDLES
 /// Where they can be found, so that no leak is reported.
 struct Freed {
@@ -52,21 +63,21 @@ void retire(Handle* handle, [[maybe_unused]] void (*release)(Handle*)) noexcept
 
 void check_handle(const Handle* handle, Kind kind)
 {
-    const std::string name = kind == Kind::system ? "rc_system" : "rc_simulation";
-    if (!handle) throw Refusal(RC_BAD_HANDLE, name + ": found null; expected a handle");
+    if (!handle) throw Refusal(RC_BAD_HANDLE, name_of(kind) + ": found null; expected a handle");
     const Kind found = handle->kind.load(std::memory_order_relaxed);
     if (found == kind) return;
-    throw Refusal(RC_BAD_HANDLE, name + (found == Kind::freed ? ": the handle has been freed"
-                                                              : ": this is no such handle"));
+    throw Refusal(RC_BAD_HANDLE,
+                  name_of(kind) + (found == Kind::freed ? ": the handle has been freed"
+                                                        : ": this is no such handle"));
 }
 
 InUse::InUse(Handle* handle, Kind kind) : handle_(handle)
 {
     check_handle(handle, kind);
     if (handle->busy.exchange(true, std::memory_order_acquire)) {
-        throw Refusal(RC_BUSY,
-                      "rc_simulation: found it in use by another call, of another thread or around "
-                      "a callback; expected one call at a time");
+        throw Refusal(RC_BUSY, name_of(kind) +
+                                   ": found it in use by another call, of another thread or around "
+                                   "a callback; expected one call at a time");
     }
 }
 

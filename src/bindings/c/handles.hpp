@@ -12,6 +12,7 @@ enum class Kind : std::uint64_t {
     freed = 0,
     system = 0x6d65747379736372,      // "rcsystem" in memory
     simulation = 0x616c756d69736372,  // "rcsimula"
+    monitor = 0x6f74696e6f6d6372,     // "rcmonito"
 };
 
 /// What every handle begins with.
@@ -43,5 +44,25 @@ public:
 private:
     Handle* handle_;
 };
+
+/// Calls `body(handle)` while no other call may.
+template <class H, class Body>
+[[nodiscard]] rc_status with(H* handle, const Body& body) noexcept
+{
+    return guarded([&] {
+        const InUse in_use(handle, H::kind_of);
+        body(*handle);
+    });
+}
+
+/// The same where the result is a value, and `failed` means failure.
+template <class T, class H, class Body>
+[[nodiscard]] T value_of(H* handle, T failed, const Body& body) noexcept
+{
+    return guarded_value(failed, [&] {
+        const InUse in_use(handle, H::kind_of);
+        return static_cast<T>(body(*handle));
+    });
+}
 
 }  // namespace ricochet::c

@@ -3,14 +3,18 @@
 #include <limits>
 #include <string>
 
-#include "bindings/c/run.hpp"
+#include "bindings/c/options.hpp"
 #include "bindings/c/structs.hpp"
 
 namespace ricochet::c {
 
 namespace {
 
-[[nodiscard]] rc_options defaults() noexcept
+template <class T>
+[[nodiscard]] T defaults() noexcept;
+
+template <>
+rc_options defaults<rc_options>() noexcept
 {
     const Options standard;
     rc_options options{};
@@ -39,42 +43,103 @@ namespace {
     return options;
 }
 
-[[noreturn]] void refuse(const std::string& message)
+template <>
+rc_monitor_options defaults<rc_monitor_options>() noexcept
 {
-    throw Refusal(RC_INVALID, "rc_options: " + message);
+    const Options standard;
+    rc_monitor_options options{};
+    options.size = sizeof options;
+    options.event_tolerance = standard.event_tolerance;
+    options.event_rtol = standard.event_rtol;
+    options.event_window = standard.event_window;
+    options.detector = RC_EXTREMUM;
+    options.locator = RC_NEWTON;
+    options.look_inside = standard.look_inside;
+    options.record_events = standard.record_events;
+    options.event_states = standard.event_states;
+    return options;
 }
 
-[[nodiscard]] bool flag(const char* name, std::int32_t value)
+/// Fills in a struct of the caller's of this size.
+template <class T>
+[[nodiscard]] rc_status fill_in(const char* name, T* options, std::size_t size) noexcept
 {
-    if (value == 0 || value == 1) return value == 1;
-    refuse(std::string(name) + " must be 0 or 1, got " + std::to_string(value));
+    return guarded([&] {
+        if (!options) throw_null((std::string(name) + "_default, options").c_str());
+        T full = defaults<T>();
+        // Checked as if it were there already: memory of the caller's may hold anything.
+        full.size = size;
+        static_cast<void>(size_of_given<T>(&full, name));
+        std::memcpy(options, &full, size);
+    });
 }
 
-/// @throws Refusal unless the value is one of 0 to `last`.
-template <class Enum>
-[[nodiscard]] Enum one_of(const char* name, std::int32_t value, Enum last)
-{
-    if (value >= 0 && value <= static_cast<std::int32_t>(last)) return static_cast<Enum>(value);
-    refuse(std::string(name) + ": there is no rc_" + name + " " + std::to_string(value));
-}
+/// What is said in a struct of this name.
+class Reader {
+public:
+    explicit Reader(const char* name) : struct_(name) {}
+
+    [[noreturn]] void refuse(const std::string& message) const
+    {
+        throw Refusal(RC_INVALID, std::string(struct_) + ": " + message);
+    }
+
+    [[nodiscard]] bool flag(const char* name, std::int32_t value) const
+    {
+        if (value == 0 || value == 1) return value == 1;
+        refuse(std::string(name) + " must be 0 or 1, got " + std::to_string(value));
+    }
+
+    /// @throws Refusal unless the value is one of 0 to `last`.
+    template <class Enum>
+    [[nodiscard]] Enum one_of(const char* name, std::int32_t value, Enum last) const
+    {
+        if (value >= 0 && value <= static_cast<std::int32_t>(last)) return static_cast<Enum>(value);
+        refuse(std::string(name) + ": there is no rc_" + name + " " + std::to_string(value));
+    }
+
+    template <class T>
+    [[nodiscard]] FinderOptions finders(const T& from) const
+    {
+        FinderOptions finders{.detector = one_of("detector", from.detector, RC_FORESEEN),
+                              .locator = one_of("locator", from.locator, RC_TOMS748),
+                              .gate = {}};
+        const bool asks_gate = finders.detector >= RC_CALIBRATED;
+        if (asks_gate && !from.gate) refuse("found no gate; expected the path of its model");
+        if (!asks_gate && from.gate) refuse("found a gate for a detector that asks none");
+        if (asks_gate) finders.gate = from.gate;
+        return finders;
+    }
+
+    /// What runs and monitors have in common.
+    template <class T>
+    void read_events(const T& from, Options& options) const
+    {
+        options.event_tolerance = from.event_tolerance;
+        options.event_rtol = from.event_rtol;
+        options.event_window = from.event_window;
+        options.look_inside = flag("look_inside", from.look_inside);
+        options.record_events = flag("record_events", from.record_events);
+        options.event_states = flag("event_states", from.event_states);
+    }
+
+private:
+    const char* struct_;
+};
 
 }  // namespace
 
 RunOptions read_options(const rc_options* given)
 {
-    const auto from = read_struct<rc_options>(given, "rc_options", defaults());
+    const Reader reader("rc_options");
+    const auto from = read_struct<rc_options>(given, "rc_options", defaults<rc_options>());
     RunOptions run;
-    run.method = one_of("method", from.method, RC_EULER);
-    run.detector = one_of("detector", from.detector, RC_FORESEEN);
-    run.locator = one_of("locator", from.locator, RC_TOMS748);
-    run.fixed_step = flag("fixed_step", from.fixed_step);
-    const bool asks_gate = run.detector >= RC_CALIBRATED;
-    if (asks_gate && !from.gate) refuse("found no gate; expected the path of its model");
-    if (!asks_gate && from.gate) refuse("found a gate for a detector that asks none");
-    if (asks_gate) run.gate = from.gate;
+    run.method = reader.one_of("method", from.method, RC_EULER);
+    run.fixed_step = reader.flag("fixed_step", from.fixed_step);
+    run.finders = reader.finders(from);
     if (from.sample_count > 0 && !from.sample_times) {
-        refuse("found a sample_count of " + std::to_string(from.sample_count) +
-               " without sample_times");
+        reader.refuse("found a sample_count of " + std::to_string(from.sample_count) +
+                      " without sample_times");
     }
     Options& options = run.options;
     options.t_start = from.t_start;
@@ -85,31 +150,43 @@ RunOptions read_options(const rc_options* given)
     options.atol = from.atol;
     options.h_min = from.h_min;
     options.h_max = from.h_max;
-    options.event_tolerance = from.event_tolerance;
-    options.event_rtol = from.event_rtol;
-    options.event_window = from.event_window;
-    options.look_inside = flag("look_inside", from.look_inside);
-    options.stop_at_event = flag("stop_at_event", from.stop_at_event);
-    options.record_events = flag("record_events", from.record_events);
-    options.event_states = flag("event_states", from.event_states);
-    options.record_steps = flag("record_steps", from.record_steps);
+    options.stop_at_event = reader.flag("stop_at_event", from.stop_at_event);
+    options.record_steps = reader.flag("record_steps", from.record_steps);
+    reader.read_events(from, options);
     options.sample_times.assign(from.sample_times, from.sample_times + from.sample_count);
     options.max_steps = from.max_steps;
     options.stall_steps = from.stall_steps;
     return run;
 }
 
+MonitorOptions read_options(const rc_monitor_options* given)
+{
+    const Reader reader("rc_monitor_options");
+    const auto standard = defaults<rc_monitor_options>();
+    const auto from = given ? read_struct(given, "rc_monitor_options", standard) : standard;
+    MonitorOptions monitor;
+    monitor.finders = reader.finders(from);
+    monitor.backward = reader.flag("backward", from.backward);
+    monitor.cut_at_all = reader.flag("cut_at_all", from.cut_at_all);
+    Options& options = monitor.options;
+    reader.read_events(from, options);
+    options.t_end = monitor.backward ? -1 : 1;
+    validate(options, false);
+    options.t_end *= std::numeric_limits<double>::infinity();
+    return monitor;
+}
+
 }  // namespace ricochet::c
 
-extern "C" rc_status rc_options_default(rc_options* options, size_t size)
+extern "C" {
+
+rc_status rc_options_default(rc_options* options, size_t size)
 {
-    using namespace ricochet::c;
-    return guarded([&] {
-        if (!options) throw_null("rc_options_default, options");
-        rc_options full = defaults();
-        // Checked as if it were there already: memory of the caller's may hold anything.
-        full.size = size;
-        static_cast<void>(size_of_given<rc_options>(&full, "rc_options"));
-        std::memcpy(options, &full, size);
-    });
+    return ricochet::c::fill_in("rc_options", options, size);
+}
+
+rc_status rc_monitor_options_default(rc_monitor_options* options, size_t size)
+{
+    return ricochet::c::fill_in("rc_monitor_options", options, size);
+}
 }

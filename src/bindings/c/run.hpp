@@ -9,38 +9,11 @@
 #include <vector>
 
 #include "bindings/c/callback_system.hpp"
-#include "ricochet/hybrid/event.hpp"
-#include "ricochet/hybrid/statistics.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "bindings/c/options.hpp"
+#include "bindings/c/results.hpp"
 #include "ricochet/integrate/outcome.hpp"
 
 namespace ricochet::c {
-
-/// Options of a run, checked.
-struct RunOptions {
-    Options options;
-    rc_method method = RC_DOPRI5;
-    bool fixed_step = false;
-    rc_detector detector = RC_EXTREMUM;
-    rc_locator locator = RC_NEWTON;
-    std::string gate;  ///< path of a model; empty: none
-};
-
-/// @throws Refusal naming the option.
-[[nodiscard]] RunOptions read_options(const rc_options* given);
-
-/// An event whose states are read where they lie.
-struct ShownEvent {
-    double t = 0;
-    EventKind kind = EventKind::crossing;
-    std::size_t guard = 0;
-    Mode mode_before = 0, mode_after = 0;
-    const double* before = nullptr;  ///< null where it was not kept
-    const double* after = nullptr;
-    Bracket bracket;
-    double slope = 0, error = 0;
-    bool late = false;
-};
 
 /// As `Simulation`, for states of a size known at run time. Whatever its functions throw, the run
 /// stands where its last step was complete.
@@ -63,10 +36,6 @@ public:
     [[nodiscard]] virtual bool ended() const noexcept = 0;
     [[nodiscard]] virtual Outcome outcome() const noexcept = 0;
 
-    struct Counts {
-        Statistics statistics;
-        std::size_t guard = no_guard, other_guard = no_guard;
-    };
     [[nodiscard]] virtual Counts counts() = 0;
     [[nodiscard]] virtual std::size_t events() const noexcept = 0;
     [[nodiscard]] virtual ShownEvent event(std::size_t i) const noexcept = 0;

@@ -11,21 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "bindings/c/callback_table.hpp"
+#include "bindings/c/callback_setup.hpp"
 #include "bindings/c/run.hpp"
-#include "ricochet/detail/core.hpp"
-#include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/calibrated.hpp"
-#include "ricochet/detect/ends.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/newton.hpp"
-#include "ricochet/locate/toms748.hpp"
-#include "ricochet/nn/safetensors.hpp"
 
 namespace ricochet::c {
 
@@ -33,11 +22,8 @@ template <class X>
 class RunOf final : public AnyRun {
 public:
     RunOf(std::shared_ptr<const CallbackSystem> system, const X& x0, const RunOptions& options)
-        : system_(std::move(system)),
-          door_(*system_, x0),
-          table_(CallbackTable<X>::make(*system_)),
-          setup_(setup_of(options)),
-          loop_(detail::make_loop(setup_, x0, options.options))
+        : callbacks_(std::move(system), x0, options.finders),
+          loop_(detail::make_loop(setup_of(options), x0, options.options))
     {
     }
 
@@ -74,18 +60,7 @@ public:
     }
     [[nodiscard]] ShownEvent event(std::size_t i) const noexcept override
     {
-        const Event<X>& event = loop_->run().events[i];
-        return {.t = event.t,
-                .kind = event.kind,
-                .guard = event.guard,
-                .mode_before = event.mode_before,
-                .mode_after = event.mode_after,
-                .before = event.before.size() > 0 ? event.before.data() : nullptr,
-                .after = event.after.size() > 0 ? event.after.data() : nullptr,
-                .bracket = event.bracket,
-                .slope = event.slope,
-                .error = event.error,
-                .late = event.late};
+        return shown(loop_->run().events[i]);
     }
     [[nodiscard]] const std::vector<double>& sample_times() const noexcept override
     {
@@ -125,79 +100,27 @@ private:
     }
 
     template <class Method>
-    void set_method(detail::RunSetup<X>& setup, bool fixed_step) const
+    static void set_method(detail::RunSetup<X>& setup, bool fixed_step)
     {
         setup.error_controlled = !fixed_step;
         setup.stepping = fixed_step ? detail::written_type<FixedStep<Method>>()
                                     : detail::written_type<ErrorControlled<Method>>();
         setup.kernel = &detail::kernel_by_name<X>(detail::NameOf<Method>::name);
     }
-    void set_method(detail::RunSetup<X>& setup, const RunOptions& options) const
+    [[nodiscard]] detail::RunSetup<X> setup_of(const RunOptions& options) const
     {
+        detail::RunSetup<X> setup = callbacks_.setup();
         switch (options.method) {
-            case RC_DOPRI5: return set_method<Dopri5>(setup, options.fixed_step);
-            case RC_FEHLBERG78: return set_method<Fehlberg78>(setup, options.fixed_step);
-            case RC_CASH_KARP54: return set_method<CashKarp54>(setup, options.fixed_step);
-            case RC_RK4: return set_method<Rk4>(setup, options.fixed_step);
-            case RC_EULER: return set_method<Euler>(setup, options.fixed_step);
-        }
-    }
-
-    template <class Detector>
-    void set_detector(detail::RunSetup<X>& setup, const Detector& detector)
-    {
-        const auto kept = std::make_shared<const Detector>(detector);
-        setup.detector = detail::DetectorTableOf<Detector, CallbackSystem, X>::make(*kept);
-        setup.detecting = kept.get();
-        // Without what it plans by, a detector is the exact one that it is made around.
-        const rc_callbacks& has = system_->callbacks();
-        if (has.guard_count == 0 || (setup.detector.needs_bounds && !has.speed_bound)) {
-            setup.detector.puts_off = false;
-        }
-        detector_ = kept;
-    }
-    void set_detector(detail::RunSetup<X>& setup, const RunOptions& options)
-    {
-        const auto gate = [&] { return gates::Gate(load_model(options.gate)); };
-        switch (options.detector) {
-            case RC_EXTREMUM: return set_detector(setup, Extremum());
-            case RC_ENDS: return set_detector(setup, Ends());
-            case RC_BERNSTEIN: return set_detector(setup, Bernstein());
-            case RC_PLANNED: return set_detector(setup, Planned<>());
-            case RC_CALIBRATED: return set_detector(setup, Calibrated<>(gate()));
-            case RC_CALIBRATED_BOUNDS: return set_detector(setup, CalibratedBounds<>(gate()));
-            case RC_FORESEEN: return set_detector(setup, Foreseen<>(gate()));
-        }
-    }
-
-    template <class Locator>
-    static void set_locator(detail::RunSetup<X>& setup)
-    {
-        static const Locator locator;
-        setup.locator = detail::locator_table<Locator>();
-        setup.locating = &locator;
-    }
-
-    [[nodiscard]] detail::RunSetup<X> setup_of(const RunOptions& options)
-    {
-        detail::RunSetup<X> setup;
-        setup.system = &table_;
-        setup.door = static_cast<detail::Door<CallbackSystem, X>*>(&door_);
-        set_method(setup, options);
-        set_detector(setup, options);
-        switch (options.locator) {
-            case RC_NEWTON: set_locator<Newton>(setup); break;
-            case RC_BISECTION: set_locator<Bisection>(setup); break;
-            case RC_TOMS748: set_locator<Toms748>(setup); break;
+            case RC_DOPRI5: set_method<Dopri5>(setup, options.fixed_step); break;
+            case RC_FEHLBERG78: set_method<Fehlberg78>(setup, options.fixed_step); break;
+            case RC_CASH_KARP54: set_method<CashKarp54>(setup, options.fixed_step); break;
+            case RC_RK4: set_method<Rk4>(setup, options.fixed_step); break;
+            case RC_EULER: set_method<Euler>(setup, options.fixed_step); break;
         }
         return setup;
     }
 
-    std::shared_ptr<const CallbackSystem> system_;
-    CallbackDoor<X> door_;
-    detail::SystemTable<X> table_;
-    std::shared_ptr<const void> detector_;
-    detail::RunSetup<X> setup_;
+    CallbackSetup<X> callbacks_;
     std::unique_ptr<detail::AnyLoop<X>> loop_;
 };
 

@@ -1,15 +1,14 @@
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
-#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "bindings/c/handles.hpp"
+#include "bindings/c/results.hpp"
 #include "bindings/c/run.hpp"
 #include "bindings/c/structs.hpp"
 #include "bindings/c/system.hpp"
@@ -17,6 +16,7 @@
 using namespace ricochet::c;
 
 struct rc_simulation : Handle {
+    static constexpr Kind kind_of = Kind::simulation;
     rc_simulation() : Handle(Kind::simulation) {}
 
     std::unique_ptr<AnyRun> run;
@@ -30,41 +30,6 @@ struct rc_simulation : Handle {
 namespace ricochet::c {
 
 namespace {
-
-/// A loop has some forty arrays of the dimension of the state. Where there is no memory for
-/// them it is better known before the first is written to.
-void require_memory(std::size_t dimension)
-{
-    constexpr std::size_t arrays = 48;
-    constexpr std::size_t large = 1'000'000;
-    if (dimension < large) return;
-    if (dimension > std::numeric_limits<std::size_t>::max() / (2 * arrays * sizeof(double))) {
-        throw std::bad_alloc();
-    }
-    const std::size_t bytes = dimension * arrays * sizeof(double);
-    void* volatile room = ::operator new(bytes, std::nothrow);  // volatile: not left out
-    if (!room) throw std::bad_alloc();
-    ::operator delete(room);
-}
-
-/// Calls `body(simulation)` while no other call may.
-template <class Body>
-[[nodiscard]] rc_status with(rc_simulation* simulation, const Body& body) noexcept
-{
-    return guarded([&] {
-        const InUse in_use(simulation, Kind::simulation);
-        body(*simulation);
-    });
-}
-
-template <class T, class Body>
-[[nodiscard]] T value_of(rc_simulation* simulation, T failed, const Body& body) noexcept
-{
-    return guarded_value(failed, [&] {
-        const InUse in_use(simulation, Kind::simulation);
-        return static_cast<T>(body(*simulation));
-    });
-}
 
 /// Advances the run by `go`, which says whether it goes on.
 template <class Go>
@@ -89,13 +54,6 @@ template <class Go>
     });
 }
 
-void require_index(const char* what, std::size_t index, std::size_t count)
-{
-    if (index < count) return;
-    throw Refusal(RC_INVALID, std::string("there is no ") + what + " " + std::to_string(index) +
-                                  "; found " + std::to_string(count) + " of them");
-}
-
 void require_solution(const rc_simulation& at, double t)
 {
     if (!at.run->keeps_steps()) {
@@ -104,14 +62,6 @@ void require_solution(const rc_simulation& at, double t)
                       "at least one step");
     }
     if (std::isnan(t)) throw Refusal(RC_INVALID, "rc_solution: t must be a time, got NaN");
-}
-
-void require_dimension(const char* what, std::size_t found, std::size_t expected)
-{
-    if (found == expected) return;
-    throw Refusal(RC_INVALID, std::string(what) + ": found n = " + std::to_string(found) +
-                                  "; expected " + std::to_string(expected) +
-                                  ", the dimension of the system");
 }
 
 [[nodiscard]] rc_status evaluate(rc_simulation* simulation, double t, bool before, double* x,
@@ -142,9 +92,6 @@ static_assert(static_cast<int>(Outcome::reached_end) == RC_REACHED_END &&
               static_cast<int>(Outcome::cancelled) == RC_CANCELLED &&
               static_cast<int>(Outcome::stalled) == RC_STALLED &&
               static_cast<int>(Outcome::stopped_by_callback) == RC_STOPPED_BY_CALLBACK);
-static_assert(static_cast<int>(EventKind::accumulation) == RC_ACCUMULATION &&
-              static_cast<int>(EventKind::jump) == RC_JUMP);
-static_assert(no_guard == RC_NO_GUARD && time_event_reset == RC_TIME_EVENT_RESET);
 
 }  // namespace
 
@@ -224,18 +171,8 @@ rc_status rc_cancel(rc_simulation* simulation)
 
 rc_status rc_callback_failure(rc_simulation* simulation, rc_callback_error* error)
 {
-    const auto show = [&](const CallbackFailed& failed) {
-        write_struct(error,
-                     {.size = sizeof *error,
-                      .code = failed.code,
-                      .reserved = 0,
-                      .callback = failed.callback,
-                      .guard = failed.guard,
-                      .t = failed.t},
-                     "rc_callback_error");
-    };
-    if (!simulation) return guarded([&] { show(last_failed_callback()); });
-    return with(simulation, [&](const rc_simulation& at) { show(at.failed); });
+    if (!simulation) return guarded([&] { write_failure(error, last_failed_callback()); });
+    return with(simulation, [&](const rc_simulation& at) { write_failure(error, at.failed); });
 }
 
 double rc_time(rc_simulation* simulation)
@@ -281,36 +218,8 @@ const char* rc_outcome_text(rc_outcome_code outcome)
 
 rc_status rc_get_statistics(rc_simulation* simulation, rc_statistics* statistics)
 {
-    return with(simulation, [&](rc_simulation& at) {
-        const AnyRun::Counts counts = at.run->counts();
-        const ricochet::Statistics& from = counts.statistics;
-        write_struct(statistics,
-                     {.size = sizeof *statistics,
-                      .steps = from.steps,
-                      .rejected = from.rejected,
-                      .refined_steps = from.refined_steps,
-                      .unresolved_steps = from.unresolved_steps,
-                      .resteps = from.resteps,
-                      .flow_calls = from.flow_calls,
-                      .guard_calls = from.guard_calls,
-                      .network_calls = from.network_calls,
-                      .late_events = from.late_events,
-                      .checks_put_off = from.checks_put_off,
-                      .outside_domain = from.outside_domain,
-                      .bound_calls = from.bound_calls,
-                      .rollbacks = from.rollbacks,
-                      .repeated_steps = from.repeated_steps,
-                      .events = from.events,
-                      .suppressed = from.suppressed,
-                      .disabled = from.disabled,
-                      .proved = from.evidence.proved,
-                      .checked = from.evidence.checked,
-                      .gated = from.evidence.gated,
-                      .assumed = from.evidence.assumed,
-                      .guard = counts.guard,
-                      .other_guard = counts.other_guard},
-                     "rc_statistics");
-    });
+    return with(simulation,
+                [&](rc_simulation& at) { write_statistics(statistics, at.run->counts()); });
 }
 
 size_t rc_event_count(rc_simulation* simulation)
@@ -323,22 +232,7 @@ rc_status rc_event_at(rc_simulation* simulation, size_t index, rc_event* event)
 {
     return with(simulation, [&](const rc_simulation& at) {
         require_index("event", index, at.run->events());
-        const ShownEvent shown = at.run->event(index);
-        write_struct(event,
-                     {.size = sizeof *event,
-                      .t = shown.t,
-                      .guard = shown.guard,
-                      .kind = static_cast<std::int32_t>(shown.kind),
-                      .late = shown.late,
-                      .mode_before = shown.mode_before,
-                      .mode_after = shown.mode_after,
-                      .before = shown.before,
-                      .after = shown.after,
-                      .bracket_lo = shown.bracket.lo,
-                      .bracket_hi = shown.bracket.hi,
-                      .slope = shown.slope,
-                      .error = shown.error},
-                     "rc_event");
+        write_event(event, at.run->event(index));
     });
 }
 
@@ -381,14 +275,7 @@ rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size)
 {
     return with(simulation, [&](const rc_simulation& at) {
         if (!size) throw_null("rc_save, size");
-        const std::string text = at.run->save();
-        const std::size_t room = std::exchange(*size, text.size());
-        if (!bytes) return;
-        if (room < text.size()) {
-            throw Refusal(RC_INVALID, "rc_save: found room for " + std::to_string(room) +
-                                          " bytes; expected " + std::to_string(text.size()));
-        }
-        text.copy(static_cast<char*>(bytes), text.size());
+        write_snapshot("rc_save", at.run->save(), bytes, size);
     });
 }
 

@@ -1,0 +1,106 @@
+// A system of callbacks with a detector and a locator, as the engine knows them.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "bindings/c/callback_table.hpp"
+#include "bindings/c/options.hpp"
+#include "ricochet/detail/core.hpp"
+#include "ricochet/detail/finders.hpp"
+#include "ricochet/detect/bernstein.hpp"
+#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/toms748.hpp"
+#include "ricochet/nn/safetensors.hpp"
+
+namespace ricochet::c {
+
+template <class X>
+class CallbackSetup {
+public:
+    /// @throws std::invalid_argument or std::runtime_error for a model that is no gate.
+    CallbackSetup(std::shared_ptr<const CallbackSystem> system, const X& like,
+                  const FinderOptions& finders)
+        : system_(std::move(system)),
+          door_(*system_, like),
+          table_(CallbackTable<X>::make(*system_))
+    {
+        setup_.system = &table_;
+        setup_.door = static_cast<detail::Door<CallbackSystem, X>*>(&door_);
+        set_detector(finders);
+        set_locator(finders.locator);
+    }
+    CallbackSetup(const CallbackSetup&) = delete;
+    CallbackSetup& operator=(const CallbackSetup&) = delete;
+
+    /// Without a method. Refers to this object.
+    [[nodiscard]] const detail::RunSetup<X>& setup() const noexcept { return setup_; }
+
+private:
+    template <class Detector>
+    void set_detector(const Detector& detector);
+    void set_detector(const FinderOptions& finders);
+
+    template <class Locator>
+    void set_locator()
+    {
+        static const Locator locator;
+        setup_.locator = detail::locator_table<Locator>();
+        setup_.locating = &locator;
+    }
+    void set_locator(rc_locator locator)
+    {
+        switch (locator) {
+            case RC_NEWTON: return set_locator<Newton>();
+            case RC_BISECTION: return set_locator<Bisection>();
+            case RC_TOMS748: return set_locator<Toms748>();
+        }
+    }
+
+    std::shared_ptr<const CallbackSystem> system_;
+    CallbackDoor<X> door_;
+    detail::SystemTable<X> table_;
+    std::shared_ptr<const void> detector_;
+    detail::RunSetup<X> setup_;
+};
+
+template <class X>
+template <class Detector>
+void CallbackSetup<X>::set_detector(const Detector& detector)
+{
+    const auto kept = std::make_shared<const Detector>(detector);
+    setup_.detector = detail::DetectorTableOf<Detector, CallbackSystem, X>::make(*kept);
+    setup_.detecting = kept.get();
+    // Without what it plans by, a detector is the exact one that it is made around.
+    const rc_callbacks& has = system_->callbacks();
+    if (has.guard_count == 0 || (setup_.detector.needs_bounds && !has.speed_bound)) {
+        setup_.detector.puts_off = false;
+    }
+    detector_ = kept;
+}
+
+template <class X>
+void CallbackSetup<X>::set_detector(const FinderOptions& finders)
+{
+    const auto gate = [&] { return gates::Gate(load_model(finders.gate)); };
+    switch (finders.detector) {
+        case RC_EXTREMUM: return set_detector(Extremum());
+        case RC_ENDS: return set_detector(Ends());
+        case RC_BERNSTEIN: return set_detector(Bernstein());
+        case RC_PLANNED: return set_detector(Planned<>());
+        case RC_CALIBRATED: return set_detector(Calibrated<>(gate()));
+        case RC_CALIBRATED_BOUNDS: return set_detector(CalibratedBounds<>(gate()));
+        case RC_FORESEEN: return set_detector(Foreseen<>(gate()));
+    }
+}
+
+// Compiled with the runs of such states.
+extern template class CallbackSetup<std::vector<double>>;
+
+}  // namespace ricochet::c

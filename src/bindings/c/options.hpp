@@ -1,0 +1,38 @@
+// Options as a C program gives them, checked.
+#pragma once
+
+#include <string>
+
+#include "bindings/c/error.hpp"
+#include "ricochet/integrate/options.hpp"
+
+namespace ricochet::c {
+
+/// How events are detected and located.
+struct FinderOptions {
+    rc_detector detector = RC_EXTREMUM;
+    rc_locator locator = RC_NEWTON;
+    std::string gate;  ///< path of a model; empty: none
+};
+
+struct RunOptions {
+    Options options;
+    rc_method method = RC_DOPRI5;
+    bool fixed_step = false;
+    FinderOptions finders;
+};
+
+struct MonitorOptions {
+    Options options;  ///< of the engine, from here to the end of time
+    FinderOptions finders;
+    bool backward = false;
+    bool cut_at_all = false;
+};
+
+/// @throws Refusal naming the option.
+[[nodiscard]] RunOptions read_options(const rc_options* given);
+/// Null: the defaults.
+/// @throws Refusal or std::invalid_argument naming the option.
+[[nodiscard]] MonitorOptions read_options(const rc_monitor_options* given);
+
+}  // namespace ricochet::c

@@ -1,0 +1,69 @@
+// What runs and monitors have come to, as a C program is shown it.
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+#include "bindings/c/error.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/statistics.hpp"
+
+namespace ricochet::c {
+
+/// An event whose states are read where they lie.
+struct ShownEvent {
+    double t = 0;
+    EventKind kind = EventKind::crossing;
+    std::size_t guard = 0;
+    Mode mode_before = 0, mode_after = 0;
+    const double* before = nullptr;  ///< null where it was not kept
+    const double* after = nullptr;
+    Bracket bracket;
+    double slope = 0, error = 0;
+    bool late = false;
+};
+
+template <class X>
+[[nodiscard]] ShownEvent shown(const Event<X>& event) noexcept
+{
+    return {.t = event.t,
+            .kind = event.kind,
+            .guard = event.guard,
+            .mode_before = event.mode_before,
+            .mode_after = event.mode_after,
+            .before = event.before.size() > 0 ? event.before.data() : nullptr,
+            .after = event.after.size() > 0 ? event.after.data() : nullptr,
+            .bracket = event.bracket,
+            .slope = event.slope,
+            .error = event.error,
+            .late = event.late};
+}
+
+struct Counts {
+    Statistics statistics;
+    std::size_t guard = no_guard, other_guard = no_guard;
+};
+
+// All throw Refusal if the struct is not as it has to be.
+void write_event(rc_event* event, const ShownEvent& from);
+void write_statistics(rc_statistics* statistics, const Counts& from);
+void write_failure(rc_callback_error* error, const CallbackFailed& from);
+
+/// Fills in `*size`, and the room where there is one.
+/// @throws Refusal if it is too small.
+void write_snapshot(const char* function, std::string_view text, void* bytes, std::size_t* size);
+
+/// @throws Refusal
+void require_index(const char* what, std::size_t index, std::size_t count);
+/// @throws Refusal
+void require_dimension(const char* function, std::size_t found, std::size_t expected);
+
+/// @throws Refusal naming the component of `what` that is NaN or infinite.
+void require_finite(const char* function, const char* what, const double* x, std::size_t n);
+
+/// A loop has some forty arrays of the dimension of the state. Where there is no memory for
+/// them it is better known before the first is written to.
+/// @throws std::bad_alloc
+void require_memory(std::size_t dimension);
+
+}  // namespace ricochet::c
