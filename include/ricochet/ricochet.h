@@ -245,6 +245,8 @@ typedef struct rc_options {
     uint64_t stall_steps; /**< 1000000 steps in a row advance the time by 1e-9 of the span, or the
                              run ends as RC_STALLED; 0: any number may stand still */
     const char* gate;     /**< path of the model of the detectors that ask one, else null */
+    const double* component_atol; /**< one for each component in the place of atol, copied; null */
+    size_t component_count;       /**< of them, 0 */
 } rc_options;
 
 /** Fills in the defaults; `size` is sizeof(rc_options), and t_end becomes NaN. RC_WRONG_SIZE. */

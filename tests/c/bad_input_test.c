@@ -126,6 +126,9 @@ static void refuses_options_that_are_none(void)
     CHECK_OPTION((options.sample_count = 1, options.sample_times = &sample), "sample time");
     CHECK_OPTION((sample = NAN, options.sample_count = 1, options.sample_times = &sample),
                  "sample_times");
+    CHECK_OPTION(options.component_count = 2, "component_atol");
+    CHECK_OPTION((options.component_count = 1, options.component_atol = start),
+                 "each of the 2 components");
     CHECK_OPTION(options.gate = "gate.safetensors", "gate");
     CHECK_OPTION(options.detector = RC_FORESEEN, "gate");
     CHECK_REFUSED(RC_INVALID, rc_options_default(NULL, sizeof options), "null");

@@ -75,6 +75,8 @@ int main(void)
     AT(rc_options, max_steps);
     AT(rc_options, stall_steps);
     AT(rc_options, gate);
+    AT(rc_options, component_atol);
+    AT(rc_options, component_count);
     SIZE(rc_callback_error);
     AT(rc_callback_error, size);
     AT(rc_callback_error, code);

@@ -474,6 +474,53 @@ static void takes_states_of_many_components(void)
     rc_system_free(system);
 }
 
+/* --- tolerances --- */
+
+/* A rotation, beside one of which nothing is asked. */
+static int rotate_fast_and_slow(void* user, rc_mode mode, double t, const double* x, double* dxdt,
+                                size_t n)
+{
+    (void)user, (void)mode, (void)t, (void)n;
+    dxdt[0] = x[1];
+    dxdt[1] = -x[0];
+    dxdt[2] = 50 * x[3];
+    dxdt[3] = -50 * x[2];
+    return 0;
+}
+
+static uint64_t steps_with(double atol, const double* component_atol)
+{
+    const double start[4] = {1, 0, 1, 0};
+    rc_callbacks callbacks;
+    rc_options options = options_until(6);
+    rc_statistics statistics;
+    rc_system* system;
+    rc_simulation* simulation;
+    memset(&callbacks, 0, sizeof callbacks);
+    callbacks.size = sizeof callbacks;
+    callbacks.dimension = 4;
+    callbacks.flow = rotate_fast_and_slow;
+    options.atol = atol;
+    options.component_atol = component_atol;
+    options.component_count = component_atol ? 4 : 0;
+    statistics.size = sizeof statistics;
+    CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
+    CHECK_STATUS(RC_OK, rc_simulation_new(system, start, 4, &options, &simulation));
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK_STATUS(RC_OK, rc_get_statistics(simulation, &statistics));
+    rc_simulation_free(simulation);
+    rc_system_free(system);
+    return statistics.steps;
+}
+
+static void takes_a_tolerance_for_each_component(void)
+{
+    const double equal[4] = {1e-9, 1e-9, 1e-9, 1e-9};
+    const double slow[4] = {1e-9, 1e-9, 1, 1};
+    CHECK(steps_with(1, equal) == steps_with(1e-9, NULL));
+    CHECK(2 * steps_with(1, slow) < steps_with(1e-9, NULL));
+}
+
 /* --- cancelling --- */
 
 static rc_simulation* to_cancel;
@@ -530,6 +577,7 @@ int main(int argc, char** argv)
     plans_by_bounds();
     asks_a_gate(argv[1]);
     takes_states_of_many_components();
+    takes_a_tolerance_for_each_component();
     is_cancelled_and_continued();
     return 0;
 }

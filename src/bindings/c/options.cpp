@@ -141,6 +141,10 @@ RunOptions read_options(const rc_options* given)
         reader.refuse("found a sample_count of " + std::to_string(from.sample_count) +
                       " without sample_times");
     }
+    if (from.component_count > 0 && !from.component_atol) {
+        reader.refuse("found a component_count of " + std::to_string(from.component_count) +
+                      " without component_atol");
+    }
     Options& options = run.options;
     options.t_start = from.t_start;
     options.t_end = from.t_end;
@@ -154,6 +158,7 @@ RunOptions read_options(const rc_options* given)
     options.record_steps = reader.flag("record_steps", from.record_steps);
     reader.read_events(from, options);
     options.sample_times.assign(from.sample_times, from.sample_times + from.sample_count);
+    options.component_atol.assign(from.component_atol, from.component_atol + from.component_count);
     options.max_steps = from.max_steps;
     options.stall_steps = from.stall_steps;
     return run;
