@@ -14,7 +14,7 @@
 int main()
 {
     using ricochet::DiodeCircuit;
-    using ricochet::SetValuedOutcome;
+    using ricochet::Outcome;
 
     const DiodeCircuit circuit;
     ricochet::SetValuedMotion<DiodeCircuit> motion(
@@ -22,7 +22,7 @@ int main()
         {.t_end = 20, .step = 1e-3, .switches = ricochet::Switches::located});
 
     unsigned long long seen = 0;
-    while (motion.advance() == SetValuedOutcome::running) {
+    while (motion.advance() == Outcome::running) {
         if (motion.statistics().switches == seen) continue;
         seen = motion.statistics().switches;
         const auto& at = motion.state();

@@ -26,5 +26,5 @@ int main()
         }
         std::puts("");
     }
-    return rupture.outcome == RuptureOutcome::at_rest ? 0 : 1;
+    return rupture.outcome == Outcome::at_rest ? 0 : 1;
 }

@@ -9,10 +9,10 @@
 #include <random>
 #include <string>
 
+#include "problems/rolling_ball.hpp"
 #include "random_inclusions.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
-#include "problems/rolling_ball.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
 #include "ricochet/systems/woodpecker.hpp"
 
@@ -46,7 +46,7 @@ void follow_mechanism(const System& system, const typename TimeStepping<System>:
                                   motion.state().t);
     };
     typename Motion::State before = motion.state();
-    while (motion.advance() != SetValuedOutcome::not_converged) {
+    while (motion.advance() != Outcome::not_converged) {
         const typename Motion::State& now = motion.state();
         const double h = now.t - before.t;
         const typename Motion::Vector middle = before.q + h / 2 * before.v;
@@ -102,7 +102,7 @@ void follow_mechanism(const System& system, const typename TimeStepping<System>:
         if (plastic && dissipated > room_p * speed) blame("contacts drive", dissipated);
         ++tally.steps;
         before = now;
-        if (motion.outcome() != SetValuedOutcome::running) return;
+        if (motion.outcome() != Outcome::running) return;
     }
     ++tally.reported;
 }
@@ -198,7 +198,7 @@ struct RandomRollingBall {
         options.sample_times = equal_times(ball.t_end, samples);
         options.set_valued.step = ball.t_end / divisions;
         const auto run = hand_over(system, ball.start, options);
-        if (run.outcome != HandOverOutcome::reached_end) {
+        if (run.outcome != Outcome::reached_end) {
             ++reported;
             continue;
         }

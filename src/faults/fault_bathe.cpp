@@ -252,22 +252,20 @@ public:
             if (!accepted) {
                 ++out_.statistics.rejected;
                 if (h < 1e-12 * std::max(t_, std::min(1.0, end))) {
-                    return finish(solved ? RuptureOutcome::step_underflow
-                                         : RuptureOutcome::not_converged);
+                    return finish(solved ? Outcome::step_underflow : Outcome::not_converged);
                 }
                 continue;
             }
             accept(step, step == left ? end : t_ + step);
             if (at_rest()) {
                 rest_time_ = t_;
-                return finish(RuptureOutcome::at_rest);
+                return finish(Outcome::at_rest);
             }
             if (options_.progress && !options_.progress(t_ * unit))
-                return finish(RuptureOutcome::cancelled);
-            if (out_.statistics.steps >= options_.max_steps)
-                return finish(RuptureOutcome::step_limit);
+                return finish(Outcome::cancelled);
+            if (out_.statistics.steps >= options_.max_steps) return finish(Outcome::step_limit);
         }
-        return finish(RuptureOutcome::reached_end);
+        return finish(Outcome::reached_end);
     }
 
 private:
@@ -481,7 +479,7 @@ private:
         return true;
     }
 
-    Rupture finish(RuptureOutcome outcome)
+    Rupture finish(Outcome outcome)
     {
         out_.outcome = outcome;
         record_.finish(t_, rest_time_, false, now_.fields);

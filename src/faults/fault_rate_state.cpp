@@ -87,14 +87,13 @@ public:
             const double left = end - t_;
             const double step = left <= h * (1 + 1e-9) ? left : left < 2 * h ? left / 2 : h;
             const bool solved = attempt(step);
-            if (solved && !finite(next_)) return finish(RuptureOutcome::non_finite);
+            if (solved && !finite(next_)) return finish(Outcome::non_finite);
             const double error = solved && controlled() ? error_of() : 0;
             if (!solved || error > 1) {
                 ++out_.rupture.statistics.rejected;
                 h = step * (solved ? std::clamp(growth(error), 0.1, 0.9) : 0.25);
                 if (h < 1e-14 * t_ + 1e-12) {
-                    return finish(solved ? RuptureOutcome::step_underflow
-                                         : RuptureOutcome::not_converged);
+                    return finish(solved ? Outcome::step_underflow : Outcome::not_converged);
                 }
                 continue;
             }
@@ -103,11 +102,11 @@ public:
                                            step < h && error < 1 ? h : 0));
             accept(step, step == left ? end : t_ + step);
             if (options_.progress && !options_.progress(t_ * unit))
-                return finish(RuptureOutcome::cancelled);
+                return finish(Outcome::cancelled);
             if (out_.rupture.statistics.steps >= options_.max_steps)
-                return finish(RuptureOutcome::step_limit);
+                return finish(Outcome::step_limit);
         }
-        return finish(RuptureOutcome::reached_end);
+        return finish(Outcome::reached_end);
     }
 
 private:
@@ -351,7 +350,7 @@ private:
         if (fastest < level) event.end = crossing;
     }
 
-    RateStateRupture finish(RuptureOutcome outcome)
+    RateStateRupture finish(Outcome outcome)
     {
         Rupture& r = out_.rupture;
         r.outcome = outcome;

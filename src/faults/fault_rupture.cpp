@@ -122,27 +122,27 @@ public:
         out_.longest_step = longest_ * fault_.time_unit();
         double h = longest_;
         start();
-        out_.outcome = RuptureOutcome::reached_end;
+        out_.outcome = Outcome::reached_end;
         while (t_ < end && !at_rest()) {
             const double left = end - t_;
             const double step = left <= h * (1 + 1e-9) ? left : left < 2 * h ? 0.5 * left : h;
             const double error = attempt(step);
-            if (!std::isfinite(error)) return finish(RuptureOutcome::non_finite);
+            if (!std::isfinite(error)) return finish(Outcome::non_finite);
             h = std::min(longest_, step * growth(error));
             if (error > 1) {
                 ++out_.statistics.rejected;
-                if (h < 1e-12 * end) return finish(RuptureOutcome::step_underflow);
+                if (h < 1e-12 * end) return finish(Outcome::step_underflow);
                 continue;
             }
             accept(step, step == left ? end : t_ + step);
             if (options_.progress && !options_.progress(t_ * fault_.time_unit())) {
-                return finish(RuptureOutcome::cancelled);
+                return finish(Outcome::cancelled);
             }
             if (out_.statistics.steps >= options_.max_steps) {
-                return finish(RuptureOutcome::step_limit);
+                return finish(Outcome::step_limit);
             }
         }
-        return finish(at_rest() ? RuptureOutcome::at_rest : RuptureOutcome::reached_end);
+        return finish(at_rest() ? Outcome::at_rest : Outcome::reached_end);
     }
 
 private:
@@ -292,10 +292,10 @@ private:
         return {.slip = fault_.share() * sum.slip, .velocity = fault_.share() * sum.velocity};
     }
 
-    Rupture finish(RuptureOutcome outcome)
+    Rupture finish(Outcome outcome)
     {
         out_.outcome = outcome;
-        const bool rests = outcome == RuptureOutcome::at_rest;
+        const bool rests = outcome == Outcome::at_rest;
         record_.finish(t_, rests ? last_stop_ : std::numeric_limits<double>::quiet_NaN(), true,
                        now_);
         auto& s = out_.statistics;
@@ -349,35 +349,6 @@ void validate(const RuptureOptions& o)
         require(t >= 0 && t <= o.t_end, "snapshot_times must lie within [0, t_end]", t);
     }
     require(o.max_steps > 0, "max_steps must be positive", 0);
-}
-
-std::string_view name(RuptureOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case RuptureOutcome::reached_end: return "reached_end";
-        case RuptureOutcome::at_rest: return "at_rest";
-        case RuptureOutcome::non_finite: return "non_finite";
-        case RuptureOutcome::step_underflow: return "step_underflow";
-        case RuptureOutcome::step_limit: return "step_limit";
-        case RuptureOutcome::not_converged: return "not_converged";
-        case RuptureOutcome::cancelled: return "cancelled";
-    }
-    return "unknown";
-}
-
-std::string_view describe(RuptureOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case RuptureOutcome::reached_end: return "the end was reached, and the fault still moves";
-        case RuptureOutcome::at_rest: return "every element came to rest for good";
-        case RuptureOutcome::non_finite: return "a velocity is not finite; take shorter steps";
-        case RuptureOutcome::step_underflow: return "no step met the tolerance; loosen rtol";
-        case RuptureOutcome::step_limit: return "the limit of steps was reached; raise max_steps";
-        case RuptureOutcome::not_converged:
-            return "an implicit stage has no solution that was found; take shorter steps";
-        case RuptureOutcome::cancelled: return "the run was cancelled";
-    }
-    return "unknown";
 }
 
 double stable_step_of_mode(double damping)

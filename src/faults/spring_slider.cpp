@@ -51,20 +51,6 @@ std::string_view name(SliderEventKind kind) noexcept
     return "";
 }
 
-std::string_view describe(SliderOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case SliderOutcome::reached_end: return "reached the end";
-        case SliderOutcome::unsolved: return "the equation of a stage was not solved";
-        case SliderOutcome::step_underflow:
-            return "the step fell below the spacing of times; loosen rtol";
-        case SliderOutcome::step_limit: return "the number of steps reached its limit";
-        case SliderOutcome::non_finite: return "the state is not finite";
-        case SliderOutcome::cancelled: return "the run was cancelled";
-    }
-    return "";
-}
-
 namespace {
 
 void validate_options(const SliderOptions& o)
@@ -113,9 +99,9 @@ public:
         sample_until(start, start, start.t);
         double h = options_.step > 0 ? options_.step : options_.first_step;
         while (out_.state.t < t_end) {
-            if (out_.steps >= options_.max_steps) return stop(SliderOutcome::step_limit);
+            if (out_.steps >= options_.max_steps) return stop(Outcome::step_limit);
             if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
-                return stop(SliderOutcome::cancelled);
+                return stop(Outcome::cancelled);
             }
             const double stop_at = std::min(t_end, slider_.load.next_corner(out_.state.t));
             const double room = stop_at - out_.state.t;
@@ -124,7 +110,7 @@ public:
             const double taken = to_stop ? room : h;
             SliderState to = out_.state;
             const StepReport report = take(to, taken);
-            if (!std::isfinite(to.x + to.v + to.xi)) return stop(SliderOutcome::non_finite);
+            if (!std::isfinite(to.x + to.v + to.xi)) return stop(Outcome::non_finite);
             if (options_.step == 0) {
                 const double error = report.solved() ? norm(report.error, to) : 1e6;
                 const double factor =
@@ -133,18 +119,18 @@ public:
                     ++out_.rejected;
                     h = taken * std::clamp(factor, 0.1, 0.9);
                     if (h < 1e-14 * std::abs(out_.state.t) + 1e-300) {
-                        return stop(SliderOutcome::step_underflow);
+                        return stop(Outcome::step_underflow);
                     }
                     continue;
                 }
                 h = (to_stop ? std::max(h, taken) : taken) * std::clamp(factor, 0.2, 5.0);
             } else if (!report.solved()) {
-                return stop(SliderOutcome::unsolved);
+                return stop(Outcome::not_converged);
             }
             if (to_stop) to.t = stop_at;
             accept(to, report);
         }
-        out_.outcome = SliderOutcome::reached_end;
+        out_.outcome = Outcome::reached_end;
         return std::move(out_);
     }
 
@@ -286,7 +272,7 @@ private:
         }
     }
 
-    SliderRun stop(SliderOutcome outcome)
+    SliderRun stop(Outcome outcome)
     {
         out_.outcome = outcome;
         return std::move(out_);

@@ -22,6 +22,11 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::wrong_dimension: return "wrong_dimension";
         case Outcome::stalled: return "stalled";
         case Outcome::stopped_by_callback: return "stopped_by_callback";
+        case Outcome::at_rest: return "at_rest";
+        case Outcome::not_handed_over: return "not_handed_over";
+        case Outcome::released: return "released";
+        case Outcome::law_violated: return "law_violated";
+        case Outcome::running: return "running";
     }
     return "unknown";
 }
@@ -75,6 +80,14 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::stopped_by_callback:
             return "a function of the system reported an error; all that was computed before is "
                    "kept, and the run goes on from the last completed step when it is asked to";
+        case Outcome::at_rest: return "every element came to rest for good";
+        case Outcome::not_handed_over:
+            return "events alone do not lead on from here; allow set-valued steps";
+        case Outcome::released: return "every reaction is at a bound, as was asked for";
+        case Outcome::law_violated:
+            return "a step ended with a reaction that contradicts its law; look at reaction_set, "
+                   "or take shorter steps";
+        case Outcome::running: return "the run has not ended";
     }
     return "unknown outcome";
 }

@@ -163,12 +163,11 @@ public:
     {
         const std::uint64_t stages = motion_->statistics().stages;
         motion_->next_step(h);
-        const SetValuedOutcome outcome = motion_->advance();
+        const Outcome outcome = motion_->advance();
         Attempt out{.length = h};
         out.work = static_cast<double>(motion_->statistics().stages - stages);
-        out.ended = outcome != SetValuedOutcome::running;
-        out.solved =
-            outcome == SetValuedOutcome::running || outcome == SetValuedOutcome::reached_end;
+        out.ended = outcome != Outcome::running;
+        out.solved = outcome == Outcome::running || outcome == Outcome::reached_end;
         if (!out.solved || !motion_->state().w.allFinite()) {
             out.solved = false;
             out.ended = true;
@@ -200,7 +199,7 @@ public:
     [[nodiscard]] StepTrial trial() const
     {
         const SetValuedStatistics& s = motion_->statistics();
-        StepTrial out{.ended = motion_->outcome() == SetValuedOutcome::reached_end,
+        StepTrial out{.ended = motion_->outcome() == Outcome::reached_end,
                       .work = static_cast<double>(s.stages),
                       .steps = s.accepted,
                       .rejected = s.rejected + s.unsolved,

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "ricochet/detail/random.hpp"
-#include "ricochet/learn/step_control.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/learn/step_control.hpp"
 #include "step_reference.hpp"
 
 namespace ricochet::learn {
@@ -54,8 +54,7 @@ public:
                       .observer = [&](const BatheStep& step) { comparison.look(step); }});
         give_back(std::move(runs));
         const RuptureStatistics& s = r.statistics;
-        StepTrial out{.ended = r.outcome == RuptureOutcome::reached_end ||
-                               r.outcome == RuptureOutcome::at_rest,
+        StepTrial out{.ended = r.outcome == Outcome::reached_end || r.outcome == Outcome::at_rest,
                       .work = static_cast<double>(s.iterations),
                       .steps = s.steps,
                       .rejected = s.rejected,

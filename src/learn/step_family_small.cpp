@@ -59,9 +59,9 @@ struct SmallProblem {
         SetValuedMotion<System> motion(system, start, set);
         Samples<System> at(t_end, set.estimate);
         double sum = 0;
-        while (motion.outcome() == SetValuedOutcome::running) {
-            const SetValuedOutcome outcome = motion.advance();
-            if (outcome != SetValuedOutcome::running && outcome != SetValuedOutcome::reached_end) {
+        while (motion.outcome() == Outcome::running) {
+            const Outcome outcome = motion.advance();
+            if (outcome != Outcome::running && outcome != Outcome::reached_end) {
                 break;
             }
             at.step(motion, [&](std::size_t i, const StateOf<System>& w) {
@@ -70,7 +70,7 @@ struct SmallProblem {
             if (rule.watch && !rule.watch(motion.state().t / t_end)) break;
         }
         const SetValuedStatistics& s = motion.statistics();
-        StepTrial out{.ended = motion.outcome() == SetValuedOutcome::reached_end,
+        StepTrial out{.ended = motion.outcome() == Outcome::reached_end,
                       .work = static_cast<double>(s.stages),
                       .steps = s.accepted,
                       .rejected = s.rejected + s.unsolved,

@@ -8,10 +8,10 @@
 #include <stdexcept>
 #include <vector>
 
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet::learn::detail {
@@ -184,13 +184,13 @@ inline Reference<DiodeCircuit> reference_of(const DiodeCircuit& system,
         system, start,
         {.t_end = t_end, .step = 5e-4 * system.step_unit(), .switches = Switches::located});
     Samples<DiodeCircuit> at(t_end);
-    while (motion.outcome() == SetValuedOutcome::running) {
+    while (motion.outcome() == Outcome::running) {
         (void)motion.advance();
         at.step(motion, [&](std::size_t, const Eigen::Vector3d& w) { out.push_back(w); });
     }
     // The last time may lie behind the end by rounding.
     if (out.size() == samples) out.push_back(motion.state().w);
-    if (motion.outcome() != SetValuedOutcome::reached_end || out.size() != samples + 1) {
+    if (motion.outcome() != Outcome::reached_end || out.size() != samples + 1) {
         throw std::runtime_error(fmt::format("the reference of a diode circuit ended early: {}",
                                              describe(motion.outcome())));
     }

@@ -4,44 +4,6 @@
 
 namespace ricochet {
 
-std::string_view name(HandOverOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case HandOverOutcome::reached_end: return "reached_end";
-        case HandOverOutcome::not_converged: return "not_converged";
-        case HandOverOutcome::step_underflow: return "step_underflow";
-        case HandOverOutcome::step_limit: return "step_limit";
-        case HandOverOutcome::non_finite: return "non_finite";
-        case HandOverOutcome::cancelled: return "cancelled";
-        case HandOverOutcome::not_handed_over: return "not_handed_over";
-        case HandOverOutcome::released: return "released";
-        case HandOverOutcome::law_violated: return "law_violated";
-    }
-    return "unknown";
-}
-
-std::string_view describe(HandOverOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case HandOverOutcome::reached_end: return "the run reached its end";
-        case HandOverOutcome::not_converged:
-            return "a set is empty, or a set-valued stage has no solution that the solver could "
-                   "find; look at the bounds, try another stage method or a looser tolerance";
-        case HandOverOutcome::step_underflow: return "step fell below h_min; loosen rtol";
-        case HandOverOutcome::step_limit: return "max_steps steps were taken; allow more";
-        case HandOverOutcome::non_finite:
-            return "the flow, a guard or the state is no longer finite; look at the system there";
-        case HandOverOutcome::cancelled: return "the run was cancelled";
-        case HandOverOutcome::not_handed_over:
-            return "events alone do not lead on from here; allow set-valued steps";
-        case HandOverOutcome::released: return "every reaction is at a bound, as was asked for";
-        case HandOverOutcome::law_violated:
-            return "a step ended with a reaction that contradicts its law; look at reaction_set, "
-                   "which must be a function of time and state, or try a shorter step";
-    }
-    return "unknown outcome";
-}
-
 std::string_view name(PhaseCause cause) noexcept
 {
     switch (cause) {
@@ -168,28 +130,6 @@ std::optional<PhaseCause> cause_after(Outcome outcome) noexcept
         case Outcome::step_underflow:
         case Outcome::stalled: return PhaseCause::stuck;
         default: return std::nullopt;
-    }
-}
-
-HandOverOutcome in_hand_over(Outcome outcome) noexcept
-{
-    switch (outcome) {
-        case Outcome::reached_end: return HandOverOutcome::reached_end;
-        case Outcome::stalled:
-        case Outcome::step_limit: return HandOverOutcome::step_limit;
-        case Outcome::cancelled: return HandOverOutcome::cancelled;
-        case Outcome::step_underflow: return HandOverOutcome::step_underflow;
-        default: return HandOverOutcome::non_finite;
-    }
-}
-
-HandOverOutcome in_hand_over(SetValuedOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case SetValuedOutcome::not_converged: return HandOverOutcome::not_converged;
-        case SetValuedOutcome::step_underflow: return HandOverOutcome::step_underflow;
-        case SetValuedOutcome::step_limit: return HandOverOutcome::step_limit;
-        default: return HandOverOutcome::reached_end;
     }
 }
 

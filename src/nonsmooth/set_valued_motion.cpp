@@ -7,33 +7,6 @@
 
 namespace ricochet {
 
-std::string_view name(SetValuedOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case SetValuedOutcome::running: return "running";
-        case SetValuedOutcome::reached_end: return "reached_end";
-        case SetValuedOutcome::not_converged: return "not_converged";
-        case SetValuedOutcome::step_underflow: return "step_underflow";
-        case SetValuedOutcome::step_limit: return "step_limit";
-    }
-    return "unknown";
-}
-
-std::string_view describe(SetValuedOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case SetValuedOutcome::running: return "the run has not ended";
-        case SetValuedOutcome::reached_end: return "the run reached its end";
-        case SetValuedOutcome::not_converged:
-            return "a stage has no solution that the solver could find; try another stage method "
-                   "or a looser tolerance";
-        case SetValuedOutcome::step_underflow:
-            return "step fell below h_min; loosen rtol or let the controller accept larger errors";
-        case SetValuedOutcome::step_limit: return "max_attempts steps were tried; allow more";
-    }
-    return "unknown outcome";
-}
-
 void validate(const SetValuedOptions& options)
 {
     constexpr detail::Require require{"SetValuedOptions"};

@@ -10,17 +10,17 @@
 
 #include "compare.hpp"
 #include "faults/fault.hpp"
+#include "faults/step_progress.hpp"
 #include "files.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
 #include "registry.hpp"
 #include "report.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "run_watch.hpp"
-#include "faults/step_progress.hpp"
 #include "studies.hpp"
 #include "timing.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 
 namespace ricochet::app {
 
@@ -201,7 +201,7 @@ int compare_fault(const CompareRequest& request)
     for (const Way& way : all) {
         if (Interrupts::any()) break;
         rows.push_back(measure(fault, way, exact, progress));
-        ended = ended && rows.back().run.outcome == RuptureOutcome::at_rest;
+        ended = ended && rows.back().run.outcome == Outcome::at_rest;
     }
     progress.clear();
     const bool complete = !Interrupts::any();

@@ -144,7 +144,7 @@ Trace<System> trace(std::string name, const System& system, const StateOf<System
             out.w.push_back(state.w);
             out.reaction.push_back(state.reaction[0]);
         };
-        out.ended = motion.run(look) == SetValuedOutcome::reached_end;
+        out.ended = motion.run(look) == Outcome::reached_end;
         out.counts = motion.statistics();
     };
     run(true);

@@ -53,7 +53,7 @@ struct FaultRun {
     double seconds = none;
     std::vector<double> t{}, h{};           ///< [s] start and length of every step
     std::vector<double> at{}, v{}, slip{};  ///< means at the starts and middles of the steps
-    [[nodiscard]] bool ended() const { return rupture.outcome == RuptureOutcome::at_rest; }
+    [[nodiscard]] bool ended() const { return rupture.outcome == Outcome::at_rest; }
 };
 
 FaultRun run_rule(std::string name, const StrikeSlipFault& fault, BatheOptions bathe,
@@ -151,7 +151,7 @@ FaultRun tqc(const StrikeSlipFault& fault, bool timed = true,
     const std::string name = fmt::format("TQC, alpha {}", actor.parameters.at("alpha"));
     if (lengths.empty()) {
         FaultRun out{.name = name};
-        out.rupture.outcome = RuptureOutcome::not_converged;
+        out.rupture.outcome = Outcome::not_converged;
         return out;
     }
     return run_rule(name, fault,

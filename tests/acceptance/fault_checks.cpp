@@ -14,9 +14,9 @@
 
 #include "fault_energy.hpp"
 #include "measure.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet::bench {
 
@@ -40,7 +40,7 @@ Measured go_on_after_earthquakes()
         const RateStateRupture r =
             simulate(fault, {.t_end = 1e9, .rtol = 1e-3, .max_steps = 20'000}, weakening(overload),
                      {.order = 4});
-        out.pass = out.pass && r.rupture.outcome == RuptureOutcome::reached_end && r.unsolved == 0;
+        out.pass = out.pass && r.rupture.outcome == Outcome::reached_end && r.unsolved == 0;
         out.text +=
             fmt::format("{}{} steps", out.text.empty() ? "" : ", ", r.rupture.statistics.steps);
         out.details.push_back(
@@ -75,7 +75,7 @@ Measured go_on_with_any_friction()
         for (const int order : {2, 4}) {
             const RateStateRupture r = simulate(
                 fault, {.t_end = 3e8, .rtol = 1e-3, .max_steps = 60'000}, f, {.order = order});
-            ended[order / 4] += r.rupture.outcome == RuptureOutcome::reached_end;
+            ended[order / 4] += r.rupture.outcome == Outcome::reached_end;
             steps[order / 4] += r.rupture.statistics.steps;
         }
     }

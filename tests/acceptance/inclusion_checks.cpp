@@ -51,7 +51,7 @@ void run_one(const RandomInclusion<M>& system, const ReferenceMotion& reference,
     double off = 0;
     try {
         const auto run = hand_over(system, system.start, options);
-        if (run.outcome != HandOverOutcome::reached_end) ended = name(run.outcome);
+        if (run.outcome != Outcome::reached_end) ended = name(run.outcome);
         for (std::size_t i = 0; i < run.trajectory.x.size(); ++i) {
             off = std::max(off, reference.error(i, run.trajectory.x[i]));
         }

@@ -10,9 +10,9 @@
 
 #include "fault_as_slider.hpp"
 #include "measure_fault.hpp"
-#include "ricochet/faults/spring_slider.hpp"
 #include "ricochet/detail/fault_friction_stage.hpp"
 #include "ricochet/faults/fault_rate_state.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 
 namespace ricochet::bench {
 
@@ -59,7 +59,7 @@ std::string counts(const TimedCycle& c)
 
 bool solved(const TimedCycle& c)
 {
-    return c.run.rupture.outcome == RuptureOutcome::reached_end && c.run.unsolved == 0 &&
+    return c.run.rupture.outcome == Outcome::reached_end && c.run.unsolved == 0 &&
            c.run.residual <= RateStateOptions{}.tolerance;
 }
 

@@ -86,7 +86,7 @@ std::vector<StateOf<System>> lines(const System& system, const StateOf<System>& 
 {
     SetValuedMotion<System> motion(system, start, options);
     std::vector<StateOf<System>> out{start};
-    while (motion.outcome() == SetValuedOutcome::running) {
+    while (motion.outcome() == Outcome::running) {
         (void)motion.advance();
         const auto& a = motion.before();
         const auto& b = motion.state();
@@ -217,7 +217,7 @@ Measured hand_over_sliding_mode()
     bool fine = true;
     for (const auto& [system, from, exact] : cases) {
         const auto run = sliding_run(1e-12, {exact + 1e-9, 0.3}, system, from);
-        fine = fine && run.outcome == HandOverOutcome::reached_end && run.events.size() == 1;
+        fine = fine && run.outcome == Outcome::reached_end && run.events.size() == 1;
         if (run.events.empty()) continue;
         worst = std::max(worst, std::abs(run.events[0].t - exact));
         fine = fine && run.state.w[0] == 0 && run.trajectory.x[0][0] == 0 &&
@@ -357,7 +357,7 @@ Measured observe_bathe_orders()
     const auto reaching = [&](double h) {
         SetValuedMotion<SlidingMode> motion(
             system, one(0.15), {.t_end = 0.5, .step = h, .switches = Switches::located});
-        while (motion.statistics().switches == 0 && motion.advance() == SetValuedOutcome::running) {
+        while (motion.statistics().switches == 0 && motion.advance() == Outcome::running) {
         }
         return std::abs(motion.state().t - system.reaching_time(0.15));
     };

@@ -9,9 +9,9 @@
 
 #include "fault_as_slider.hpp"
 #include "refusal.hpp"
-#include "ricochet/faults/spring_slider.hpp"
 #include "ricochet/detail/fault_friction_stage.hpp"
 #include "ricochet/faults/fault_rate_state.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 
 namespace ricochet {
 namespace {
@@ -40,8 +40,8 @@ TEST(FaultRateState, OneElementIsTheSpringSlider)
     for (const int order : {1, 2, 4}) {
         const RateStateRupture r = pair.run_fault(order);
         const SliderRun s = pair.run_as_slider(order);
-        ASSERT_EQ(r.rupture.outcome, RuptureOutcome::reached_end);
-        ASSERT_EQ(s.outcome, SliderOutcome::reached_end);
+        ASSERT_EQ(r.rupture.outcome, Outcome::reached_end);
+        ASSERT_EQ(s.outcome, Outcome::reached_end);
         EXPECT_GT(s.state.x, 0.1);
         EXPECT_NEAR(r.rupture.slip[0], s.state.x, 1e-11 * s.state.x) << order;
         EXPECT_NEAR(r.rupture.velocity[0], s.state.v, 1e-11 * s.state.v) << order;
@@ -137,7 +137,7 @@ TEST(FaultRateState, UniformFaultSlipsSymmetrically)
     const StrikeSlipFault fault({.elements = n});
     const FaultFriction friction{.normal_stress = 20e6, .slip_rate = 1e-6, .overload = 1e-3};
     const RateStateRupture r = simulate(fault, {.t_end = 1e5, .rtol = 1e-4}, friction);
-    ASSERT_EQ(r.rupture.outcome, RuptureOutcome::reached_end);
+    ASSERT_EQ(r.rupture.outcome, Outcome::reached_end);
     const auto& v = r.rupture.velocity;
     double spread = 0;
     for (int z = 0; z < n; ++z) {
@@ -285,7 +285,7 @@ TEST(FaultRateState, SlidingWithThePlatesIsSteady)
     // Rate-strengthening: a perturbation decays.
     friction.overload = 0.01;
     const RateStateRupture disturbed = simulate(fault, {.t_end = while_sliding}, friction);
-    ASSERT_EQ(disturbed.rupture.outcome, RuptureOutcome::reached_end);
+    ASSERT_EQ(disturbed.rupture.outcome, Outcome::reached_end);
     const auto& fastest = disturbed.fastest;
     EXPECT_GT(*std::max_element(fastest.begin(), fastest.end()), 1.2e-9);
     EXPECT_NEAR(disturbed.rupture.velocity.maxCoeff(), 1e-9, 1e-12);
@@ -301,7 +301,7 @@ double growth(const StrikeSlipFault& fault, FaultFriction friction)
     const RateStateRupture r =
         simulate(fault, {.t_end = 200 * cycle, .step = 0.1 * cycle, .rtol = constant_steps},
                  friction, {.order = 4, .tolerance = 1e-13});
-    EXPECT_EQ(r.rupture.outcome, RuptureOutcome::reached_end);
+    EXPECT_EQ(r.rupture.outcome, Outcome::reached_end);
     double early = 0;
     double late = 0;
     for (std::size_t i = 0; i < r.fastest.size(); ++i) {
@@ -339,7 +339,7 @@ TEST(FaultRateState, EarthquakeIsSolvedFromLoadToRest)
         return simulate(fault, {.t_end = t_end, .rtol = rtol}, friction);
     };
     const RateStateRupture r = run(4e8, 1e-3);
-    ASSERT_EQ(r.rupture.outcome, RuptureOutcome::reached_end);
+    ASSERT_EQ(r.rupture.outcome, Outcome::reached_end);
     EXPECT_EQ(r.unsolved, 0U);
     EXPECT_LE(r.residual, RateStateOptions{}.tolerance);
     ASSERT_FALSE(r.earthquakes.empty());
@@ -378,7 +378,7 @@ TEST(FaultRateState, OrderFourBringsABrakedElementToRest)
             const RateStateRupture r =
                 simulate(fault, {.t_end = 20 * h, .step = h, .rtol = rtol, .max_steps = 2000},
                          friction, {.order = 4, .first_step = h});
-            EXPECT_EQ(r.rupture.outcome, RuptureOutcome::reached_end) << q << " " << rtol;
+            EXPECT_EQ(r.rupture.outcome, Outcome::reached_end) << q << " " << rtol;
             EXPECT_LT(std::abs(r.rupture.velocity[0]), 1e-12) << q << " " << rtol;
         }
     }
@@ -395,7 +395,7 @@ TEST(FaultRateState, OrderFourGoesOnAfterAnEarthquake)
         friction.overload = overload;
         const RuptureOptions options{.t_end = 9.4e8, .rtol = 1e-3, .max_steps = 10'000};
         const RateStateRupture r = simulate(fault, options, friction, {.order = 4});
-        ASSERT_EQ(r.rupture.outcome, RuptureOutcome::reached_end) << overload;
+        ASSERT_EQ(r.rupture.outcome, Outcome::reached_end) << overload;
         EXPECT_EQ(r.unsolved, 0U) << overload;
         EXPECT_GE(r.earthquakes.size(), 2U) << overload;
         EXPECT_LT(r.earthquakes.front().end - r.earthquakes.front().start, 20) << overload;
@@ -440,7 +440,7 @@ TEST(FaultRateState, FormsAndLawsAgreeWhereTheyShould)
     for (const StateEvolution law : {StateEvolution::slip, StateEvolution::prz}) {
         friction.evolution = law;
         const RateStateRupture r = simulate(fault, options, friction);
-        EXPECT_EQ(r.rupture.outcome, RuptureOutcome::reached_end);
+        EXPECT_EQ(r.rupture.outcome, Outcome::reached_end);
         EXPECT_EQ(r.unsolved, 0U);
         EXPECT_GT(apart(a.rupture.velocity, r.rupture.velocity), 1e-3);
     }
@@ -453,8 +453,8 @@ TEST(FaultRateState, StageThatIsNotSolvedShortensTheStep)
     const RuptureOptions options{.t_end = 1e4, .step = 1e3, .rtol = constant_steps};
     const RateStateRupture free = simulate(fault, options, friction);
     const RateStateRupture bound = simulate(fault, options, friction, {.max_iterations = 4});
-    EXPECT_EQ(free.rupture.outcome, RuptureOutcome::reached_end);
-    EXPECT_EQ(bound.rupture.outcome, RuptureOutcome::reached_end);
+    EXPECT_EQ(free.rupture.outcome, Outcome::reached_end);
+    EXPECT_EQ(bound.rupture.outcome, Outcome::reached_end);
     EXPECT_GT(bound.unsolved, 0U);
     EXPECT_EQ(bound.rupture.statistics.rejected, bound.unsolved);
     EXPECT_GT(bound.rupture.statistics.steps, free.rupture.statistics.steps);

@@ -10,10 +10,10 @@
 #include <string>
 
 #include "refusal.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/detail/fault_kernel.hpp"
-#include "ricochet/faults/fault_rupture.hpp"
 #include "ricochet/detail/stiffness_series.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/fault_rupture.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet {
@@ -283,7 +283,7 @@ TEST(Rupture, OneElementHasTheKnownSlipArrestAndPeak)
 {
     // Computed once to 1e-12 as a smooth equation up to the arrest.
     const Rupture r = simulate(StrikeSlipFault(), {.t_end = 30});
-    EXPECT_EQ(r.outcome, RuptureOutcome::at_rest);
+    EXPECT_EQ(r.outcome, Outcome::at_rest);
     EXPECT_EQ(r.t, 30);
     EXPECT_NEAR(r.mean_slip, 0.22799875, 1e-7);
     EXPECT_NEAR(r.arrest_time, 12.683187, 1e-6);
@@ -334,7 +334,7 @@ TEST(Rupture, EndsWhereItIsToldAndKeepsSnapshots)
     const Rupture r = simulate(
         fault,
         {.t_end = 8, .snapshot_times = {0, 3.3, 8}, .progress = [](double) { return true; }});
-    EXPECT_EQ(r.outcome, RuptureOutcome::reached_end);
+    EXPECT_EQ(r.outcome, Outcome::reached_end);
     EXPECT_EQ(r.t, 8);
     EXPECT_TRUE(std::isnan(r.rest_time));
     ASSERT_EQ(r.snapshots.size(), 3U);
@@ -345,7 +345,7 @@ TEST(Rupture, EndsWhereItIsToldAndKeepsSnapshots)
     EXPECT_NEAR((r.snapshots[1].velocity - early.velocity).norm() / early.velocity.norm(), 0, 1e-5);
     const Rupture cancelled =
         simulate(fault, {.t_end = 8, .progress = [](double t) { return t < 1; }});
-    EXPECT_EQ(cancelled.outcome, RuptureOutcome::cancelled);
+    EXPECT_EQ(cancelled.outcome, Outcome::cancelled);
     EXPECT_LT(cancelled.t, 2);
 }
 
@@ -418,7 +418,7 @@ TEST(FaultBathe, AveragedSchemeIsOfOrderTwoThroughAllArrests)
         double before = 0;
         for (const double step : {0.5, 0.25, 0.125, 0.0625}) {
             const Rupture r = bathe(fault, step, {.bound = bound});
-            EXPECT_EQ(r.outcome, RuptureOutcome::at_rest);
+            EXPECT_EQ(r.outcome, Outcome::at_rest);
             EXPECT_EQ(r.statistics.arrests, 100U);
             const double error = std::abs(r.mean_slip - exact);
             // 4 for each halving, give or take where a step's end falls beside an arrest.
@@ -453,8 +453,8 @@ TEST(FaultBathe, StepsBeyondConvexityAreReportedOrShortened)
     // Convex below 1.5 s; a constant step of 6 s is halved until its stages have solutions.
     const Rupture r = bathe(StrikeSlipFault({.elements = 3}), 6);
     EXPECT_GT(r.statistics.rejected, 0U);
-    EXPECT_TRUE(r.outcome == RuptureOutcome::at_rest || r.outcome == RuptureOutcome::reached_end ||
-                r.outcome == RuptureOutcome::not_converged);
+    EXPECT_TRUE(r.outcome == Outcome::at_rest || r.outcome == Outcome::reached_end ||
+                r.outcome == Outcome::not_converged);
     EXPECT_TRUE(r.slip.allFinite());
     // With the bound extrapolated every stage is convex.
     const Rupture extrapolated =

@@ -36,7 +36,7 @@ TEST(RateStateSlider, HasTheEventsOfVariationalSteps)
         run_slider(slider, start, {.t_end = 0.3, .rtol = 1e-10, .threshold = threshold});
 
     ASSERT_EQ(loop.outcome, Outcome::reached_end);
-    ASSERT_EQ(steps.outcome, SliderOutcome::reached_end);
+    ASSERT_EQ(steps.outcome, Outcome::reached_end);
     std::size_t matched = 0;
     for (const auto& event : loop.events) {
         if (event.kind != EventKind::crossing) continue;  // the corner of the load

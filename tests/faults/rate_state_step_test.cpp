@@ -31,7 +31,7 @@ SliderState fixed(const SpringSlider& slider, int order, double h, double t_end)
 {
     const SliderRun run =
         run_slider(slider, slider_case_start(), {.t_end = t_end, .order = order, .step = h});
-    EXPECT_EQ(run.outcome, SliderOutcome::reached_end);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_EQ(run.unsolved, 0U);
     return run.state;
 }
@@ -178,7 +178,7 @@ TEST(VariationalStep, StaysStableWhereOrdinarySolversFail)
         for (const int order : {1, 2, 4}) {
             const SliderRun run =
                 run_slider(c.slider, slider_case_start(), {.t_end = 2, .order = order, .step = h});
-            EXPECT_EQ(run.outcome, SliderOutcome::reached_end);
+            EXPECT_EQ(run.outcome, Outcome::reached_end);
             EXPECT_LE(std::abs(run.state.v), 100);
             EXPECT_EQ(run.unsolved, 0U);
         }
@@ -234,7 +234,7 @@ TEST(SpringSlider, LocatesOnsetAndArrest)
     const SliderCase c = a_case(0.5);
     const SliderOptions options{.t_end = 0.6, .threshold = 5e-4};
     const SliderRun run = run_slider(c.slider, slider_case_start(), options);
-    ASSERT_EQ(run.outcome, SliderOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_GE(run.events.size(), 4U);
     for (std::size_t i = 0; i < run.events.size(); ++i) {
         EXPECT_EQ(run.events[i].kind,
@@ -258,7 +258,7 @@ TEST(SpringSlider, FollowsALoadThatReverses)
     for (const double h : {0.0, 1e-3, 1.0 / 32}) {
         const SliderRun run =
             run_slider(c.slider, slider_case_start(), {.t_end = 1.4, .step = h, .samples = 141});
-        ASSERT_EQ(run.outcome, SliderOutcome::reached_end) << h;
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << h;
         EXPECT_LE(run.residual, 1e-10);
         ASSERT_EQ(run.samples.size(), 141U);
         EXPECT_GT(run.samples[19].v, 0);

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "ricochet/detail/random.hpp"
-#include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet::learn {
@@ -80,7 +80,7 @@ TEST(StepWorld, AConstantActionIsAConstantStepOfAFault)
                                       .rtol = 1e-3,
                                       .atol = 1e-6,
                                       .h_max = 20});
-        EXPECT_EQ(run.outcome, RuptureOutcome::at_rest);
+        EXPECT_EQ(run.outcome, Outcome::at_rest);
         EXPECT_TRUE(episode.terminal);
         EXPECT_EQ(episode.trial.steps, run.statistics.steps);
         EXPECT_EQ(episode.trial.solves, run.statistics.solves);

@@ -2,11 +2,10 @@
 
 #include <gtest/gtest.h>
 
-
 #include "allocations.hpp"
+#include "problems/incline_block.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "problems/incline_block.hpp"
 
 namespace ricochet {
 namespace {
@@ -17,9 +16,9 @@ void expect_no_allocation(const System& system, const StateOf<System>& w0,
 {
     SetValuedMotion<System> motion(system, w0, options);
     const auto before = testing_support::allocations();
-    const SetValuedOutcome outcome = motion.run();
+    const Outcome outcome = motion.run();
     EXPECT_EQ(testing_support::allocations() - before, 0u);
-    EXPECT_EQ(outcome, SetValuedOutcome::reached_end);
+    EXPECT_EQ(outcome, Outcome::reached_end);
     EXPECT_GT(motion.statistics().accepted, 20U);
 }
 

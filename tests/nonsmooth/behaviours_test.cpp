@@ -58,7 +58,7 @@ TEST(NonsmoothBehaviours, AFixedPointSolvesRandomDefiniteSystems)
              .step = h,
              .scheme = {.scheme = Scheme::backward_euler,
                         .stage = {.method = StageMethod::fixed_point, .tolerance = 1e-11}}});
-        ASSERT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        ASSERT_EQ(motion.run(), Outcome::reached_end);
         const Relaxation::Square whole = Relaxation::Square::Identity(5, 5) + h * system.stiffness;
         const Relaxation::Vector exact = whole.llt().solve(w0);
         // The residual of 1e-11 over the least eigenvalue, which is at least 1 + h.
@@ -89,10 +89,10 @@ TEST(NonsmoothBehaviours, NoStepIsShorterThanTheLeastOne)
                                    .atol = 1e-12,
                                    .h_min = h_min});
     double shortest = 1;
-    while (motion.advance() == SetValuedOutcome::running) {
+    while (motion.advance() == Outcome::running) {
         shortest = std::min(shortest, motion.state().t - motion.before().t);
     }
-    EXPECT_EQ(motion.outcome(), SetValuedOutcome::step_underflow);
+    EXPECT_EQ(motion.outcome(), Outcome::step_underflow);
     EXPECT_GE(shortest, h_min);
 }
 
@@ -153,7 +153,7 @@ TEST(NonsmoothBehaviours, AChainOfThreeHundredUnknownsIsFollowed)
 {
     SetValuedMotion<Chain> motion(Chain{}, Eigen::VectorXd::Zero(Chain::n),
                                   {.t_end = 1, .step = 0.1});
-    ASSERT_EQ(motion.run(), SetValuedOutcome::reached_end);
+    ASSERT_EQ(motion.run(), Outcome::reached_end);
     EXPECT_TRUE(motion.state().w.allFinite());
     // The front has passed a few masses; the rest is held by the floor, to the residual.
     EXPECT_GT(motion.state().w[0], 0.01);

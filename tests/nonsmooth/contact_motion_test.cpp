@@ -45,7 +45,7 @@ TEST(ContactMotion, ImpactsAccumulateIntoSlidingAndRest)
     const auto run =
         hand_over(Ball{}, {0, 0.8}, {4, 0},
                   {.t_end = 3, .set_valued = {.step = h}, .sample_times = {0.4, 1.0, 1.5, 3}});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_GE(run.events.size(), 20U);
     double t = 0.4;
     double u = 4;
@@ -77,7 +77,7 @@ TEST(ContactMotion, GoesBackToFlightWhereTheContactOpens)
     for (const double h : {1e-3, 1e-4}) {
         const auto run = hand_over(Ball{.lift = 14, .lift_at = 1}, {0, 0}, {0, 0},
                                    {.t_end = 2, .set_valued = {.step = h}});
-        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
         ASSERT_EQ(run.phases.size(), 3U);
         EXPECT_EQ(run.phases[2].cause, PhaseCause::released);
         EXPECT_FALSE(run.phases[2].set_valued);
@@ -94,7 +94,7 @@ TEST(ContactMotion, ABlockThatFallsOnTwoCornersComesToRest)
     block.bounce = 0.3;
     const auto run =
         hand_over(block, {0, 0.3, 0.05}, {1, 0, 0}, {.t_end = 4, .set_valued = {.step = 1e-3}});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_GT(run.events.size(), 10U);
     EXPECT_GT(run.statistics.contact_time, 1);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(run.x[3 + i], 0, 1e-8) << i;
@@ -111,11 +111,11 @@ TEST(ContactMotion, TheWoodpeckerDescendsAsUnderTimeSteppingAlone)
     const double h = 1e-5;
     const auto run = hand_over(toy, Woodpecker::start(), Woodpecker::start_velocity(),
                                {.t_end = 1, .set_valued = {.step = h}});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_GT(run.statistics.to_flight, 2U);
     TimeStepping<Woodpecker> steps(toy, Woodpecker::start(), Woodpecker::start_velocity(),
                                    {.t_end = 1, .step = h});
-    ASSERT_EQ(steps.run(), SetValuedOutcome::reached_end);
+    ASSERT_EQ(steps.run(), Outcome::reached_end);
     EXPECT_NEAR(run.x[0], steps.state().q[0], 0.02 * std::abs(steps.state().q[0]));
 }
 
@@ -123,7 +123,7 @@ TEST(ContactMotion, StopsAfterSoManySteps)
 {
     const auto run = hand_over(Ball{}, {0, 0.8}, {4, 0},
                                {.t_end = 3, .set_valued = {.step = 1e-3}, .max_steps = 500});
-    EXPECT_EQ(run.outcome, HandOverOutcome::step_limit);
+    EXPECT_EQ(run.outcome, Outcome::step_limit);
     EXPECT_EQ(run.statistics.event_driven.steps + run.statistics.time_stepping.steps, 500U);
     EXPECT_GT(run.t, 1.2);
     EXPECT_LT(run.t, 2);
@@ -149,7 +149,7 @@ struct Shuttle {
 TEST(ContactMotion, ElasticImpactsKeepTheEnergyToRounding)
 {
     const auto run = hand_over(Shuttle(), {0, 0.5}, {0.3, 1}, {.t_end = 200});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_GT(run.events.size(), 100U);
     Eigen::Matrix2d m;
     Shuttle::mass({}, m);
@@ -169,7 +169,7 @@ TEST(ContactMotion, AForceThatIsNotFiniteInContactEndsTheRun)
 {
     const auto run = hand_over(Ball{.lift = std::nan(""), .lift_at = 1}, {0, 0}, {0, 0},
                                {.t_end = 2, .set_valued = {.step = 1e-2}});
-    EXPECT_EQ(run.outcome, HandOverOutcome::non_finite);
+    EXPECT_EQ(run.outcome, Outcome::non_finite);
     EXPECT_GT(run.t, 0.98);
     EXPECT_LT(run.t, 1.01);
     EXPECT_TRUE(std::isfinite(run.x[1]));
@@ -180,7 +180,7 @@ TEST(ContactMotion, ARunOfNoLengthIsOver)
     for (const double height : {0.0, 1.0}) {
         const auto run =
             hand_over(Ball{}, {0, height}, {0, 0}, {.t_start = 1, .t_end = 1, .sample_times = {1}});
-        EXPECT_EQ(run.outcome, HandOverOutcome::reached_end);
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
         EXPECT_EQ(run.t, 1);
         ASSERT_EQ(run.trajectory.t.size(), 1U);
         EXPECT_EQ(run.trajectory.x[0][1], height);

@@ -40,7 +40,7 @@ TEST(EventHandOver, AMassThatWouldChatterSticks)
     const auto run =
         integrate(belt, Belt::State{2, 0},
                   {.t_end = 12, .rtol = 1e-11, .atol = 1e-12, .sample_times = {5, 11}});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_EQ(run.t, 12);
     EXPECT_NEAR(run.x[0], -0.2, 1e-9);
     EXPECT_EQ(run.x[1], 0);
@@ -64,7 +64,7 @@ TEST(EventHandOver, StickSlipIsGivenBackAtEverySlip)
         {.belt_speed = 0.2, .friction = 1, .weakening = 3, .law = FrictionLaw::hyperbolic})};
     const auto run =
         integrate(belt, Belt::State{0, 0.2}, {.t_end = 40, .rtol = 1e-11, .atol = 1e-12});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     const auto alone = hand_over(belt.inclusion, Eigen::Vector2d(0, 0.2),
                                  {.t_end = 40, .rtol = 1e-11, .atol = 1e-12});
     std::vector<double> slips;
@@ -98,10 +98,10 @@ TEST(EventHandOver, StepsOfAllPhasesCountTowardsTheLimit)
     const std::uint64_t all = taken(with(1'000'000));
     // The last of three quarters of the steps is far behind the first hand-over.
     const auto run = with(all * 3 / 4);
-    EXPECT_EQ(run.outcome, HandOverOutcome::step_limit);
+    EXPECT_EQ(run.outcome, Outcome::step_limit);
     EXPECT_GT(run.phases.size(), 2U);
     EXPECT_LE(taken(run), all * 3 / 4);
-    EXPECT_EQ(with(all + 1).outcome, HandOverOutcome::reached_end);
+    EXPECT_EQ(with(all + 1).outcome, Outcome::reached_end);
 }
 
 /// With modes, whose reset leads from one field into the other and back: endless at one instant.
@@ -135,7 +135,7 @@ TEST(EventHandOver, TwoFieldsThatPointAtEachOtherSlide)
     const Relay relay;
     const auto run = integrate(relay, Relay::State(Relay::State::Constant(SlidingMode::start)),
                                {.t_end = SlidingMode::t_end, .rtol = 1e-12, .atol = 1e-13});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.phases.size(), 2U);
     // As `HandOver.SlidingModeReachesZeroInTimeAndStaysThereToTheBit`.
     EXPECT_NEAR(run.phases[1].from, 0.093315472931294579027, 1e-12);
@@ -147,7 +147,7 @@ TEST(EventHandOver, AnInclusionAloneNeedsNoOtherCall)
     const auto run =
         integrate(SlidingMode{}, SlidingMode::Vector(SlidingMode::Vector::Constant(0.15)),
                   {.t_end = 0.5, .rtol = 1e-12, .atol = 1e-13});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 1U);
     EXPECT_NEAR(run.events[0].t, 0.093315472931294579027, 1e-12);
 }

@@ -7,14 +7,14 @@
 #include <numbers>
 
 #include "piecewise_linear.hpp"
+#include "problems/incline_block.hpp"
+#include "problems/rolling_ball.hpp"
+#include "problems/super_twisting.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
-#include "problems/incline_block.hpp"
-#include "problems/rolling_ball.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 #include "ricochet/systems/stick_slip.hpp"
-#include "problems/super_twisting.hpp"
 
 namespace ricochet {
 namespace {
@@ -94,7 +94,7 @@ void reach_zero(const SlidingMode& system, double from, double exact_time)
                                 .atol = 1e-13,
                                 .sample_times = {0.05, exact_time + 1e-9, 0.3, 0.5}});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
     EXPECT_NEAR(run.events[0].t, exact_time, 1e-12);
@@ -124,7 +124,7 @@ void follow(const Eigen::Vector3d& start, double t_end, std::size_t changes)
         hand_over(DiodeCircuit{}, start, {.t_end = t_end, .rtol = 1e-12, .atol = 1e-12},
                   ErrorControlled<Fehlberg78>{});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), changes);
     int before = start[0] > 0 ? 1 : -1;
     for (std::size_t i = 0; i < changes; ++i) {
@@ -161,7 +161,7 @@ TEST(HandOver, CoulombOscillatorTurnsAndRests)
     const auto run = hand_over(FrictionInclusion({.law = FrictionLaw::constant}),
                                Eigen::Vector2d(2, 0), {.t_end = 12, .rtol = 1e-12, .atol = 1e-13});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 3u);
     for (int n = 1; n <= 3; ++n) {
         const auto& event = run.events[static_cast<std::size_t>(n - 1)];
@@ -180,7 +180,7 @@ TEST(HandOver, StickSlipStartsAtTheOnsetOfSlipAndRepeats)
         hand_over(FrictionInclusion({.belt_speed = 0.2, .friction = 1, .weakening = 3}),
                   Eigen::Vector2d(1, 0.2), {.t_end = 25, .rtol = 1e-12, .atol = 1e-13});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 4u);
     const EventKind kinds[] = {EventKind::stick, EventKind::slip, EventKind::stick,
                                EventKind::slip};
@@ -200,7 +200,7 @@ TEST(HandOver, EveryLawOfFrictionSticksAndSlips)
         const FrictionInclusion system(
             {.belt_speed = 0.2, .friction = 1, .weakening = 1, .residual = 0.5, .law = law});
         const auto run = hand_over(system, Eigen::Vector2d(0, 0.2), {.t_end = 40});
-        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
         ASSERT_GE(run.events.size(), 4u);
         // Slip begins where the spring meets the friction at rest.
         EXPECT_EQ(run.events[0].kind, EventKind::slip);
@@ -218,7 +218,7 @@ TEST(HandOver, BallSlidesRollsAndRestsOnThePlate)
     const double plate = ball.parameters().plate_speed;
     const auto run = hand_over(ball, Eigen::Vector2d(plate + faster, 0), {.t_end = 6});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 2u);
     // The motion is linear in time: only rounding is left.
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
@@ -238,7 +238,7 @@ TEST(HandOver, BallIsShakenOffItsRest)
     const double limit = 0.001 * 9.81 / 0.05;
     const auto run = hand_over(ball, Eigen::Vector2d(0.5, 0), {.t_end = 1});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_EQ(run.events[0].kind, EventKind::slip);
     EXPECT_EQ(run.events[0].guard, 1u);
@@ -266,7 +266,7 @@ TEST(HandOver, ChangesThatCoincideGoThroughStepsAndBack)
     // Both are held until t = 1, then w' = t - 1.
     const auto run = hand_over(TwinRelays{}, Eigen::Vector2d(0, 0), {.t_end = 3});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_GE(run.phases.size(), 3u);
     EXPECT_EQ(run.phases[1].cause, PhaseCause::several);
     EXPECT_TRUE(run.phases[1].set_valued);
@@ -286,7 +286,7 @@ TEST(HandOver, TwistingAccumulatesAndIsHeldBySteps)
     const SuperTwisting system;
     const auto run = hand_over(system, Eigen::Vector2d(1, 0), {.t_end = 10});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.phases.size(), 2u);
     EXPECT_EQ(run.phases[1].cause, PhaseCause::accumulation);
     // Held at zero, the relay balances the rate of the disturbance, cos t.
@@ -301,7 +301,7 @@ TEST(HandOver, ABallOfReactionsIsFollowedBySteps)
     const auto& p = system.parameters();
     const auto run = hand_over(system, Eigen::Vector4d(1, 0, 0, 0), {.t_end = 2});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.phases.size(), 1u);
     EXPECT_EQ(run.phases[0].cause, PhaseCause::no_modes);
     // Straight down the slope it stops after v^2 / (2 a); the step across the stop is of
@@ -372,7 +372,7 @@ TEST(HandOver, AHalfLineHoldsToTheEnd)
 {
     const auto system = pushed(-1, [](double) { return IntervalSet::half_line(); });
     const auto run = hand_over(system, one(1), {.t_end = 3});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
     EXPECT_NEAR(run.events[0].t, 1, 1e-12);
@@ -386,7 +386,7 @@ TEST(HandOver, AReactionWithoutBoundsHoldsInOnePhase)
     const double infinity = std::numeric_limits<double>::infinity();
     const auto system = pushed(-5, [=](double) { return IntervalSet::symmetric(infinity); });
     const auto run = hand_over(system, one(0), {.t_end = 3});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_EQ(run.state.w[0], 0);
     EXPECT_NEAR(run.state.reaction[0], 5, 1e-14);
     EXPECT_EQ(run.phases.size(), 1u);
@@ -396,7 +396,7 @@ template <class Set>
 void expect_empty_at_one_half(double start, const Set& set)
 {
     const auto run = hand_over(pushed(0.1, set), one(start), {.t_end = 1});
-    EXPECT_EQ(run.outcome, HandOverOutcome::not_converged);
+    EXPECT_EQ(run.outcome, Outcome::not_converged);
     // Steps of 1e-3 end within one of the time, events where the set changes.
     EXPECT_NEAR(run.state.t, 0.5, 2e-3);
     EXPECT_EQ(run.failure.set, 0);
@@ -412,7 +412,7 @@ TEST(HandOver, ASetThatBecomesEmptyEndsTheRun)
     const auto run = hand_over(
         pushed(0.1, [](double t) { return IntervalSet::symmetric(t < 0.5 ? 1 : std::nan("")); }),
         one(5), {.t_end = 1});
-    EXPECT_EQ(run.outcome, HandOverOutcome::non_finite);
+    EXPECT_EQ(run.outcome, Outcome::non_finite);
     EXPECT_LE(run.state.t, 0.5);
 }
 
@@ -428,7 +428,7 @@ struct SecondVanishes : TwinRelays {
 TEST(HandOver, NamesTheReactionWhoseSetIsEmpty)
 {
     const auto run = hand_over(SecondVanishes{}, Eigen::Vector2d(3, 3), {.t_end = 1});
-    EXPECT_EQ(run.outcome, HandOverOutcome::not_converged);
+    EXPECT_EQ(run.outcome, Outcome::not_converged);
     EXPECT_NEAR(run.state.t, 0.5, 1e-9);
     EXPECT_EQ(run.failure.set, 1);
     EXPECT_NEAR(run.state.w[0], 2.5, 1e-8);
@@ -451,7 +451,7 @@ struct RelayTwoIntegrationsAway {
 TEST(HandOver, ChatteringIsSteppedOver)
 {
     const auto run = hand_over(RelayTwoIntegrationsAway{}, Eigen::Vector2d(0, 1e-8), {.t_end = 1});
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_GE(run.phases.size(), 2u);
     EXPECT_EQ(run.phases[1].cause, PhaseCause::chattering);
     // A thousand steps of 1e-3, and a few hundred switches before each set-valued phase; the
@@ -465,10 +465,10 @@ TEST(HandOver, StepsOfBothKindsCountTowardsTheLimit)
 {
     const auto run = hand_over(RelayTwoIntegrationsAway{}, Eigen::Vector2d(0, 1e-8),
                                {.t_end = 1, .max_steps = 700});
-    EXPECT_EQ(run.outcome, HandOverOutcome::step_limit);
+    EXPECT_EQ(run.outcome, Outcome::step_limit);
     EXPECT_LE(run.statistics.event_driven.steps + run.statistics.set_valued.attempted, 700u);
     EXPECT_EQ(hand_over(SlidingMode{}, one(0.15), {.t_end = 1, .max_steps = 0}).outcome,
-              HandOverOutcome::step_limit);
+              Outcome::step_limit);
 }
 
 // --- reactions that move while everything is held ---
@@ -494,7 +494,7 @@ TEST(HandOver, EveryExitFromRestIsFound)
     constexpr int halves = 120;
     const auto run = hand_over(system, one(0), {.t_end = halves * half});
 
-    ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 2u * halves);
     for (std::size_t i = 0; i < halves; ++i) {
         EXPECT_EQ(run.events[2 * i].kind, EventKind::slip);
@@ -513,7 +513,7 @@ TEST(HandOver, TwoSinesAsALoadMoveARelayFromRest)
         const Loaded system{.slow = 0.7, .fast = 0.3 + 0.002 * i, .frequency = 3 + 0.07 * i};
         const auto run = hand_over(system, one(0), {.t_end = 20});
         const auto fine = hand_over(system, one(0), {.t_end = 20, .h_max = 0.02});
-        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
         EXPECT_EQ(run.events.size(), fine.events.size()) << i;
         EXPECT_NEAR(run.state.w[0], fine.state.w[0], 1e-8) << i;
         for (const auto& event : run.events) EXPECT_NE(event.mode_before, event.mode_after) << i;
@@ -526,7 +526,7 @@ TEST(HandOver, ALoadOfTheSizeOfTheBoundIsHeldInLongSteps)
     for (const double load : {1.0, std::nextafter(1.0, 0.0), -1.0}) {
         const auto system = pushed(load, [](double) { return IntervalSet::symmetric(1); });
         const auto run = hand_over(system, one(0), {.t_end = 100});
-        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
         EXPECT_EQ(run.state.w[0], 0);
         EXPECT_LE(run.statistics.event_driven.steps, 50u);
     }
@@ -537,7 +537,7 @@ TEST(HandOver, ALoadOfTheSizeOfTheBoundIsHeldInLongSteps)
 TEST(HandOver, EndsAtOnceWhereItStarts)
 {
     const auto run = hand_over(SlidingMode{}, one(0.15), {.t_end = 0});
-    EXPECT_EQ(run.outcome, HandOverOutcome::reached_end);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_EQ(run.state.w[0], 0.15);
 }
 
@@ -545,12 +545,12 @@ TEST(HandOver, ReportsLimitsAndCancelling)
 {
     const auto few =
         hand_over(DiodeCircuit{}, DiodeCircuit::start(), {.t_end = 20, .max_steps = 5});
-    EXPECT_EQ(few.outcome, HandOverOutcome::step_limit);
+    EXPECT_EQ(few.outcome, Outcome::step_limit);
     EXPECT_LT(few.state.t, 20);
     const std::atomic<bool> stop{true};
     const auto none =
         hand_over(InclineBlock{}, Eigen::Vector4d(1, 0, 0, 0), {.t_end = 2, .cancelled = &stop});
-    EXPECT_EQ(none.outcome, HandOverOutcome::cancelled);
+    EXPECT_EQ(none.outcome, Outcome::cancelled);
 }
 
 struct Singular : TwinRelays {
@@ -587,7 +587,7 @@ struct Obstacle : SlidingMode {
 TEST(HandOver, RefusesAStartInsideAnObstacle)
 {
     EXPECT_THROW((void)hand_over(Obstacle{}, one(-1), {.t_end = 1}), std::invalid_argument);
-    EXPECT_EQ(hand_over(Obstacle{}, one(1), {.t_end = 0.1}).outcome, HandOverOutcome::reached_end);
+    EXPECT_EQ(hand_over(Obstacle{}, one(1), {.t_end = 0.1}).outcome, Outcome::reached_end);
 }
 
 }  // namespace

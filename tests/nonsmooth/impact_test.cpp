@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "problems/incline_block.hpp"
 #include "refusal.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
-#include "problems/incline_block.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
 #include "ricochet/systems/woodpecker.hpp"
 
@@ -25,7 +25,7 @@ TEST(InclineBlockMotion, KeepsItsInvariantToOrderTwoWhileItTurns)
         SetValuedMotion<InclineBlock> motion(block, {-1, 2, 0, 0},
                                              {.t_end = 0.6, .step = 0.01 / (1 << k)});
         const double start = block.invariant(motion.state().w);
-        EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        EXPECT_EQ(motion.run(), Outcome::reached_end);
         drift[k] = block.invariant(motion.state().w) - start;
         EXPECT_LT(std::abs(drift[k]), 1e-2 * start);
     }
@@ -38,7 +38,7 @@ TEST(InclineBlockMotion, ComesToRestWhereFrictionHoldsIt)
     const InclineBlock block;
     const double braking = 9.81 * (0.5 * std::cos(0.3) - std::sin(0.3));
     SetValuedMotion<InclineBlock> motion(block, {2, 0, 0, 0}, {.t_end = 2, .step = 1e-3});
-    EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+    EXPECT_EQ(motion.run(), Outcome::reached_end);
     EXPECT_NEAR(motion.state().w[0], 0, 1e-10);
     EXPECT_NEAR(motion.state().w[1], 0, 1e-10);
     EXPECT_NEAR(motion.state().w[2], 2 * 2 / (2 * braking), 2e-3);  // a step at 2 m/s
@@ -80,7 +80,7 @@ TEST(TimeStepping, PassesTheAccumulationOfABouncingBallAndRests)
 {
     // From 1 m with e = 0.5 the impacts end at sqrt(2 / g) (1 + e) / (1 - e) = 1.3546 s.
     TimeStepping<Ball1d> motion({}, Ball1d::V(1.0), Ball1d::V(0.0), {.t_end = 2, .step = 1e-3});
-    EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+    EXPECT_EQ(motion.run(), Outcome::reached_end);
     EXPECT_EQ(motion.state().t, 2);
     EXPECT_NEAR(motion.state().v[0], 0, 1e-9);
     EXPECT_NEAR(motion.state().q[0], 0, 5e-3);
@@ -98,7 +98,7 @@ TEST(TimeStepping, IsOfOrderOneAcrossAnImpact)
         for (int k = 0; k < 20; ++k) {
             TimeStepping<Ball1d> motion({}, Ball1d::V(1.0), Ball1d::V(0.0),
                                         {.t_end = 0.8, .step = 0.8 / (steps + 3 * k)});
-            EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+            EXPECT_EQ(motion.run(), Outcome::reached_end);
             sum += std::abs(motion.state().q[0] - exact);
         }
         return sum / 20;
@@ -118,7 +118,7 @@ TEST(TimeStepping, EnergyOfAnElasticBallNeverGrowsAtAnImpact)
         const double energy = 9.81 * state.q[0] + state.v[0] * state.v[0] / 2;
         EXPECT_NEAR(energy, 9.81, 0.15) << state.t;
     }),
-              SetValuedOutcome::reached_end);
+              Outcome::reached_end);
 }
 
 TEST(TimeStepping, ABlockOnTwoCornersSlidesToRestAndLeansForward)
@@ -135,7 +135,7 @@ TEST(TimeStepping, ABlockOnTwoCornersSlidesToRestAndLeansForward)
         EXPECT_NEAR(state.impulse[0], 0.4 * weight, 1e-6 * weight) << state.t;
         EXPECT_NEAR(state.impulse[3], -0.4 * 0.6 * weight, 1e-6 * weight);
     }),
-              SetValuedOutcome::reached_end);
+              Outcome::reached_end);
     EXPECT_NEAR(motion.state().q[0], 3 * 3 / (2 * 0.4 * 9.81), 3 * h);
     EXPECT_NEAR(motion.state().v.norm(), 0, 1e-9);
     // A corner that rounding has opened falls for one step: g h^2.
@@ -155,7 +155,7 @@ TEST(TimeStepping, TheWoodpeckerClimbsDownInACycle)
             heights.push_back(state.q[0]);
         }
     }),
-              SetValuedOutcome::reached_end);
+              Outcome::reached_end);
     ASSERT_GT(beak.size(), 8U);
     // The last cycles are alike, and each brings it down.
     const std::size_t n = beak.size();
@@ -201,7 +201,7 @@ TEST(TimeStepping, AnImpactWithoutASolutionEndsTheRunAndMakesNoEnergy)
         RoughCorner corner;
         corner.mu = mu;
         TimeStepping<RoughCorner> motion(corner, {0, 0}, {-1, -1}, {.t_end = 1, .step = 0.01});
-        EXPECT_EQ(motion.run(), SetValuedOutcome::not_converged);
+        EXPECT_EQ(motion.run(), Outcome::not_converged);
         EXPECT_EQ(motion.state().t, 0);
         EXPECT_EQ(motion.state().v, Eigen::Vector2d(-1, -1));
         EXPECT_GT(motion.failure().residual, 1e-3);
@@ -214,7 +214,7 @@ TEST(TimeStepping, AForceThatIsNotFiniteEndsTheRunWithWhatWasComputed)
     for (const double height : {0.0, 5.0}) {  // in contact, in flight
         TimeStepping<Corner> motion({.e = 0, .broken_from = 0.5}, {1, height}, {0, 0},
                                     {.t_end = 1, .step = 0.01});
-        EXPECT_EQ(motion.run(), SetValuedOutcome::not_converged);
+        EXPECT_EQ(motion.run(), Outcome::not_converged);
         // Steps are halved ten times on the way there.
         EXPECT_GT(motion.state().t, 0.48);
         EXPECT_LT(motion.state().t, 0.51);
@@ -228,7 +228,7 @@ TEST(TimeStepping, ARunOfNoLengthIsOver)
     TimeStepping<Ball1d> motion({}, Ball1d::V(1.0), Ball1d::V(0.0),
                                 {.t_start = 2, .t_end = 2, .step = 0.1});
     int seen = 0;
-    EXPECT_EQ(motion.run([&](const auto&) { ++seen; }), SetValuedOutcome::reached_end);
+    EXPECT_EQ(motion.run([&](const auto&) { ++seen; }), Outcome::reached_end);
     EXPECT_EQ(seen, 1);
     EXPECT_EQ(motion.state().t, 2);
     EXPECT_EQ(motion.state().q[0], 1);

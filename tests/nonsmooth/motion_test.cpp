@@ -111,7 +111,7 @@ TEST(SlidingModeMotion, IsExactlyZeroOnceItSlides)
             // The reaction of before the switch is half used in the step after it.
             if (state.t > 0.0965 && state.w[0] != 0) zero_for_ever = false;
         });
-        EXPECT_EQ(outcome, SetValuedOutcome::reached_end);
+        EXPECT_EQ(outcome, Outcome::reached_end);
         EXPECT_EQ(motion.state().t, 0.5);
         EXPECT_TRUE(zero_for_ever);
         // There the reaction balances the disturbance.
@@ -131,7 +131,7 @@ TEST(SlidingModeMotion, IsOfOrderTwoOnTheSmoothStretchAndAtTheLocatedSwitch)
             SetValuedMotion<SlidingMode> motion(
                 system, one(from),
                 {.t_end = 0.5, .step = 1e-3 / (k + 1), .switches = Switches::located});
-            while (motion.advance() == SetValuedOutcome::running) {
+            while (motion.advance() == Outcome::running) {
                 const auto& state = motion.state();
                 if (state.t < 0.07) {
                     before_switch[k] = std::max(before_switch[k],
@@ -139,7 +139,7 @@ TEST(SlidingModeMotion, IsOfOrderTwoOnTheSmoothStretchAndAtTheLocatedSwitch)
                 }
                 if (motion.statistics().switches == 1 && switching[k] == 0) switching[k] = state.t;
             }
-            EXPECT_EQ(motion.outcome(), SetValuedOutcome::reached_end);
+            EXPECT_EQ(motion.outcome(), Outcome::reached_end);
             EXPECT_EQ(motion.statistics().switches, 1U);
             EXPECT_EQ(motion.state().w[0], 0);
         }
@@ -188,7 +188,7 @@ TEST(DiodeCircuitMotion, MeetsAllTwelveChangesInOrderWithErrorsOfOrderTwo)
             DiodeCircuit(), DiodeCircuit::start(),
             {.t_end = 20, .step = 2e-3 / (k + 1), .switches = Switches::located});
         std::uint64_t seen = 0;
-        while (motion.advance() == SetValuedOutcome::running) {
+        while (motion.advance() == Outcome::running) {
             if (motion.statistics().switches == seen) continue;
             ++seen;
             times[k].push_back(motion.state().t);
@@ -222,7 +222,7 @@ TEST(DiodeCircuitMotion, IsOfOrderOneWhereJumpsOfTheReactionAreSteppedOver)
             SetValuedMotion<DiodeCircuit> motion(
                 DiodeCircuit(), DiodeCircuit::start(),
                 {.t_end = 4, .step = 4.0 / (steps + 17 * k), .switches = switches});
-            EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+            EXPECT_EQ(motion.run(), Outcome::reached_end);
             sum += (motion.state().w - exact.final).norm();
         }
         return sum / 8;
@@ -265,7 +265,7 @@ double order_while_sliding(const SchemeOptions& scheme)
     for (int k = 0; k < 3; ++k) {
         SetValuedMotion<SlipWeakening> motion(
             SlipWeakening(), {0, -2, 0}, {.t_end = 2, .step = 0.02 / (1 << k), .scheme = scheme});
-        EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        EXPECT_EQ(motion.run(), Outcome::reached_end);
         final[k] = motion.state().w[2];
     }
     return std::log2((final[0] - final[1]) / (final[1] - final[2]));
@@ -291,7 +291,7 @@ TEST(Order, WhileStickingSchemesKeepTheirOrders)
                 DiodeCircuit(), {0, 0.5, 0.1},
                 {.t_end = 1, .step = 0.01 / (1 << k), .scheme = scheme});
             EXPECT_EQ(motion.run([](const auto& state) { EXPECT_EQ(state.w[0], 0); }),
-                      SetValuedOutcome::reached_end);
+                      Outcome::reached_end);
             final[k] = motion.state().w[1];
         }
         return std::log2((final[0] - final[1]) / (final[1] - final[2]));
@@ -313,7 +313,7 @@ TEST(CoulombInclusion, TurnsAndSticksWhereTheAutomatonDoes)
         inclusion, {2, 0}, {.t_end = 12, .step = 1e-3, .switches = Switches::located});
     std::vector<Eigen::Vector3d> turns;
     std::uint64_t seen = 0;
-    while (motion.advance() == SetValuedOutcome::running) {
+    while (motion.advance() == Outcome::running) {
         if (motion.statistics().switches == seen) continue;
         seen = motion.statistics().switches;
         turns.push_back({motion.state().t, motion.state().w[0], motion.state().w[1]});
@@ -337,7 +337,7 @@ TEST(CoulombInclusion, FixedStepsAreOfOrderOneAcrossTurns)
         for (int k = 0; k < 20; ++k) {
             SetValuedMotion<FrictionInclusion> motion(FrictionInclusion(), {2, 0},
                                                       {.t_end = 4, .step = 4.0 / (steps + 3 * k)});
-            EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+            EXPECT_EQ(motion.run(), Outcome::reached_end);
             // After one turn, at pi: u = 0.3 * -1 + (-1.4 + 0.3) cos(t - pi).
             sum += std::abs(motion.state().w[0] - (-0.3 - 1.1 * std::cos(4 - std::numbers::pi)));
         }
@@ -360,12 +360,12 @@ TEST(StickSlipInclusion, SticksAgainWhenTheAutomatonDoesWithErrorsOfOrderTwo)
             {.t_end = 14, .step = 2e-3 / (k + 1), .switches = Switches::located});
         double stick = 0;
         double onset = 0;
-        while (motion.advance() == SetValuedOutcome::running) {
+        while (motion.advance() == Outcome::running) {
             const bool sticks = motion.branches()[0] == Branch::inside;
             if (stick == 0 && sticks && motion.state().w[0] < 0) stick = motion.state().t;
             if (stick != 0 && onset == 0 && !sticks) onset = motion.state().t;
         }
-        EXPECT_EQ(motion.outcome(), SetValuedOutcome::reached_end);
+        EXPECT_EQ(motion.outcome(), Outcome::reached_end);
         stick_error[k] = stick - 0.5 - StickSlip::stick_time;
         period_error[k] = onset - 0.5 - StickSlip::period;
     }
@@ -389,7 +389,7 @@ TEST(Energy, BackwardEulerNeverGains)
             EXPECT_LE(system.energy(state.w), energy * (1 + 1e-14)) << state.t;
             energy = system.energy(state.w);
         }),
-                  SetValuedOutcome::reached_end);
+                  Outcome::reached_end);
     }
 }
 
@@ -404,7 +404,7 @@ TEST(Energy, BatheWithoutFrictionNeverGains)
             EXPECT_LE(system.energy(state.w), energy * (1 + 1e-14)) << state.t;
             energy = system.energy(state.w);
         }),
-                  SetValuedOutcome::reached_end);
+                  Outcome::reached_end);
     }
 }
 
@@ -426,7 +426,7 @@ double largest_growth(double step, FirstStage first_stage)
             if (energy > 1e-3) growth = std::max(growth, now / energy);
             energy = now;
         }),
-                  SetValuedOutcome::reached_end);
+                  Outcome::reached_end);
     }
     return growth;
 }
@@ -451,7 +451,7 @@ TEST(Energy, MotionStaysBoundedFarAboveTheNaturalStep)
                 {.t_end = 1000 * step, .step = step, .scheme = {.first_stage = first}});
             EXPECT_EQ(
                 motion.run([](const auto& state) { EXPECT_LT(state.w.norm(), 5) << state.t; }),
-                SetValuedOutcome::reached_end);
+                Outcome::reached_end);
         }
     }
 }
@@ -478,7 +478,7 @@ TEST(ErrorControl, EveryControllerReachesTheEndOfTheCircuitWithAnErrorNearItsTol
             sum += (state.w - exact.state(state.t)).squaredNorm();
             size += exact.state(state.t).squaredNorm();
         }),
-                  SetValuedOutcome::reached_end);
+                  Outcome::reached_end);
         EXPECT_EQ(motion.state().t, 20);
         EXPECT_LT(std::sqrt(sum / size), 2e-3) << controller.index();
         const auto& s = motion.statistics();
@@ -515,7 +515,7 @@ TEST(ErrorControl, LandsExactlyOnTheEndWithoutASliver)
         SetValuedMotion<DiodeCircuit> motion(DiodeCircuit(), DiodeCircuit::start(),
                                              {.t_end = 21, .step = step});
         double shortest = 1;
-        while (motion.advance() == SetValuedOutcome::running) {
+        while (motion.advance() == Outcome::running) {
             shortest = std::min(shortest, motion.state().t - motion.before().t);
         }
         EXPECT_EQ(motion.state().t, 21);
@@ -556,7 +556,7 @@ TEST(Locate, FindsTheReleaseOfTheStuckDiodeFromTheReaction)
             {.t_start = stuck, .t_end = 4, .step = 0.01 / (1 << k)});
         const auto bound = [](const auto& s) { return 0.8 - 1e-12 - std::abs(s.reaction[0]); };
         std::optional<SetValuedState<DiodeCircuit>> at;
-        while (!at && motion.advance() == SetValuedOutcome::running) {
+        while (!at && motion.advance() == Outcome::running) {
             at = motion.locate(bound);
         }
         ASSERT_TRUE(at);
@@ -650,7 +650,7 @@ TEST(Doubling, KeepsTheTwoHalfStepsWhereSwitchesAreLocated)
                                     .error_order = 1,
                                     .switches = Switches::located,
                                     .scheme = {.scheme = Scheme::backward_euler}});
-    ASSERT_EQ(motion.advance(), SetValuedOutcome::running);
+    ASSERT_EQ(motion.advance(), Outcome::running);
     ASSERT_EQ(motion.state().t, 0.1);
     const auto exact = std::complex<double>(1, 1) / ((1.0 - z / 2.0) * (1.0 - z / 2.0));
     EXPECT_NEAR(motion.state().w[0], exact.real(), 1e-14);
@@ -682,7 +682,7 @@ TEST(Start, IsRefusedWhereNoReactionOfAConeOpposesIt)
     const Eigen::Vector2d push(1, -1);
     // -y must be normal to the cone: y in its dual, y0 >= |y1| / 2.
     for (const Eigen::Vector2d& start : {Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, 1),
-                                        Eigen::Vector2d(1, 2.01), Eigen::Vector2d(1, -3)}) {
+                                         Eigen::Vector2d(1, 2.01), Eigen::Vector2d(1, -3)}) {
         EXPECT_THROW((void)first_reaction(cone, push, start), std::invalid_argument) << start;
     }
     EXPECT_EQ(first_reaction(cone, push, {1, 0.5}), Eigen::Vector2d(0, 0));
@@ -694,8 +694,9 @@ TEST(Start, IsRefusedWhereNoReactionOfAConeOpposesIt)
     EXPECT_THROW((void)first_reaction(Ball<2>(infinity), push, {1, 0}), std::invalid_argument);
     EXPECT_NEAR((first_reaction(Ball<2>(2), push, {3, 4}) - Eigen::Vector2d(-1.2, -1.6)).norm(), 0,
                 1e-8);
-    EXPECT_NEAR((first_reaction(Ball<2>(2), push, {3e-9, 4e-9}) - Eigen::Vector2d(-1.2, -1.6)).norm(),
-                0, 1e-8);
+    EXPECT_NEAR(
+        (first_reaction(Ball<2>(2), push, {3e-9, 4e-9}) - Eigen::Vector2d(-1.2, -1.6)).norm(), 0,
+        1e-8);
 }
 
 // f escapes to infinity at t = 1 and is no number beyond.
@@ -709,7 +710,7 @@ struct Escaping {
 TEST(Failure, EndsTheRunWithTimeAndResidual)
 {
     SetValuedMotion<Escaping> motion(Escaping(), one(0.5), {.t_end = 2, .step = 0.01});
-    EXPECT_EQ(motion.run(), SetValuedOutcome::not_converged);
+    EXPECT_EQ(motion.run(), Outcome::not_converged);
     EXPECT_LT(motion.state().t, 1);
     EXPECT_GT(motion.state().t, 0.99);
     EXPECT_FALSE(motion.failure().converged);
@@ -720,13 +721,16 @@ TEST(Failure, EndsTheRunWithTimeAndResidual)
 
 // The bound turns negative at t = 0.5: the set is empty from there on.
 struct Vanishing : SlidingMode {
-    static IntervalSet reaction_set(double t, const One&) { return IntervalSet::symmetric(0.5 - t); }
+    static IntervalSet reaction_set(double t, const One&)
+    {
+        return IntervalSet::symmetric(0.5 - t);
+    }
 };
 
 TEST(Failure, NamesTheSetThatFailed)
 {
     SetValuedMotion<Vanishing> motion(Vanishing(), one(1), {.t_end = 2, .step = 0.01});
-    EXPECT_EQ(motion.run(), SetValuedOutcome::not_converged);
+    EXPECT_EQ(motion.run(), Outcome::not_converged);
     EXPECT_NEAR(motion.state().t, 0.5, 0.01);
     EXPECT_EQ(motion.failure().set, 0);
 }
@@ -735,7 +739,7 @@ TEST(Failure, AStepLimitIsKept)
 {
     SetValuedMotion<SlidingMode> motion(SlidingMode(), one(1),
                                         {.t_end = 1, .step = 0.01, .max_attempts = 7});
-    EXPECT_EQ(motion.run(), SetValuedOutcome::step_limit);
+    EXPECT_EQ(motion.run(), Outcome::step_limit);
     EXPECT_EQ(motion.statistics().attempted, 7U);
 }
 

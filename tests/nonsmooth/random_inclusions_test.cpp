@@ -37,7 +37,7 @@ void follow(InclusionFamily family, std::uint64_t seed, int reference_steps)
     const InclusionMatrices<RandomInclusion<M>> matrices(system);
     for (const double divisions : {200, 1000, 5000}) {
         const auto run = run_of<M>(system, divisions);
-        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end) << name(run.outcome);
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << name(run.outcome);
         const double h = system.t_end / divisions;
         for (std::size_t i = 0; i < run.trajectory.x.size(); ++i) {
             EXPECT_LE(reference.error(i, run.trajectory.x[i]), reference.allowed(h))
@@ -94,7 +94,7 @@ TEST(RandomInclusions, ARelayTwoIntegrationsAwayIsCrossedAtAnySpeed)
         system.start[1] = speed;
         system.t_end = 0.2;
         const auto run = run_of<4>(system, 1000);
-        ASSERT_EQ(run.outcome, HandOverOutcome::reached_end);
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
         EXPECT_FALSE(run.phases.size() > 1) << name(run.phases[1].cause) << " at " << speed;
     }
 }

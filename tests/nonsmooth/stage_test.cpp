@@ -168,7 +168,7 @@ TEST(SetsOfOnesOwn, SixRelaysOfDynamicSizeMatchTheSameInCases)
     for (const int n : {3, 6}) {
         SetValuedMotion<ManyRelays> motion(ManyRelays{n}, Eigen::VectorXd::Constant(n, 0.4),
                                            {.t_end = 3, .step = 0.01});
-        EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        EXPECT_EQ(motion.run(), Outcome::reached_end);
         final[n == 6] = motion.state().w.head(3);
     }
     EXPECT_LT((final[0] - final[1]).norm(), 1e-9);
@@ -204,7 +204,7 @@ TEST(Stops, KeepTheStateInsideAndPushOnlyInwards)
             EXPECT_GE(s.w[0], -1);
             EXPECT_LE(s.w[0], 2);
         }),
-                  SetValuedOutcome::reached_end);
+                  Outcome::reached_end);
         // The step that meets the stop half uses its reaction: a step times the drive.
         EXPECT_LT(worst, 3e-3);
     }
@@ -222,7 +222,7 @@ TEST(SuperTwistingMotion, ReachesZeroInFiniteTimeAndStays)
     EXPECT_EQ(motion.run([&](const auto& state) {
         if (state.t > 6) late = std::max(late, std::abs(state.w[0]));
     }),
-              SetValuedOutcome::reached_end)
+              Outcome::reached_end)
         << motion.state().t << " " << motion.failure().residual;
     // Implicitly discretised there is no chattering: x1 is zero to rounding, x2 = 0 with it,
     // and the reaction is minus the rate of the disturbance.

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "refusal.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet {
@@ -144,7 +144,7 @@ TEST(StepPolicy, ThatReturnsZeroIsTheClassicalRule)
     const auto end_of = [](const StepController& controller) {
         SetValuedMotion<DiodeCircuit> motion(DiodeCircuit{}, DiodeCircuit::start(),
                                              circuit_options(controller));
-        EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        EXPECT_EQ(motion.run(), Outcome::reached_end);
         return motion.state().w;
     };
     EXPECT_EQ(end_of(LearnedStep{.policy = policy(DiodeCircuit::step_layout())}),
@@ -215,8 +215,7 @@ TEST(StepPolicy, AnyWeightsEndTheRun)
             weights.push_back(5 * std::sin(static_cast<double>((k + 1) * (i + 1))));
         }
         const Rupture run = rupture(learned(policy(fault_step_layout(), weights), 1e-3));
-        EXPECT_TRUE(run.outcome == RuptureOutcome::at_rest ||
-                    run.outcome == RuptureOutcome::reached_end)
+        EXPECT_TRUE(run.outcome == Outcome::at_rest || run.outcome == Outcome::reached_end)
             << describe(run.outcome);
         EXPECT_EQ(run.t, 30.0);
         EXPECT_NEAR(run.mean_slip / slip, 1, 0.1);
@@ -253,7 +252,7 @@ TEST(StepPolicy, SlidingModeEndsWhereItShould)
     options.scheme.first_stage = FirstStage::switch_aware;
     SetValuedMotion<SlidingMode> motion(SlidingMode{}, SlidingMode::Vector::Constant(0.15),
                                         options);
-    EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+    EXPECT_EQ(motion.run(), Outcome::reached_end);
     EXPECT_EQ(motion.state().t, 0.5);
     EXPECT_EQ(motion.state().w[0], 0.0);
     EXPECT_GT(std::get<LearnedStep>(motion.controller()).asked, 0U);
@@ -274,7 +273,7 @@ TEST(ErrorFields, AreMeasuredByTheirNorms)
         parameters.current *= scale;
         SetValuedMotion<DiodeCircuit> motion(DiodeCircuit(parameters),
                                              scale * DiodeCircuit::start(), options);
-        EXPECT_EQ(motion.run(), SetValuedOutcome::reached_end);
+        EXPECT_EQ(motion.run(), Outcome::reached_end);
         return motion.statistics().accepted;
     };
     // A power of two changes no bit of the state's digits.

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "ricochet/faults/strike_slip_fault.hpp"
+#include "ricochet/integrate/outcome.hpp"
 
 namespace ricochet {
 
@@ -39,20 +40,6 @@ struct RuptureOptions {
 
 /// @throws std::invalid_argument naming the option, what was given and what was expected.
 void validate(const RuptureOptions& options);
-
-enum class RuptureOutcome {
-    reached_end,
-    at_rest,  ///< nothing moves any more, nor will: the end is reached exactly
-    non_finite,
-    step_underflow,
-    step_limit,
-    not_converged,  ///< an implicit stage was not solved however short the step
-    cancelled,
-};
-
-[[nodiscard]] std::string_view name(RuptureOutcome outcome) noexcept;
-/// One sentence with the remedy.
-[[nodiscard]] std::string_view describe(RuptureOutcome outcome) noexcept;
 
 /// Fields over the elements, along x first.
 struct RuptureSnapshot {
@@ -77,7 +64,7 @@ struct RuptureStatistics {
 };
 
 struct Rupture {
-    RuptureOutcome outcome = RuptureOutcome::reached_end;
+    Outcome outcome = Outcome::reached_end;
     double t = 0;              ///< [s] reached
     double mean_slip = 0;      ///< path, mean over the square [m]
     double peak_velocity = 0;  ///< of the mean velocity [m/s]

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ricochet/detail/variational_step.hpp"
+#include "ricochet/integrate/outcome.hpp"
 
 namespace ricochet {
 
@@ -60,16 +61,6 @@ struct SliderEvent {
     SliderState at{};
 };
 
-enum class SliderOutcome {
-    reached_end,
-    unsolved,        ///< an equation had no solution found
-    step_underflow,  ///< no step above 1e-14 t met the tolerance
-    step_limit,
-    non_finite,
-    cancelled,  ///< `SliderOptions::cancelled` was set
-};
-[[nodiscard]] std::string_view describe(SliderOutcome outcome) noexcept;
-
 struct SliderOptions {
     double t_end = 2;          ///< [s], after the start
     int order = 4;             ///< 1, 2 or 4
@@ -84,7 +75,7 @@ struct SliderOptions {
 };
 
 struct SliderRun {
-    SliderOutcome outcome = SliderOutcome::reached_end;
+    Outcome outcome = Outcome::reached_end;
     SliderState state{};
     std::vector<SliderEvent> events{};
     std::vector<SliderState> samples{};

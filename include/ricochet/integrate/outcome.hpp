@@ -24,6 +24,11 @@ enum class Outcome {
     wrong_dimension,       ///< the flow or a reset left a state of another dimension
     stalled,               ///< `Options::stall_steps` steps hardly advanced the time
     stopped_by_callback,   ///< a function of the system reported an error, see `ricochet.h`
+    at_rest,               ///< of a fault: nothing moves any more, nor will; the end is reached
+    not_handed_over,       ///< a set-valued phase was due, and `HandOverOptions::events_only`
+    released,              ///< no reaction is held any more, and `HandOverOptions::until_released`
+    law_violated,          ///< a set-valued step ended with a reaction that contradicts its y
+    running,               ///< of a set-valued motion: it has not ended
 };
 
 /// The enumerator's name, e.g. "reached_end".

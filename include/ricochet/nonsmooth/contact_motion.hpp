@@ -52,7 +52,7 @@ template <int N>
 struct AnyContactRun {
     using X = typename AnyFlight<N>::State;
 
-    HandOverOutcome outcome = HandOverOutcome::reached_end;
+    Outcome outcome = Outcome::reached_end;
     double t = 0;
     X x{};
     std::vector<Event<X>> events;
@@ -108,7 +108,7 @@ private:
             .t_start = options.t_start, .t_end = options.t_end, .step = options.set_valued.step};
     }
 
-    void end_with(HandOverOutcome outcome)
+    void end_with(Outcome outcome)
     {
         run_.outcome = outcome;
         ended_ = true;
@@ -152,14 +152,14 @@ private:
         add(run_.statistics.event_driven, done.statistics);
         if (chatters) return touch_down(PhaseCause::chattering);
         if (const auto cause = cause_after(done.outcome)) return touch_down(*cause);
-        end_with(in_hand_over(done.outcome));
+        end_with(done.outcome);
     }
 
     // --- contact ---
 
     void touch_down(PhaseCause cause)
     {
-        if (options_.events_only) return end_with(HandOverOutcome::not_handed_over);
+        if (options_.events_only) return end_with(Outcome::not_handed_over);
         // Who is back at once stays longer.
         const bool at_once = run_.t - run_.phases.back().from < 10 * options_.set_valued.step;
         patience_ = at_once ? std::min(2 * patience_, std::uint64_t{1} << 20) : 1;
@@ -176,20 +176,20 @@ private:
         while (!ended_ && in_contact_) {
             const double t_before = steps_.state().t;
             const X before = Flight::state(steps_.state().q, steps_.state().v);
-            const SetValuedOutcome outcome = steps_.advance();
+            const Outcome outcome = steps_.advance();
             const auto& now = steps_.state();
             run_.t = now.t;
             run_.x = Flight::state(now.q, now.v);
             emit_samples(t_before, before);
             open = is_open() ? open + 1 : 0;
-            if (outcome == SetValuedOutcome::not_converged) run_.failure = steps_.failure();
-            if (outcome != SetValuedOutcome::running) {
+            if (outcome == Outcome::not_converged) run_.failure = steps_.failure();
+            if (outcome != Outcome::running) {
                 end_with(stepping_outcome(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
-                end_with(HandOverOutcome::cancelled);
+                end_with(Outcome::cancelled);
             } else if (run_.statistics.event_driven.steps + steps_.statistics().steps >=
                        options_.max_steps) {
-                end_with(HandOverOutcome::step_limit);
+                end_with(Outcome::step_limit);
             } else if (open >= patience_) {
                 in_contact_ = false;
             }
@@ -200,11 +200,11 @@ private:
         run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = PhaseCause::released});
     }
 
-    [[nodiscard]] HandOverOutcome stepping_outcome(SetValuedOutcome outcome) const
+    [[nodiscard]] Outcome stepping_outcome(Outcome outcome) const
     {
-        const bool failed = outcome == SetValuedOutcome::not_converged;
-        if (failed && std::isinf(run_.failure.residual)) return HandOverOutcome::non_finite;
-        return in_hand_over(outcome);
+        const bool failed = outcome == Outcome::not_converged;
+        if (failed && std::isinf(run_.failure.residual)) return Outcome::non_finite;
+        return outcome;
     }
 
     /// Whether no contact pushed in the last step, and all are open after it.

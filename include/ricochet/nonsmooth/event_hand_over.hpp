@@ -41,7 +41,7 @@ concept KnowsInclusion = requires(const System& system)
 /// the reaction, and the modes are the one before the phase.
 template <class X>
 struct MixedRun {
-    HandOverOutcome outcome = HandOverOutcome::reached_end;
+    Outcome outcome = Outcome::reached_end;
     double t = 0;
     X x{};
     Mode mode = 0;
@@ -115,7 +115,7 @@ private:
     [[nodiscard]] std::optional<PhaseCause> follow_events()
     {
         if (steps_taken() >= options_.max_steps) {
-            run_.outcome = HandOverOutcome::step_limit;
+            run_.outcome = Outcome::step_limit;
             return std::nullopt;
         }
         Options options = options_;
@@ -145,7 +145,7 @@ private:
         detail::add(run_.statistics.event_driven, done.statistics);
         if (chatters) return PhaseCause::chattering;
         if (const auto cause = detail::cause_after(done.outcome)) return cause;
-        run_.outcome = detail::in_hand_over(done.outcome);
+        run_.outcome = done.outcome;
         return std::nullopt;
     }
 
@@ -175,11 +175,11 @@ private:
         run_.x = detail::converted_state(done.state.w, run_.x);
         run_.failure = done.failure;
         run_.outcome = done.outcome;
-        if (done.outcome != HandOverOutcome::released) return true;
+        if (done.outcome != Outcome::released) return true;
         if (!moved) {
             // The inclusion sees nothing that would hold the motion back, and events do not lead
             // on.
-            run_.outcome = HandOverOutcome::not_handed_over;
+            run_.outcome = Outcome::not_handed_over;
             return true;
         }
         if constexpr (Moded<System, X>) run_.mode = system_.start_mode(run_.t, run_.x);

@@ -29,22 +29,6 @@
 
 namespace ricochet {
 
-enum class HandOverOutcome {
-    reached_end,
-    not_converged,    ///< a set is empty, or a stage could not be solved however short the step
-    step_underflow,   ///< no step above h_min met the tolerance
-    step_limit,       ///< `HandOverOptions::max_steps` steps were taken
-    non_finite,       ///< the motion is no longer finite
-    cancelled,        ///< `HandOverOptions::cancelled` was set
-    not_handed_over,  ///< a set-valued phase was due, and `HandOverOptions::events_only`
-    released,         ///< no reaction is held any more, and `HandOverOptions::until_released`
-    law_violated,     ///< a set-valued step ended with a reaction that contradicts its y
-};
-
-[[nodiscard]] std::string_view name(HandOverOutcome outcome) noexcept;
-/// One sentence with the remedy.
-[[nodiscard]] std::string_view describe(HandOverOutcome outcome) noexcept;
-
 /// Why a phase began.
 enum class PhaseCause {
     start,
@@ -106,9 +90,9 @@ template <int N, int M>
 struct RICOCHET_ALIGNED AnyHandOverRun {
     using Vector = Eigen::Matrix<double, N, 1>;
 
-    HandOverOutcome outcome = HandOverOutcome::reached_end;
+    Outcome outcome = Outcome::reached_end;
     StateWithReaction<N, M> state;  ///< at the time reached, with its reaction
-    Mode mode = 0;                 ///< in a set-valued phase `BranchModes::several`
+    Mode mode = 0;                  ///< in a set-valued phase `BranchModes::several`
     std::vector<Event<Vector>> events;
     std::vector<Phase> phases;
     Trajectory<Vector> trajectory;  ///< at the sample times
@@ -193,8 +177,6 @@ void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
 /// What an event-driven phase ended with, as a reason for a set-valued one; nothing if the
 /// run is over.
 [[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
-[[nodiscard]] HandOverOutcome in_hand_over(Outcome outcome) noexcept;
-[[nodiscard]] HandOverOutcome in_hand_over(SetValuedOutcome outcome) noexcept;
 
 /// A simulation with N components, whatever its system and stepper.
 template <int N>
@@ -326,7 +308,7 @@ private:
         return mode == Modes::several ? PhaseCause::several : PhaseCause::no_flow;
     }
 
-    void end_with(HandOverOutcome outcome)
+    void end_with(Outcome outcome)
     {
         run_.outcome = outcome;
         ended_ = true;
@@ -349,7 +331,7 @@ private:
 
     void follow_events() requires can_branch
     {
-        if (steps_taken() >= options_.max_steps) return end_with(HandOverOutcome::step_limit);
+        if (steps_taken() >= options_.max_steps) return end_with(Outcome::step_limit);
         typename Modes::State x;
         Eigen::Map<Vector>(x.data()) = run_.state.w;
         std::unique_ptr<EventLoop<N>> simulation;
@@ -393,7 +375,7 @@ private:
             }
         }
         finish_events(simulation->finish(), chatters, flutters);
-        if (released && !set_valued_) end_with(HandOverOutcome::released);
+        if (released && !set_valued_) end_with(Outcome::released);
     }
 
     /// Where an event-driven step begins, and what had been recorded until then.
@@ -540,7 +522,7 @@ private:
         }
         run_.mode = done.mode;
         if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
-        end_with(in_hand_over(done.outcome));
+        end_with(done.outcome);
     }
 
     /// What an event-driven phase recorded.
@@ -570,7 +552,7 @@ private:
     void end_with_empty_set() requires can_branch
     {
         run_.failure.set = modes_.faulty(run_.state.t, run_.state.w);
-        end_with(HandOverOutcome::not_converged);
+        end_with(Outcome::not_converged);
     }
 
     template <class X>
@@ -616,7 +598,7 @@ private:
                 chatter_patience_ = std::min(2 * chatter_patience_, most_patience);
             }
         }
-        if (options_.events_only) return end_with(HandOverOutcome::not_handed_over);
+        if (options_.events_only) return end_with(Outcome::not_handed_over);
         set_valued_ = true;
         ++run_.statistics.to_set_valued;
         run_.phases.push_back({.from = run_.state.t, .set_valued = true, .cause = cause});
@@ -624,8 +606,7 @@ private:
         try {
             motion_.restart(run_.state.t, run_.state.w);
         } catch (const std::invalid_argument&) {
-            end_with(run_.state.w.allFinite() ? HandOverOutcome::not_converged
-                                              : HandOverOutcome::non_finite);
+            end_with(run_.state.w.allFinite() ? Outcome::not_converged : Outcome::non_finite);
         }
     }
 
@@ -636,19 +617,19 @@ private:
         auto branches = motion_.branches();
         for (std::uint64_t steps = 1; !ended_; ++steps) {
             const std::uint64_t switches = motion_.statistics().switches;
-            const SetValuedOutcome outcome = motion_.advance();
+            const Outcome outcome = motion_.advance();
             const bool switched = motion_.statistics().switches != switches;
             emit_samples(false);
             if (switched) record_switch();
-            if (outcome != SetValuedOutcome::not_converged && breaks_law()) {
-                end_with(HandOverOutcome::law_violated);
-            } else if (outcome != SetValuedOutcome::running) {
-                if (outcome == SetValuedOutcome::not_converged) run_.failure = motion_.failure();
-                end_with(in_hand_over(outcome));
+            if (outcome != Outcome::not_converged && breaks_law()) {
+                end_with(Outcome::law_violated);
+            } else if (outcome != Outcome::running) {
+                if (outcome == Outcome::not_converged) run_.failure = motion_.failure();
+                end_with(outcome);
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
-                end_with(HandOverOutcome::cancelled);
+                end_with(Outcome::cancelled);
             } else if (steps_taken() >= options_.max_steps) {
-                end_with(HandOverOutcome::step_limit);
+                end_with(Outcome::step_limit);
             }
             // Over switches that are not located: as many steps without any as patience asks for.
             if (chatters_ && motion_.branches() != branches) {
@@ -661,7 +642,7 @@ private:
                 if (!ended_ && options_.until_released &&
                     is_released(motion_.branches(), motion_.state().t, motion_.state().w)) {
                     run_.mode = Modes::mode_of(motion_.branches());
-                    end_with(HandOverOutcome::released);
+                    end_with(Outcome::released);
                 }
                 if (!ended_ && steps >= patience_ && is_plain(switched) && release()) break;
             }

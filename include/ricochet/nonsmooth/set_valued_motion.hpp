@@ -1,7 +1,7 @@
 // Integrating an inclusion, a step at a time or to the end.
 //
 //     SetValuedMotion motion(DiodeCircuit{}, w0, {.t_end = 20, .step = 0.01});
-//     const SetValuedOutcome outcome = motion.run();
+//     const Outcome outcome = motion.run();
 //
 // A step is computed, its error judged by the controller, and accepted or repeated; a
 // stage that has no solution shortens the step and in the end stops the run. The state,
@@ -16,21 +16,10 @@
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
 #include "ricochet/detail/step_layout.hpp"
+#include "ricochet/integrate/outcome.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
-
-enum class SetValuedOutcome {
-    running,  ///< not yet ended
-    reached_end,
-    not_converged,   ///< a stage could not be solved however short the step
-    step_underflow,  ///< no step above h_min met the tolerance
-    step_limit,      ///< `SetValuedOptions::max_attempts` steps were tried
-};
-
-[[nodiscard]] std::string_view name(SetValuedOutcome outcome) noexcept;
-/// One sentence with the remedy.
-[[nodiscard]] std::string_view describe(SetValuedOutcome outcome) noexcept;
 
 enum class ErrorEstimate {
     none,      ///< what a `ConstantStep` needs
@@ -119,7 +108,7 @@ public:
     [[nodiscard]] const State& before() const noexcept { return before_; }
     [[nodiscard]] const State& middle() const noexcept { return step_.middle(); }
     [[nodiscard]] const SetValuedStatistics& statistics() const noexcept { return statistics_; }
-    [[nodiscard]] SetValuedOutcome outcome() const noexcept { return outcome_; }
+    [[nodiscard]] Outcome outcome() const noexcept { return outcome_; }
     /// The stage that ended the run as `not_converged`.
     [[nodiscard]] const StageReport& failure() const noexcept { return failure_; }
     /// The step that will be tried next.
@@ -145,19 +134,19 @@ public:
     [[nodiscard]] const Switch& last_switch() const noexcept { return last_switch_; }
 
     /// The next accepted step. `running`, or how the run ended.
-    SetValuedOutcome advance();
+    Outcome advance();
 
     /// To the end. `observer(state)` sees the start and every accepted step.
     template <class Observer>
-    SetValuedOutcome run(const Observer& observer)
+    Outcome run(const Observer& observer)
     {
         observer(std::as_const(now_));
-        while (advance() == SetValuedOutcome::running) observer(std::as_const(now_));
-        if (outcome_ == SetValuedOutcome::reached_end) observer(std::as_const(now_));
+        while (advance() == Outcome::running) observer(std::as_const(now_));
+        if (outcome_ == Outcome::reached_end) observer(std::as_const(now_));
         return outcome_;
     }
 
-    SetValuedOutcome run()
+    Outcome run()
     {
         return run([](const State&) {});
     }
@@ -170,12 +159,12 @@ public:
     [[nodiscard]] std::optional<State> locate(const Function& g, double tolerance = 0)
     {
         State at = now_;
-        const double width = find(0, g(before_), now_.t - before_.t, g(now_), tolerance,
-                                  [&](double h) {
-                                      return step_.take(before_, h, at).converged
-                                                 ? g(std::as_const(at))
-                                                 : std::numeric_limits<double>::quiet_NaN();
-                                  });
+        const double width =
+            find(0, g(before_), now_.t - before_.t, g(now_), tolerance, [&](double h) {
+                return step_.take(before_, h, at).converged
+                           ? g(std::as_const(at))
+                           : std::numeric_limits<double>::quiet_NaN();
+            });
         if (!(width > 0) || !step_.take(before_, width, at).converged) return std::nullopt;
         return at;
     }
@@ -196,8 +185,7 @@ private:
         holds_length_ = std::holds_alternative<ConstantStep>(options_.controller);
         if (traits().box) step_.branches_of(now_, start_branches_);
         remainder_ = 0;
-        outcome_ = now_.t < options_.t_end ? SetValuedOutcome::running
-                                           : SetValuedOutcome::reached_end;
+        outcome_ = now_.t < options_.t_end ? Outcome::running : Outcome::reached_end;
     }
 
     void check_reaction(const State& state) const
@@ -212,10 +200,7 @@ private:
         }
     }
 
-    SetValuedOutcome end_with(SetValuedOutcome outcome)
-    {
-        return outcome_ = outcome;
-    }
+    Outcome end_with(Outcome outcome) { return outcome_ = outcome; }
 
     /// One attempt into trial_, with its error.
     StageReport attempt(double h)
@@ -282,7 +267,9 @@ private:
     {
         double worst = 0;
         for (const ErrorField& field : options_.fields) {
-            const auto norm = [&](const Vector& v) { return v.segment(field.first, field.count).norm(); };
+            const auto norm = [&](const Vector& v) {
+                return v.segment(field.first, field.count).norm();
+            };
             const double size = std::max({norm(a), norm(b), field.floor});
             // Nothing moved, and nothing is wrong: zero over zero is no error.
             const double off = norm(error);
@@ -297,8 +284,8 @@ private:
         if (!options_.fields.empty()) return scaled_by_fields(error, a, b);
         double sum = 0;
         for (Eigen::Index i = 0; i < error.size(); ++i) {
-            const double size = options_.atol +
-                                options_.rtol * std::max(std::abs(a[i]), std::abs(b[i]));
+            const double size =
+                options_.atol + options_.rtol * std::max(std::abs(a[i]), std::abs(b[i]));
             sum += (error[i] / size) * (error[i] / size);
         }
         return std::sqrt(sum / static_cast<double>(error.size()));
@@ -377,7 +364,7 @@ private:
         std::swap(now_.reaction, trial_.reaction);
         if (last && !switched_) {
             now_.t = options_.t_end;
-            outcome_ = SetValuedOutcome::reached_end;
+            outcome_ = Outcome::reached_end;
         } else {
             // The time is carried with the remainder of its additions.
             const double increment = (trial_.t - t) + remainder_;
@@ -452,7 +439,7 @@ private:
     Switch last_switch_;
     SetValuedStatistics statistics_;
     StageReport failure_;
-    SetValuedOutcome outcome_ = SetValuedOutcome::running;
+    Outcome outcome_ = Outcome::running;
     double h_ = 0;
     double h_min_ = 0;
     double remainder_ = 0;
@@ -518,20 +505,20 @@ void AnyMotion<N, M>::restart(const State& state)
 }
 
 template <int N, int M>
-SetValuedOutcome AnyMotion<N, M>::advance()
+Outcome AnyMotion<N, M>::advance()
 {
-    if (outcome_ != SetValuedOutcome::running) return outcome_;
+    if (outcome_ != Outcome::running) return outcome_;
     int failures = 0;
     bool solved = true;
     for (;;) {
         if (statistics_.attempted == options_.max_attempts) {
-            return end_with(SetValuedOutcome::step_limit);
+            return end_with(Outcome::step_limit);
         }
         const double left = options_.t_end - now_.t;
         if (left <= 4 * std::numeric_limits<double>::epsilon() * std::abs(options_.t_end)) {
             // A change was located at the end up to rounding.
             now_.t = options_.t_end;
-            return end_with(SetValuedOutcome::reached_end);
+            return end_with(Outcome::reached_end);
         }
         double h = std::min(h_, options_.h_max);
         // No sliver is left for the last step: a step within a part in 1e9 takes it all.
@@ -561,8 +548,7 @@ SetValuedOutcome AnyMotion<N, M>::advance()
             solved = true;
         }
         if (!(h_ >= h_min_)) {
-            return end_with(solved ? SetValuedOutcome::step_underflow
-                                   : SetValuedOutcome::not_converged);
+            return end_with(solved ? Outcome::step_underflow : Outcome::not_converged);
         }
     }
 }

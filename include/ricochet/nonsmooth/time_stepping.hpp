@@ -87,23 +87,23 @@ public:
 
     [[nodiscard]] const State& state() const noexcept { return state_; }
     [[nodiscard]] const TimeSteppingStatistics& statistics() const noexcept { return statistics_; }
-    [[nodiscard]] SetValuedOutcome outcome() const noexcept { return outcome_; }
+    [[nodiscard]] Outcome outcome() const noexcept { return outcome_; }
     /// The contact problem that ended the run as `not_converged`; its residual is infinite and
     /// its contact -1 where a force, a gap, a direction or the velocity was not finite.
     [[nodiscard]] const ContactReport& failure() const noexcept { return failure_; }
 
-    SetValuedOutcome advance();
+    Outcome advance();
 
     template <class Observer>
-    SetValuedOutcome run(const Observer& observer)
+    Outcome run(const Observer& observer)
     {
         observer(std::as_const(state_));
-        if (outcome_ != SetValuedOutcome::running) return outcome_;
-        while (advance() == SetValuedOutcome::running) observer(std::as_const(state_));
-        if (outcome_ == SetValuedOutcome::reached_end) observer(std::as_const(state_));
+        if (outcome_ != Outcome::running) return outcome_;
+        while (advance() == Outcome::running) observer(std::as_const(state_));
+        if (outcome_ == Outcome::reached_end) observer(std::as_const(state_));
         return outcome_;
     }
-    SetValuedOutcome run()
+    Outcome run()
     {
         return run([](const State&) {});
     }
@@ -196,7 +196,7 @@ private:
     std::vector<double> friction_;
     TimeSteppingStatistics statistics_;
     ContactReport failure_;
-    SetValuedOutcome outcome_ = SetValuedOutcome::running;
+    Outcome outcome_ = Outcome::running;
 };
 
 template <int N>
@@ -226,20 +226,20 @@ void AnyTimeStepping<N>::restart(double t, const Vector& q, const Vector& v)
 {
     impulse_.setZero(system_->contacts * system_->components);
     state_ = {t, q, v, impulse_};
-    outcome_ = t < options_.t_end ? SetValuedOutcome::running : SetValuedOutcome::reached_end;
+    outcome_ = t < options_.t_end ? Outcome::running : Outcome::reached_end;
 }
 
 template <int N>
-SetValuedOutcome AnyTimeStepping<N>::advance()
+Outcome AnyTimeStepping<N>::advance()
 {
-    if (outcome_ != SetValuedOutcome::running) return outcome_;
+    if (outcome_ != Outcome::running) return outcome_;
     const double left = options_.t_end - state_.t;
     double h = options_.step;
     bool last = left <= h * (1 + 1e-9);
     if (last) h = left;
     // Another length is another problem, which may be easier.
     for (int attempt = 0; !take(h); ++attempt) {
-        if (attempt == 10) return outcome_ = SetValuedOutcome::not_converged;
+        if (attempt == 10) return outcome_ = Outcome::not_converged;
         ++statistics_.unsolved;
         h /= 2;
         last = false;
@@ -247,7 +247,7 @@ SetValuedOutcome AnyTimeStepping<N>::advance()
     ++statistics_.steps;
     if (last) {
         state_.t = options_.t_end;
-        outcome_ = SetValuedOutcome::reached_end;
+        outcome_ = Outcome::reached_end;
     }
     return outcome_;
 }

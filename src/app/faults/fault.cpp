@@ -14,12 +14,12 @@
 #include "interrupt.hpp"
 #include "json_text.hpp"
 #include "plot.hpp"
+#include "policy_lookup.hpp"
 #include "report.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "run_watch.hpp"
 #include "simulate.hpp"
-#include "policy_lookup.hpp"
 #include "step_progress.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 
 namespace ricochet::app {
 
@@ -171,7 +171,7 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
         out["statistics"]["iterations"] = s.iterations;
         if (how.controller == "learned") out["statistics"]["handed_over"] = s.handed_over;
     }
-    if (r.outcome == RuptureOutcome::cancelled) out["incomplete"] = Interrupts::cause();
+    if (r.outcome == Outcome::cancelled) out["incomplete"] = Interrupts::cause();
     if (request.kernel) out["kernel"] = request.kernel->string();
     if (request.samples) {
         const MeanSamples samples = sampled(r, asked.t_end, *request.samples);
@@ -344,7 +344,7 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
     }();
     progress.clear();
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    const bool cancelled = r.outcome == RuptureOutcome::cancelled;
+    const bool cancelled = r.outcome == Outcome::cancelled;
     if (cancelled) asked.t_end = r.t;  // of samples and pictures
     deliver(
         {[&] {
@@ -360,7 +360,7 @@ int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
              if (request.plot) draw_rupture(fault, asked, r, *request.plot);
          }});
     if (cancelled) return ended_early(fmt::format("at t = {} s", r.t));
-    return r.outcome == RuptureOutcome::reached_end || r.outcome == RuptureOutcome::at_rest ? 0 : 1;
+    return r.outcome == Outcome::reached_end || r.outcome == Outcome::at_rest ? 0 : 1;
 }
 
 }  // namespace ricochet::app

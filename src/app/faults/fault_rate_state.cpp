@@ -16,10 +16,10 @@
 #include "json_text.hpp"
 #include "plot.hpp"
 #include "report.hpp"
+#include "ricochet/faults/fault_rate_state.hpp"
 #include "run_watch.hpp"
 #include "simulate.hpp"
 #include "step_progress.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
 
 namespace ricochet::app {
 
@@ -145,7 +145,7 @@ std::string json(const SystemEntry& system, const std::vector<double>& values,
                {"inner_iterations", r.inner},
                {"stiffness_products", s.products}}},
              {"memory_estimate", StrikeSlipFault::memory(fault.parameters())}};
-    if (rupture.outcome == RuptureOutcome::cancelled) out["incomplete"] = Interrupts::cause();
+    if (rupture.outcome == Outcome::cancelled) out["incomplete"] = Interrupts::cause();
     if (request.kernel) out["kernel"] = request.kernel->string();
     if (request.samples) {
         const MeanSamples samples = sampled(rupture, asked.t_end, *request.samples);
@@ -277,7 +277,7 @@ int simulate_rate_state_fault(const SystemEntry& system, const SimulateRequest& 
     }();
     progress.clear();
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    const bool cancelled = r.rupture.outcome == RuptureOutcome::cancelled;
+    const bool cancelled = r.rupture.outcome == Outcome::cancelled;
     if (cancelled) asked.t_end = r.rupture.t;  // of samples
     deliver({[&] {
                  print(request.json ? json(system, values, fault, asked, r, request, taken.count())
@@ -304,7 +304,7 @@ int simulate_rate_state_fault(const SystemEntry& system, const SimulateRequest& 
                  draw_cycle(fault, r, *request.plot);
              }});
     if (cancelled) return ended_early(fmt::format("at t = {} s", r.rupture.t));
-    return r.rupture.outcome == RuptureOutcome::reached_end ? 0 : 1;
+    return r.rupture.outcome == Outcome::reached_end ? 0 : 1;
 }
 
 }  // namespace ricochet::app

@@ -95,7 +95,7 @@ double positive(std::string_view option, const std::optional<double>& given, dou
 Run<std::vector<double>> plain(const SpringSlider& slider, const SliderRun& run)
 {
     Run<std::vector<double>> out;
-    if (run.outcome == SliderOutcome::cancelled) out.outcome = Outcome::cancelled;
+    out.outcome = run.outcome;
     out.t = run.state.t;
     out.x = shown(slider, run.state);
     for (const SliderState& s : run.samples) {
@@ -142,22 +142,9 @@ std::string to_text(const SpringSlider& slider, const RunSettings& settings,
     }
     return out + fmt::format("{:>22.15g} {:<9} {:>13.6e} {:>13.6e} {:>9.6f}\n\n{}\n", run.state.t,
                              "end", run.state.x, run.state.v, slider_friction(slider, run.state),
-                             run.outcome == SliderOutcome::cancelled
+                             run.outcome == Outcome::cancelled
                                  ? fmt::format("incomplete: {}", Interrupts::cause())
                                  : std::string(describe(run.outcome)));
-}
-
-std::string_view outcome_name(SliderOutcome outcome)
-{
-    switch (outcome) {
-        case SliderOutcome::reached_end: return "reached_end";
-        case SliderOutcome::unsolved: return "not_converged";
-        case SliderOutcome::step_underflow: return "step_underflow";
-        case SliderOutcome::step_limit: return "step_limit";
-        case SliderOutcome::non_finite: return "non_finite";
-        case SliderOutcome::cancelled: return "cancelled";
-    }
-    return "";
 }
 
 std::string to_json(const SpringSlider& slider, const SliderOptions& options, const SliderRun& run,
@@ -168,7 +155,7 @@ std::string to_json(const SpringSlider& slider, const SliderOptions& options, co
         events.push_back({{"t", e.at.t}, {"kind", name(e.kind)}, {"state", shown(slider, e.at)}});
     }
     Json out{{"system", "spring-slider"},
-             {"outcome", outcome_name(run.outcome)},
+             {"outcome", ricochet::name(run.outcome)},
              {"t", run.state.t},
              {"state", shown(slider, run.state)},
              {"order", options.order},
@@ -183,7 +170,7 @@ std::string to_json(const SpringSlider& slider, const SliderOptions& options, co
              {"unsolved", run.unsolved},
              {"not_convex", run.not_convex},
              {"residual", run.residual}};
-    if (run.outcome == SliderOutcome::cancelled) out["incomplete"] = Interrupts::cause();
+    if (run.outcome == Outcome::cancelled) out["incomplete"] = Interrupts::cause();
     if (with_trajectory) {
         const Run<std::vector<double>> all = plain(slider, run);
         out["trajectory"] = {{"t", all.trajectory.t}, {"x", all.trajectory.x}};
@@ -237,10 +224,10 @@ int simulate_spring_slider(const SystemEntry& entry, const SimulateRequest& requ
              [&] {
                  if (request.plot) plot(entry, settings, plain(slider, run), *request.plot);
              }});
-    if (run.outcome == SliderOutcome::cancelled) {
+    if (run.outcome == Outcome::cancelled) {
         return ended_early(fmt::format("at t = {} s", run.state.t));
     }
-    return run.outcome == SliderOutcome::reached_end ? 0 : 1;
+    return run.outcome == Outcome::reached_end ? 0 : 1;
 }
 
 }  // namespace ricochet::app

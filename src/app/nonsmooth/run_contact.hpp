@@ -42,7 +42,7 @@ template <class System, class Vector>
     options.set_valued.step = settings.set_valued->step;
     const auto run = hand_over(system, q, v, options);
     TimedRun out;
-    out.run.outcome = as_outcome(run.outcome);
+    out.run.outcome = run.outcome;
     out.run.t = run.t;
     out.run.x = detail::as_vector(run.x);
     for (const auto& event : run.events) {
@@ -113,13 +113,12 @@ template <class System, class Vector>
         impulse = now.impulse;
     };
     look(motion.state());
-    auto outcome = SetValuedOutcome::running;
-    while (outcome == SetValuedOutcome::running && !o.cancelled->load(std::memory_order_relaxed)) {
-        outcome = motion.statistics().steps < o.max_steps ? motion.advance()
-                                                          : SetValuedOutcome::step_limit;
-        if (outcome != SetValuedOutcome::not_converged) look(motion.state());
+    auto outcome = Outcome::running;
+    while (outcome == Outcome::running && !o.cancelled->load(std::memory_order_relaxed)) {
+        outcome = motion.statistics().steps < o.max_steps ? motion.advance() : Outcome::step_limit;
+        if (outcome != Outcome::not_converged) look(motion.state());
     }
-    out.run.outcome = as_outcome(outcome);
+    out.run.outcome = outcome == Outcome::running ? Outcome::cancelled : outcome;
     out.run.t = t;
     out.run.x = detail::as_vector(x);
     out.run.statistics.events = out.run.events.size();

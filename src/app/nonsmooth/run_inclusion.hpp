@@ -69,7 +69,7 @@ template <class System>
 [[nodiscard]] TimedRun shown(const HandOverRun<System>& run)
 {
     TimedRun out;
-    out.run.outcome = as_outcome(run.outcome);
+    out.run.outcome = run.outcome;
     out.run.t = run.state.t;
     out.run.x = plain(run.state.w);
     out.run.mode = shown_mode<System>(run.mode);
@@ -98,15 +98,16 @@ template <class System, class Stepping>
 
 /// As `motion.run`. @return `running` if it was cancelled
 template <class Motion, class Observer>
-[[nodiscard]] SetValuedOutcome run_until_cancelled(const Options& options, Motion& motion,
-                                                   const Observer& observer)
+[[nodiscard]] Outcome run_until_cancelled(const Options& options, Motion& motion,
+                                          const Observer& observer)
 {
     observer(motion.state());
     for (;;) {
-        const SetValuedOutcome outcome = motion.advance();
-        const bool goes_on = outcome == SetValuedOutcome::running;
-        if (goes_on || outcome == SetValuedOutcome::reached_end) observer(motion.state());
-        if (!goes_on || options.cancelled->load(std::memory_order_relaxed)) return outcome;
+        const Outcome outcome = motion.advance();
+        const bool goes_on = outcome == Outcome::running;
+        if (goes_on || outcome == Outcome::reached_end) observer(motion.state());
+        if (!goes_on) return outcome;
+        if (options.cancelled->load(std::memory_order_relaxed)) return Outcome::cancelled;
     }
 }
 
@@ -159,7 +160,7 @@ template <class System>
         }
         branches = after;
     };
-    out.run.outcome = as_outcome(run_until_cancelled(settings.options, motion, look));
+    out.run.outcome = run_until_cancelled(settings.options, motion, look);
     out.run.t = motion.state().t;
     out.run.x = plain(motion.state().w);
     out.run.mode = branch_mode<System>(branches);

@@ -160,31 +160,4 @@ SetValuedOptions set_valued_options(const RunSettings& settings)
     return options;
 }
 
-Outcome as_outcome(HandOverOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case HandOverOutcome::reached_end: return Outcome::reached_end;
-        case HandOverOutcome::law_violated:
-        case HandOverOutcome::not_converged: return Outcome::not_converged;
-        case HandOverOutcome::step_underflow: return Outcome::step_underflow;
-        case HandOverOutcome::step_limit: return Outcome::step_limit;
-        case HandOverOutcome::non_finite: return Outcome::non_finite;
-        case HandOverOutcome::cancelled: return Outcome::cancelled;
-        case HandOverOutcome::released: return Outcome::reached_end;
-        case HandOverOutcome::not_handed_over: break;
-    }
-    return Outcome::zeno;
-}
-
-Outcome as_outcome(SetValuedOutcome outcome) noexcept
-{
-    switch (outcome) {
-        case SetValuedOutcome::not_converged: return Outcome::not_converged;
-        case SetValuedOutcome::step_underflow: return Outcome::step_underflow;
-        case SetValuedOutcome::step_limit: return Outcome::step_limit;
-        case SetValuedOutcome::running: return Outcome::cancelled;
-        default: return Outcome::reached_end;
-    }
-}
-
 }  // namespace ricochet::app

@@ -20,7 +20,4 @@ namespace ricochet::app {
 /// The options of Bathe's steps and of time stepping.
 [[nodiscard]] SetValuedOptions set_valued_options(const RunSettings& settings);
 
-[[nodiscard]] Outcome as_outcome(HandOverOutcome outcome) noexcept;
-[[nodiscard]] Outcome as_outcome(SetValuedOutcome outcome) noexcept;
-
 }  // namespace ricochet::app
