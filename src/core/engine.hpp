@@ -87,6 +87,7 @@ protected:
     /// What rounding of the time and of the state, 8 units in the last place of each
     /// component, may make of guard i at the start of the step.
     [[nodiscard]] double rounding_of(std::size_t i);
+    [[nodiscard]] double rounding_of(std::size_t i, double t, const X& x);
 
     [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
 
@@ -361,6 +362,9 @@ protected:
     void note_crossings_to_set();
 
     [[nodiscard]] bool counts_at_set(std::size_t i);
+    /// Whether a recorded guard has not yet left its side at the set by no more than what
+    /// rounding makes of its value there.
+    [[nodiscard]] bool is_rounding_at_set(std::size_t i, const GuardSample& at);
 
     [[nodiscard]] bool is_member(std::size_t i) noexcept
     {

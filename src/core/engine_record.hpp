@@ -23,11 +23,17 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
         const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
         const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays
-        const bool with_set = !record.info.boolean && !rests && at.s > record.from &&
-                              search_.crosses_with_set(step_, bank_, i, at, resolution_);
+        const bool may_cross = !record.info.boolean && !rests && at.s > record.from;
+        const bool with_set =
+            may_cross && (search_.crosses_with_set(step_, bank_, i, at, resolution_) ||
+                          is_rounding_at_set(i, at));
         GuardSample last = at;
-        // On the side that it comes from, until it crosses.
-        if (with_set) record.band = std::fabs(at.value);
+        // On the side that it comes from, until it crosses. The time of the set is a double.
+        if (with_set) {
+            constexpr double epsilon = std::numeric_limits<double>::epsilon();
+            const double ulp = epsilon * std::fabs(step_.time(at.s));
+            record.band = std::fabs(at.value) + std::fabs(at.rate) * ulp;
+        }
         if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
         if (!record.acting) {
             search_.note_crossings(step_, bank_, i, last, resolution_, calls());
@@ -45,6 +51,16 @@ inline void EventEngine<X, single>::note_crossings_to_set()
             }
         }  // else its own event is still to come
     }
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::is_rounding_at_set(std::size_t i, const GuardSample& at)
+{
+    const double size = std::fabs(at.value);
+    const double moves = std::fabs(at.rate) * std::fabs(step_.time(at.s));
+    if (bank_[i].acting || has_left(bank_[i].side, at.value)) return false;
+    if (!(size <= 0x1p-20 * std::max(bank_.scale(i, step_.h()), moves))) return false;
+    return size <= rounding_of(i, step_.time(at.s), search_.before());
 }
 
 template <class X, bool single>

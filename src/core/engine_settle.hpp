@@ -231,12 +231,17 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
 template <class X, bool single>
 inline double EventEngine<X, single>::rounding_of(std::size_t i)
 {
+    return rounding_of(i, step_.time(0), step_.x0());
+}
+
+template <class X, bool single>
+inline double EventEngine<X, single>::rounding_of(std::size_t i, double t, const X& x)
+{
     constexpr double nudge = 8 * std::numeric_limits<double>::epsilon();
     const auto guard = bank_.view(i, step_.mode(), calls());
-    const double t = step_.time(0);
-    const double g = guard.value(t, step_.x0());
-    double rounding = std::fabs(guard.value(t * (1 + nudge), step_.x0()) - g);
-    X near = step_.x0();
+    const double g = guard.value(t, x);
+    double rounding = std::fabs(guard.value(t * (1 + nudge), x) - g);
+    X near = x;
     for_each_component(near, [&](auto c) {
         const double kept = near[c];
         if (kept == 0) return;

@@ -419,7 +419,7 @@ private:
         const double far = sign * (beyond(end, 0.25) - end.value);
         const double bend = 32 * (far - 2 * near);  // half the curvature
         const double slope = 16 * near - 4 * far;
-        const bool turns = sign * end.value - slope * slope / (4 * bend) >= -scales_.band;
+        const bool turns = sign * end.value - slope * (slope / (4 * bend)) >= -scales_.band;
         return bend > 0 && turns ? 1 : 0;
     }
 

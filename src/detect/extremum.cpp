@@ -30,13 +30,24 @@ struct GuardCubic {
         // p'(u) = r0 + 2 b u + 3 c u^2
         const double b = 3 * (v1 - v0) - 2 * r0 - r1;
         const double c = 3 * (2 * (v0 - v1) + r0 + r1);
-        const double root = std::sqrt(std::max(b * b - c * r0, 0.0));
+        const double k = unit(std::max({std::fabs(b), std::fabs(c), std::fabs(r0)}));
+        const double square = (k * b) * (k * b) - (k * c) * (k * r0);
+        const double root = std::sqrt(std::max(square, 0.0)) / k;
         // At a minimum p'' = 2 (b + c u) > 0, so b + c u = root.
         const double signed_root = minimum ? root : -root;
         const double sum = b + signed_root;
         double u = minimum == (b >= 0) ? -r0 / sum : (signed_root - b) / c;
         if (!(u > 0 && u < 1)) u = 0.5;
         return u;
+    }
+
+private:
+    /// A power of two, 1 as a rule, that brings values of this size to where their squares
+    /// neither underflow nor overflow. It changes no bit of a result.
+    [[nodiscard]] static double unit(double largest) noexcept
+    {
+        if (largest < 0x1p-450) return 0x1p600;
+        return largest > 0x1p450 ? 0x1p-600 : 1;
     }
 };
 
@@ -87,7 +98,7 @@ Finding clear_if(bool known) noexcept
         if (beyond == cubic.v1) return false;
     }
     const double curvature = cubic.curvature1();
-    return curvature > 0 && cubic.v1 - cubic.r1 * cubic.r1 / (2 * curvature) >= -watch.touch;
+    return curvature > 0 && cubic.v1 - cubic.r1 * (cubic.r1 / (2 * curvature)) >= -watch.touch;
 }
 
 /// The larger of the slopes between three samples.
@@ -195,7 +206,8 @@ Finding clear_if(bool known) noexcept
         if (sign * lowest.value >= value) lowest = sample;
         // What is still to come: a parabola falls by rate^2 / (2 curvature).
         const double bend = std::min(rate - sign * lo.rate, sign * hi.rate - rate) / width;
-        double fall = bend > 0 ? rate * rate / (2 * bend) : std::fabs(rate) * width;
+        // The square of a rate may underflow.
+        double fall = bend > 0 ? rate * (rate / (2 * bend)) : std::fabs(rate) * width;
         if (width <= coarse_part * path.h() && !path.is_rated()) {
             fall = std::max(fall, steepest(lo, sample, hi) * width);
         }

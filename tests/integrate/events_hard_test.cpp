@@ -598,6 +598,34 @@ TEST(HardEvents, ImpactsDoNotDependOnHowFarTheEndLies)
     EXPECT_GT(expected.size(), 200u);
 }
 
+/// A weight on a spring, a surface that moves under it, and beside the guard with the reset one
+/// that has the same surface and is only recorded, computed in another way.
+struct CountedCrossings {
+    std::size_t guard_count = 2;
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const { return {.resets = which == 0}; }
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -x[0]}; }
+    [[nodiscard]] double guard(std::size_t which, double t, const X& x) const
+    {
+        const double surface = 0.4 - 0.6 * std::sin(1.3 * t + 0.2);
+        return which == 0 ? std::sinh(x[0] - surface) : 3.1 * x[0] - 3.1 * surface;
+    }
+    void reset(std::size_t, double, X& x) const { x[1] *= 0.9; }
+};
+
+TEST(HardEvents, ARecordedGuardHasItsEventOnceWhereAResetSharesItsSurface)
+{
+    // The two tell their surface by no more than their roundings, and the reset is applied where
+    // the first of them is: it may leave the state on the way to the other, or a rounding past it.
+    for (int i = 0; i < 18; ++i) {
+        const auto run = integrate(CountedCrossings{}, X{1.328 + 0.0006 * i, 0.3},
+                                   {.t_start = 7, .t_end = 40, .rtol = 1e-11, .h_max = 0.3});
+        std::array<int, 2> counts{};
+        for (const auto& event : run.events) counts[event.guard] += changes_sign(event.kind);
+        ASSERT_GT(counts[0], 2);
+        ASSERT_EQ(counts[1], counts[0]) << "start " << i;
+    }
+}
+
 TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
 {
     // At rest at the origin, under a force that grows with the time: x = t^3 / 6 meets 1.
