@@ -1,6 +1,7 @@
 from enum import IntEnum
 from types import SimpleNamespace
-from typing import Any, Callable, Iterable, Iterator, Optional, Sequence, Tuple, Union
+from typing import (Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence, Tuple,
+                    Union)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -180,6 +181,60 @@ class Simulation:
     def ended(self) -> bool: ...
     @property
     def run(self) -> Run: ...
+
+class Verdict(IntEnum):
+    STANDS = 0
+    CUT = 1
+    RESTS = 2
+    ENDED = 3
+
+class Cut(NamedTuple):
+    t: float
+    s: float
+    before: Floats
+    after: Floats
+    mode_before: Any
+    mode_after: Any
+    fired: list[int]
+    fired_names: list[str]
+    on_time: bool
+    accumulation: bool
+    state_changed: bool
+
+class Monitor:
+    def __init__(self, system: Union[System, _Ready], like: ArrayLike, *, backward: bool = False,
+                 cut_at_all: bool = False, event_tolerance: float = 0.0, event_rtol: float = 0.0,
+                 event_window: float = 0.0, look_inside: bool = True, record_events: bool = True,
+                 event_states: bool = True, detector: str = "extremum",
+                 locator: str = "newton") -> None: ...
+    def start(self, t: float, x: ArrayLike, scale: float, rate: Optional[ArrayLike] = None,
+              mode: Any = None) -> Verdict: ...
+    def examine(self, t0: float, h: float, x0: ArrayLike, x1: ArrayLike, rate0: ArrayLike,
+                rate1: ArrayLike,
+                interpolate: Optional[Callable[[float], ArrayLike]] = None) -> Verdict: ...
+    def resume(self, scale: float, rate: Optional[ArrayLike] = None, *,
+               after: Optional[ArrayLike] = None, mode: Any = None) -> Verdict: ...
+    def hold(self, t: float) -> Verdict: ...
+    def skip_to(self, t: float, x: ArrayLike, rate: ArrayLike) -> None: ...
+    @property
+    def cut(self) -> Cut: ...
+    @property
+    def t(self) -> float: ...
+    @property
+    def x(self) -> Floats: ...
+    @property
+    def mode(self) -> Any: ...
+    @property
+    def must_stop_at(self) -> float: ...
+    @property
+    def quiet_until(self) -> float: ...
+    @property
+    def events(self) -> NDArray[np.void]: ...
+    @property
+    def run(self) -> Run: ...
+    def clear_events(self) -> None: ...
+    def save(self) -> Snapshot: ...
+    def restore(self, snapshot: Snapshot) -> None: ...
 
 class OdeResult(dict[str, Any]):
     def __getattr__(self, name: str) -> Any: ...

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "record.hpp"
@@ -31,6 +32,12 @@ public:
     [[nodiscard]] const std::atomic<bool>* cancelled() const noexcept { return &cancelled_; }
     /// What a handler has raised.
     [[nodiscard]] const std::optional<PythonError>& raised() const noexcept { return raised_; }
+    /// The same, to be raised here; what comes after it goes on.
+    [[nodiscard]] std::optional<PythonError> take_raised() noexcept
+    {
+        cancelled_ = false;
+        return std::exchange(raised_, std::nullopt);
+    }
 
 private:
     using Clock = std::chrono::steady_clock;
