@@ -9,6 +9,7 @@ floating-point numbers.
 from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
 from ._ivp import OdeResult, solve_ivp
 from ._monitor import Cut, Monitor, Verdict
+from ._network import Network
 from ._plot import plot
 from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum, StickSlip,
                      Thermostat)
@@ -20,7 +21,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Compiled", "CoulombOscillator",
-    "Cut", "Guard", "ImpactOscillator", "Kind", "Monitor", "OdeResult", "Pendulum", "Run",
+    "Cut", "Guard", "ImpactOscillator", "Kind", "Monitor", "Network", "OdeResult", "Pendulum", "Run",
     "Simulation", "Snapshot", "Solution", "StickSlip", "System", "Thermostat", "Verdict", "guard",
     "integrate", "plot", "solve_ivp",
 ]

@@ -4,6 +4,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from . import _ricochet
+from ._network import set_gate
 from ._run import set_mode, source_of, state_from
 
 
@@ -36,7 +37,7 @@ class Cut(NamedTuple):
 
 
 _OPTIONS = ("event_tolerance", "event_rtol", "event_window", "look_inside", "record_events",
-            "event_states", "detector", "locator")
+            "event_states", "detector", "locator", "gate")
 
 
 class Monitor(_ricochet.Monitor):
@@ -66,7 +67,7 @@ class Monitor(_ricochet.Monitor):
         Every crossing ends its step, also of guards without a reset: for hosts that change the
         state themselves.
     event_tolerance, event_rtol, event_window, look_inside, record_events, event_states,
-    detector, locator
+    detector, locator, gate
         As for `integrate`.
 
     Rates are dx/dt. Steps out of turn, with a gap, beyond a time event or before ``resume`` are a
@@ -81,6 +82,7 @@ class Monitor(_ricochet.Monitor):
             if name not in _OPTIONS:
                 raise TypeError(f"Monitor: found an option {name!r}, expected some of backward, "
                                 "cut_at_all, " + ", ".join(_OPTIONS))
+        set_gate(options)
         source, modes = source_of(system)
         self._system, self._mode_list = system, modes
         super().__init__(source, state_from(like, "like"), options, bool(backward),

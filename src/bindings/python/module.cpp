@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 
 #include <exception>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "bindings.hpp"
 #include "callbacks.hpp"
 #include "ready.hpp"
+#include "ricochet/nn/safetensors.hpp"
 #include "source.hpp"
 
 namespace py = pybind11;
@@ -23,11 +25,22 @@ PYBIND11_MODULE(_ricochet, module)
             if (thrown) std::rethrow_exception(thrown);
         } catch (const PythonError& error) {
             error.restore();
+        } catch (const ricochet::ModelError& error) {
+            PyErr_SetString(PyExc_ValueError, error.what());
         }
     });
     py::class_<Source, std::shared_ptr<Source>>(module, "Source")
         .def_property_readonly("guard_count",
-                               [](const Source& self) { return self.guard_names().size(); });
+                               [](const Source& self) { return self.guard_names().size(); })
+        .def_property(
+            "parameters",
+            [](const Source& self) {
+                return std::map<std::string, double>(self.parameters.begin(),
+                                                     self.parameters.end());
+            },
+            [](Source& self, const std::map<std::string, double>& given) {
+                self.parameters = {given.begin(), given.end()};
+            });
     bind_results(module);
     module.def("ready_system", [](const std::string& name, const std::vector<double>& parameters) {
         return ready_system(name, parameters);
@@ -39,6 +52,7 @@ PYBIND11_MODULE(_ricochet, module)
     module.def("callback_system", [](const py::dict& specification) {
         return std::shared_ptr<Source>(std::make_shared<CallbackSource>(specification.ptr()));
     });
+    bind_network(module);
     bind_runs(module);
     bind_monitor(module);
 }

@@ -18,6 +18,7 @@
 #include "read_request.hpp"
 #include "results.hpp"
 #include "ricochet/monitor.hpp"
+#include "setup.hpp"
 #include "turn.hpp"
 
 namespace ricochet::python {
@@ -79,15 +80,11 @@ public:
         table_ = door_->table();
         table_.guard_on = nullptr;
         table_.rate_on = nullptr;
-        const detail::RunSetup<State> asked = setup_for(request);
-        detail::RunSetup<State> setup;
-        setup.system = &table_;
-        setup.door = door_->door();
-        setup.detector = asked.detector;
-        setup.detecting = asked.detecting;
-        setup.locator = asked.locator;
-        setup.locating = asked.locating;
-        monitor_ = detail::make_monitor(setup, like, request.options, cut_at_all);
+        setup_ = setup_for(request, *source_, *door_);
+        setup_.setup.system = &table_;
+        // The method is the host's.
+        setup_.setup.stepping = "";
+        monitor_ = detail::make_monitor(setup_.setup, like, request.options, cut_at_all);
     }
 
     [[nodiscard]] Verdict start(double t, const Given& x, double scale, const py::object& rate,
@@ -299,6 +296,7 @@ private:
     Mode start_mode_ = 0;
     std::unique_ptr<RunDoor> door_;
     detail::SystemTable<State> table_;
+    OwnedSetup setup_;
     std::unique_ptr<detail::AnyMonitor<State>> monitor_;
     std::array<State, 2> rates_;
     bool ended_ = false;

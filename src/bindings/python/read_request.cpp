@@ -10,6 +10,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "network.hpp"
+
 namespace py = pybind11;
 
 namespace ricochet::python {
@@ -33,7 +35,11 @@ namespace {
     for (const std::string_view candidate : known) {
         if (candidate == name) return candidate;
     }
-    throw py::value_error("found '" + name + "', expected one of those in the documentation");
+    std::string all;
+    for (const std::string_view candidate : known) {
+        all += (all.empty() ? "'" : ", '") + std::string(candidate) + "'";
+    }
+    throw py::value_error("found '" + name + "', expected one of " + all);
 }
 
 using Setter = void (*)(Request&, const py::handle&);
@@ -74,8 +80,13 @@ void set(Request& request, const py::handle& value)
          [](Request& request, const py::handle& value) { request.fixed = py::cast<bool>(value); }},
         {"detector",
          [](Request& request, const py::handle& value) {
-             request.detector =
-                 one_of(py::cast<std::string>(value), {"extremum", "ends", "bernstein", "planned"});
+             request.detector = one_of(py::cast<std::string>(value),
+                                       {"extremum", "ends", "bernstein", "planned", "calibrated",
+                                        "calibrated-bounds", "foreseen", "certified", "network"});
+         }},
+        {"gate",
+         [](Request& request, const py::handle& value) {
+             if (!value.is_none()) request.gate = py::cast<const PyNetwork&>(value).model();
          }},
         {"locator",
          [](Request& request, const py::handle& value) {

@@ -11,6 +11,7 @@
 #include "read_request.hpp"
 #include "results.hpp"
 #include "ricochet/detail/core.hpp"
+#include "setup.hpp"
 #include "turn.hpp"
 
 namespace ricochet::python {
@@ -103,14 +104,12 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
 
     const std::unique_ptr<RunDoor> door = source->open(x0, request);
     request.options.cancelled = door->watch().cancelled();
-    detail::RunSetup<State> setup = setup_for(request);
-    setup.system = &door->table();
-    setup.door = door->door();
+    const OwnedSetup owned = setup_for(request, *source, *door);
     Trajectory<State> steps;
     Trajectory<State>* const kept = request.record_steps ? &steps : nullptr;
     std::unique_ptr<Loop> loop;
     try {
-        loop = detail::make_loop(setup, scaled(x0, request.scale), request.options);
+        loop = detail::make_loop(owned.setup, scaled(x0, request.scale), request.options);
         work_freely(door->is_free(), [&] { drive(*loop, kept); });
     } catch (const PythonError& error) {
         out.record =
@@ -136,11 +135,9 @@ public:
         if (!given.contains("mode")) request_.options.mode = source_->start_mode();
         door_ = source_->open(x0, request_);
         request_.options.cancelled = door_->watch().cancelled();
-        detail::RunSetup<State> setup = setup_for(request_);
-        setup.system = &door_->table();
-        setup.door = door_->door();
+        setup_ = setup_for(request_, *source_, *door_);
         try {
-            loop_ = detail::make_loop(setup, scaled(x0, request_.scale), request_.options);
+            loop_ = detail::make_loop(setup_.setup, scaled(x0, request_.scale), request_.options);
         } catch (const PythonError& error) {
             PyRun run = names_;
             run.record = start_of(x0, request_.options);
@@ -251,6 +248,7 @@ private:
     Request request_;
     PyRun names_;
     std::unique_ptr<RunDoor> door_;
+    OwnedSetup setup_;
     std::unique_ptr<Loop> loop_;
     std::optional<PyRun> finished_;
     std::atomic<bool> in_use_ = false;

@@ -6,6 +6,8 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -96,6 +98,9 @@ public:
     [[nodiscard]] virtual std::vector<std::string> mode_names() const = 0;
     [[nodiscard]] virtual std::vector<std::string> guard_names() const = 0;
     [[nodiscard]] virtual Mode start_mode() const noexcept { return 0; }
+
+    /// That networks are trained for, by the names that models have for them.
+    std::map<std::string, double, std::less<>> parameters;
 };
 
 }  // namespace ricochet::python
