@@ -16,12 +16,13 @@ from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum
 from ._ricochet import Run, Snapshot, Solution
 from ._run import Kind, Simulation, integrate
 from ._system import Guard, System, guard
+from ._training import Certified, Trained, certify, train_classifier, train_gate
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Compiled", "CoulombOscillator",
-    "Cut", "Guard", "ImpactOscillator", "Kind", "Monitor", "Network", "OdeResult", "Pendulum", "Run",
-    "Simulation", "Snapshot", "Solution", "StickSlip", "System", "Thermostat", "Verdict", "guard",
-    "integrate", "plot", "solve_ivp",
+    "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Certified", "Compiled",
+    "CoulombOscillator", "Cut", "Guard", "ImpactOscillator", "Kind", "Monitor", "Network", "OdeResult",
+    "Pendulum", "Run", "Simulation", "Snapshot", "Solution", "StickSlip", "System", "Thermostat",
+    "Trained", "Verdict", "certify", "guard", "integrate", "plot", "solve_ivp", "train_classifier", "train_gate",
 ]

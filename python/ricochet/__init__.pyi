@@ -232,6 +232,49 @@ class Network:
     @property
     def certified(self) -> bool: ...
 
+class Trained:
+    network: Optional[Network]
+    outcome: str
+    message: str
+    misses_none: bool
+    trial: SimpleNamespace
+    verdict: str
+    report: Optional[dict[str, Any]]
+
+class Certified:
+    network: Network
+    proved: bool
+    outcome: str
+    message: str
+    levels: list[SimpleNamespace]
+    estimates: list[SimpleNamespace]
+    counterexample: Optional[Floats]
+    seconds: float
+
+def train_classifier(
+    system: Union[System, _Ready], starts: Any, *, step: float, mode: Any = None,
+    method: str = "rk4", progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None,
+    seed: int = 1, run_length: float = 10.0, surface_points: int = 2000, states: int = 100_000,
+    fresh_states: int = 40_000, trial_events: int = 1000, hidden: Sequence[int] = (16, 16),
+    iterations: int = 20_000, **options: Any) -> Trained: ...
+
+def train_gate(
+    system: Union[System, _Ready], starts: Any, levels: Optional[Sequence[float]] = None, *,
+    step: Union[None, float, Tuple[float, float]] = None, mode: Any = None,
+    method: Optional[str] = None,
+    progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None, seed: int = 1,
+    kind: str = "horizon", recipe: str = "state", run_length: float = 10.0, events: int = 3000,
+    states: int = 200_000, fresh_events: int = 30_000, hidden: Sequence[int] = (16, 16),
+    iterations: int = 4000, **options: Any) -> Trained: ...
+
+def certify(
+    network: Union[str, PathLike[str], Network], system: Union[System, _Ready],
+    slack: Union[Sequence[float], Callable[[Floats], float]], *,
+    least: Optional[Callable[[Floats, Floats], float]] = None,
+    progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None, margin: float = 0.0,
+    levels: int = 1, ratio: float = 2.0, seed: int = 1, threads: int = 2, limit: float = 300.0,
+    **options: Any) -> Certified: ...
+
 class Verdict(IntEnum):
     STANDS = 0
     CUT = 1

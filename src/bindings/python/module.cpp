@@ -32,6 +32,7 @@ PYBIND11_MODULE(_ricochet, module)
     py::class_<Source, std::shared_ptr<Source>>(module, "Source")
         .def_property_readonly("guard_count",
                                [](const Source& self) { return self.guard_names().size(); })
+        .def_property_readonly("start_mode", &Source::start_mode)
         .def_property(
             "parameters",
             [](const Source& self) {
