@@ -1,25 +1,28 @@
 """Hybrid systems: smooth motion, events, resets.
 
 ``solve_ivp`` takes SciPy's arguments and returns SciPy's result; events may also reset the
-state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation`` run it, and
-``BouncingBall``, ``Pendulum`` and others are ready. Events are located to neighbouring
+state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation`` run it, ``Monitor`` finds
+its events in the steps of another integrator, and ``BouncingBall``, ``Pendulum`` and others are ready. Events are located to neighbouring
 floating-point numbers.
 """
 
 from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
 from ._ivp import OdeResult, solve_ivp
+from ._monitor import Cut, Monitor, Verdict
+from ._network import Network
 from ._plot import plot
 from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum, StickSlip,
                      Thermostat)
 from ._ricochet import Run, Snapshot, Solution
 from ._run import Kind, Simulation, integrate
 from ._system import Guard, System, guard
+from ._training import Certified, Trained, certify, train_classifier, train_gate
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Compiled", "CoulombOscillator",
-    "Guard", "ImpactOscillator", "Kind", "OdeResult", "Pendulum", "Run", "Simulation",
-    "Snapshot", "Solution", "StickSlip", "System", "Thermostat", "guard", "integrate", "plot",
-    "solve_ivp",
+    "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Certified", "Compiled",
+    "CoulombOscillator", "Cut", "Guard", "ImpactOscillator", "Kind", "Monitor", "Network", "OdeResult",
+    "Pendulum", "Run", "Simulation", "Snapshot", "Solution", "StickSlip", "System", "Thermostat",
+    "Trained", "Verdict", "certify", "guard", "integrate", "plot", "solve_ivp", "train_classifier", "train_gate",
 ]

@@ -1,6 +1,8 @@
 from enum import IntEnum
+from os import PathLike
 from types import SimpleNamespace
-from typing import Any, Callable, Iterable, Iterator, Optional, Sequence, Tuple, Union
+from typing import (Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence,
+                    Tuple, Union)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,6 +109,7 @@ class System:
     name: Optional[str]
     time_events: Optional[Iterable[float]]
     changes_dimension: bool
+    parameters: Optional[Mapping[str, float]]
     def __init__(self, flow: Optional[Union[Callable[..., Any], Compiled]] = None,
                  guards: Optional[Sequence[Any]] = None, **members: Any) -> None: ...
 
@@ -158,7 +161,8 @@ def integrate(system: Union[System, _Ready], x0: ArrayLike, t_end: float, *,
               event_window: float = 0.0, look_inside: bool = True, stop_at_event: bool = False,
               record_events: bool = True, event_states: bool = True, record_steps: bool = False,
               sample_times: Optional[ArrayLike] = None, detector: str = "extremum",
-              locator: str = "newton", max_steps: int = ..., stall_steps: int = ...) -> Run: ...
+              locator: str = "newton", gate: Union[None, str, PathLike[str], Network] = None,
+              max_steps: int = ..., stall_steps: int = ...) -> Run: ...
 
 class Simulation:
     def __init__(self, system: Union[System, _Ready], x0: ArrayLike, t_end: float,
@@ -180,6 +184,151 @@ class Simulation:
     def ended(self) -> bool: ...
     @property
     def run(self) -> Run: ...
+
+class Network:
+    def __init__(self, path: Union[str, PathLike[str]]) -> None: ...
+    @classmethod
+    def from_bytes(cls, content: bytes, name: str = "bytes") -> Network: ...
+    def to_bytes(self) -> bytes: ...
+    def save(self, path: Union[str, PathLike[str]]) -> None: ...
+    def __call__(self, features: ArrayLike) -> Floats: ...
+    def alarm(self, features: ArrayLike) -> Any: ...
+    def in_domain(self, features: ArrayLike) -> Any: ...
+    def cleared(self, features: ArrayLike) -> Any: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def system(self) -> str: ...
+    @property
+    def parameters(self) -> dict[str, float]: ...
+    @property
+    def recipe(self) -> str: ...
+    @property
+    def threshold(self) -> float: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def activation(self) -> str: ...
+    @property
+    def precision(self) -> str: ...
+    @property
+    def step_range(self) -> Tuple[float, float]: ...
+    @property
+    def domain(self) -> Floats: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def outputs(self) -> int: ...
+    @property
+    def layers(self) -> list[Tuple[Floats, Floats]]: ...
+    @property
+    def offset(self) -> Floats: ...
+    @property
+    def scale(self) -> Floats: ...
+    @property
+    def levels(self) -> list[Tuple[float, float]]: ...
+    @property
+    def calibration(self) -> Optional[dict[str, Any]]: ...
+    @property
+    def certified(self) -> bool: ...
+
+class Trained:
+    network: Optional[Network]
+    outcome: str
+    message: str
+    misses_none: bool
+    trial: SimpleNamespace
+    verdict: str
+    report: Optional[dict[str, Any]]
+
+class Certified:
+    network: Network
+    proved: bool
+    outcome: str
+    message: str
+    levels: list[SimpleNamespace]
+    estimates: list[SimpleNamespace]
+    counterexample: Optional[Floats]
+    seconds: float
+
+def train_classifier(
+    system: Union[System, _Ready], starts: Any, *, step: float, mode: Any = None,
+    method: str = "rk4", progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None,
+    seed: int = 1, run_length: float = 10.0, surface_points: int = 2000, states: int = 100_000,
+    fresh_states: int = 40_000, trial_events: int = 1000, hidden: Sequence[int] = (16, 16),
+    iterations: int = 20_000, **options: Any) -> Trained: ...
+
+def train_gate(
+    system: Union[System, _Ready], starts: Any, levels: Optional[Sequence[float]] = None, *,
+    step: Union[None, float, Tuple[float, float]] = None, mode: Any = None,
+    method: Optional[str] = None,
+    progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None, seed: int = 1,
+    kind: str = "horizon", recipe: str = "state", run_length: float = 10.0, events: int = 3000,
+    states: int = 200_000, fresh_events: int = 30_000, hidden: Sequence[int] = (16, 16),
+    iterations: int = 4000, **options: Any) -> Trained: ...
+
+def certify(
+    network: Union[str, PathLike[str], Network], system: Union[System, _Ready],
+    slack: Union[Sequence[float], Callable[[Floats], float]], *,
+    least: Optional[Callable[[Floats, Floats], float]] = None,
+    progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None, margin: float = 0.0,
+    levels: int = 1, ratio: float = 2.0, seed: int = 1, threads: int = 2, limit: float = 300.0,
+    **options: Any) -> Certified: ...
+
+class Verdict(IntEnum):
+    STANDS = 0
+    CUT = 1
+    RESTS = 2
+    ENDED = 3
+
+class Cut(NamedTuple):
+    t: float
+    s: float
+    before: Floats
+    after: Floats
+    mode_before: Any
+    mode_after: Any
+    fired: list[int]
+    fired_names: list[str]
+    on_time: bool
+    accumulation: bool
+    state_changed: bool
+
+class Monitor:
+    def __init__(self, system: Union[System, _Ready], like: ArrayLike, *, backward: bool = False,
+                 cut_at_all: bool = False, event_tolerance: float = 0.0, event_rtol: float = 0.0,
+                 event_window: float = 0.0, look_inside: bool = True, record_events: bool = True,
+                 event_states: bool = True, detector: str = "extremum",
+                 locator: str = "newton",
+                 gate: Union[None, str, PathLike[str], Network] = None) -> None: ...
+    def start(self, t: float, x: ArrayLike, scale: float, rate: Optional[ArrayLike] = None,
+              mode: Any = None) -> Verdict: ...
+    def examine(self, t0: float, h: float, x0: ArrayLike, x1: ArrayLike, rate0: ArrayLike,
+                rate1: ArrayLike,
+                interpolate: Optional[Callable[[float], ArrayLike]] = None) -> Verdict: ...
+    def resume(self, scale: float, rate: Optional[ArrayLike] = None, *,
+               after: Optional[ArrayLike] = None, mode: Any = None) -> Verdict: ...
+    def hold(self, t: float) -> Verdict: ...
+    def skip_to(self, t: float, x: ArrayLike, rate: ArrayLike) -> None: ...
+    @property
+    def cut(self) -> Cut: ...
+    @property
+    def t(self) -> float: ...
+    @property
+    def x(self) -> Floats: ...
+    @property
+    def mode(self) -> Any: ...
+    @property
+    def must_stop_at(self) -> float: ...
+    @property
+    def quiet_until(self) -> float: ...
+    @property
+    def events(self) -> NDArray[np.void]: ...
+    @property
+    def run(self) -> Run: ...
+    def clear_events(self) -> None: ...
+    def save(self) -> Snapshot: ...
+    def restore(self, snapshot: Snapshot) -> None: ...
 
 class OdeResult(dict[str, Any]):
     def __getattr__(self, name: str) -> Any: ...

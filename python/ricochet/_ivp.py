@@ -7,6 +7,7 @@ import numpy as np
 
 from . import _ricochet
 from ._compiled import Compiled
+from ._network import set_gate
 from ._ready import Ready
 from ._run import Kind, set_mode, set_tolerance, source_of, state_from
 from ._system import Guard, System
@@ -198,6 +199,7 @@ def _options(options, t0, t1, components):
                 raise TypeError(f"solve_ivp: found the option {name!r}, expected its name in "
                                 "SciPy")
     given.update(options)
+    set_gate(given)
     return given
 
 

@@ -12,6 +12,8 @@ class Ready:
     def __init__(self, **parameters):
         self._parameters = {name: float(value) for name, value in parameters.items()}
         self._source = _ricochet.ready_system(self._name, list(self._parameters.values()))
+        self._source.parameters = {name.replace("_", "-"): value
+                                   for name, value in self._parameters.items()}
 
     @property
     def parameters(self):

@@ -6,6 +6,7 @@ from math import floor, log2
 import numpy as np
 
 from . import _ricochet
+from ._network import set_gate
 from ._ready import Ready
 from ._system import System
 
@@ -91,6 +92,7 @@ def prepare(system, x0, t_end, options, args=None):
     x0 = state_from(x0, "x0")
     options = dict(options, t_end=float(t_end))
     set_mode(options, system, modes)
+    set_gate(options)
     if not isinstance(options.get("atol", 0), (float, int)):
         set_tolerance(options, options["atol"], len(x0))
     samples = options.get("sample_times")
@@ -132,7 +134,11 @@ def integrate(system, x0, t_end, **options):
         Keep the whole solution, for ``run.solution``, and, without ``sample_times``, the ends of
         all steps, both sides of resets, in ``run.times`` and ``run.states``.
     detector : str
-        ``"extremum"`` (default), ``"ends"``, ``"bernstein"`` or ``"planned"``.
+        ``"extremum"`` (default), ``"ends"``, ``"bernstein"``, ``"planned"``; with a ``gate``
+        ``"foreseen"``, ``"certified"``, ``"calibrated"``, ``"calibrated-bounds"`` or ``"network"``.
+    gate : Network or path
+        The network that such a detector asks. It is for systems of its ``system`` as their name, with
+        its ``parameters``.
     locator : str
         ``"newton"`` (default), ``"bisection"`` or ``"toms748"``.
     step, h_min, h_max, event_tolerance, event_rtol, event_window, look_inside, stop_at_event,

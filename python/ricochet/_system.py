@@ -135,7 +135,7 @@ def guard(value=None, **options):
 
 _KNOWN = ("flow", "guard", "reset", "rest", "guard_rate", "unilateral", "direction", "modes",
           "name", "guards", "guard_values", "reset_set", "time_events", "next_time_event",
-          "previous_time_event", "time_reset", "changes_dimension")
+          "previous_time_event", "time_reset", "changes_dimension", "parameters")
 
 
 class System:
@@ -163,6 +163,8 @@ class System:
         What happens at these times.
     changes_dimension
         Whether resets may shorten the state without a change of mode.
+    name, parameters
+        What a network is trained for: a text, and a dictionary of numbers.
     """
 
     flow = None
@@ -176,6 +178,7 @@ class System:
     previous_time_event = None
     time_reset = None
     changes_dimension = False
+    parameters = None
 
     def __init__(self, flow=None, guards=None, **members):
         if flow is not None:
@@ -247,9 +250,13 @@ class System:
                 def preceding(t, *_):
                     k = bisect_left(times, t)
                     return times[k - 1] if k > 0 else -inf
-        return _ricochet.callback_system(dict(
+        source = _ricochet.callback_system(dict(
             name=self.name or type(self).__name__, flow=self.flow, args=args,
             modes=self._mode_list(), guards=self._guard_list(),
             guard_values=self.guard_values, reset_set=self.reset_set,
             next_time_event=following, previous_time_event=preceding,
             time_reset=self.time_reset, changes_dimension=self.changes_dimension))
+        if self.parameters is not None:
+            source.parameters = {name.replace("_", "-"): float(value)
+                                 for name, value in dict(self.parameters).items()}
+        return source

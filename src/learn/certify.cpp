@@ -124,6 +124,8 @@ public:
             }
         } catch (const std::bad_alloc&) {
             outcome = CertifyOutcome::out_of_memory;
+        } catch (const CertifyInterrupted&) {
+            outcome = CertifyOutcome::interrupted;
         }
         keep_([this] { save(all_, key_, o_.checkpoint); });
         return result(outcome);

@@ -260,6 +260,11 @@ public:
                 }
             }
             if (last) break;
+            if (options_.cancelled && *options_.cancelled) {
+                outcome = TrainingOutcome::stopped;
+                keep_([this] { save(); });
+                break;
+            }
             step();
         }
         return result(outcome);

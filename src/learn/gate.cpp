@@ -216,6 +216,12 @@ public:
                 }
             }
             if (last || since_best >= options_.patience) return true;
+            if (options_.cancelled && *options_.cancelled) {
+                // Before the first evaluation there is nothing worth keeping: no state is cleared.
+                if (!best_.empty()) keep_([&] { save(round, i, since_best, adam); });
+                outcome_ = TrainingOutcome::stopped;
+                return false;
+            }
             const double done = static_cast<double>(i) / static_cast<double>(options_.iterations);
             const double rate = options_.final_rate + (options_.rate - options_.final_rate) * 0.5 *
                                                           (1 + std::cos(std::numbers::pi * done));

@@ -49,7 +49,7 @@ def test_stubs_declare_what_there_is():
     assert set(ricochet.__all__) <= declared(public.body)
     classes = {node.name: declared(node.body) for node in public.body
                if isinstance(node, ast.ClassDef)}
-    for name in ("Run", "Solution", "Snapshot", "Simulation"):
+    for name in ("Run", "Solution", "Snapshot", "Simulation", "Monitor", "Network"):
         found = {member for member in vars(getattr(_ricochet, name)) if not member.startswith("_")}
         assert found <= classes[name], name
 

@@ -150,6 +150,10 @@ enum class CertifyOutcome {
     interrupted,    ///< by the callback; the same
 };
 
+/// Thrown by a guard or its slack to stop from there, as the callback does where it is asked: the
+/// outcome is `interrupted`.
+struct CertifyInterrupted {};
+
 /// One sentence with the remedy.
 [[nodiscard]] std::string_view describe(CertifyOutcome outcome) noexcept;
 

@@ -6,6 +6,7 @@
 // threshold is put below the logit of every event of a validation set.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -50,6 +51,8 @@ struct TrainingOptions {
     std::filesystem::path checkpoint{};   ///< written now and then and on stopping; empty: none
     std::size_t checkpoint_every = 5000;  ///< iterations
     bool resume = false;                  ///< continue from `checkpoint`
+    /// Asked before every iteration; true stops, as the callback does. Null: it is not asked.
+    const std::atomic<bool>* cancelled = nullptr;
 };
 
 /// Where a training is; given at every look at the validation set.

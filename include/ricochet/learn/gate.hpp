@@ -13,6 +13,7 @@
 // `learn/train_gate.hpp` makes the samples, and puts all together.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -72,6 +73,8 @@ struct GateTraining {
 
     std::filesystem::path checkpoint{};  ///< written at every evaluation; empty: none
     bool resume = false;                 ///< continue from `checkpoint`, to the same bits
+    /// Asked before every iteration; true stops, as the callback does. Null: it is not asked.
+    const std::atomic<bool>* cancelled = nullptr;
 };
 
 /// States of runs, and what became of them.

@@ -16,6 +16,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -85,6 +86,45 @@ void check(const ClassifierTraining& training);
 /// @throws std::invalid_argument: a network sees at most as many components.
 [[noreturn]] void throw_too_many_components(std::size_t found, std::size_t most);
 
+/// Before and after the training it is asked now and then whether to go on.
+class Asked {
+public:
+    struct Stopped {};
+
+    explicit Asked(const ProgressCallback& progress) : progress_(&progress) {}
+
+    /// @param every  of so many calls one asks
+    void begin(std::string_view stage, std::size_t total, std::uint64_t every = 64)
+    {
+        stage_ = stage;
+        total_ = total;
+        every_ = every;
+        calls_ = 0;
+    }
+    /// @throws Stopped if the callback says so
+    void operator()(std::size_t done)
+    {
+        if (calls_++ % every_ != 0 || !*progress_) return;
+        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begun_;
+        if (!(*progress_)({.iteration = done,
+                           .total = total_,
+                           .loss = std::numeric_limits<double>::quiet_NaN(),
+                           .misses = 0,
+                           .seconds = spent.count(),
+                           .stage = stage_})) {
+            throw Stopped{};
+        }
+    }
+
+private:
+    const ProgressCallback* progress_;
+    std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+    std::string_view stage_;
+    std::size_t total_ = 0;
+    std::uint64_t every_ = 64;
+    std::uint64_t calls_ = 0;
+};
+
 /// The event surface of a system as its runs have met it; see `SurfaceProblem`. Times are counted
 /// in steps.
 template <class System, class X, class Method>
@@ -98,7 +138,10 @@ public:
         double back;   ///< [steps] to the event before
     };
 
-    MetSurface(const System& system, double step) : system_(&system), step_(step) {}
+    MetSurface(const System& system, double step, Asked& asked)
+        : system_(&system), step_(step), asked_(&asked)
+    {
+    }
 
     void add(const State& at) { points_.push_back(at); }
     [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
@@ -167,6 +210,7 @@ public:
     /// The method's map over so many steps, of either sign, without events.
     [[nodiscard]] State operator()(const State& at, double steps) const
     {
+        (*asked_)(0);
         if (steps == 0) return at;
         const double span = steps * step_;
         const double parts = std::ceil(std::fabs(steps) * (1 - 1e-12));
@@ -183,6 +227,7 @@ public:
 private:
     const System* system_;
     double step_;
+    Asked* asked_;
     std::vector<State> points_;
     std::vector<Interval> box_;
     bool first_ = true;
@@ -192,7 +237,8 @@ private:
 
 /// Samples runs of `system`, trains a network on them, assesses it on states of other runs, and
 /// measures what it costs beside the exact detector, on runs of the same starts. The callback is
-/// that of `train`.
+/// that of `train`, and is asked before and after it, too: what was computed until it says no is
+/// returned as `stopped`, with an empty model if the training had not begun.
 ///
 /// @param options  event settings of the runs; times and the step come from `training`
 /// @throws std::invalid_argument if an option is outside its range, no run can be started, or the
@@ -205,6 +251,8 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
 {
     using Surface = detail::MetSurface<System, X, Method>;
     detail::check(training);
+    detail::Asked asked(progress);
+    TrainedClassifier out;
     Options run_options = options;
     run_options.step = training.step;
     run_options.sample_times.clear();
@@ -229,10 +277,12 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
     };
 
     const auto meet = [&](std::uint64_t seed) {
-        Surface surface(system, training.step);
+        Surface surface(system, training.step, asked);
+        asked.begin("sampling", training.surface_points);
         Random random(seed);
         std::uint64_t steps = 0;
         while (surface.size() < training.surface_points && steps < training.most_steps) {
+            asked(surface.size());
             const RunStart<X> from = start(random);
             const std::size_t components = static_cast<std::size_t>(from.x.size());
             if (components > Network::max_features) {
@@ -242,6 +292,7 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
             double last = from.t;
             std::size_t seen = 0;
             while (run.step()) {
+                asked(surface.size());
                 surface.visit(run.x());
                 const auto& events = run.run().events;
                 for (; seen < events.size(); ++seen) {
@@ -266,6 +317,7 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
     };
     const auto sample = [&](const Surface& surface, std::size_t states, std::uint64_t seed,
                             bool keep_band) {
+        asked.begin("labelling", 0);
         return sample_surface(surface, surface,
                               {.step = 1,
                                .events = states / 2,
@@ -277,54 +329,63 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
                                .seed = seed});
     };
 
-    const Surface surface = meet(training.seed);
-    const SurfaceSample seen = sample(surface, training.states, training.seed, false);
-    TrainingOptions how = training.training;
-    how.seed = training.seed;
-    Trained trained = train(seen.data, how, progress);
-    TrainedClassifier out{.model = std::move(trained.model), .report = trained.report, .trial = {}};
-    if constexpr (requires { std::string_view(system.name); }) out.model.system = system.name;
-    out.model.recipe = name(Recipe::state);
-    out.model.domain = surface.box();
-    out.model.step_min = out.model.step_max = training.step;
-    out.report.band = seen.band;
-    if (out.report.outcome == TrainingOutcome::diverged) return out;
+    try {
+        const Surface surface = meet(training.seed);
+        const SurfaceSample seen = sample(surface, training.states, training.seed, false);
+        TrainingOptions how = training.training;
+        how.seed = training.seed;
+        Trained trained = train(seen.data, how, progress);
+        out.model = std::move(trained.model);
+        out.report = trained.report;
+        if constexpr (requires { std::string_view(system.name); }) out.model.system = system.name;
+        out.model.recipe = name(Recipe::state);
+        out.model.domain = surface.box();
+        out.model.step_min = out.model.step_max = training.step;
+        out.report.band = seen.band;
+        const TrainingOutcome ended = out.report.outcome;
+        if (ended == TrainingOutcome::diverged || ended == TrainingOutcome::stopped) return out;
 
-    Surface other = meet(training.seed + 1'000'003);
-    other.set_box(surface.box());
-    const SurfaceSample fresh = sample(other, training.fresh_states, training.seed + 1000, true);
-    out.report.fresh = assess(out.model, fresh.data, training.margin);
-    if (!out.misses_none() && out.report.outcome == TrainingOutcome::finished) {
-        out.report.outcome = TrainingOutcome::misses_remain;
-    }
+        Surface other = meet(training.seed + 1'000'003);
+        other.set_box(surface.box());
+        const SurfaceSample fresh =
+            sample(other, training.fresh_states, training.seed + 1000, true);
+        out.report.fresh = assess(out.model, fresh.data, training.margin);
+        if (!out.misses_none() && out.report.outcome == TrainingOutcome::finished) {
+            out.report.outcome = TrainingOutcome::misses_remain;
+        }
 
-    const Network network(out.model);
-    Random random(training.seed + 2'000'003);
-    const auto time = [](double& seconds, const auto& run) {
-        const double before = detail::processor_seconds();
-        auto result = run();
-        seconds += detail::processor_seconds() - before;
-        return result;
-    };
-    ClassifierTrial& trial = out.trial;
-    run_options.record_events = false;
-    while (trial.events < training.trial_events && trial.steps < training.most_steps) {
-        const RunStart<X> from = start(random);
-        const auto exact = time(trial.exact_seconds, [&] {
-            return integrate(system, from.x, run_options, FixedStep<Method>{}, Ends{});
-        });
-        const auto predicted = time(trial.network_seconds, [&] {
-            return integrate(system, from.x, run_options, FixedStep<Method>{}, network);
-        });
-        trial.events += exact.statistics.events;
-        trial.steps += exact.statistics.steps + 1;
-        trial.exact_calls += exact.statistics.guard_calls;
-        trial.network_calls += predicted.statistics.guard_calls;
-        const std::uint64_t late = predicted.statistics.late_events;
-        const std::uint64_t lost = exact.statistics.events > predicted.statistics.events
-                                       ? exact.statistics.events - predicted.statistics.events
-                                       : 0;
-        trial.missed += std::max(late, lost);
+        const Network network(out.model);
+        Random random(training.seed + 2'000'003);
+        asked.begin("comparing", training.trial_events, 1);
+        const auto time = [](double& seconds, const auto& run) {
+            const double before = detail::processor_seconds();
+            auto result = run();
+            seconds += detail::processor_seconds() - before;
+            return result;
+        };
+        ClassifierTrial& trial = out.trial;
+        run_options.record_events = false;
+        while (trial.events < training.trial_events && trial.steps < training.most_steps) {
+            asked(trial.events);
+            const RunStart<X> from = start(random);
+            const auto exact = time(trial.exact_seconds, [&] {
+                return integrate(system, from.x, run_options, FixedStep<Method>{}, Ends{});
+            });
+            const auto predicted = time(trial.network_seconds, [&] {
+                return integrate(system, from.x, run_options, FixedStep<Method>{}, network);
+            });
+            trial.events += exact.statistics.events;
+            trial.steps += exact.statistics.steps + 1;
+            trial.exact_calls += exact.statistics.guard_calls;
+            trial.network_calls += predicted.statistics.guard_calls;
+            const std::uint64_t late = predicted.statistics.late_events;
+            const std::uint64_t lost = exact.statistics.events > predicted.statistics.events
+                                           ? exact.statistics.events - predicted.statistics.events
+                                           : 0;
+            trial.missed += std::max(late, lost);
+        }
+    } catch (const detail::Asked::Stopped&) {
+        out.report.outcome = TrainingOutcome::stopped;
     }
     return out;
 }

@@ -203,7 +203,7 @@ public:
         Random random(seed);
         const Planned<> planned({.longest_stretch = 16, .check_bounds = true});
         begin_stage("checking bounds", 0);
-        for (std::size_t done = 0; done < steps && !stopped_;) {
+        for (std::size_t done = 0; done < steps && goes_on(0);) {
             const Exact exact = start(random);
             Simulation<System, X, Stepping, Planned<>> run(*system_, exact.x(), options_used_,
                                                            Stepping{}, planned);
@@ -228,7 +228,8 @@ public:
         GateTrial trial;
         const double before = detail::processor_seconds();
         begin_stage("testing", events);
-        while (trial.events < events && trial.steps < training_.most_steps && !stopped_) {
+        while (trial.events < events && trial.steps < training_.most_steps &&
+               goes_on(trial.events)) {
             std::optional<Exact> exact(start(random));
             Options options = options_used_;
             std::optional<Gated> gated(std::in_place, *system_, exact->x(), options, Stepping{},

@@ -3,6 +3,7 @@
 
 #include "python_error.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -36,8 +37,13 @@ using CompiledRate = double (*)(std::uint32_t mode, double t, const double* x, c
 using CompiledReset = std::uint32_t (*)(std::uint32_t mode, double t, double* x, std::size_t n,
                                         void* user);
 
+/// Of every call, further ones included.
+constexpr std::size_t most_arguments = 32;
+
 struct CallbackGuard {
     std::string name;
+    std::string title;  ///< in messages: "guard floor", "events[0]"
+    std::string owner;  ///< in messages, of its reset and other functions: "floor", "events[0]"
     GuardInfo info;
     Function value, rate, reset, rest, enabled;
     Function speed_bound, acceleration_bound, lower_bound, upper_bound;
@@ -63,6 +69,7 @@ private:
     void fill_table();
 
     std::string name_;
+    std::string flow_title_;  ///< in messages: "flow", "fun"
     Function flow_, guard_values_, reset_set_;
     Function next_time_event_, previous_time_event_, time_reset_;
     std::vector<CallbackGuard> guards_;

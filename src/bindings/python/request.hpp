@@ -1,12 +1,14 @@
 // What Python asks of a run, in the library's terms.
 #pragma once
 
+#include <memory>
 #include <string_view>
 #include <vector>
 
 #include "ricochet/detail/core.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/integrate/options.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::python {
 
@@ -18,8 +20,9 @@ struct Request {
     bool fixed = false;  ///< steps of `options.step`
     std::string_view detector = "extremum";
     std::string_view locator = "newton";
-    bool record_steps = false;  ///< keep the state at the end of every step
-    bool dense = false;         ///< keep every step as a polynomial
+    std::shared_ptr<const Model> gate{};  ///< for the detectors that ask one
+    bool record_steps = false;            ///< keep the state at the end of every step
+    bool dense = false;                   ///< keep every step as a polynomial
 
     /// One component of a scaled state is worth so much; empty: 1 each. Powers of two, so that
     /// scaling rounds nothing.
@@ -32,10 +35,5 @@ struct Request {
                scale.empty();
     }
 };
-
-/// The setup of a run with states sized at run time. The detector and the locator are the
-/// library's; a system and its door are still to be named.
-/// @throws std::invalid_argument for a detector or locator that there is not.
-[[nodiscard]] detail::RunSetup<State> setup_for(const Request& request);
 
 }  // namespace ricochet::python

@@ -6,9 +6,12 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "record.hpp"
@@ -31,6 +34,12 @@ public:
     [[nodiscard]] const std::atomic<bool>* cancelled() const noexcept { return &cancelled_; }
     /// What a handler has raised.
     [[nodiscard]] const std::optional<PythonError>& raised() const noexcept { return raised_; }
+    /// The same, to be raised here; what comes after it goes on.
+    [[nodiscard]] std::optional<PythonError> take_raised() noexcept
+    {
+        cancelled_ = false;
+        return std::exchange(raised_, std::nullopt);
+    }
 
 private:
     using Clock = std::chrono::steady_clock;
@@ -89,6 +98,9 @@ public:
     [[nodiscard]] virtual std::vector<std::string> mode_names() const = 0;
     [[nodiscard]] virtual std::vector<std::string> guard_names() const = 0;
     [[nodiscard]] virtual Mode start_mode() const noexcept { return 0; }
+
+    /// That networks are trained for, by the names that models have for them.
+    std::map<std::string, double, std::less<>> parameters;
 };
 
 }  // namespace ricochet::python

@@ -1,4 +1,4 @@
-#include "request.hpp"
+#include "setup.hpp"
 
 #include <span>
 #include <stdexcept>
@@ -50,16 +50,28 @@ void locate_by(detail::RunSetup<State>& setup)
 
 }  // namespace
 
-detail::RunSetup<State> setup_for(const Request& request)
+OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door)
 {
-    detail::RunSetup<State> setup;
+    OwnedSetup out;
+    detail::RunSetup<State>& setup = out.setup;
+    setup.system = &door.table();
+    setup.door = door.door();
     setup.kernel = &detail::kernel_by_name<State>(request.method);
     setup.method_by_name = true;
     setup.error_controlled = !request.fixed;
     setup.stepping = request.fixed ? detail::written_type<FixedStep<MethodByName>>()
                                    : detail::written_type<ErrorControlled<MethodByName>>();
     const std::string_view detector = request.detector;
-    if (detector == "extremum") {
+    if (detect_by_gate(out, request, source, door)) {
+        if (!request.scale.empty()) {
+            throw std::invalid_argument(
+                "atol: found one for each component; expected one for all, as a gate sees states "
+                "as they are");
+        }
+    } else if (request.gate) {
+        throw std::invalid_argument("gate: found one for the detector '" + std::string(detector) +
+                                    "', which asks none");
+    } else if (detector == "extremum") {
         detect_by<Extremum>(setup);
     } else if (detector == "ends") {
         detect_by<Ends>(setup);
@@ -68,7 +80,11 @@ detail::RunSetup<State> setup_for(const Request& request)
     } else if (detector == "planned") {
         detect_by<Planned<>>(setup);
     } else {
-        refuse("detector", detector, "'extremum', 'ends', 'bernstein' or 'planned'");
+        refuse("detector", detector, "one of those in the documentation");
+    }
+    // Without what it plans by, a detector is the exact one that it is made around.
+    if (!setup.system->guarded || (setup.detector.needs_bounds && !setup.system->bounded)) {
+        setup.detector.puts_off = false;
     }
     const std::string_view locator = request.locator;
     if (locator == "newton") {
@@ -80,7 +96,7 @@ detail::RunSetup<State> setup_for(const Request& request)
     } else {
         refuse("locator", locator, "'newton', 'bisection' or 'toms748'");
     }
-    return setup;
+    return out;
 }
 
 }  // namespace ricochet::python

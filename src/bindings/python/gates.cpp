@@ -1,0 +1,144 @@
+// Detectors that ask a network, for systems known at run time.
+#include <array>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "ricochet/detail/finders.hpp"
+#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/certified.hpp"
+#include "ricochet/detect/network.hpp"
+#include "setup.hpp"
+
+namespace ricochet::python {
+
+namespace {
+
+/// A system at the door of a run, as far as detectors ask it.
+class AskedSystem {
+public:
+    AskedSystem(const Source& source, RunDoor& door)
+        : name(door.table().name(door.door())), source_(&source), door_(&door)
+    {
+    }
+
+    void flow(Mode mode, double t, const State& x, State& dxdt) const
+    {
+        (void)door_->table().flow(door_->door(), mode, t, x, dxdt);
+    }
+    [[nodiscard]] double guard(double /*t*/, const State& /*x*/) const { return 1; }
+    [[nodiscard]] double speed_bound(double /*t*/, const State& /*x*/) const { return 0; }
+    [[nodiscard]] std::size_t mode_count() const
+    {
+        return door_->table().moded ? door_->table().mode_count(door_->door()) : 0;
+    }
+    [[nodiscard]] std::optional<double> parameter(std::string_view of) const
+    {
+        const auto found = source_->parameters.find(of);
+        if (found == source_->parameters.end()) return std::nullopt;
+        return found->second;
+    }
+
+    std::string name;
+
+private:
+    const Source* source_;
+    RunDoor* door_;
+};
+
+/// A detector, and the system that it asks. The loop hands over the door of the run, of whose type
+/// the detector knows nothing.
+template <class Detector>
+class At : public Detector {
+public:
+    template <class Asked>
+    At(AskedSystem system, Asked&& asked)
+        : Detector(std::forward<Asked>(asked)), system_(std::move(system))
+    {
+    }
+
+    void add_to(OwnedSetup& out, std::shared_ptr<const At> self) const
+    {
+        auto& table = out.setup.detector;
+        table = detail::DetectorTableOf<Detector, AskedSystem, State>::make(*this);
+        table.check = [](const void* at, void*, const State& x, double smallest, double largest) {
+            from(at).Detector::check(from(at).system_, x, smallest, largest);
+        };
+        if constexpr (requires(const State& x) { this->horizon(system_, Mode{}, 0.0, x); }) {
+            table.horizon = [](const void* at, void*, Mode mode, double t, const State& x) {
+                const auto answer = from(at).Detector::horizon(from(at).system_, mode, t, x);
+                return detail::GateAnswer{answer.cleared, answer.outside};
+            };
+        }
+        if constexpr (requires(const State& x) {
+                          this->level(system_, std::size_t{}, Mode{}, 0.0, x);
+                      }) {
+            table.level = [](const void* at, void*, std::size_t which, Mode mode, double t,
+                             const State& x) {
+                const auto answer = from(at).Detector::level(from(at).system_, which, mode, t, x);
+                return detail::GateAnswer{answer.cleared, answer.outside};
+            };
+        }
+        if constexpr (std::is_same_v<Detector, Network>) {
+            table.clears = [](const void* at, void*, const detail::StepState<State>& step,
+                              std::uint64_t& calls) {
+                detail::Door<AskedSystem, State> door(from(at).system_, step.x0);
+                const GuardView<AskedSystem, State> guard(
+                    from(at).system_, calls, 0, step.mode, Crossing::falling, step.backward);
+                return from(at).Detector::clears(
+                    guard, detail::StepToCome<AskedSystem, State>(door, step));
+            };
+        }
+        out.setup.detecting = static_cast<const Detector*>(self.get());
+        out.detector = std::move(self);
+    }
+
+private:
+    [[nodiscard]] static const At& from(const void* detector) noexcept
+    {
+        return static_cast<const At&>(*static_cast<const Detector*>(detector));
+    }
+
+    AskedSystem system_;
+};
+
+template <class Detector, class Asked>
+void detect_by(OwnedSetup& out, const Source& source, RunDoor& door, Asked&& asked)
+{
+    const auto kept =
+        std::make_shared<const At<Detector>>(AskedSystem(source, door), std::forward<Asked>(asked));
+    kept->add_to(out, kept);
+}
+
+}  // namespace
+
+bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& source, RunDoor& door)
+{
+    const std::string_view detector = request.detector;
+    const auto model = [&] {
+        if (request.gate) return Model(*request.gate);
+        throw std::invalid_argument(
+            "gate: found None, expected the path of a model, or a Network, "
+            "for the detector '" +
+            std::string(detector) + "'");
+    };
+    if (detector == "calibrated") {
+        detect_by<Calibrated<>>(out, source, door, gates::Gate(model()));
+    } else if (detector == "calibrated-bounds") {
+        detect_by<CalibratedBounds<>>(out, source, door, gates::Gate(model()));
+    } else if (detector == "foreseen") {
+        detect_by<Foreseen<>>(out, source, door, gates::Gate(model()));
+    } else if (detector == "certified") {
+        detect_by<Certified<>>(out, source, door, model());
+    } else if (detector == "network") {
+        detect_by<Network>(out, source, door, model());
+    } else {
+        return false;
+    }
+    return true;
+}
+
+}  // namespace ricochet::python

@@ -1,0 +1,37 @@
+// A trained network as Python has it.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "ricochet/detail/classifier.hpp"
+#include "ricochet/detail/gate.hpp"
+#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet::python {
+
+/// Immutable, so that threads may share it.
+class PyNetwork {
+public:
+    /// @throws std::invalid_argument if the layers do not fit together, or as `gates::Gate`.
+    explicit PyNetwork(Model model);
+
+    [[nodiscard]] std::shared_ptr<const Model> model() const { return model_; }
+    [[nodiscard]] const Classifier& classifier() const noexcept { return classifier_; }
+    /// Null unless the model is a gate.
+    [[nodiscard]] const gates::Gate* gate() const noexcept { return gate_ ? &*gate_ : nullptr; }
+    /// Null unless it has a certificate that holds.
+    [[nodiscard]] const CertifiedClassifier* certified() const noexcept
+    {
+        return certified_ ? &*certified_ : nullptr;
+    }
+
+private:
+    std::shared_ptr<const Model> model_;
+    Classifier classifier_;
+    std::optional<gates::Gate> gate_;
+    std::optional<CertifiedClassifier> certified_;
+};
+
+}  // namespace ricochet::python

@@ -1,0 +1,162 @@
+#define NPY_NO_DEPRECATED_API NPY_1_7_API_VERSION
+#include "numbers.hpp"
+
+#include <numpy/arrayobject.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace ricochet::python {
+
+namespace {
+
+/// NumPy's functions, found once. (`import_array` returns from the function it stands in.)
+void require_numpy()
+{
+    static const bool found = [] { return _import_array() >= 0; }();
+    if (!found) throw PythonError();
+}
+
+}  // namespace
+
+void raise(PyObject* type, const std::string& sentence)
+{
+    PyErr_SetString(type, sentence.c_str());
+    throw PythonError();
+}
+
+std::string type_of(PyObject* object)
+{
+    return object == Py_None ? "None" : Py_TYPE(object)->tp_name;
+}
+
+double as_guard(PyObject* result, const std::string& who)
+{
+    require_numpy();
+    if (PyFloat_Check(result)) return PyFloat_AS_DOUBLE(result);
+    if (PyBool_Check(result)) return result == Py_True ? 1 : -1;
+    if (PyArray_IsScalar(result, Bool)) return PyObject_IsTrue(result) ? 1 : -1;
+    if (!PyComplex_Check(result) && result != Py_None) {
+        const double number = PyFloat_AsDouble(result);
+        if (number != -1 || !PyErr_Occurred()) return number;
+        if (!PyErr_ExceptionMatches(PyExc_TypeError) && !PyErr_ExceptionMatches(PyExc_ValueError)) {
+            throw PythonError();
+        }
+        PyErr_Clear();
+    }
+    raise(PyExc_TypeError, who + " returned " + type_of(result) + ", expected a number");
+}
+
+Numbers::Numbers(PyObject* result, const char* who, const std::string& of)
+    : result_(result), who_(who), of_(of)
+{
+    require_numpy();
+    if (PyList_CheckExact(result) || PyTuple_CheckExact(result)) {
+        items_ = PySequence_Fast_ITEMS(result);
+        size_ = static_cast<std::size_t>(PySequence_Fast_GET_SIZE(result));
+        for (std::size_t i = 0; i < size_; ++i) {
+            if (!PyFloat_Check(items_[i]) && !PyLong_Check(items_[i])) {
+                items_ = nullptr;  // let NumPy see whether these are numbers
+                break;
+            }
+        }
+        if (items_) return;
+    }
+    read_array();
+}
+
+void Numbers::copy(double* out, const std::vector<double>& factors) const
+{
+    for (std::size_t i = 0; i < size_; ++i) {
+        double number = 0;
+        if (!items_) {
+            number = data_[i];
+        } else if (PyFloat_Check(items_[i])) {
+            number = PyFloat_AS_DOUBLE(items_[i]);
+        } else {
+            number = PyLong_AsDouble(items_[i]);
+            if (number == -1 && PyErr_Occurred()) throw PythonError();
+        }
+        out[i] = i < factors.size() ? number * factors[i] : number;
+    }
+}
+
+void Numbers::refuse(const std::string& found) const
+{
+    raise(PyExc_TypeError,
+          std::string(who_) + of_ + " returned " + found + ", expected a sequence of numbers");
+}
+
+void Numbers::read_array()
+{
+    if (result_ == Py_None) refuse("None");
+    Ref array = Ref::take(PyArray_FromAny(result_, nullptr, 0, 0, 0, nullptr));
+    if (!array) {
+        const PythonError error;
+        if (!PyErr_GivenExceptionMatches(error.value(), PyExc_ValueError) &&
+            !PyErr_GivenExceptionMatches(error.value(), PyExc_TypeError)) {
+            throw error;
+        }
+        refuse("a " + type_of(result_));
+    }
+    auto* given = reinterpret_cast<PyArrayObject*>(array.get());
+    const int type = PyArray_TYPE(given);
+    if (PyTypeNum_ISCOMPLEX(type)) refuse("complex numbers");
+    if (PyTypeNum_ISFLEXIBLE(type) || PyTypeNum_ISDATETIME(type)) {
+        refuse("a " + type_of(result_));
+    }
+    if (PyArray_NDIM(given) > 1) {
+        raise(PyExc_ValueError, std::string(who_) + of_ + " returned an array of " +
+                                    std::to_string(PyArray_NDIM(given)) +
+                                    " dimensions, expected 1");
+    }
+    if (type == NPY_OBJECT) return read_objects(array);
+    if (type != NPY_DOUBLE || !PyArray_ISCARRAY_RO(given)) {
+        array = Ref::take(PyArray_FromAny(array.get(), PyArray_DescrFromType(NPY_DOUBLE), 0, 1,
+                                          NPY_ARRAY_CARRAY_RO | NPY_ARRAY_FORCECAST, nullptr));
+        if (!array) {
+            PyErr_Clear();
+            refuse("a " + type_of(result_));
+        }
+        given = reinterpret_cast<PyArrayObject*>(array.get());
+    }
+    data_ = static_cast<const double*>(PyArray_DATA(given));
+    size_ = static_cast<std::size_t>(PyArray_SIZE(given));
+    kept_ = std::move(array);
+}
+
+void Numbers::read_objects(const Ref& array)
+{
+    const Ref list = checked(PyArray_ToList(reinterpret_cast<PyArrayObject*>(array.get())));
+    if (!PyList_Check(list.get())) refuse("a " + type_of(result_));
+    for (Py_ssize_t i = 0; i < PyList_GET_SIZE(list.get()); ++i) {
+        converted_.push_back(PyFloat_AsDouble(PyList_GET_ITEM(list.get(), i)));
+        if (PyErr_Occurred()) {
+            PyErr_Clear();
+            refuse("a " + type_of(result_) + " with a " + type_of(PyList_GET_ITEM(list.get(), i)));
+        }
+    }
+    data_ = converted_.data();
+    size_ = converted_.size();
+}
+
+PyObject* ShownArray::show(const State& x, const std::vector<double>& scale)
+{
+    require_numpy();
+    auto* array = reinterpret_cast<PyArrayObject*>(array_.get());
+    const auto size = static_cast<npy_intp>(x.size());
+    if (!array || Py_REFCNT(array) != 1 || PyArray_NDIM(array) != 1 ||
+        PyArray_DIM(array, 0) != size || PyArray_TYPE(array) != NPY_DOUBLE ||
+        !PyArray_ISCARRAY(array)) {
+        npy_intp shape = size;
+        array_ = checked(PyArray_SimpleNew(1, &shape, NPY_DOUBLE));
+        array = reinterpret_cast<PyArrayObject*>(array_.get());
+    }
+    auto* to = static_cast<double*>(PyArray_DATA(array));
+    std::memcpy(to, x.data(), x.size() * sizeof(double));
+    for (std::size_t i = 0; i < std::min(scale.size(), x.size()); ++i) to[i] *= scale[i];
+    return array_.get();
+}
+
+}  // namespace ricochet::python

@@ -1,0 +1,59 @@
+// Numbers that functions of Python return, and arrays that they are shown.
+#pragma once
+
+#include "python_error.hpp"
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "request.hpp"
+
+namespace ricochet::python {
+
+[[noreturn]] void raise(PyObject* type, const std::string& sentence);
+
+/// What the type of an object is called.
+[[nodiscard]] std::string type_of(PyObject* object);
+
+/// One number that a callback has returned; true counts as 1, false as -1.
+/// @throws PythonError naming `who` returned something else
+[[nodiscard]] double as_guard(PyObject* result, const std::string& who);
+
+/// The numbers that a callback has returned, which is kept alive by the caller.
+class Numbers {
+public:
+    /// @throws PythonError naming `who` and `of`, if these are no numbers
+    Numbers(PyObject* result, const char* who, const std::string& of);
+
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+
+    /// out[i] = number i, times factors[i] where there is one.
+    void copy(double* out, const std::vector<double>& factors = {}) const;
+
+private:
+    [[noreturn]] void refuse(const std::string& found) const;
+    void read_array();
+    void read_objects(const Ref& array);
+
+    PyObject* result_;
+    const char* who_;
+    const std::string& of_;
+    std::vector<double> converted_;
+    PyObject** items_ = nullptr;
+    const double* data_ = nullptr;
+    std::size_t size_ = 0;
+    Ref kept_;
+};
+
+/// An array that callbacks are shown. Where one has kept it, the next is shown another, so that
+/// what was kept does not change.
+class ShownArray {
+public:
+    [[nodiscard]] PyObject* show(const State& x, const std::vector<double>& scale);
+
+private:
+    Ref array_;
+};
+
+}  // namespace ricochet::python

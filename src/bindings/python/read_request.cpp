@@ -1,0 +1,140 @@
+#include "read_request.hpp"
+
+#include <pybind11/stl.h>
+
+#include <functional>
+#include <initializer_list>
+#include <map>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "network.hpp"
+
+namespace py = pybind11;
+
+namespace ricochet::python {
+
+namespace {
+
+[[nodiscard]] MethodName method_named(const std::string& name)
+{
+    if (name == "dopri5") return MethodName::dopri5;
+    if (name == "fehlberg78") return MethodName::fehlberg78;
+    if (name == "cash-karp54") return MethodName::cash_karp54;
+    if (name == "rk4") return MethodName::rk4;
+    if (name == "euler") return MethodName::euler;
+    throw py::value_error("found '" + name +
+                          "', expected 'dopri5', 'fehlberg78', 'cash-karp54', 'rk4' or 'euler'");
+}
+
+[[nodiscard]] std::string_view one_of(const std::string& name,
+                                      std::initializer_list<std::string_view> known)
+{
+    for (const std::string_view candidate : known) {
+        if (candidate == name) return candidate;
+    }
+    std::string all;
+    for (const std::string_view candidate : known) {
+        all += (all.empty() ? "'" : ", '") + std::string(candidate) + "'";
+    }
+    throw py::value_error("found '" + name + "', expected one of " + all);
+}
+
+using Setter = void (*)(Request&, const py::handle&);
+
+template <auto member>
+void set(Request& request, const py::handle& value)
+{
+    using T = std::remove_cvref_t<decltype(request.options.*member)>;
+    request.options.*member = py::cast<T>(value);
+}
+
+[[nodiscard]] const std::map<std::string, Setter, std::less<>>& setters()
+{
+    static const std::map<std::string, Setter, std::less<>> all{
+        {"t_start", &set<&Options::t_start>},
+        {"t_end", &set<&Options::t_end>},
+        {"mode", &set<&Options::mode>},
+        {"step", &set<&Options::step>},
+        {"rtol", &set<&Options::rtol>},
+        {"atol", &set<&Options::atol>},
+        {"h_min", &set<&Options::h_min>},
+        {"h_max", &set<&Options::h_max>},
+        {"event_tolerance", &set<&Options::event_tolerance>},
+        {"event_rtol", &set<&Options::event_rtol>},
+        {"event_window", &set<&Options::event_window>},
+        {"look_inside", &set<&Options::look_inside>},
+        {"stop_at_event", &set<&Options::stop_at_event>},
+        {"record_events", &set<&Options::record_events>},
+        {"event_states", &set<&Options::event_states>},
+        {"sample_times", &set<&Options::sample_times>},
+        {"max_steps", &set<&Options::max_steps>},
+        {"stall_steps", &set<&Options::stall_steps>},
+        {"method",
+         [](Request& request, const py::handle& value) {
+             request.method = method_named(py::cast<std::string>(value));
+         }},
+        {"fixed",
+         [](Request& request, const py::handle& value) { request.fixed = py::cast<bool>(value); }},
+        {"detector",
+         [](Request& request, const py::handle& value) {
+             request.detector = one_of(py::cast<std::string>(value),
+                                       {"extremum", "ends", "bernstein", "planned", "calibrated",
+                                        "calibrated-bounds", "foreseen", "certified", "network"});
+         }},
+        {"gate",
+         [](Request& request, const py::handle& value) {
+             if (!value.is_none()) request.gate = py::cast<const PyNetwork&>(value).model();
+         }},
+        {"locator",
+         [](Request& request, const py::handle& value) {
+             request.locator =
+                 one_of(py::cast<std::string>(value), {"newton", "bisection", "toms748"});
+         }},
+        {"record_steps",
+         [](Request& request, const py::handle& value) {
+             request.record_steps = py::cast<bool>(value);
+         }},
+        {"dense",
+         [](Request& request, const py::handle& value) {
+             request.dense = request.options.record_steps = py::cast<bool>(value);
+         }},
+        {"scale",
+         [](Request& request, const py::handle& value) {
+             request.scale = py::cast<std::vector<double>>(value);
+         }},
+    };
+    return all;
+}
+
+}  // namespace
+
+Request request_from(const py::dict& given)
+{
+    Request request;
+    for (const auto& [key, value] : given) {
+        const auto name = py::cast<std::string>(key);
+        const auto setter = setters().find(name);
+        if (setter == setters().end()) {
+            std::string known;
+            for (const auto& [option, set] : setters()) {
+                if (option != "scale") known += (known.empty() ? "" : ", ") + option;
+            }
+            throw py::type_error("found an option '" + name + "', expected some of " + known);
+        }
+        try {
+            setter->second(request, value);
+        } catch (const py::cast_error&) {
+            throw py::type_error(
+                name + ": found " + py::cast<std::string>(py::repr(value)) + ", a " +
+                py::cast<std::string>(py::str(py::type::of(value).attr("__name__"))));
+        } catch (const py::value_error& error) {
+            throw py::value_error(name + ": " + error.what());
+        }
+    }
+    return request;
+}
+
+}  // namespace ricochet::python

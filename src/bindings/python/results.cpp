@@ -1,0 +1,382 @@
+#include "results.hpp"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "bindings.hpp"
+#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/snapshot.hpp"
+
+namespace ricochet::python {
+
+namespace {
+
+/// Memory of `owner` as an array that is not to be written to.
+[[nodiscard]] py::array view(const py::dtype& type, std::vector<py::ssize_t> shape,
+                             std::vector<py::ssize_t> strides, const void* data, py::handle owner)
+{
+    py::array out(type, std::move(shape), std::move(strides), data, owner);
+    py::detail::array_proxy(out.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+    return out;
+}
+
+[[nodiscard]] py::dtype make_event_type(std::size_t width)
+{
+    py::list names, formats, offsets;
+    const auto add = [&](const char* name, const std::string& format, std::size_t offset) {
+        names.append(name);
+        formats.append(format);
+        offsets.append(offset);
+    };
+    const std::string states = "(" + std::to_string(width) + ",)f8";
+    add("t", "f8", offsetof(EventHead, t));
+    add("guard", "i8", offsetof(EventHead, guard));
+    add("bracket", "(2,)f8", offsetof(EventHead, bracket));
+    add("slope", "f8", offsetof(EventHead, slope));
+    add("error", "f8", offsetof(EventHead, error));
+    add("mode_before", "u4", offsetof(EventHead, mode_before));
+    add("mode_after", "u4", offsetof(EventHead, mode_after));
+    add("kind", "u1", offsetof(EventHead, kind));
+    add("late", "?", offsetof(EventHead, late));
+    add("before", states, sizeof(EventHead));
+    add("after", states, sizeof(EventHead) + 8 * width);
+    return py::dtype(names, formats, offsets,
+                     static_cast<py::ssize_t>(sizeof(EventHead) + 16 * width));
+}
+
+/// The type of events with states of `width` components; made once, since NumPy takes its time.
+[[nodiscard]] py::dtype event_type(std::size_t width)
+{
+    // Never destroyed: the interpreter may be gone by then.
+    static auto& made = *new std::map<std::size_t, py::dtype>;
+    const auto known = made.find(width);
+    if (known != made.end()) return known->second;
+    return made.emplace(width, make_event_type(width)).first->second;
+}
+using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64_t)>;
+
+[[nodiscard]] py::object statistics_of(const Statistics& s)
+{
+    static const auto& space =
+        *new py::object(py::module_::import("types").attr("SimpleNamespace"));
+    using namespace py::literals;
+    const py::object evidence =
+        space("proved"_a = s.evidence.proved, "checked"_a = s.evidence.checked,
+              "gated"_a = s.evidence.gated, "assumed"_a = s.evidence.assumed);
+    py::dict counts;
+    const auto add = [&](const char* name, std::uint64_t count) { counts[name] = count; };
+    add("steps", s.steps);
+    add("rejected", s.rejected);
+    add("refined_steps", s.refined_steps);
+    add("unresolved_steps", s.unresolved_steps);
+    add("resteps", s.resteps);
+    add("flow_calls", s.flow_calls);
+    add("guard_calls", s.guard_calls);
+    add("checks_put_off", s.checks_put_off);
+    add("bound_calls", s.bound_calls);
+    add("rollbacks", s.rollbacks);
+    add("repeated_steps", s.repeated_steps);
+    add("events", s.events);
+    add("suppressed", s.suppressed);
+    add("disabled", s.disabled);
+    counts["evidence"] = evidence;
+    return space(**counts);
+}
+
+[[nodiscard]] py::bytes bytes_of(const std::vector<double>& numbers)
+{
+    return py::bytes(reinterpret_cast<const char*>(numbers.data()),
+                     numbers.size() * sizeof(double));
+}
+
+[[nodiscard]] std::vector<double> numbers_of(const py::bytes& bytes)
+{
+    const std::string_view text = bytes;
+    if (text.size() % sizeof(double) != 0) throw py::value_error("found a pickle that was cut");
+    std::vector<double> out(text.size() / sizeof(double));
+    std::memcpy(out.data(), text.data(), text.size());
+    return out;
+}
+
+[[nodiscard]] py::tuple pickled(const PySolution& self)
+{
+    Snapshot numbers;
+    self.solution->visit(detail::SnapshotWriter(numbers));
+    return py::make_tuple(bytes_of(numbers.numbers), numbers.counts, self.scale, self.modes);
+}
+
+[[nodiscard]] PySolution solution_from(const py::tuple& state)
+{
+    Snapshot numbers;
+    numbers.numbers = numbers_of(state[0]);
+    numbers.counts = py::cast<std::vector<std::uint64_t>>(state[1]);
+    PySolution out{.solution = std::make_shared<Solution<State>>(), .scale = {}};
+    detail::SnapshotReader reader(numbers);
+    out.solution->visit(reader);
+    reader.finish();
+    out.scale = py::cast<std::vector<double>>(state[2]);
+    out.modes = state[3];
+    return out;
+}
+
+[[nodiscard]] py::tuple pickled(const PyRun& self)
+{
+    const Record& r = self.record;
+    return py::make_tuple(
+        static_cast<int>(r.outcome), r.t, r.x, r.mode, r.guard, r.other_guard,
+        std::bit_cast<Counts>(r.statistics), r.width, r.event_count, bytes_of(r.events),
+        bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
+        r.solution ? py::object(pickled(PySolution{r.solution, r.scale})) : py::object(py::none()),
+        self.modes, self.guard_names);
+}
+
+[[nodiscard]] PyRun run_from(const py::tuple& state)
+{
+    PyRun out;
+    Record& r = out.record;
+    r.outcome = static_cast<Outcome>(py::cast<int>(state[0]));
+    r.t = py::cast<double>(state[1]);
+    r.x = py::cast<std::vector<double>>(state[2]);
+    r.mode = py::cast<Mode>(state[3]);
+    r.guard = py::cast<std::int64_t>(state[4]);
+    r.other_guard = py::cast<std::int64_t>(state[5]);
+    r.statistics = std::bit_cast<Statistics>(py::cast<Counts>(state[6]));
+    r.width = py::cast<std::size_t>(state[7]);
+    r.event_count = py::cast<std::size_t>(state[8]);
+    r.events = numbers_of(state[9]);
+    r.times = numbers_of(state[10]);
+    r.states = numbers_of(state[11]);
+    if (r.events.size() != r.event_count * r.event_stride() ||
+        r.states.size() != r.times.size() * r.width) {
+        throw py::value_error("found a pickle of a run that does not fit together");
+    }
+    r.wrong_bound = py::cast<std::string>(state[12]);
+    if (!state[13].is_none()) {
+        PySolution solution = solution_from(state[13]);
+        r.solution = std::move(solution.solution);
+        r.scale = std::move(solution.scale);
+    }
+    out.modes = state[14];
+    out.guard_names = py::cast<std::vector<std::string>>(state[15]);
+    return out;
+}
+
+}  // namespace
+
+py::array PySolution::at(const py::object& t, bool before) const
+{
+    const auto evaluate = [&](double time) {
+        State x = before ? solution->before(time) : (*solution)(time);
+        put_state(State(x), scale, x.size(), x.data());
+        return x;
+    };
+    const py::array_t<double, py::array::c_style | py::array::forcecast> times(t);
+    if (times.ndim() == 0) {
+        const State x = evaluate(*times.data());
+        return py::array_t<double>(static_cast<py::ssize_t>(x.size()), x.data());
+    }
+    if (times.ndim() != 1) {
+        throw py::value_error("t: found " + std::to_string(times.ndim()) +
+                              " dimensions, expected a number or one dimension");
+    }
+    std::vector<State> states;
+    std::size_t width = 0;
+    for (py::ssize_t k = 0; k < times.size(); ++k) {
+        states.push_back(evaluate(times.data()[k]));
+        width = std::max(width, states.back().size());
+    }
+    if (states.empty()) width = evaluate(solution->time(0)).size();
+    const auto rows = static_cast<py::ssize_t>(width);
+    py::array_t<double> numbers({rows, times.size()});
+    for (py::ssize_t k = 0; k < times.size(); ++k) {
+        const State& x = states[static_cast<std::size_t>(k)];
+        for (py::ssize_t i = 0; i < rows; ++i) {
+            const auto c = static_cast<std::size_t>(i);
+            numbers.mutable_at(i, k) =
+                c < x.size() ? x[c] : std::numeric_limits<double>::quiet_NaN();
+        }
+    }
+    return py::array(std::move(numbers));
+}
+
+py::array events_of(const Record& record, const py::handle& owner)
+{
+    return view(event_type(record.width), {static_cast<py::ssize_t>(record.event_count)},
+                {static_cast<py::ssize_t>(8 * record.event_stride())}, record.events.data(), owner);
+}
+
+void raise_with(const PythonError& error, PyRun&& run)
+{
+    const py::object attached = py::cast(std::move(run));
+    if (PyObject_SetAttrString(error.value(), "ricochet_run", attached.ptr()) != 0) PyErr_Clear();
+    error.restore();
+    throw py::error_already_set();
+}
+
+py::object modes_of(const Source& source, const py::object& given)
+{
+    if (!given.is_none()) return given;
+    const std::vector<std::string> names = source.mode_names();
+    return names.empty() ? py::object(py::none()) : py::object(py::cast(names));
+}
+
+void bind_results(py::module_& module)
+{
+    py::class_<PySolution, std::shared_ptr<PySolution>>(
+        module, "Solution",
+        "The solution at any time: called with a time, or an array of them, it gives the state, or "
+        "states as columns; at an event those after it.")
+        .def("__call__",
+             [](const PySolution& self, const py::object& t) { return self.at(t, false); })
+        .def(
+            "before", [](const PySolution& self, const py::object& t) { return self.at(t, true); },
+            "The state before an event at t; else as a call.")
+        .def(
+            "mode",
+            [](const PySolution& self, double t) {
+                const PyRun names{.record = {}, .modes = self.modes, .guard_names = {}};
+                return names.mode_named(self.solution->mode(t));
+            },
+            "The mode at t, after an event there.")
+        .def_property_readonly(
+            "ts",
+            [](const PySolution& self) {
+                std::vector<double> times;
+                for (std::size_t k = 0; k <= self.solution->size(); ++k) {
+                    times.push_back(self.solution->time(k));
+                }
+                return py::array_t<double>(static_cast<py::ssize_t>(times.size()), times.data());
+            },
+            "When the steps start, and the end of the last.")
+        .def_property_readonly(
+            "t_min",
+            [](const PySolution& self) {
+                const auto& solution = *self.solution;
+                return std::min(solution.time(0), solution.time(solution.size()));
+            },
+            "The earlier end of the solution.")
+        .def_property_readonly(
+            "t_max",
+            [](const PySolution& self) {
+                const auto& solution = *self.solution;
+                return std::max(solution.time(0), solution.time(solution.size()));
+            },
+            "The later end of the solution.")
+        .def(py::pickle([](const PySolution& self) { return pickled(self); },
+                        [](const py::tuple& state) { return solution_from(state); }));
+
+    const auto self_of = [](const py::object& self) -> const PyRun& {
+        return py::cast<const PyRun&>(self);
+    };
+    py::class_<PyRun, std::shared_ptr<PyRun>>(
+        module, "Run", "What a run has computed; its arrays are views of it.")
+        .def("__repr__",
+             [](const PyRun& self) {
+                 return "<Run: " + std::string(name(self.record.outcome)) +
+                        " at t = " + py::str(py::float_(self.record.t)).cast<std::string>() + ", " +
+                        std::to_string(self.record.statistics.events) + " events>";
+             })
+        .def_property_readonly(
+            "outcome", [](const PyRun& self) { return std::string(name(self.record.outcome)); },
+            "How the run ended, e.g. 'reached_end' or 'zeno'.")
+        .def_property_readonly(
+            "message",
+            [](const PyRun& self) {
+                std::string out(describe(self.record.outcome));
+                if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
+                return out;
+            },
+            "A sentence about the outcome.")
+        .def_property_readonly(
+            "success",
+            [](const PyRun& self) {
+                return self.record.outcome == Outcome::reached_end ||
+                       self.record.outcome == Outcome::stopped_by_event;
+            },
+            "Whether the run reached its end, or an event that ends it.")
+        .def_property_readonly(
+            "t", [](const PyRun& self) { return self.record.t; }, "The time reached.")
+        .def_property_readonly(
+            "x",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.x.size())}, {8},
+                            r.x.data(), self);
+            },
+            "The state at that time.")
+        .def_property_readonly(
+            "mode", [](const PyRun& self) { return self.mode_named(self.record.mode); },
+            "The mode at that time.")
+        .def_property_readonly(
+            "guard",
+            [](const PyRun& self) -> py::object {
+                if (self.record.guard < 0) return py::none();
+                return py::int_(self.record.guard);
+            },
+            "The number of the guard that ended the run, or None.")
+        .def_property_readonly(
+            "other_guard",
+            [](const PyRun& self) -> py::object {
+                if (self.record.other_guard < 0) return py::none();
+                return py::int_(self.record.other_guard);
+            },
+            "Of two conflicting resets the second, or None.")
+        .def_readonly("modes", &PyRun::modes, "What the modes are called, or None.")
+        .def_readonly("guard_names", &PyRun::guard_names, "What the guards are called.")
+        .def_property_readonly(
+            "statistics", [](const PyRun& self) { return statistics_of(self.record.statistics); },
+            "What the run did, counted; its evidence says why steps were taken to hold no event.")
+        .def_property_readonly(
+            "events",
+            [self_of](const py::object& self) { return events_of(self_of(self).record, self); },
+            "The events, as a structured array with the fields t, guard, bracket, slope, error, "
+            "mode_before, mode_after, kind, late, before, after.")
+        .def_property_readonly(
+            "times",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.times.size())},
+                            {8}, r.times.data(), self);
+            },
+            "The times of `states`: sample times, or the ends of steps.")
+        .def_property_readonly(
+            "states",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                const auto width = static_cast<py::ssize_t>(r.width);
+                return view(py::dtype::of<double>(),
+                            {static_cast<py::ssize_t>(r.times.size()), width}, {8 * width, 8},
+                            r.states.data(), self);
+            },
+            "States, one a row; shorter ones end in NaN.")
+        .def_property_readonly(
+            "solution",
+            [](const PyRun& self) -> py::object {
+                if (!self.record.solution) return py::none();
+                return py::cast(PySolution{self.record.solution, self.record.scale, self.modes});
+            },
+            "The solution at any time, or None where it was not kept.")
+        .def(py::pickle([](const PyRun& self) { return pickled(self); },
+                        [](const py::tuple& state) { return run_from(state); }));
+
+    py::class_<Snapshot>(module, "Snapshot", "A simulation, saved.")
+        .def_property_readonly(
+            "text", [](const Snapshot& self) { return to_text(self); },
+            "The snapshot as text, with a checksum.")
+        .def_static(
+            "from_text", [](const std::string& text) { return snapshot_from_text(text); },
+            "The snapshot that was written as this text.")
+        .def("__eq__", [](const Snapshot& self, const Snapshot& other) { return self == other; })
+        .def(py::pickle([](const Snapshot& self) { return to_text(self); },
+                        [](const std::string& text) { return snapshot_from_text(text); }));
+}
+
+}  // namespace ricochet::python

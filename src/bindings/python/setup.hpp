@@ -1,0 +1,27 @@
+// What a run is made of, from what Python asks.
+#pragma once
+
+#include <memory>
+
+#include "request.hpp"
+#include "ricochet/detail/core.hpp"
+#include "source.hpp"
+
+namespace ricochet::python {
+
+/// A setup, and the detector that it points to where that is its own.
+struct OwnedSetup {
+    detail::RunSetup<State> setup;
+    std::shared_ptr<const void> detector;
+};
+
+/// The setup of a run of `source` at `door`, which must outlive it.
+/// @throws std::invalid_argument for a detector or locator that there is not, or a gate that is not
+/// what the detector asks.
+[[nodiscard]] OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door);
+
+/// The same for the detectors that ask a gate. False: the request names another one.
+[[nodiscard]] bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& source,
+                                  RunDoor& door);
+
+}  // namespace ricochet::python

@@ -1,0 +1,282 @@
+// Runs: whole ones, and those that are driven by hand.
+
+#include <pybind11/stl.h>
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "bindings.hpp"
+#include "read_request.hpp"
+#include "results.hpp"
+#include "ricochet/detail/core.hpp"
+#include "setup.hpp"
+#include "turn.hpp"
+
+namespace ricochet::python {
+
+namespace {
+
+using Loop = detail::AnyLoop<State>;
+
+/// Goes to the end; the state at the end of every step into `steps` if there is one, both sides of
+/// a reset.
+void drive(Loop& loop, Trajectory<State>* steps)
+{
+    if (!steps) {
+        while (!loop.ended()) loop.advance_once(true);
+        return;
+    }
+    const auto push = [&](double t, const State& x) {
+        if (x.empty() || (!steps->t.empty() && steps->t.back() == t && steps->x.back() == x)) {
+            return;
+        }
+        steps->t.push_back(t);
+        steps->x.push_back(x);
+    };
+    push(loop.t(), loop.x());
+    std::size_t seen = loop.run().events.size();
+    while (!loop.ended()) {
+        loop.step();
+        const auto& events = loop.run().events;
+        for (; seen < events.size(); ++seen) {
+            const auto& event = events[seen];
+            if (event.t == loop.t() && event.before != event.after) {
+                push(event.t, event.before);
+                seen = events.size();
+                break;
+            }
+        }
+        push(loop.t(), loop.x());
+    }
+}
+
+[[nodiscard]] State scaled(State x, const std::vector<double>& scale)
+{
+    for (std::size_t i = 0; i < std::min(scale.size(), x.size()); ++i) x[i] /= scale[i];
+    return x;
+}
+
+/// Does what needs no interpreter without it.
+template <class Work>
+void work_freely(bool freely, const Work& work)
+{
+    if (freely) {
+        const py::gil_scoped_release others;
+        work();
+    } else {
+        work();
+    }
+}
+
+/// Before the first step.
+[[nodiscard]] Record start_of(const State& x0, const Options& options)
+{
+    Record record;
+    record.outcome = Outcome::cancelled;
+    record.t = options.t_start;
+    record.x = x0;
+    record.width = x0.size();
+    record.mode = options.mode;
+    return record;
+}
+
+PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py::dict& given,
+                const py::object& mode_names)
+{
+    Request request = request_from(given);
+    if (!given.contains("mode")) request.options.mode = source->start_mode();
+    PyRun out{
+        .record = {}, .modes = modes_of(*source, mode_names), .guard_names = source->guard_names()};
+
+    SignalWatch watch;
+    request.options.cancelled = watch.cancelled();
+    std::optional<Record> whole;
+    if (request.is_plain()) {
+        work_freely(true, [&] { whole = source->run_whole(x0, request, watch); });
+    }
+    if (whole) {
+        out.record = std::move(*whole);
+        if (watch.raised()) raise_with(*watch.raised(), std::move(out));
+        return out;
+    }
+
+    const std::unique_ptr<RunDoor> door = source->open(x0, request);
+    request.options.cancelled = door->watch().cancelled();
+    const OwnedSetup owned = setup_for(request, *source, *door);
+    Trajectory<State> steps;
+    Trajectory<State>* const kept = request.record_steps ? &steps : nullptr;
+    std::unique_ptr<Loop> loop;
+    try {
+        loop = detail::make_loop(owned.setup, scaled(x0, request.scale), request.options);
+        work_freely(door->is_free(), [&] { drive(*loop, kept); });
+    } catch (const PythonError& error) {
+        out.record =
+            loop ? record_of(loop->finish(), request.scale, kept) : start_of(x0, request.options);
+        raise_with(error, std::move(out));
+    }
+    out.record = record_of(loop->finish(), request.scale, kept);
+    if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
+    return out;
+}
+
+/// A run driven by hand. One thread at a time.
+class PySimulation {
+public:
+    PySimulation(std::shared_ptr<Source> source, const State& x0, const py::dict& given,
+                 const py::object& mode_names)
+        : source_(std::move(source)),
+          request_(request_from(given)),
+          names_{.record = {},
+                 .modes = modes_of(*source_, mode_names),
+                 .guard_names = source_->guard_names()}
+    {
+        if (!given.contains("mode")) request_.options.mode = source_->start_mode();
+        door_ = source_->open(x0, request_);
+        request_.options.cancelled = door_->watch().cancelled();
+        setup_ = setup_for(request_, *source_, *door_);
+        try {
+            loop_ = detail::make_loop(setup_.setup, scaled(x0, request_.scale), request_.options);
+        } catch (const PythonError& error) {
+            PyRun run = names_;
+            run.record = start_of(x0, request_.options);
+            raise_with(error, std::move(run));
+        }
+    }
+
+    bool step()
+    {
+        return use([&] { return loop_->step(); });
+    }
+    bool advance()
+    {
+        return use([&] { return loop_->advance(); });
+    }
+    [[nodiscard]] PyRun run_to_end()
+    {
+        use([&] {
+            loop_->show_all();
+            while (!loop_->ended()) loop_->advance_once(true);
+            return true;
+        });
+        return finish();
+    }
+    [[nodiscard]] PyRun finish()
+    {
+        const Turn turn(in_use_, "Simulation");
+        if (!finished_) {
+            finished_.emplace(names_);
+            finished_->record = record_of(loop_->finish(), request_.scale);
+        }
+        return *finished_;
+    }
+
+    [[nodiscard]] double t()
+    {
+        const Turn turn(in_use_, "Simulation");
+        return loop_->t();
+    }
+    [[nodiscard]] py::array x()
+    {
+        const Turn turn(in_use_, "Simulation");
+        State x = loop_->x();
+        put_state(State(x), request_.scale, x.size(), x.data());
+        return py::array_t<double>(static_cast<py::ssize_t>(x.size()), x.data());
+    }
+    [[nodiscard]] py::object mode()
+    {
+        const Turn turn(in_use_, "Simulation");
+        return names_.mode_named(loop_->mode());
+    }
+    [[nodiscard]] bool ended()
+    {
+        const Turn turn(in_use_, "Simulation");
+        return loop_->ended();
+    }
+    /// What has been computed so far.
+    [[nodiscard]] PyRun so_far()
+    {
+        const Turn turn(in_use_, "Simulation");
+        if (finished_) return *finished_;
+        PyRun out = names_;
+        Run<State> run = loop_->run();
+        run.t = loop_->t();
+        run.x = loop_->x();
+        run.mode = loop_->mode();
+        if (!loop_->ended()) run.outcome = Outcome::cancelled;
+        out.record = record_of(std::move(run), request_.scale);
+        return out;
+    }
+
+    [[nodiscard]] Snapshot save()
+    {
+        const Turn turn(in_use_, "Simulation");
+        return loop_->save();
+    }
+    void restore(const Snapshot& snapshot)
+    {
+        const Turn turn(in_use_, "Simulation");
+        if (finished_) throw std::runtime_error("Simulation: found finished, expected going on");
+        loop_->restore(snapshot);
+    }
+
+private:
+    template <class Work>
+    bool use(const Work& work)
+    {
+        const Turn turn(in_use_, "Simulation");
+        if (finished_) return false;
+        bool goes_on = false;
+        try {
+            work_freely(door_->is_free(), [&] { goes_on = work(); });
+        } catch (const PythonError& error) {
+            end_with(error);
+        }
+        if (const auto& raised = door_->watch().raised()) end_with(*raised);
+        return goes_on;
+    }
+
+    [[noreturn]] void end_with(const PythonError& error)
+    {
+        finished_.emplace(names_);
+        finished_->record = record_of(loop_->finish(), request_.scale);
+        raise_with(error, PyRun(*finished_));
+    }
+
+    std::shared_ptr<Source> source_;
+    Request request_;
+    PyRun names_;
+    std::unique_ptr<RunDoor> door_;
+    OwnedSetup setup_;
+    std::unique_ptr<Loop> loop_;
+    std::optional<PyRun> finished_;
+    std::atomic<bool> in_use_ = false;
+};
+
+}  // namespace
+
+void bind_runs(py::module_& module)
+{
+    module.def("integrate", &integrate);
+    py::class_<PySimulation>(module, "Simulation")
+        .def(py::init<std::shared_ptr<Source>, const State&, const py::dict&, const py::object&>())
+        .def("step", &PySimulation::step,
+             "Takes one step, with whatever events it holds. False: the run has ended.")
+        .def("advance", &PySimulation::advance,
+             "Goes on to the next event or sample time. False: the run has ended.")
+        .def("run_to_end", &PySimulation::run_to_end, "Goes on to the end, and returns the Run.")
+        .def("finish", &PySimulation::finish, "Ends the run here, and returns what was computed.")
+        .def("save", &PySimulation::save, "All that the future depends on, as a Snapshot.")
+        .def(
+            "restore", &PySimulation::restore,
+            "Goes on where the snapshot of a run of the same system was taken, with the same bits.")
+        .def_property_readonly("t", &PySimulation::t, "The time.")
+        .def_property_readonly("x", &PySimulation::x, "The state, which may be kept.")
+        .def_property_readonly("mode", &PySimulation::mode, "The mode.")
+        .def_property_readonly("ended", &PySimulation::ended, "Whether the run has ended.")
+        .def_property_readonly("run", &PySimulation::so_far,
+                               "What has been computed so far, as a Run.");
+}
+
+}  // namespace ricochet::python
