@@ -149,7 +149,8 @@ std::string to_json(const GateReport& report)
                                  {"gain", t.gain()},
                                  {"network_calls", t.network_calls},
                                  {"outside", t.outside},
-                                 {"repeated_steps", t.repeated}}}};
+                                 {"repeated_steps", t.repeated},
+                                 {"verdict", describe(t.rivals)}}}};
     return out.dump(2);
 }
 

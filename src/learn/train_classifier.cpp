@@ -15,8 +15,10 @@ std::string ClassifierTrial::describe() const
                   "looking at the end of every step is faster: the network takes {:.2f} "
                   "times as long",
                   ratio);
-    return fmt::format("{}; it asks the guard {} times instead of {}, and misses {} of {} events",
-                       cost, network_calls, exact_calls, missed, events);
+    const std::string verdict = learn::describe(rivals);
+    return fmt::format(
+        "{}; it asks the guard {} times instead of {}, and misses {} of {} events{}{}", cost,
+        network_calls, exact_calls, missed, events, verdict.empty() ? "" : "; ", verdict);
 }
 
 namespace detail {

@@ -57,6 +57,17 @@ TEST(TrainClassifier, AnySystemGetsANetworkFromItsOwnRuns)
     EXPECT_FALSE(trained.trial.pays());
     EXPECT_NE(trained.trial.describe().find("is faster"), std::string::npos)
         << trained.trial.describe();
+    EXPECT_NE(trained.trial.describe().find("the network is not the fastest of 6 ways"),
+              std::string::npos)
+        << trained.trial.describe();
+    ASSERT_EQ(trained.trial.rivals.size(), 6u);
+    const Rival& exact = trained.trial.rivals.front();
+    EXPECT_GE(exact.events, 200u);
+    for (const Rival& rival : trained.trial.rivals) {
+        EXPECT_GT(rival.guard_calls, 0u) << rival.name;
+        EXPECT_GT(rival.seconds, 0) << rival.name;
+        EXPECT_LE(rival.events, exact.events) << rival.name;
+    }
 }
 
 TEST(TrainClassifier, TheSameSeedGivesTheSameNetwork)

@@ -117,6 +117,12 @@ TEST(TrainGate, SavesMostChecksOfABlackBoxAndKeepsItsEvents)
     EXPECT_NEAR(trained.model.calibration.miss_bound, 3.0 / static_cast<double>(trial.events),
                 1e-15);
     EXPECT_EQ(trained.model.system, "table");
+    ASSERT_EQ(trial.rivals.size(), 6U);
+    EXPECT_GE(trial.rivals.front().events, 200U);
+    EXPECT_EQ(trial.rivals.back().name, "the network");
+    EXPECT_EQ(trial.rivals.back().events, trial.rivals.front().events);
+    EXPECT_LT(2 * trial.rivals.back().guard_calls, trial.rivals.front().guard_calls);
+    EXPECT_EQ(describe(trial.rivals).find("the network is "), 0U) << describe(trial.rivals);
 
     const Options options{.t_end = 50, .step = 0.005};
     const X start{0.1, 0.2, 0.5, 0.3};

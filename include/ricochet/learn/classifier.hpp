@@ -66,6 +66,18 @@ struct Progress {
     std::string_view stage = "training";
 };
 
+/// A way of looking for events.
+struct Rival {
+    std::string name;  ///< "every step", "every 4 steps", ...
+    std::uint64_t guard_calls = 0;
+    double seconds = 0;        ///< of processor time
+    std::uint64_t events = 0;  ///< that it found
+};
+
+/// What is fastest, and what the last of them, the network, takes: one sentence, empty if there are
+/// none. The first is `Extremum` at every step.
+[[nodiscard]] std::string describe(const std::vector<Rival>& rivals);
+
 /// Draws a bar, or returns false to stop the training; the best so far is kept.
 using ProgressCallback = std::function<bool(const Progress&)>;
 

@@ -25,8 +25,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/gate.hpp"
 #include "ricochet/detail/adam.hpp"
+#include "ricochet/detail/gate.hpp"
 #include "ricochet/learn/classifier.hpp"
 #include "ricochet/nn/model.hpp"
 
@@ -113,6 +113,7 @@ struct GateTrial {
     std::uint64_t outside = 0;        ///< of its box
     std::uint64_t repeated = 0;       ///< steps taken again
     double seconds = 0;               ///< of processor time, both
+    std::vector<Rival> rivals{};  ///< other ways of looking, on some of these runs; the gate last
 
     [[nodiscard]] double miss_bound() const;  ///< at 95 % confidence
     /// Guard calls saved: of every step over gated.

@@ -65,6 +65,9 @@ struct ClassifierTrial {
     /// Whether the network saves time.
     [[nodiscard]] bool pays() const noexcept { return network_seconds < exact_seconds; }
 
+    std::vector<Rival>
+        rivals{};  ///< other ways of looking, on some of these runs; the network last
+
     /// One sentence: "looking at the end of every step is faster: with the network ...".
     [[nodiscard]] std::string describe() const;
 };
@@ -384,6 +387,13 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
                                            : 0;
             trial.missed += std::max(late, lost);
         }
+        detail::RivalRuns<System, X, FixedStep<Method>, Network> rivals(system, network);
+        while (rivals.events() < std::min<std::uint64_t>(trial.events, 200)) {
+            asked(trial.events);
+            const X x0 = start(random).x;
+            rivals.add(x0, run_options);
+        }
+        trial.rivals = rivals.rivals();
     } catch (const detail::Asked::Stopped&) {
         out.report.outcome = TrainingOutcome::stopped;
     }

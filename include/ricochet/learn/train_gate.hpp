@@ -30,11 +30,12 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detail/random.hpp"
+#include "ricochet/detail/rivals.hpp"
 #include "ricochet/detect/calibrated.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/simulation.hpp"
 #include "ricochet/learn/gate.hpp"
-#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 
@@ -105,9 +106,6 @@ struct FlowOnly {
 /// @throws std::invalid_argument: a guard has broken a bound; see `WrongBound`.
 [[noreturn]] void throw_wrong_bound(std::size_t guard, double since, double then, double t,
                                     double value, double allowed);
-
-/// Processor time of this thread's process [s].
-[[nodiscard]] double processor_seconds() noexcept;
 
 }  // namespace detail
 
@@ -252,6 +250,24 @@ public:
         }
         trial.seconds = detail::processor_seconds() - before;
         return trial;
+    }
+
+    /// So many events in all ways of looking, the detector last.
+    template <class Detector>
+    [[nodiscard]] std::vector<Rival> rivals(const Detector& detector, std::size_t events,
+                                            std::uint64_t seed)
+    {
+        Random random(seed);
+        detail::RivalRuns<System, X, Stepping, Detector> runs(*system_, detector);
+        begin_stage("comparing", events);
+        std::uint64_t rounds = 0;
+        while (runs.events() < events && rounds++ < events && goes_on(runs.events())) {
+            const X x0 = start(random).x();
+            Options options = options_used_;
+            options.record_events = false;
+            runs.add(x0, options);
+        }
+        return runs.rivals();
     }
 
 private:
@@ -595,10 +611,15 @@ template <class System, class X, class Stepping>
     const std::uint64_t fresh = training.seed + 7'000'003;
     GateTrial& trial = trained.report.trial;
     const gates::Gate gate(trained.model);
+    const auto try_out = [&](const auto& detector) {
+        trial = runs.compare(detector, training.fresh_events, fresh);
+        constexpr std::size_t enough = 200;
+        trial.rivals = runs.rivals(detector, std::min(enough, training.fresh_events), fresh + 1);
+    };
     if (training.kind == GateKind::horizon) {
-        trial = runs.compare(Calibrated(gate), training.fresh_events, fresh);
+        try_out(Calibrated(gate));
     } else if constexpr (Bounded<System, X>) {
-        trial = runs.compare(CalibratedBounds(gate), training.fresh_events, fresh);
+        try_out(CalibratedBounds(gate));
     }
     if (runs.stopped()) return stop();
     if (trial.events > 0) {

@@ -119,6 +119,8 @@ std::string text(const learn::GateReport& report)
         "them outside of its box\n",
         t.steps, t.events, t.misses, t.miss_bound(), t.gated_calls, t.exact_calls, t.gain(),
         t.network_calls, t.outside);
+    const std::string verdict = learn::describe(t.rivals);
+    if (!verdict.empty()) out += verdict + '\n';
     return out + fmt::format("{}\n", describe(report.outcome));
 }
 

@@ -334,6 +334,7 @@ py::object train_gate(const std::shared_ptr<Source>& source, const Rows& states,
                  "outcome_text"_a = std::string(describe(trained.report.outcome)),
                  "outcome"_a = static_cast<int>(trained.report.outcome),
                  "misses_none"_a = trial.events > 0 && trial.misses == 0,
+                 "verdict"_a = learn::describe(trial.rivals),
                  "trial"_a = py::dict(
                      "events"_a = trial.events, "missed"_a = trial.misses,
                      "miss_bound"_a = trial.events > 0 ? trial.miss_bound() : 1.0,

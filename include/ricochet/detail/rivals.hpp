@@ -1,0 +1,70 @@
+// Internal: what it declares may change without notice.
+//
+// A trained network beside the other ways of looking for events, on the same runs.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/learn/classifier.hpp"
+
+namespace ricochet::learn {
+
+namespace detail {
+
+/// Processor time of this thread's process [s].
+[[nodiscard]] double processor_seconds() noexcept;
+
+/// The same runs in all ways that there are.
+template <class System, class X, class Stepping, class Network>
+class RivalRuns {
+public:
+    /// Keeps references.
+    RivalRuns(const System& system, const Network& network) : system_(&system), network_(&network)
+    {
+    }
+
+    void add(const X& x0, const Options& options)
+    {
+        std::size_t next = 0;
+        const auto run = [&](std::string_view name, const auto& detector) {
+            if (next == rivals_.size()) rivals_.push_back({.name = std::string(name)});
+            Rival& rival = rivals_[next++];
+            const double before = processor_seconds();
+            const Statistics counts =
+                integrate(*system_, x0, options, Stepping{}, detector).statistics;
+            rival.seconds += processor_seconds() - before;
+            rival.guard_calls += counts.guard_calls;
+            rival.events += counts.events;
+        };
+        run("every step", Extremum{});
+        run("the end of every step", Ends{});
+        run("every 2 steps", EveryK(2));
+        run("every 4 steps", EveryK(4));
+        run("every 8 steps", EveryK(8));
+        if constexpr (Bounded<System, X>) run("what bounds demand", Planned{});
+        run("the network", *network_);
+    }
+
+    [[nodiscard]] const std::vector<Rival>& rivals() const noexcept { return rivals_; }
+    [[nodiscard]] std::uint64_t events() const noexcept
+    {
+        return rivals_.empty() ? 0 : rivals_.front().events;
+    }
+
+private:
+    const System* system_;
+    const Network* network_;
+    std::vector<Rival> rivals_;
+};
+
+}  // namespace detail
+
+}  // namespace ricochet::learn
