@@ -25,6 +25,44 @@ _EPS = np.finfo(float).eps
 #: What SciPy says of these, for programs that compare.
 _MESSAGES = {"reached_end": "The solver successfully reached the end of the integration interval.",
              "stopped_by_event": "A termination event occurred."}
+#: The other outcomes, of functions that SciPy's arguments name.
+_OWN_MESSAGES = {
+    "zeno": "the motion presses on an event with a reset, or its events accumulate there, and "
+            "nothing stops it; give the event a rest, or end t_span earlier",
+    "outside_mode": "a reset left the state behind a unilateral event; let it put the state where "
+                    "the event function is zero or positive",
+    "endless_cascade": "resets triggered each other a hundred times at one time; let each leave the "
+                       "zeros of the other events",
+    "conflicting_resets": "two events happened together and their resets gave one component two "
+                          "values; take a System with reset_set to say what happens then",
+    "step_underflow": "the step became too small without meeting the tolerance; loosen rtol and "
+                      "atol",
+    "step_limit": "as many steps were taken as max_steps allows; allow more or end t_span earlier",
+    "non_finite": "fun, an event or a reset returned NaN or infinity; the last finite state is "
+                  "kept",
+    "stalled": "stall_steps steps advanced the time by less than 1e-9 of t_span; end it earlier, "
+               "let events that accumulate come to rest, or raise max_step or stall_steps"}
+_WORDS = (("t_end - t_start", "t_span[1] - t_span[0]"), ("t_end", "t_span[1]"),
+          ("t_start", "t_span[0]"), ("h_max", "max_step"), ("the start must", "y0 must"),
+          ("the start lies", "y0 lies"), ("expected guard >= 0", "expected a value >= 0"),
+          ("; g >= 0 bounds", "; event >= 0 bounds"), ("step must", "first_step must"))
+
+
+def _in_our_words(error, events):
+    """A message of the library that names its own options as the arguments of solve_ivp."""
+    text = str(error)
+    if not text.startswith("integrate: ") or hasattr(error, "ricochet_run"):
+        return error
+    text = "solve_ivp: " + text[len("integrate: "):]
+    for theirs, ours in _WORDS:
+        text = text.replace(theirs, ours)
+    if events:
+        import re
+
+        text = re.sub(r"guard (\d+)(?: \(\1\))?", r"events[\1]", text)
+        text = text.replace("its crossing must be falling: g >= 0",
+                            "its direction must be -1: a value >= 0")
+    return type(error)(text)
 
 
 class OdeResult(dict):
@@ -145,14 +183,21 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
                 return np.asarray(pointwise(t, y[:, None], *further)).ravel()
         modes = None
         source = _ricochet.callback_system(dict(
-            name="solve_ivp", flow=fun, args=args, guards=guards))
+            name="solve_ivp", flow=fun, flow_title="fun", args=args, guards=guards))
     if t0 == t1:
         return _nothing(t0, start, samples, dense_output, count if watched else None)
-    run = _ricochet.integrate(source, start, given, modes)
-    return _result(run, count if watched else None, dense_output)
+    events_given = not isinstance(fun, (System, Ready))
+    try:
+        run = _ricochet.integrate(source, start, given, modes)
+    except (ValueError, RuntimeError) as error:
+        said = _in_our_words(error, events_given)
+        if said is error:
+            raise
+        raise said from None
+    return _result(run, count if watched else None, dense_output, events_given)
 
 
-def _refuse_near_names(event):
+def _refuse_near_names(event, who):
     """What is nearly an attribute of an event is one misspelt: SciPy ignores it."""
     known = ("terminal", "direction", "reset", "rest", "rate", "unilateral", "name")
     for found in getattr(event, "__dict__", ()):
@@ -160,7 +205,24 @@ def _refuse_near_names(event):
             continue
         meant = get_close_matches(found.lower(), known, 1, 0.8)
         if meant:
-            raise ValueError(f"event: found an attribute {found!r}, expected {meant[0]!r}")
+            raise ValueError(f"{who}: found an attribute {found!r}, expected {meant[0]!r}")
+
+
+#: What SciPy has other names for.
+_HERE = ("t_start", "method", "sample_times", "record_steps", "rtol", "atol")
+_ARGUMENTS = ("method", "t_eval", "dense_output", "events", "vectorized", "args", "rtol", "atol",
+              "max_step", "first_step")
+
+
+def _is_number(given):
+    return isinstance(given, (int, float, np.number)) and not isinstance(given, bool)
+
+
+def _numbers(given, what):
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
 
 
 def _options(options, t0, t1, components):
@@ -169,26 +231,25 @@ def _options(options, t0, t1, components):
         if name in options:
             warn(f"{name} has no effect for an explicit method", stacklevel=3)
             del options[name]
-    rtol = np.asarray(options.pop("rtol", 1e-3), dtype=float)
-    rtol = float(rtol.min())
+    rtol = float(_numbers(options.pop("rtol", 1e-3), "rtol").min())
     if rtol < 100 * _EPS:
         warn(f"At least one element of rtol, {rtol}, is too small; {100 * _EPS} is taken",
              stacklevel=3)
         rtol = 100 * _EPS
     given = {"t_start": t0, "t_end": t1, "rtol": rtol}
     atol = options.pop("atol", 1e-6)
-    if np.any(np.asarray(atol, dtype=float) < 0):
+    if np.any(_numbers(atol, "atol") < 0):
         raise ValueError(f"atol: found {atol}, expected numbers that are not negative")
     set_tolerance(given, atol, components)
     max_step = options.pop("max_step", None)
     if max_step is not None:
-        if not max_step > 0:
-            raise ValueError(f"max_step: found {max_step}, expected a positive number")
+        if not _is_number(max_step) or not max_step > 0:
+            raise ValueError(f"max_step: found {max_step!r}, expected a positive number")
         given["h_max"] = float(max_step)
     first_step = options.pop("first_step", None)
     if first_step is not None:
-        if not 0 < first_step <= abs(t1 - t0):
-            raise ValueError(f"first_step: found {first_step}, expected a number in "
+        if not _is_number(first_step) or not 0 < first_step <= abs(t1 - t0):
+            raise ValueError(f"first_step: found {first_step!r}, expected a number in "
                              f"(0, {abs(t1 - t0)}]")
         given["step"] = float(first_step)
     for name in ("t_start", "t_end", "method", "mode", "sample_times", "record_steps", "dense"):
@@ -198,6 +259,11 @@ def _options(options, t0, t1, components):
             else:
                 raise TypeError(f"solve_ivp: found the option {name!r}, expected its name in "
                                 "SciPy")
+    known = [name for name in _ricochet.option_names() if name not in _HERE]
+    for name in options:
+        if name not in known:
+            raise TypeError(f"solve_ivp: found an option {name!r}, expected some of "
+                            + ", ".join(_ARGUMENTS + tuple(known)))
     given.update(options)
     set_gate(given)
     return given
@@ -206,7 +272,7 @@ def _options(options, t0, t1, components):
 def _sample_times(t_eval, t0, t1):
     if t_eval is None:
         return None
-    times = np.asarray(t_eval, dtype=float)
+    times = _numbers(t_eval, "t_eval")
     if times.ndim != 1:
         raise ValueError(f"t_eval: found {times.ndim} dimensions, expected 1")
     outside = times[~((times >= min(t0, t1)) & (times <= max(t0, t1)))]
@@ -227,17 +293,22 @@ def _guards(events, t0, start, args):
     y = np.array(start)
     out = []
     for index, event in enumerate(events):
+        who = f"events[{index}]"
         if isinstance(event, Guard):
-            out.append(event._specification(index))
+            out.append(dict(event._specification(index), title=who))
             continue
         if not callable(event) and not isinstance(event, Compiled):
-            raise TypeError(f"events: found a {type(event).__name__}, expected functions (t, y)")
-        _refuse_near_names(event)
+            raise TypeError(f"{who}: found a {type(event).__name__}, expected a function (t, y)")
+        _refuse_near_names(event, who)
         direction = getattr(event, "direction", 0)
         terminal = getattr(event, "terminal", False)
         terminal = 0 if terminal is None else terminal
-        if int(terminal) != terminal or terminal < 0:
-            raise ValueError(f"terminal: found {terminal!r}, expected a bool or a whole number")
+        if not isinstance(terminal, (bool, np.bool_)) and not _is_number(terminal) or (
+                int(terminal) != terminal or terminal < 0):
+            raise ValueError(f"{who}.terminal: found {terminal!r}, expected a bool or a whole "
+                             "number")
+        if not _is_number(direction):
+            raise TypeError(f"{who}.direction: found {direction!r}, expected a number")
         reset = getattr(event, "reset", None)
         unilateral = bool(getattr(event, "unilateral", False))
         if unilateral and direction == 0:
@@ -248,6 +319,8 @@ def _guards(events, t0, start, args):
                       rate=getattr(event, "rate", None), unilateral=unilateral,
                       stop_after=int(terminal))
         specification = guard._specification(index)
+        own = specification["name"]
+        specification["title"] = who if own == str(index) else f"{who} ({own})"
         if not isinstance(event, Compiled):
             try:
                 first = event(t0, y.copy(), *args)
@@ -258,13 +331,16 @@ def _guards(events, t0, start, args):
     return out, True
 
 
-def _result(run, count, dense_output):
+def _result(run, count, dense_output, events_given):
     result = OdeResult(t=run.times, y=run.states.T, sol=run.solution if dense_output else None,
                        t_events=None, y_events=None)
     statistics = run.statistics
+    message = _MESSAGES.get(run.outcome, run.message)
+    if events_given:
+        message = _OWN_MESSAGES.get(run.outcome, message)
     result.update(nfev=statistics.flow_calls, njev=0, nlu=0,
                   status={"reached_end": 0, "stopped_by_event": 1}.get(run.outcome, -1),
-                  message=_MESSAGES.get(run.outcome, run.message), success=run.success)
+                  message=message, success=run.success)
     result.update(y_events_after=None, kinds=None, modes=None)
     if count is not None:
         events = run.events

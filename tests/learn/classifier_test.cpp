@@ -1,6 +1,7 @@
 #include "ricochet/learn/classifier.hpp"
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -202,6 +203,27 @@ TEST(Train, InterruptedTrainingResumesToTheSameBits)
     });
     EXPECT_EQ(first, 700U);
     EXPECT_EQ(weights(resumed.model), whole);
+}
+
+TEST(Train, CancelledTrainingStopsBeforeItsNextIterationAndResumesToTheSameBits)
+{
+    const DataSet data = disc(1000, 1);
+    const TemporaryFile file("ricochet-checkpoint");
+    TrainingOptions options = small();
+    const std::vector<double> whole = weights(train(data, options).model);
+
+    std::atomic<bool> cancelled = false;
+    options.checkpoint = file.path();
+    options.cancelled = &cancelled;
+    const Trained part = train(data, options, [&](const Progress& progress) {
+        cancelled = progress.iteration == 700;
+        return true;
+    });
+    EXPECT_EQ(part.report.iterations, 700U);
+    EXPECT_FALSE(part.model.layers.empty());
+    cancelled = false;
+    options.resume = true;
+    EXPECT_EQ(weights(train(data, options).model), whole);
 }
 
 TEST(Train, CheckpointOfOtherDataOrOptionsIsRefused)

@@ -126,6 +126,7 @@ def test_modes_of_a_thermostat():
         np.testing.assert_allclose(run.events["t"], exact[:len(run.events)], rtol=1e-8)
         assert len(run.events) == 16
         assert run.events["mode_after"].tolist() == [1, 0] * 8
+        assert run.event_modes == [tuple(run.modes), tuple(run.modes)[::-1]] * 8
         assert run.mode == (Room.OFF if on is Room.ON else "off")
     assert own.guard_names == ["too_cold", "too_warm"]
     for system, mode in ((Thermostat(), Room.OFF), (ready, "off"), (ready, 0)):

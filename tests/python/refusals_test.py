@@ -54,6 +54,55 @@ def test_options_that_are_none(options, error, words):
         ricochet.solve_ivp(decay, (0, 1), [1.0], **options)
 
 
+def marked(**attributes):
+    def event(t, y):
+        return y[0] - 0.5
+
+    for name, value in attributes.items():
+        setattr(event, name, value)
+    return event
+
+
+@pytest.mark.parametrize("options, error, words", [
+    ({"events": [decay, lambda t, y: math.nan]}, ValueError,
+     r"solve_ivp: events\[1\] must be finite at the start, got nan"),
+    ({"events": marked(unilateral=True)}, ValueError,
+     r"solve_ivp: events\[0\] \(event\) is unilateral and needs a reset"),
+    ({"events": marked(reset=3)}, TypeError, r"reset of events\[0\] \(event\): found a int"),
+    ({"events": [decay, 3]}, TypeError, r"events\[1\]: found a int, expected a function \(t, y\)"),
+    ({"events": marked(terminal="x")}, ValueError, r"events\[0\].terminal: found 'x'"),
+    ({"events": marked(terminal=-1)}, ValueError, r"events\[0\].terminal: found -1"),
+    ({"events": marked(direction="x")}, TypeError, r"events\[0\].direction: found 'x'"),
+    ({"events": lambda t, y: "a"}, TypeError, r"^events\[0\] returned str, expected a number"),
+    ({"t_span": (0, math.inf)}, ValueError, r"solve_ivp: t_span\[1\] must be a finite time"),
+    ({"y0": [math.nan]}, ValueError, "solve_ivp: y0 must be finite"),
+    ({"fun": 3}, TypeError, "fun: found a int, expected a function"),
+    ({"fun": lambda t, y: [1.0, 2.0]}, ValueError, "^fun returned 2 numbers for a state of 1"),
+    ({"rtol": "a"}, TypeError, "rtol: found 'a'"), ({"max_step": "a"}, ValueError, "max_step"),
+    ({"t_eval": "a"}, TypeError, "t_eval: found 'a'"),
+    ({"maxstep": 1.0}, TypeError, "'maxstep', expected some of method, .*max_step, .*detector")])
+def test_solve_ivp_says_it_in_its_own_words(options, error, words):
+    given = dict(dict(fun=decay, t_span=(0, 1), y0=[1.0]), **options)
+    with pytest.raises(error, match=words) as raised:
+        ricochet.solve_ivp(**given)
+    assert "guard" not in str(raised.value) and "flow" not in str(raised.value)
+    # A system has guards and a flow.
+    with pytest.raises(TypeError, match="'h_maxx', expected some of .*h_max, .*t_start"):
+        ricochet.integrate(ricochet.System(decay), [1.0], 1.0, h_maxx=1)
+    with pytest.raises(ValueError, match="integrate: guard 0 must be finite"):
+        ricochet.integrate(ricochet.System(decay, [ricochet.Guard(lambda t, x: math.nan)]), [1.0],
+                           1.0)
+
+
+def test_how_it_ended_is_said_in_the_words_of_solve_ivp():
+    for fun, events, outcome, words in (
+            (lambda t, y: [math.nan], None, "non_finite", "fun, an event or a reset"),
+            (decay, marked(unilateral=True, reset=lambda t, y: [0.3]), "outside_mode",
+             "unilateral event")):
+        found = ricochet.solve_ivp(fun, (0, 2), [1.0], events=events)
+        assert found.status == -1 and found.outcome == outcome and words in found.message
+
+
 @pytest.mark.parametrize("span", [(0,), 5, (0, 1, 2), ("a", "b"), (0, math.nan), (0, math.inf)])
 def test_spans_that_are_none(span):
     with pytest.raises(ValueError):
@@ -114,7 +163,7 @@ def test_functions_that_are_none():
     ([None, 1.0], TypeError), ([[1.0], 2.0], (TypeError, ValueError)), (object(), TypeError),
     ([], ValueError)])
 def test_flows_that_return_something_else(result, error):
-    with pytest.raises(error, match="flow returned"):
+    with pytest.raises(error, match="fun returned"):
         ricochet.solve_ivp(lambda t, y: result, (0, 1), [1.0, 2.0])
 
     def reset(t, y):
@@ -124,7 +173,7 @@ def test_flows_that_return_something_else(result, error):
         return y[0] - 0.5
 
     event.reset = reset
-    with pytest.raises(error, match="reset of event returned") as raised:
+    with pytest.raises(error, match=r"reset of events\[0\] \(event\) returned") as raised:
         ricochet.solve_ivp(lambda t, y: [-1.0, 0.0], (0, 1), [1.0, 2.0], events=event)
     assert raised.value.ricochet_run.t <= 0.5
 

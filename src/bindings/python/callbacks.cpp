@@ -1,6 +1,7 @@
 #include "callbacks.hpp"
 
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "numbers.hpp"
@@ -42,7 +43,7 @@ namespace {
 
 }  // namespace
 
-Function::Function(PyObject* given)
+Function::Function(PyObject* given, const std::string& who)
 {
     if (given == Py_None) return;
     if (PyObject_HasAttrString(given, "_ricochet_address")) {
@@ -55,7 +56,7 @@ Function::Function(PyObject* given)
         return;
     }
     if (!PyCallable_Check(given)) {
-        raise(PyExc_TypeError, "found a " + type_of(given) + ", expected a function");
+        raise(PyExc_TypeError, who + ": found a " + type_of(given) + ", expected a function");
     }
     object = Ref::share(given);
 }
@@ -65,11 +66,13 @@ CallbackSource::CallbackSource(PyObject* specification)
     if (!PyDict_Check(specification)) {
         raise(PyExc_TypeError, "found a " + type_of(specification) + ", expected a dictionary");
     }
-    const auto function = [&](const char* key) { return Function(item(specification, key).get()); };
+    const auto function = [&](const char* key) {
+        return Function(item(specification, key).get(), key);
+    };
     name_ = text_in(specification, "name");
     flow_title_ = text_in(specification, "flow_title");
     if (flow_title_.empty()) flow_title_ = "flow";
-    flow_ = function("flow");
+    flow_ = Function(item(specification, "flow").get(), flow_title_);
     if (!flow_) raise(PyExc_TypeError, flow_title_ + ": found None, expected a function");
     guard_values_ = function("guard_values");
     reset_set_ = function("reset_set");
@@ -133,14 +136,16 @@ CallbackSource::CallbackSource(PyObject* specification)
 void CallbackSource::read_guard(PyObject* specification)
 {
     CallbackGuard& guard = guards_.emplace_back();
-    const auto function = [&](const char* key) { return Function(item(specification, key).get()); };
+    const auto function = [&](const char* key) {
+        return Function(item(specification, key).get(), std::string(key) + " of " + guard.owner);
+    };
     guard.name = text_in(specification, "name");
     guard.title = guard.owner = text_in(specification, "title");
     if (guard.title.empty()) {
         guard.title = "guard " + guard.name;
         guard.owner = guard.name;
     }
-    guard.value = function("value");
+    guard.value = Function(item(specification, "value").get(), guard.title);
     guard.rate = function("rate");
     guard.reset = function("reset");
     guard.rest = function("rest");
@@ -155,7 +160,9 @@ void CallbackSource::read_guard(PyObject* specification)
     }
     const double direction = number_in(specification, "direction", 0);
     guard.info = {
-        .name = guard.name,
+        // One without a name is called by its number.
+        .name = guard.name == std::to_string(guards_.size() - 1) ? std::string_view()
+                                                                 : std::string_view(guard.name),
         .crossing = direction < 0   ? Crossing::falling
                     : direction > 0 ? Crossing::rising
                                     : Crossing::either,

@@ -22,7 +22,8 @@ struct Function {
 
     Function() = default;
     /// None is no function. An object that has `_ricochet_address` is a compiled one.
-    explicit Function(PyObject* given);
+    /// @throws PythonError naming `who` is something else
+    Function(PyObject* given, const std::string& who);
 
     explicit operator bool() const noexcept { return object || address; }
 };

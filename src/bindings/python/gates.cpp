@@ -86,8 +86,8 @@ public:
             table.clears = [](const void* at, void*, const detail::StepState<State>& step,
                               std::uint64_t& calls) {
                 detail::Door<AskedSystem, State> door(from(at).system_, step.x0);
-                const GuardView<AskedSystem, State> guard(
-                    from(at).system_, calls, 0, step.mode, Crossing::falling, step.backward);
+                const GuardView<AskedSystem, State> guard(from(at).system_, calls, 0, step.mode,
+                                                          Crossing::falling, step.backward);
                 return from(at).Detector::clears(
                     guard, detail::StepToCome<AskedSystem, State>(door, step));
             };

@@ -111,6 +111,16 @@ void set(Request& request, const py::handle& value)
 
 }  // namespace
 
+std::vector<std::string> option_names()
+{
+    std::vector<std::string> names;
+    for (const auto& [option, set] : setters()) {
+        // Those that Python makes of others.
+        if (option != "scale" && option != "dense" && option != "t_end") names.push_back(option);
+    }
+    return names;
+}
+
 Request request_from(const py::dict& given)
 {
     Request request;
@@ -119,8 +129,8 @@ Request request_from(const py::dict& given)
         const auto setter = setters().find(name);
         if (setter == setters().end()) {
             std::string known;
-            for (const auto& [option, set] : setters()) {
-                if (option != "scale") known += (known.empty() ? "" : ", ") + option;
+            for (const std::string& option : option_names()) {
+                known += (known.empty() ? "" : ", ") + option;
             }
             throw py::type_error("found an option '" + name + "', expected some of " + known);
         }

@@ -340,6 +340,20 @@ void bind_results(py::module_& module)
             "The events, as a structured array with the fields t, guard, bracket, slope, error, "
             "mode_before, mode_after, kind, late, before, after.")
         .def_property_readonly(
+            "event_modes",
+            [](const PyRun& self) {
+                py::list modes;
+                const Record& r = self.record;
+                for (std::size_t i = 0; i < r.event_count; ++i) {
+                    EventHead head;
+                    std::memcpy(&head, r.events.data() + i * r.event_stride(), sizeof head);
+                    modes.append(py::make_tuple(self.mode_named(head.mode_before),
+                                                self.mode_named(head.mode_after)));
+                }
+                return modes;
+            },
+            "The modes before and after each event, by name where the system names them.")
+        .def_property_readonly(
             "times",
             [self_of](const py::object& self) {
                 const Record& r = self_of(self).record;

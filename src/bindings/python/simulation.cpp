@@ -259,6 +259,7 @@ private:
 void bind_runs(py::module_& module)
 {
     module.def("integrate", &integrate);
+    module.def("option_names", &option_names);
     py::class_<PySimulation>(module, "Simulation")
         .def(py::init<std::shared_ptr<Source>, const State&, const py::dict&, const py::object&>())
         .def("step", &PySimulation::step,
