@@ -57,7 +57,7 @@ protected:
           guarded_(system_->guarded),
           resets_any_(system_->resets()),
           timed_(system_->timed()),
-          puts_off_(setup.detector.puts_off),
+          puts_off_(puts_off(setup.detector, *setup.system)),
           predicts_(setup.detector.clears != nullptr),
           options_(options),
           meter_(puts_off_ ? nullptr : setup.detector.metering),

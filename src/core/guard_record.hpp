@@ -88,6 +88,14 @@ struct GuardRecord {
     return side == Side::above ? 1 : side == Side::below ? -1 : 0;
 }
 
+/// Whether checks are put off. Without what it plans by, a detector is the exact one that it is
+/// made around.
+template <class X>
+[[nodiscard]] bool puts_off(const DetectorTable<X>& detector, const SystemTable<X>& system)
+{
+    return detector.puts_off && system.guarded && (!detector.needs_bounds || system.bounded);
+}
+
 /// What a detector asks of all guards, of a system with bounds or without.
 struct BankRules {
     Screening screening = Screening::ends;
@@ -113,7 +121,7 @@ struct BankRules {
         const bool bounded = system->bounded;
         return {.screening = detector.screening,
                 .uses_rates = detector.uses_rates,
-                .puts_off = detector.puts_off,
+                .puts_off = detail::puts_off(detector, *system.operator->()),
                 .remembers = detector.uses_rates && !detector.looks_inside && !bounded,
                 .coarse = detector.uses_rates && bounded,
                 .looks = detector.looks_inside && !bounded,

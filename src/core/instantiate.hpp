@@ -27,7 +27,7 @@ namespace ricochet::detail {
 template <class X>
 [[nodiscard]] bool has_single_guard(const RunSetup<X>& setup)
 {
-    return fixed_size<X>() > 0 && !setup.detector.puts_off &&
+    return fixed_size<X>() > 0 && !puts_off(setup.detector, *setup.system) &&
            setup.system->guard_count(setup.door) == 1;
 }
 

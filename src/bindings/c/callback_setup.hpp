@@ -77,11 +77,6 @@ void CallbackSetup<X>::set_detector(const Detector& detector)
     const auto kept = std::make_shared<const Detector>(detector);
     setup_.detector = detail::DetectorTableOf<Detector, CallbackSystem, X>::make(*kept);
     setup_.detecting = kept.get();
-    // Without what it plans by, a detector is the exact one that it is made around.
-    const rc_callbacks& has = system_->callbacks();
-    if (has.guard_count == 0 || (setup_.detector.needs_bounds && !has.speed_bound)) {
-        setup_.detector.puts_off = false;
-    }
     detector_ = kept;
 }
 

@@ -82,10 +82,6 @@ OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door
     } else {
         refuse("detector", detector, "one of those in the documentation");
     }
-    // Without what it plans by, a detector is the exact one that it is made around.
-    if (!setup.system->guarded || (setup.detector.needs_bounds && !setup.system->bounded)) {
-        setup.detector.puts_off = false;
-    }
     const std::string_view locator = request.locator;
     if (locator == "newton") {
         locate_by<Newton>(setup);
