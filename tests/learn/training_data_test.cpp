@@ -78,13 +78,8 @@ TEST_P(Gate, IsTheStoredSetAndTheOneThatTheNetworkIsScaledBy)
 {
     const TrainingSet set = data_of(GetParam()).make({});
     expect_stored(GetParam(), set);
-    // Sums of 3e5 terms are rounded to 1e-11. Three gates were trained before the rule for first
-    // steps under error control was changed, on states of which a few were others.
-    const bool before =
-        std::set<std::string>{"coulomb-oscillator-gate-adaptive", "impact-oscillator-gate-adaptive",
-                              "stick-slip-gate-adaptive"}
-            .contains(GetParam());
-    expect_trained_on(GetParam(), set, before ? 0.01 : 1e-9);
+    // Sums of 3e5 terms are rounded to 1e-11.
+    expect_trained_on(GetParam(), set, 1e-9);
 }
 
 std::string test_name(const testing::TestParamInfo<const char*>& info)

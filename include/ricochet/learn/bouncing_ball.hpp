@@ -12,8 +12,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "ricochet/learn/classifier.hpp"
 #include "ricochet/detail/surface.hpp"
+#include "ricochet/learn/classifier.hpp"
 
 namespace ricochet::learn {
 

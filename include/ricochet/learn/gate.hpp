@@ -104,11 +104,11 @@ struct GateSamples {
 
 /// A gate in runs, side by side with the exact detector.
 struct GateTrial {
-    std::uint64_t events = 0;         ///< of the exact runs
-    std::uint64_t misses = 0;         ///< of these, not found, or not at the same time
-    std::uint64_t steps = 0;          ///< of the exact runs
-    std::uint64_t exact_calls = 0;    ///< of the guard, with a look at every step
-    std::uint64_t gated_calls = 0;    ///< of the guard, with the gate
+    std::uint64_t events = 0;       ///< of the exact runs
+    std::uint64_t misses = 0;       ///< of these, not found, or not at the same time but for errors
+    std::uint64_t steps = 0;        ///< of the exact runs
+    std::uint64_t exact_calls = 0;  ///< of the guard, with a look at every step
+    std::uint64_t gated_calls = 0;  ///< of the guard, with the gate
     std::uint64_t network_calls = 0;  ///< of the gate
     std::uint64_t outside = 0;        ///< of its box
     std::uint64_t repeated = 0;       ///< steps taken again

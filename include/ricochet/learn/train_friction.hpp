@@ -15,9 +15,9 @@
 #include <optional>
 #include <vector>
 
+#include "ricochet/detail/levenberg_marquardt.hpp"
 #include "ricochet/faults/additive_pair.hpp"
 #include "ricochet/faults/histories.hpp"
-#include "ricochet/detail/levenberg_marquardt.hpp"
 
 namespace ricochet::learn {
 

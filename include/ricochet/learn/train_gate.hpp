@@ -233,15 +233,15 @@ public:
             std::optional<Gated> gated(std::in_place, *system_, exact->x(), options, Stepping{},
                                        detector);
             for (;;) {
-                const bool same = next_event_is_same(*exact, *gated, trial.events);
+                const Agreement next = take_next_event(*exact, *gated, trial.events);
                 if (stopped_) break;
                 const bool ended = exact->ended();
                 const double t = exact->t();
                 const X x = exact->x();
                 const Mode mode = exact->mode();
-                if (same && !ended) continue;
+                if (next == Agreement::to_the_bit && !ended) continue;
                 finish(*exact, *gated, trial);
-                trial.misses += same ? 0 : 1;
+                trial.misses += next == Agreement::none ? 1 : 0;
                 if (ended || trial.events >= events || !(options.t_end > t)) break;
                 options.t_start = t;
                 options.mode = mode;
@@ -484,21 +484,31 @@ private:
         remember(run, nowhere);
     }
 
-    /// Takes both to their next event, after `seen` of them in earlier runs; whether it is the
-    /// same.
+    enum class Agreement {
+        to_the_bit,
+        to_the_error,  ///< of locating it, from other brackets
+        none,
+    };
+
+    /// Takes both to their next event, after `seen` of them in earlier runs.
     template <class Gated>
-    [[nodiscard]] bool next_event_is_same(Exact& exact, Gated& gated, std::uint64_t seen)
+    [[nodiscard]] Agreement take_next_event(Exact& exact, Gated& gated, std::uint64_t seen)
     {
         const std::size_t before = exact.run().events.size();
         while (exact.run().events.size() == before && exact.step()) {
-            if (!goes_on(seen + before)) return false;
+            if (!goes_on(seen + before)) return Agreement::none;
         }
         while (gated.run().events.size() == before && gated.advance()) {
         }
         const auto& a = exact.run().events;
         const auto& b = gated.run().events;
-        if (a.size() != b.size()) return false;
-        return a.size() == before || (a.back().t == b.back().t && a.back().guard == b.back().guard);
+        if (a.size() != b.size()) return Agreement::none;
+        if (a.size() == before) return Agreement::to_the_bit;
+        const double apart = std::fabs(a.back().t - b.back().t);
+        if (a.back().guard != b.back().guard || !(apart <= a.back().error + b.back().error)) {
+            return Agreement::none;
+        }
+        return apart == 0 ? Agreement::to_the_bit : Agreement::to_the_error;
     }
 
     template <class Gated>
