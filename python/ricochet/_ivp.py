@@ -9,7 +9,7 @@ from . import _ricochet
 from ._compiled import Compiled
 from ._network import set_gate
 from ._ready import Ready
-from ._run import Kind, set_mode, set_tolerance, source_of, state_from
+from ._run import Kind, numbers_from, set_mode, set_tolerance, source_of, state_from
 from ._system import Guard, System
 
 _METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78"}
@@ -218,27 +218,20 @@ def _is_number(given):
     return isinstance(given, (int, float, np.number)) and not isinstance(given, bool)
 
 
-def _numbers(given, what):
-    try:
-        return np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
-
-
 def _options(options, t0, t1, components):
     options = dict(options)
     for name in _IMPLICIT_OPTIONS:
         if name in options:
             warn(f"{name} has no effect for an explicit method", stacklevel=3)
             del options[name]
-    rtol = float(_numbers(options.pop("rtol", 1e-3), "rtol").min())
+    rtol = float(numbers_from(options.pop("rtol", 1e-3), "rtol").min())
     if rtol < 100 * _EPS:
         warn(f"At least one element of rtol, {rtol}, is too small; {100 * _EPS} is taken",
              stacklevel=3)
         rtol = 100 * _EPS
     given = {"t_start": t0, "t_end": t1, "rtol": rtol}
     atol = options.pop("atol", 1e-6)
-    if np.any(_numbers(atol, "atol") < 0):
+    if np.any(numbers_from(atol, "atol") < 0):
         raise ValueError(f"atol: found {atol}, expected numbers that are not negative")
     set_tolerance(given, atol, components)
     max_step = options.pop("max_step", None)
@@ -272,7 +265,7 @@ def _options(options, t0, t1, components):
 def _sample_times(t_eval, t0, t1):
     if t_eval is None:
         return None
-    times = _numbers(t_eval, "t_eval")
+    times = numbers_from(t_eval, "t_eval")
     if times.ndim != 1:
         raise ValueError(f"t_eval: found {times.ndim} dimensions, expected 1")
     outside = times[~((times >= min(t0, t1)) & (times <= max(t0, t1)))]

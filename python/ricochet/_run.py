@@ -1,7 +1,6 @@
 """Running systems."""
 
 from enum import IntEnum
-from math import floor, log2
 
 import numpy as np
 
@@ -42,9 +41,17 @@ def state_from(given, what):
         raise TypeError(f"{what}: found {given!r}, expected numbers") from None
 
 
+def numbers_from(given, what):
+    """An array of floats."""
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
+
+
 def set_tolerance(options, atol, components):
-    """``atol`` as one number, and a unit for each component where it has many."""
-    array = np.asarray(atol, dtype=float)
+    """``atol`` as one number, or as one for each component of the start."""
+    array = numbers_from(atol, "atol")
     if array.ndim == 0:
         options["atol"] = float(array)
         return
@@ -53,13 +60,9 @@ def set_tolerance(options, atol, components):
                          f"({components},)")
     if not np.all(np.isfinite(array)) or np.any(array < 0):
         raise ValueError("atol: found a number that is negative or not finite")
-    least = array[array > 0].min() if np.any(array > 0) else 0.0
-    options["atol"] = float(least)
-    if np.all(array == least):
-        return
-    # Powers of two, rounded down: the scaling is exact, and no component gets a larger
-    # tolerance than was asked for.
-    options["scale"] = [2.0 ** floor(log2(a / least)) if a > 0 else 2.0 ** -200 for a in array]
+    options["component_atol"] = array.tolist()
+    # The tolerance of components that a reset adds.
+    options["atol"] = float(array[array > 0].min()) if np.any(array > 0) else 0.0
 
 
 def set_mode(options, system, modes):
@@ -125,9 +128,8 @@ def integrate(system, x0, t_end, **options):
     fixed : bool
         Steps of length ``step`` instead of error control.
     rtol, atol : float
-        1e-8, 1e-10. ``atol`` may have one number for each component: then the states are counted in
-        units that are powers of two, and a component has between half of what was asked for
-        and all of it.
+        1e-8, 1e-10. ``atol`` may have one number for each component; components that a reset adds
+        then have the smallest of these that is not zero.
     sample_times : array_like
         Where ``run.times`` and ``run.states`` are wanted.
     record_steps : bool

@@ -249,6 +249,8 @@ def test_pickled_results_are_the_same():
     result = ricochet.solve_ivp(fall, (0, 5), [1.0, 0.0], events=ball_events(), dense_output=True)
     again = pickle.loads(pickle.dumps(result))
     assert np.array_equal(again.sol(t), result.sol(t)) and again.kinds == result.kinds
+    with pytest.raises(ValueError, match="another version"):
+        ricochet.Solution.__new__(ricochet.Solution).__setstate__((b"", [], [], None))
 
 
 def test_what_a_callback_keeps_does_not_change():
@@ -324,6 +326,54 @@ def compiled_ball(flow, height, rate, bounce):
     guard = ricochet.Guard(ricochet.Compiled(height), rate=ricochet.Compiled(rate),
                            reset=ricochet.Compiled(bounce), name="floor", unilateral=True)
     return ricochet.System(flow, [guard])
+
+
+@pytest.mark.parametrize("ready", [ricochet.Pendulum(), ricochet.ImpactOscillator(),
+                                   ricochet.StickSlip(), ricochet.Thermostat()])
+def test_a_ready_system_takes_a_tolerance_for_each_component(ready):
+    x0 = ready.start
+    each = [1e-9] * len(x0)
+
+    def expect_same(one, other):
+        assert one.statistics == other.statistics
+        assert np.array_equal(one.x, other.x)
+        for name in ("t", "guard", "before", "after"):
+            assert np.array_equal(one.events[name], other.events[name])
+
+    # By the loop of the system, by the one for all systems, and driven by hand.
+    for options in ({}, {"locator": "bisection"}, {"method": "fehlberg78"}):
+        expect_same(ricochet.integrate(ready, x0, 12.0, atol=1e-9, **options),
+                    ricochet.integrate(ready, x0, 12.0, atol=each, **options))
+    expect_same(ricochet.integrate(ready, x0, 12.0, atol=1e-9),
+                ricochet.Simulation(ready, x0, 12.0, atol=each).run_to_end())
+    fine = ricochet.integrate(ready, x0, 12.0, rtol=1e-13, atol=[1e-13] + each[1:])
+    coarse = ricochet.integrate(ready, x0, 12.0, rtol=1e-13, atol=[1e-3] + each[1:])
+    assert fine.statistics.steps > coarse.statistics.steps
+
+
+def test_components_that_a_reset_adds_have_the_smallest_tolerance():
+    # y'' = -y is added to a constant at time 1: its steps are as many as those of a run in which
+    # all components have its tolerance.
+    def flow(t, x):
+        return [0.0] if len(x) == 1 else [0.0, x[2], -x[1]]
+
+    timer = ricochet.Guard(lambda t, x: 1.0 - t, reset=lambda t, x: [x[0], 1.0, 0.0])
+    system = ricochet.System(flow, [timer], changes_dimension=True)
+
+    def steps(atol, x0=(1.0,)):
+        return ricochet.integrate(system, x0, 9.0, rtol=1e-13, atol=atol).statistics.steps
+
+    assert steps([1e-6]) == steps(1e-6) < steps([1e-9]) == steps(1e-9)
+
+
+def test_a_snapshot_belongs_to_the_tolerances_of_its_run():
+    def simulation(atol):
+        return ricochet.Simulation(ricochet.Pendulum(), ricochet.Pendulum.start, 5.0, atol=atol)
+
+    saved = simulation([1e-9, 1e-6]).save()
+    simulation([1e-9, 1e-6]).restore(saved)
+    with pytest.raises(ValueError, match="component_atol"):
+        simulation([1e-9, 1e-7]).restore(saved)
 
 
 def expect_ball(system):

@@ -189,8 +189,17 @@ def test_features_and_gates_that_do_not_fit(classifier):
     nameless.parameters = None
     with pytest.raises(ValueError, match="does not declare"):
         run(nameless, gate=GATE, detector="calibrated")
-    with pytest.raises(ValueError, match="atol"):
-        run(gate=GATE, detector="calibrated", atol=[1e-8, 1e-4])
+
+
+def test_a_gate_serves_a_run_with_a_tolerance_for_each_component():
+    # A gate omits checks of guards, and leaves the steps as they are.
+    def run(atol, **options):
+        return ricochet.integrate(Oscillator(), [0.0, 0.0], 60.0, atol=atol, **options)
+
+    exact, gated = run([1e-9, 1e-6]), run([1e-9, 1e-6], gate=GATE, detector="calibrated")
+    assert gated.statistics.evidence.gated > 0 and exact.events.size > 0
+    assert gated.statistics.steps == exact.statistics.steps
+    assert np.array_equal(gated.events["t"], exact.events["t"])
 
 
 def test_planning_without_bounds_checks_every_step():

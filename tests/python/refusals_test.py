@@ -42,6 +42,7 @@ def test_starts_that_are_none(y0, error):
     ({"t_eval": [math.nan]}, ValueError, "nan"), ({"rtol": math.nan}, ValueError, "rtol"),
     ({"atol": -1}, ValueError, "atol"),
     ({"atol": [1, 2]}, ValueError, "shape"), ({"atol": [math.nan]}, ValueError, "atol"),
+    ({"atol": ["a"]}, TypeError, "atol: found .*, expected numbers"),
     ({"max_step": 0}, ValueError, "max_step"), ({"max_step": -1}, ValueError, "max_step"),
     ({"first_step": 0}, ValueError, "first_step"), ({"first_step": 5}, ValueError, "first_step"),
     ({"args": 3}, TypeError, "args"), ({"events": 3}, TypeError, "int"),
@@ -52,6 +53,29 @@ def test_starts_that_are_none(y0, error):
 def test_options_that_are_none(options, error, words):
     with pytest.raises(error, match=words):
         ricochet.solve_ivp(decay, (0, 1), [1.0], **options)
+
+
+@pytest.mark.parametrize("atol, error, words", [
+    ([1e-9], ValueError, r"atol: found shape \(1,\), expected a number or \(2,\)"),
+    ([[1e-9, 1e-9]], ValueError, r"atol: found shape \(1, 2\)"),
+    ([1e-9, -1], ValueError, "atol: found a number that is negative or not finite"),
+    ([1e-9, math.nan], ValueError, "atol: found a number that is negative or not finite"),
+    ([1e-9, math.inf], ValueError, "atol: found a number that is negative or not finite"),
+    (["a", "b"], TypeError, "atol: found .*, expected numbers"),
+    ([1e-9, 1j], TypeError, "atol: found .*, expected numbers")])
+@pytest.mark.parametrize("system", [ricochet.System(fall), ricochet.BouncingBall()])
+def test_tolerances_of_components_that_are_none(system, atol, error, words):
+    for run in ricochet.integrate, ricochet.Simulation:
+        with pytest.raises(error, match=words):
+            run(system, [1.0, 0.0], 1.0, atol=atol)
+
+
+@pytest.mark.parametrize("system", [ricochet.System(fall), ricochet.BouncingBall()])
+def test_without_rtol_no_tolerance_of_a_component_is_zero(system):
+    run = ricochet.integrate(system, [1.0, 0.0], 0.1, rtol=0, atol=[1e-9, 1e-8])
+    assert run.outcome == "reached_end"
+    with pytest.raises(ValueError, match="rtol must be positive"):
+        ricochet.integrate(system, [1.0, 0.0], 0.1, rtol=0, atol=[1e-9, 0.0])
 
 
 def marked(**attributes):

@@ -109,16 +109,46 @@ def test_tolerances_of_components_hold():
 
     assert error(1e-6) > 1e-10
     assert error([1e-6, 1e-17, 1e-17]) < 1e-15
-    # Scaling by powers of two rounds nothing: the same tolerance for all is the same run, and
-    # states, events and solution are in the caller's units.
-    plain = ricochet.solve_ivp(fun, (0, 20), start, rtol=1e-6, atol=1e-14)
-    same = ricochet.solve_ivp(fun, (0, 20), start, rtol=1e-6, atol=[1e-14] * 3)
-    assert np.array_equal(plain.y, same.y)
     apart = ricochet.solve_ivp(fun, (0, 20), start, rtol=1e-6, atol=[1e-3, 1e-14, 0.0],
                                dense_output=True, events=lambda t, y: y[1])
     assert np.array_equal(apart.y[:, 0], start)
     np.testing.assert_allclose(apart.sol(20.0), exact, atol=1e-12)
     np.testing.assert_allclose(apart.t_events[0], np.pi * (0.5 + np.arange(6)), atol=1e-3)
+
+
+def swing(t, y):
+    return [y[1], -y[0]]
+
+
+@pytest.mark.parametrize("y0", [[1.0], [1.0, 0.0]])
+@pytest.mark.parametrize("method", ["RK45", "DOP853"])
+def test_equal_tolerances_of_components_are_one_tolerance(y0, method):
+    fun = swing if len(y0) == 2 else lambda t, y: -y
+
+    def solve(atol, rtol):
+        return ricochet.solve_ivp(fun, (0, 20), y0, method, rtol=rtol, atol=atol, dense_output=True,
+                                  events=lambda t, y: y[0] - 0.5)
+
+    def expect_same(one, each):
+        assert one.nfev == each.nfev
+        for name in ("t", "y"):
+            assert np.array_equal(one[name], each[name])
+        assert np.array_equal(one.t_events[0], each.t_events[0])
+        assert np.array_equal(one.sol(np.linspace(0, 20, 50)), each.sol(np.linspace(0, 20, 50)))
+
+    expect_same(solve(1e-9, 1e-6), solve([1e-9] * len(y0), 1e-6))
+    expect_same(solve(1e-9, 1e-6), solve(np.full(len(y0), 1e-9), 1e-6))
+    # An rtol of zero counts as 100 eps, as in SciPy.
+    with pytest.warns(UserWarning, match="rtol"):
+        expect_same(solve(1e-9, 0.0), solve([1e-9] * len(y0), 0.0))
+
+
+def test_a_tolerance_of_a_component_is_taken_as_it_is():
+    # A looser tolerance for the position saves steps, also where it is less than twice the other.
+    def steps(atol):
+        return ricochet.solve_ivp(swing, (0, 20), [1.0, 0.0], rtol=1e-13, atol=atol).nfev
+
+    assert steps([1.5e-9, 1e-9]) < steps([1e-9, 1e-9])
 
 
 def test_a_start_without_length():

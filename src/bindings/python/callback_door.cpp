@@ -1,7 +1,6 @@
 // The functions of a system of callbacks, as a run calls them.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -21,11 +20,7 @@ class CallbackDoor final : public RunDoor {
     using Table = detail::SystemTable<State>;
 
 public:
-    CallbackDoor(const CallbackSource& source, const Request& request)
-        : source_(source), scale_(request.scale)
-    {
-        for (const double unit : scale_) inverse_.push_back(1 / unit);
-    }
+    explicit CallbackDoor(const CallbackSource& source) : source_(source) {}
 
     [[nodiscard]] const Table& table() const noexcept override { return source_.table_; }
     [[nodiscard]] void* door() noexcept override { return this; }
@@ -142,26 +137,6 @@ private:
         return *static_cast<CallbackDoor*>(door);
     }
 
-    // --- states ---
-
-    [[nodiscard]] double unit(std::size_t i) const noexcept
-    {
-        return i < scale_.size() ? scale_[i] : 1;
-    }
-    [[nodiscard]] double inverse(std::size_t i) const noexcept
-    {
-        return i < inverse_.size() ? inverse_[i] : 1;
-    }
-
-    /// For compiled functions.
-    [[nodiscard]] const double* plain(const State& x, State& room) const
-    {
-        if (scale_.empty()) return x.data();
-        room = x;
-        for (std::size_t i = 0; i < std::min(scale_.size(), x.size()); ++i) room[i] *= scale_[i];
-        return room.data();
-    }
-
     // --- calls ---
 
     /// function([mode,] t, further..., arguments...)
@@ -189,9 +164,7 @@ private:
 
     [[nodiscard]] std::string name() const
     {
-        std::string out = source_.name_.empty() ? "Python" : source_.name_;
-        for (const double unit : scale_) out += ' ' + std::to_string(std::ilogb(unit));
-        return out;
+        return source_.name_.empty() ? "Python" : source_.name_;
     }
 
     bool flow(Mode mode, double t, const State& x, State& dxdt)
@@ -200,21 +173,18 @@ private:
         if (dxdt.size() != x.size()) dxdt.resize(x.size());
         if (function.address) {
             watch_.tick();
-            reinterpret_cast<CompiledFlow>(function.address)(mode, t, plain(x, room_), dxdt.data(),
+            reinterpret_cast<CompiledFlow>(function.address)(mode, t, x.data(), dxdt.data(),
                                                              x.size(), function.user);
-            for (std::size_t i = 0; i < std::min(inverse_.size(), x.size()); ++i) {
-                dxdt[i] *= inverse_[i];
-            }
             return true;
         }
-        const Ref result = call(function, mode, t, x_.show(x, scale_));
+        const Ref result = call(function, mode, t, x_.show(x));
         const Numbers numbers(result.get(), "", source_.flow_title_);
         if (numbers.size() != x.size()) {
             raise(PyExc_ValueError, source_.flow_title_ + " returned " +
                                         std::to_string(numbers.size()) +
                                         " numbers for a state of " + std::to_string(x.size()));
         }
-        numbers.copy(dxdt.data(), inverse_);
+        numbers.copy(dxdt.data());
         return true;
     }
 
@@ -233,7 +203,7 @@ private:
             }
             return;
         }
-        const Ref result = call(source_.guard_values_, mode, t, x_.show(x, scale_));
+        const Ref result = call(source_.guard_values_, mode, t, x_.show(x));
         const Numbers numbers(result.get(), "guard_values", nobody_);
         if (numbers.size() != g.size()) {
             raise(PyExc_ValueError, "guard_values returned " + std::to_string(numbers.size()) +
@@ -251,8 +221,8 @@ private:
         }
         const CallbackGuard& guard = source_.guards_[which];
         if (guard.value.address) {
-            return reinterpret_cast<CompiledGuard>(guard.value.address)(mode, t, plain(x, room_),
-                                                                        x.size(), guard.value.user);
+            return reinterpret_cast<CompiledGuard>(guard.value.address)(mode, t, x.data(), x.size(),
+                                                                        guard.value.user);
         }
         return number(guard.value, "", guard.title, mode, t, x);
     }
@@ -260,7 +230,7 @@ private:
     [[nodiscard]] double number(const Function& function, const char* what, const std::string& of,
                                 Mode mode, double t, const State& x)
     {
-        const Ref result = call(function, mode, t, x_.show(x, scale_));
+        const Ref result = call(function, mode, t, x_.show(x));
         if (PyFloat_Check(result.get())) return PyFloat_AS_DOUBLE(result.get());
         return as_guard(result.get(), what + of);
     }
@@ -270,11 +240,10 @@ private:
     {
         const CallbackGuard& guard = source_.guards_[which];
         if (guard.rate.address) {
-            const double* state = plain(x, room_);
             return reinterpret_cast<CompiledRate>(guard.rate.address)(
-                mode, t, state, plain(dxdt, rate_room_), x.size(), guard.rate.user);
+                mode, t, x.data(), dxdt.data(), x.size(), guard.rate.user);
         }
-        const Ref result = call(guard.rate, mode, t, x_.show(x, scale_), dxdt_.show(dxdt, scale_));
+        const Ref result = call(guard.rate, mode, t, x_.show(x), dxdt_.show(dxdt));
         return as_guard(result.get(), "rate of " + guard.owner);
     }
 
@@ -300,7 +269,7 @@ private:
     {
         const CallbackGuard& guard = source_.guards_[which];
         if (!guard.enabled) return true;
-        const Ref result = call(guard.enabled, mode, t, x_.show(x, scale_));
+        const Ref result = call(guard.enabled, mode, t, x_.show(x));
         const int truth = PyObject_IsTrue(result.get());
         if (truth < 0) throw PythonError();
         return truth != 0;
@@ -318,8 +287,8 @@ private:
                                                                 : infinity;
         }
         if (function.address) {
-            return reinterpret_cast<CompiledGuard>(function.address)(
-                mode, t, at(door).plain(x, at(door).room_), x.size(), function.user);
+            return reinterpret_cast<CompiledGuard>(function.address)(mode, t, x.data(), x.size(),
+                                                                     function.user);
         }
         return at(door).number(function, "bound of ", guard.owner, mode, t, x);
     }
@@ -333,12 +302,10 @@ private:
         if (!function) return mode;
         if (function.address) {
             const auto reset = reinterpret_cast<CompiledReset>(function.address);
-            for (std::size_t i = 0; i < x.size(); ++i) x[i] *= unit(i);
             const Mode next = reset(mode, t, x.data(), x.size(), function.user);
-            for (std::size_t i = 0; i < x.size(); ++i) x[i] *= inverse(i);
             return source_.moded_ ? next : mode;
         }
-        const Ref result = call(function, mode, t, x_.show(x, scale_));
+        const Ref result = call(function, mode, t, x_.show(x));
         return take_place(result.get(), what, of, mode, x);
     }
 
@@ -353,7 +320,7 @@ private:
             PyList_SET_ITEM(list.get(), static_cast<Py_ssize_t>(fired.size()),
                             PyUnicode_FromString("time"));
         }
-        const Ref result = call(source_.reset_set_, mode, t, x_.show(x, scale_), list.get());
+        const Ref result = call(source_.reset_set_, mode, t, x_.show(x), list.get());
         return take_place(result.get(), "reset_set", nobody_, mode, x);
     }
 
@@ -401,7 +368,7 @@ private:
                                         " numbers for a state of " + std::to_string(x.size()));
         }
         x.resize(numbers.size());
-        numbers.copy(x.data(), inverse_);
+        numbers.copy(x.data());
     }
 
     [[nodiscard]] double time_event(const Function& function, double t, double never)
@@ -418,9 +385,8 @@ private:
     }
 
     const CallbackSource& source_;
-    std::vector<double> scale_, inverse_;
     ShownArray x_, dxdt_;
-    State room_, rate_room_, there_;
+    State there_;
     std::vector<double> values_;
     const std::string nobody_;
 };
@@ -430,9 +396,9 @@ void CallbackSource::fill_table()
     CallbackDoor::fill(table_, *this);
 }
 
-std::unique_ptr<RunDoor> CallbackSource::open(const State& /*x0*/, const Request& request) const
+std::unique_ptr<RunDoor> CallbackSource::open(const State& /*x0*/) const
 {
-    return std::make_unique<CallbackDoor>(*this, request);
+    return std::make_unique<CallbackDoor>(*this);
 }
 
 }  // namespace ricochet::python

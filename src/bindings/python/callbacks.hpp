@@ -58,8 +58,7 @@ public:
     /// @throws PythonError if something in it is missing, or of another type
     explicit CallbackSource(PyObject* specification);
 
-    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0,
-                                                const Request& request) const override;
+    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override;
     [[nodiscard]] std::vector<std::string> mode_names() const override;
     [[nodiscard]] std::vector<std::string> guard_names() const override;
 

@@ -44,7 +44,7 @@ public:
     using State = python::State;
 
     DoorSystem(const Source& source, const State& like)
-        : source_(&source), door_(source.open(like, Request{})), table_(&door_->table())
+        : source_(&source), door_(source.open(like)), table_(&door_->table())
     {
         name = table_->name(door_->door());
     }

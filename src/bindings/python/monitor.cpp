@@ -75,7 +75,7 @@ public:
         validate(request.options, false);
         request.options.t_end = sign_ * std::numeric_limits<double>::infinity();
         start_mode_ = source_->start_mode();
-        door_ = source_->open(like, request);
+        door_ = source_->open(like);
         // Guards see whole states: a host's interpolant need be no polynomial.
         table_ = door_->table();
         table_.guard_on = nullptr;
@@ -255,7 +255,7 @@ private:
         run.x = monitor_->x();
         run.mode = monitor_->mode();
         if (!ended_) run.outcome = Outcome::cancelled;
-        out.record = record_of(std::move(run), {});
+        out.record = record_of(std::move(run));
         return out;
     }
 

@@ -3,7 +3,6 @@
 
 #include <numpy/arrayobject.h>
 
-#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -66,19 +65,17 @@ Numbers::Numbers(PyObject* result, const char* who, const std::string& of)
     read_array();
 }
 
-void Numbers::copy(double* out, const std::vector<double>& factors) const
+void Numbers::copy(double* out) const
 {
     for (std::size_t i = 0; i < size_; ++i) {
-        double number = 0;
         if (!items_) {
-            number = data_[i];
+            out[i] = data_[i];
         } else if (PyFloat_Check(items_[i])) {
-            number = PyFloat_AS_DOUBLE(items_[i]);
+            out[i] = PyFloat_AS_DOUBLE(items_[i]);
         } else {
-            number = PyLong_AsDouble(items_[i]);
-            if (number == -1 && PyErr_Occurred()) throw PythonError();
+            out[i] = PyLong_AsDouble(items_[i]);
+            if (out[i] == -1 && PyErr_Occurred()) throw PythonError();
         }
-        out[i] = i < factors.size() ? number * factors[i] : number;
     }
 }
 
@@ -141,7 +138,7 @@ void Numbers::read_objects(const Ref& array)
     size_ = converted_.size();
 }
 
-PyObject* ShownArray::show(const State& x, const std::vector<double>& scale)
+PyObject* ShownArray::show(const State& x)
 {
     require_numpy();
     auto* array = reinterpret_cast<PyArrayObject*>(array_.get());
@@ -153,9 +150,7 @@ PyObject* ShownArray::show(const State& x, const std::vector<double>& scale)
         array_ = checked(PyArray_SimpleNew(1, &shape, NPY_DOUBLE));
         array = reinterpret_cast<PyArrayObject*>(array_.get());
     }
-    auto* to = static_cast<double*>(PyArray_DATA(array));
-    std::memcpy(to, x.data(), x.size() * sizeof(double));
-    for (std::size_t i = 0; i < std::min(scale.size(), x.size()); ++i) to[i] *= scale[i];
+    std::memcpy(PyArray_DATA(array), x.data(), x.size() * sizeof(double));
     return array_.get();
 }
 

@@ -28,8 +28,7 @@ public:
 
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
 
-    /// out[i] = number i, times factors[i] where there is one.
-    void copy(double* out, const std::vector<double>& factors = {}) const;
+    void copy(double* out) const;
 
 private:
     [[noreturn]] void refuse(const std::string& found) const;
@@ -50,7 +49,7 @@ private:
 /// what was kept does not change.
 class ShownArray {
 public:
-    [[nodiscard]] PyObject* show(const State& x, const std::vector<double>& scale);
+    [[nodiscard]] PyObject* show(const State& x);
 
 private:
     Ref array_;

@@ -60,6 +60,7 @@ void set(Request& request, const py::handle& value)
         {"step", &set<&Options::step>},
         {"rtol", &set<&Options::rtol>},
         {"atol", &set<&Options::atol>},
+        {"component_atol", &set<&Options::component_atol>},
         {"h_min", &set<&Options::h_min>},
         {"h_max", &set<&Options::h_max>},
         {"event_tolerance", &set<&Options::event_tolerance>},
@@ -101,10 +102,6 @@ void set(Request& request, const py::handle& value)
          [](Request& request, const py::handle& value) {
              request.dense = request.options.record_steps = py::cast<bool>(value);
          }},
-        {"scale",
-         [](Request& request, const py::handle& value) {
-             request.scale = py::cast<std::vector<double>>(value);
-         }},
     };
     return all;
 }
@@ -116,7 +113,9 @@ std::vector<std::string> option_names()
     std::vector<std::string> names;
     for (const auto& [option, set] : setters()) {
         // Those that Python makes of others.
-        if (option != "scale" && option != "dense" && option != "t_end") names.push_back(option);
+        if (option != "component_atol" && option != "dense" && option != "t_end") {
+            names.push_back(option);
+        }
     }
     return names;
 }

@@ -74,8 +74,7 @@ Record run_by(const Method& method, const System& system, const State& x0, const
     const Watched<System> watched(system, watch);
     detail::PartsOfRun<Watched<System>, X, Stepping, Extremum, Newton> parts(
         watched, start, Stepping{method}, Extremum{}, Newton{});
-    return record_of(detail::run_whole(parts.setup(), detail::core_state(start), request.options),
-                     {});
+    return record_of(detail::run_whole(parts.setup(), detail::core_state(start), request.options));
 }
 
 template <class System>
@@ -89,14 +88,9 @@ public:
 
     [[nodiscard]] const System& system() const noexcept { return system_; }
 
-    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0,
-                                                const Request& request) const override
+    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override
     {
         require_size(x0);
-        if (!request.scale.empty()) {
-            throw std::invalid_argument(std::string(System::name) +
-                                        ": found an atol for each component; expected one for all");
-        }
         return std::make_unique<ReadyDoor<System>>(system_);
     }
 

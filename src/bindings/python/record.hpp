@@ -45,7 +45,6 @@ struct Record {
     std::vector<double> times;
     std::vector<double> states;                 ///< row after row of `width`
     std::shared_ptr<Solution<State>> solution;  ///< null: not kept
-    std::vector<double> scale;                  ///< of the states in `solution`
     std::string wrong_bound;                    ///< what is known of one, as a sentence
 
     [[nodiscard]] std::size_t event_stride() const noexcept
@@ -54,23 +53,19 @@ struct Record {
     }
 };
 
-/// Writes x, times `scale`, to `out`, and NaN up to `width`.
+/// Writes x to `out`, and NaN up to `width`.
 template <class X>
-void put_state(const X& x, const std::vector<double>& scale, std::size_t width, double* out)
+void put_state(const X& x, std::size_t width, double* out)
 {
     for (std::size_t i = 0; i < width; ++i) {
-        const bool scaled = i < scale.size();
-        out[i] = i >= x.size() ? std::numeric_limits<double>::quiet_NaN()
-                 : scaled      ? x[i] * scale[i]
-                               : x[i];
+        out[i] = i < x.size() ? x[i] : std::numeric_limits<double>::quiet_NaN();
     }
 }
 
 /// @param times, states  at the ends of steps, where they are to be kept; else those of the
 ///                       trajectory are
 template <class X>
-[[nodiscard]] Record record_of(Run<X>&& run, const std::vector<double>& scale,
-                               const Trajectory<X>* steps = nullptr)
+[[nodiscard]] Record record_of(Run<X>&& run, const Trajectory<X>* steps = nullptr)
 {
     Record out;
     const Trajectory<X>& kept = steps ? *steps : run.trajectory;
@@ -82,8 +77,7 @@ template <class X>
         out.width = std::max({out.width, event.before.size(), event.after.size()});
     }
     for (const X& x : kept.x) out.width = std::max(out.width, x.size());
-    out.x.resize(run.x.size());
-    put_state(run.x, scale, out.x.size(), out.x.data());
+    out.x.assign(run.x.begin(), run.x.end());
     out.mode = run.mode;
     out.guard = signed_guard(run.guard);
     out.other_guard = signed_guard(run.other_guard);
@@ -104,21 +98,20 @@ template <class X>
                              .unused = {}};
         std::memcpy(at, &head, sizeof head);
         double* states = at + sizeof(EventHead) / sizeof(double);
-        put_state(event.before, scale, out.width, states);
-        put_state(event.after, scale, out.width, states + out.width);
+        put_state(event.before, out.width, states);
+        put_state(event.after, out.width, states + out.width);
         at += out.event_stride();
     }
     out.times = kept.t;
     out.states.resize(kept.x.size() * out.width);
     for (std::size_t i = 0; i < kept.x.size(); ++i) {
-        put_state(kept.x[i], scale, out.width, out.states.data() + i * out.width);
+        put_state(kept.x[i], out.width, out.states.data() + i * out.width);
     }
     if constexpr (std::is_same_v<X, State>) {
         if (!run.solution.empty()) {
             out.solution = std::make_shared<Solution<State>>(std::move(run.solution));
         }
     }
-    out.scale = scale;
     if (run.wrong_bound) {
         const auto& wrong = *run.wrong_bound;
         out.wrong_bound = "at t = " + std::to_string(wrong.t) + " the guard is " +

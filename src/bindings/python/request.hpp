@@ -24,15 +24,10 @@ struct Request {
     bool record_steps = false;            ///< keep the state at the end of every step
     bool dense = false;                   ///< keep every step as a polynomial
 
-    /// One component of a scaled state is worth so much; empty: 1 each. Powers of two, so that
-    /// scaling rounds nothing.
-    std::vector<double> scale{};
-
     /// Everything by default, so that a loop made for its system at compile time may serve.
     [[nodiscard]] bool is_plain() const noexcept
     {
-        return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense &&
-               scale.empty();
+        return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense;
     }
 };
 

@@ -110,20 +110,19 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
 {
     Snapshot numbers;
     self.solution->visit(detail::SnapshotWriter(numbers));
-    return py::make_tuple(bytes_of(numbers.numbers), numbers.counts, self.scale, self.modes);
+    return py::make_tuple(bytes_of(numbers.numbers), numbers.counts, self.modes);
 }
 
 [[nodiscard]] PySolution solution_from(const py::tuple& state)
 {
+    if (state.size() != 3) throw py::value_error("found a pickle of another version");
     Snapshot numbers;
     numbers.numbers = numbers_of(state[0]);
     numbers.counts = py::cast<std::vector<std::uint64_t>>(state[1]);
-    PySolution out{.solution = std::make_shared<Solution<State>>(), .scale = {}};
+    PySolution out{.solution = std::make_shared<Solution<State>>(), .modes = state[2]};
     detail::SnapshotReader reader(numbers);
     out.solution->visit(reader);
     reader.finish();
-    out.scale = py::cast<std::vector<double>>(state[2]);
-    out.modes = state[3];
     return out;
 }
 
@@ -134,7 +133,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         static_cast<int>(r.outcome), r.t, r.x, r.mode, r.guard, r.other_guard,
         std::bit_cast<Counts>(r.statistics), r.width, r.event_count, bytes_of(r.events),
         bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
-        r.solution ? py::object(pickled(PySolution{r.solution, r.scale})) : py::object(py::none()),
+        r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
         self.modes, self.guard_names);
 }
 
@@ -159,11 +158,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         throw py::value_error("found a pickle of a run that does not fit together");
     }
     r.wrong_bound = py::cast<std::string>(state[12]);
-    if (!state[13].is_none()) {
-        PySolution solution = solution_from(state[13]);
-        r.solution = std::move(solution.solution);
-        r.scale = std::move(solution.scale);
-    }
+    if (!state[13].is_none()) r.solution = solution_from(state[13]).solution;
     out.modes = state[14];
     out.guard_names = py::cast<std::vector<std::string>>(state[15]);
     return out;
@@ -174,9 +169,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
 py::array PySolution::at(const py::object& t, bool before) const
 {
     const auto evaluate = [&](double time) {
-        State x = before ? solution->before(time) : (*solution)(time);
-        put_state(State(x), scale, x.size(), x.data());
-        return x;
+        return before ? solution->before(time) : (*solution)(time);
     };
     const py::array_t<double, py::array::c_style | py::array::forcecast> times(t);
     if (times.ndim() == 0) {
@@ -375,7 +368,7 @@ void bind_results(py::module_& module)
             "solution",
             [](const PyRun& self) -> py::object {
                 if (!self.record.solution) return py::none();
-                return py::cast(PySolution{self.record.solution, self.record.scale, self.modes});
+                return py::cast(PySolution{self.record.solution, self.modes});
             },
             "The solution at any time, or None where it was not kept.")
         .def(py::pickle([](const PyRun& self) { return pickled(self); },

@@ -29,10 +29,9 @@ struct PyRun {
     }
 };
 
-/// The solution at any time, with states as users have them.
+/// The solution at any time.
 struct PySolution {
     std::shared_ptr<Solution<State>> solution;
-    std::vector<double> scale;
     py::object modes = py::none();
 
     /// The states at t, a number or an array of them; at an event before it, or after it.

@@ -48,6 +48,26 @@ void locate_by(detail::RunSetup<State>& setup)
                                 "', expected " + expected);
 }
 
+void detect_without_gate(detail::RunSetup<State>& setup, const Request& request)
+{
+    const std::string_view detector = request.detector;
+    if (request.gate) {
+        throw std::invalid_argument("gate: found one for the detector '" + std::string(detector) +
+                                    "', which asks none");
+    }
+    if (detector == "extremum") {
+        detect_by<Extremum>(setup);
+    } else if (detector == "ends") {
+        detect_by<Ends>(setup);
+    } else if (detector == "bernstein") {
+        detect_by<Bernstein>(setup);
+    } else if (detector == "planned") {
+        detect_by<Planned<>>(setup);
+    } else {
+        refuse("detector", detector, "one of those in the documentation");
+    }
+}
+
 }  // namespace
 
 OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door)
@@ -61,27 +81,7 @@ OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door
     setup.error_controlled = !request.fixed;
     setup.stepping = request.fixed ? detail::written_type<FixedStep<MethodByName>>()
                                    : detail::written_type<ErrorControlled<MethodByName>>();
-    const std::string_view detector = request.detector;
-    if (detect_by_gate(out, request, source, door)) {
-        if (!request.scale.empty()) {
-            throw std::invalid_argument(
-                "atol: found one for each component; expected one for all, as a gate sees states "
-                "as they are");
-        }
-    } else if (request.gate) {
-        throw std::invalid_argument("gate: found one for the detector '" + std::string(detector) +
-                                    "', which asks none");
-    } else if (detector == "extremum") {
-        detect_by<Extremum>(setup);
-    } else if (detector == "ends") {
-        detect_by<Ends>(setup);
-    } else if (detector == "bernstein") {
-        detect_by<Bernstein>(setup);
-    } else if (detector == "planned") {
-        detect_by<Planned<>>(setup);
-    } else {
-        refuse("detector", detector, "one of those in the documentation");
-    }
+    if (!detect_by_gate(out, request, source, door)) detect_without_gate(setup, request);
     const std::string_view locator = request.locator;
     if (locator == "newton") {
         locate_by<Newton>(setup);

@@ -52,12 +52,6 @@ void drive(Loop& loop, Trajectory<State>* steps)
     }
 }
 
-[[nodiscard]] State scaled(State x, const std::vector<double>& scale)
-{
-    for (std::size_t i = 0; i < std::min(scale.size(), x.size()); ++i) x[i] /= scale[i];
-    return x;
-}
-
 /// Does what needs no interpreter without it.
 template <class Work>
 void work_freely(bool freely, const Work& work)
@@ -102,21 +96,20 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
         return out;
     }
 
-    const std::unique_ptr<RunDoor> door = source->open(x0, request);
+    const std::unique_ptr<RunDoor> door = source->open(x0);
     request.options.cancelled = door->watch().cancelled();
     const OwnedSetup owned = setup_for(request, *source, *door);
     Trajectory<State> steps;
     Trajectory<State>* const kept = request.record_steps ? &steps : nullptr;
     std::unique_ptr<Loop> loop;
     try {
-        loop = detail::make_loop(owned.setup, scaled(x0, request.scale), request.options);
+        loop = detail::make_loop(owned.setup, x0, request.options);
         work_freely(door->is_free(), [&] { drive(*loop, kept); });
     } catch (const PythonError& error) {
-        out.record =
-            loop ? record_of(loop->finish(), request.scale, kept) : start_of(x0, request.options);
+        out.record = loop ? record_of(loop->finish(), kept) : start_of(x0, request.options);
         raise_with(error, std::move(out));
     }
-    out.record = record_of(loop->finish(), request.scale, kept);
+    out.record = record_of(loop->finish(), kept);
     if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
     return out;
 }
@@ -127,20 +120,20 @@ public:
     PySimulation(std::shared_ptr<Source> source, const State& x0, const py::dict& given,
                  const py::object& mode_names)
         : source_(std::move(source)),
-          request_(request_from(given)),
           names_{.record = {},
                  .modes = modes_of(*source_, mode_names),
                  .guard_names = source_->guard_names()}
     {
-        if (!given.contains("mode")) request_.options.mode = source_->start_mode();
-        door_ = source_->open(x0, request_);
-        request_.options.cancelled = door_->watch().cancelled();
-        setup_ = setup_for(request_, *source_, *door_);
+        Request request = request_from(given);
+        if (!given.contains("mode")) request.options.mode = source_->start_mode();
+        door_ = source_->open(x0);
+        request.options.cancelled = door_->watch().cancelled();
+        setup_ = setup_for(request, *source_, *door_);
         try {
-            loop_ = detail::make_loop(setup_.setup, scaled(x0, request_.scale), request_.options);
+            loop_ = detail::make_loop(setup_.setup, x0, request.options);
         } catch (const PythonError& error) {
             PyRun run = names_;
-            run.record = start_of(x0, request_.options);
+            run.record = start_of(x0, request.options);
             raise_with(error, std::move(run));
         }
     }
@@ -167,7 +160,7 @@ public:
         const Turn turn(in_use_, "Simulation");
         if (!finished_) {
             finished_.emplace(names_);
-            finished_->record = record_of(loop_->finish(), request_.scale);
+            finished_->record = record_of(loop_->finish());
         }
         return *finished_;
     }
@@ -180,8 +173,7 @@ public:
     [[nodiscard]] py::array x()
     {
         const Turn turn(in_use_, "Simulation");
-        State x = loop_->x();
-        put_state(State(x), request_.scale, x.size(), x.data());
+        const State& x = loop_->x();
         return py::array_t<double>(static_cast<py::ssize_t>(x.size()), x.data());
     }
     [[nodiscard]] py::object mode()
@@ -205,7 +197,7 @@ public:
         run.x = loop_->x();
         run.mode = loop_->mode();
         if (!loop_->ended()) run.outcome = Outcome::cancelled;
-        out.record = record_of(std::move(run), request_.scale);
+        out.record = record_of(std::move(run));
         return out;
     }
 
@@ -240,12 +232,11 @@ private:
     [[noreturn]] void end_with(const PythonError& error)
     {
         finished_.emplace(names_);
-        finished_->record = record_of(loop_->finish(), request_.scale);
+        finished_->record = record_of(loop_->finish());
         raise_with(error, PyRun(*finished_));
     }
 
     std::shared_ptr<Source> source_;
-    Request request_;
     PyRun names_;
     std::unique_ptr<RunDoor> door_;
     OwnedSetup setup_;

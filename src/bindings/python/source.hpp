@@ -81,9 +81,8 @@ public:
     virtual ~Source() = default;
 
     /// The system at the door of a run, which the source outlives.
-    /// @throws std::invalid_argument for a start or a request that it cannot serve.
-    [[nodiscard]] virtual std::unique_ptr<RunDoor> open(const State& x0,
-                                                        const Request& request) const = 0;
+    /// @throws std::invalid_argument for a start that it cannot serve.
+    [[nodiscard]] virtual std::unique_ptr<RunDoor> open(const State& x0) const = 0;
 
     /// The whole run by a loop made for this system, if there is one for such a request. Does not
     /// need the interpreter.
