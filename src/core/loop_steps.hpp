@@ -194,7 +194,7 @@ inline auto Loop<X, single>::time_to_surface() -> Approach
         if (!counts(record.side, record.info.crossing)) continue;
         const double g = bank_.g0(i);
         const double rate = approach_rate(i);
-        const double ahead = g * rate < 0 ? -g / rate : infinity;
+        const double ahead = g * rate < 0 && std::isfinite(rate) ? -g / rate : infinity;
         if (ahead < first.ahead) first = {i, ahead};
     }
     return first;

@@ -431,6 +431,24 @@ TEST(HardEvents, AGuardThatIsNoNumberEndsTheRunOnAPlateauToo)
     EXPECT_EQ(integrate(Broken{}, X1{0}, {.t_end = 4, .h_max = 0.1}).outcome, Outcome::non_finite);
 }
 
+TEST(HardEvents, AGuardThatBecomesInfiniteHasNoEventThere)
+{
+    struct Broken {
+        double beyond;
+        void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+        [[nodiscard]] double guard(double, const X1& x) const { return x[0] < 1.5 ? 1.2 : beyond; }
+    };
+    for (const double sign : {-1.0, 1.0}) {
+        for (const double h_max : {0.1, 0.4, 10.0}) {
+            const auto run = integrate(Broken{sign * std::numeric_limits<double>::infinity()},
+                                       X1{0}, {.t_end = 3, .h_max = h_max});
+            EXPECT_EQ(run.outcome, Outcome::non_finite);
+            EXPECT_NEAR(run.t, 1.5, 1e-12);
+            EXPECT_TRUE(run.events.empty()) << sign << " " << h_max;
+        }
+    }
+}
+
 TEST(HardEvents, ASpoiltSnapshotIsRefusedAndChangesNothing)
 {
     const Pressed system;
@@ -515,8 +533,8 @@ TEST(HardEvents, AnEventAtTheEndOfAStepHasTheStateOfTheStep)
     // rk4, h^5 / 120 a step off exp(-t): nothing may be gone along the tangent.
     for (const double h : {0.125, 0.1, 0.05}) {
         for (const double at : {0.5, 0.75, 1.0}) {
-            const auto run = integrate(StraightGuard{at}, {0, 1}, {.t_end = 1.2, .step = h},
-                                       FixedStep<Rk4>{});
+            const auto run =
+                integrate(StraightGuard{at}, {0, 1}, {.t_end = 1.2, .step = h}, FixedStep<Rk4>{});
             ASSERT_GE(run.events.size(), 1u);
             EXPECT_NEAR(run.events[0].t, at, 1e-15);
             EXPECT_NEAR(run.events[0].before[1], std::exp(-at), 2 * std::pow(h, 4) * at / 120)
