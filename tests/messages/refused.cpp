@@ -117,6 +117,15 @@ int main()
 // CASE 17: declares no State
 #elif CASE == 17
     (void)integrate(Stateless{}, {10, 0}, {.t_end = 1});
+// CASE 19: found no options
+#elif CASE == 19
+    (void)integrate(falling, {10, 0});
+// CASE 20: found no options
+#elif CASE == 20
+    (void)integrate(Falling{}, x0);
+// CASE 21: found a start of another type than System::State
+#elif CASE == 21
+    (void)integrate(falling, std::vector<double>{10, 0}, {.t_end = 1});
 // CASE 18: compiled with -ffast-math or -ffinite-math-only
 #else
     (void)integrate(System{}, x0, {.t_end = 1});

@@ -89,6 +89,15 @@ auto integrate(detail::AnySystemGiven, detail::AnyStartGiven, const detail::Miss
     return Run<std::vector<double>>{};
 }
 
+/// Without options.
+template <class Unused = void>
+auto integrate(detail::AnySystemGiven, detail::AnyStartGiven)
+{
+    static_assert(detail::never<Unused>,
+                  "ricochet: found no options; expected at least when the run ends, {.t_end = 20}");
+    return Run<std::vector<double>>{};
+}
+
 /// {10, 0, 1} for two components, or {10}, where the others would be zero without a word.
 template <class System, std::size_t given, class... Choices>
 requires(detail::fixed_size<typename System::State>() > 0 &&

@@ -41,14 +41,30 @@ requires Flowing<System, X> && StateVector<X>
                   "ricochet::nonsmooth, and ricochet/nonsmooth/event_hand_over.hpp to be included, "
                   "which hands it over");
     detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
-                                                                   locator);
-    return detail::as_callers<X>(
-        detail::run_whole(parts.setup(), detail::core_state(x0), options), x0);
+                                                                     locator);
+    return detail::as_callers<X>(detail::run_whole(parts.setup(), detail::core_state(x0), options),
+                                 x0);
 }
 
 /// What has no flow for such a state.
 template <class System, class X>
 concept NotIntegrable = !(Flowing<System, X> && StateVector<X>);
+
+namespace detail {
+
+/// Whether the flow fits the state that the system declares, but not the start.
+template <class System, class X>
+[[nodiscard]] consteval bool takes_another_state()
+{
+    if constexpr (requires { typename System::State; }) {
+        return !std::is_same_v<X, typename System::State> &&
+               Flowing<System, typename System::State>;
+    } else {
+        return false;
+    }
+}
+
+}  // namespace detail
 
 /// What cannot be integrated is refused with a sentence instead of a list of concepts.
 template <class System, class X = typename System::State, class... Choices>
@@ -58,7 +74,11 @@ requires NotIntegrable<System, X> Run<X> integrate(const System&, const X&, cons
     static_assert(StateVector<X>,
                   "ricochet: found a start that is no state; expected std::array, std::vector or a "
                   "vector of Eigen, of double");
-    if constexpr (StateVector<X>) {
+    if constexpr (detail::takes_another_state<System, X>()) {
+        static_assert(detail::never<System>,
+                      "ricochet: found a start of another type than System::State, which is what "
+                      "the flow takes");
+    } else if constexpr (StateVector<X>) {
         static_assert(detail::check_declarations<System, X>());
         static_assert(detail::flow_declaration<System, X>() != detail::Declaration::absent,
                       "ricochet: found no flow that fits the state; expected void flow([Mode,] "
