@@ -515,8 +515,8 @@ TEST(HardEvents, AnEventAtTheEndOfAStepHasTheStateOfTheStep)
     // rk4, h^5 / 120 a step off exp(-t): nothing may be gone along the tangent.
     for (const double h : {0.125, 0.1, 0.05}) {
         for (const double at : {0.5, 0.75, 1.0}) {
-            const auto run = integrate(StraightGuard{at}, {0, 1}, {.t_end = 1.2, .step = h},
-                                       FixedStep<Rk4>{});
+            const auto run =
+                integrate(StraightGuard{at}, {0, 1}, {.t_end = 1.2, .step = h}, FixedStep<Rk4>{});
             ASSERT_GE(run.events.size(), 1u);
             EXPECT_NEAR(run.events[0].t, at, 1e-15);
             EXPECT_NEAR(run.events[0].before[1], std::exp(-at), 2 * std::pow(h, 4) * at / 120)
@@ -642,6 +642,28 @@ TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
     EXPECT_NEAR(times[1], std::cbrt(6), 1e-8);
     EXPECT_EQ(times[2], times[1]);
     EXPECT_EQ(times[3], times[1]);
+}
+
+/// A crest one unit in the last place high, where the guard is zero at a great many offsets; its
+/// rate is said to fall there, as that of a flow that jumps at the surface does.
+struct RoundedCrest {
+    static constexpr Crossing crossing = Crossing::either;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0] - 1; }
+    [[nodiscard]] double guard_rate(double, const X& x, const X& dxdt) const
+    {
+        return x[0] >= 1 ? -0.12975690807267726 : dxdt[0];
+    }
+};
+
+TEST(HardEvents, ARateThatContradictsASurfaceOfRoundingIsNotFollowedForEver)
+{
+    const double step = 5.2524596791578209e-08;
+    const auto run = integrate(RoundedCrest{}, X{0.99999999999999978, 3.1083531824869161e-08},
+                               {.t_end = 3 * step, .step = step}, FixedStep<Rk4>{});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    // Nine of a row, and a doubling of what is left out after each: 30 of them span the step.
+    EXPECT_LE(run.events.size(), 3 * 30 * 9U);
 }
 
 }  // namespace
