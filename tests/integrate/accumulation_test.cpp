@@ -201,10 +201,10 @@ struct PairOnMovingFloor {
     static constexpr std::size_t guard_count = 2;
     static constexpr std::size_t mode_count = 4;
     double restitution = 0.5;
-    double speed = 0;  // of the floor
-    double floor = 0;  // at first
+    double speed = 0;               // of the floor
+    std::array<double, 2> floor{};  // at first
 
-    [[nodiscard]] double floor_at(double t) const { return floor + speed * t; }
+    [[nodiscard]] double floor_at(std::size_t i, double t) const { return floor[i] + speed * t; }
     [[nodiscard]] bool enabled(std::size_t i, Mode mode) const { return (mode >> i & 1) == 0; }
     void flow(Mode mode, double, const State& x, State& dxdt) const
     {
@@ -215,17 +215,17 @@ struct PairOnMovingFloor {
     }
     [[nodiscard]] double guard(std::size_t i, Mode, double t, const State& x) const
     {
-        return x[2 * i] - floor_at(t);
+        return x[2 * i] - floor_at(i, t);
     }
     Mode reset(std::size_t i, Mode mode, double t, State& x) const
     {
-        x[2 * i] = floor_at(t);
+        x[2 * i] = floor_at(i, t);
         x[2 * i + 1] = speed - restitution * (x[2 * i + 1] - speed);
         return mode;
     }
     Mode rest(std::size_t i, Mode mode, double t, State& x) const
     {
-        x[2 * i] = floor_at(t);
+        x[2 * i] = floor_at(i, t);
         x[2 * i + 1] = speed;
         return mode | Mode(1) << i;
     }
@@ -243,7 +243,8 @@ TEST(Accumulation, BodiesThatComeToRestTogetherOnAMovingFloor)
     // in which the floor would pass the second, or leave it.
     for (const double speed : {0.161, -0.292}) {
         for (const double floor : {0.0, 37.2}) {
-            const PairOnMovingFloor pair{.restitution = 0.6, .speed = speed, .floor = floor};
+            const PairOnMovingFloor pair{
+                .restitution = 0.6, .speed = speed, .floor = {floor, floor}};
             const auto run = integrate(
                 pair, PairOnMovingFloor::State{floor + 1, speed, floor + 1, speed}, {.t_end = 3});
             ASSERT_EQ(run.outcome, Outcome::reached_end) << speed << " " << floor;
@@ -258,6 +259,23 @@ TEST(Accumulation, BodiesThatComeToRestTogetherOnAMovingFloor)
             }
             EXPECT_EQ(rests, 2);
         }
+    }
+}
+
+TEST(Accumulation, NoBodyFallsThroughWhereAnotherRebounds)
+{
+    // Thrown up together from two floors, so that impacts coincide but for rounding: at one of the
+    // first the second is a unit in the last place below its floor.
+    const PairOnMovingFloor pair{.restitution = 0.61225596540089211,
+                                 .speed = 0.27965981389702688,
+                                 .floor = {-0.16113326978938503, 1.3236337156829157}};
+    const double v = 1.8272878172954812 + pair.speed;
+    const auto run = integrate(pair, PairOnMovingFloor::State{pair.floor[0], v, pair.floor[1], v},
+                               {.t_end = 1.25});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.mode, 3U);
+    for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_NEAR(run.x[2 * i], pair.floor_at(i, run.t), 1e-12) << i;
     }
 }
 
