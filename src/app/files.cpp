@@ -18,6 +18,7 @@
 
 #include "input.hpp"
 #include "interrupt.hpp"
+#include "say.hpp"
 
 namespace ricochet::app {
 
@@ -131,7 +132,7 @@ int open_device(const fs::path& device)
         }
         if (errno != ENXIO || !fs::is_fifo(device) || Interrupts::any()) return descriptor;
         if (!std::exchange(said, true)) {
-            fmt::print(stderr, "ricochet: waiting for somebody to read '{}'\n", device.string());
+            say("ricochet: waiting for somebody to read '{}'\n", device.string());
         }
         std::this_thread::sleep_for(often);
     }

@@ -1,5 +1,5 @@
-// What ends a command early and keeps what it has computed: Ctrl-C, a request to terminate, memory
-// that runs short.
+// What ends a command early and keeps what it has computed: Ctrl-C, a request to terminate, a
+// terminal that goes away, memory that runs short.
 #pragma once
 
 #include <unistd.h>
@@ -11,7 +11,13 @@
 namespace ricochet::app {
 
 /// Why a command is to end early.
-enum class Cause : int { none = 0, interrupt = SIGINT, terminate = SIGTERM, memory = -1 };
+enum class Cause : int {
+    none = 0,
+    interrupt = SIGINT,
+    terminate = SIGTERM,
+    hang_up = SIGHUP,
+    memory = -1,
+};
 
 /// While it lives, the first interrupt sets a flag that runs look at after every step; a second one
 /// ends the program.
@@ -32,11 +38,15 @@ public:
         action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
         sigaction(SIGINT, &action, &before_int_);
         sigaction(SIGTERM, &action, &before_term_);
+        sigaction(SIGHUP, &action, &before_hup_);
+        // Of `nohup`: the command outlives its terminal.
+        if (before_hup_.sa_handler == SIG_IGN) sigaction(SIGHUP, &before_hup_, nullptr);
     }
     ~Interrupts()
     {
         sigaction(SIGINT, &before_int_, nullptr);
         sigaction(SIGTERM, &before_term_, nullptr);
+        sigaction(SIGHUP, &before_hup_, nullptr);
     }
     Interrupts(const Interrupts&) = delete;
     Interrupts& operator=(const Interrupts&) = delete;
@@ -60,6 +70,7 @@ public:
             case Cause::none: break;
             case Cause::interrupt: return "interrupted";
             case Cause::terminate: return "asked to terminate";
+            case Cause::hang_up: return "left by its terminal";
             case Cause::memory: return "no memory was left for more";
         }
         return "";
@@ -78,6 +89,7 @@ private:
     static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
     struct sigaction before_int_ = {};
     struct sigaction before_term_ = {};
+    struct sigaction before_hup_ = {};
 };
 
 }  // namespace ricochet::app

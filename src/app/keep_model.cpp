@@ -10,6 +10,7 @@
 #include "files.hpp"
 #include "input.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "say.hpp"
 
 namespace ricochet::app {
 
@@ -75,13 +76,12 @@ void claim_training(const fs::path& out, fs::path& checkpoint, bool resume)
 void say_what_is_kept(const fs::path& checkpoint, const std::string& trouble)
 {
     std::error_code error;
-    if (!trouble.empty()) fmt::print(stderr, "ricochet: {}\n", printable(trouble));
+    if (!trouble.empty()) say("ricochet: {}\n", printable(trouble));
     if (fs::exists(checkpoint, error)) {
-        fmt::print(stderr,
-                   "ricochet: interrupted; the same command with --resume goes on from '{}'\n",
-                   checkpoint.string());
+        say("ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+            checkpoint.string());
     } else {
-        fmt::print(stderr, "ricochet: interrupted; nothing is kept\n");
+        say("ricochet: interrupted; nothing is kept\n");
     }
 }
 

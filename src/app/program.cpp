@@ -1,9 +1,12 @@
 #include "program.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -18,6 +21,7 @@
 #include "options.hpp"
 #include "report.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "say.hpp"
 
 namespace ricochet::app {
 
@@ -99,7 +103,7 @@ int run(const AddCommands& add, int count, char** arguments)
     app.footer(
         "Example:\n  ricochet simulate bouncing-ball\n\n"
         "Exit status: 0 fine, 1 a run that ended early or a file that could not be written,\n"
-        "2 bad input, 130 or 143 interrupted: the result so far is printed, as incomplete.");
+        "2 bad input, 129, 130 or 143 interrupted: the result so far is printed, as incomplete.");
     int status = 0;
     add(app, status);
 
@@ -120,7 +124,7 @@ int run(const AddCommands& add, int count, char** arguments)
 
 int fail(int status, std::string_view sentence)
 {
-    fmt::print(stderr, "ricochet: {}\n", printable(sentence));
+    say("ricochet: {}\n", printable(sentence));
     return status;
 }
 
@@ -246,12 +250,30 @@ void add_compare(CLI::App& app, int& status, CompareHandler handler)
     });
 }
 
+namespace {
+
+/// Opens what of standard input, output and error is closed, so that no file of the command takes
+/// its number, and what is printed goes into no file. Printing to an output that was closed still
+/// fails.
+void keep_standard_descriptors()
+{
+    for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+        if (fcntl(descriptor, F_GETFD) != -1 || errno != EBADF) continue;
+        // The lowest number that is free is this one.
+        const int flags = descriptor == STDOUT_FILENO ? O_RDONLY : O_RDWR;
+        if (open("/dev/null", flags) != descriptor) return;
+    }
+}
+
+}  // namespace
+
 int run_program(const AddCommands& add, int count, char** arguments)
 {
     // A file or a pipe that takes no more is an error like any other: what else there is to write
     // still is.
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
+    keep_standard_descriptors();
     try {
         return run(add, count, arguments);
     } catch (const BadInput& error) {

@@ -3,7 +3,7 @@
 // Exit status: 0 fine; 1 a run or training that ended otherwise than hoped (its
 // result is printed all the same) or a file that could not be written in the end;
 // 2 bad input: one sentence on standard error, nothing printed, nothing written;
-// 130 and 143 a run or comparison ended by a signal, its result printed as incomplete.
+// 129, 130 and 143 a run or comparison ended by a signal, its result printed as incomplete.
 #pragma once
 
 #include <functional>

@@ -11,6 +11,7 @@
 #include "interrupt.hpp"
 #include "joined.hpp"
 #include "json_text.hpp"
+#include "say.hpp"
 #include "set_valued.hpp"
 #include "timing.hpp"
 
@@ -302,7 +303,7 @@ std::string to_csv(const SystemEntry& system, const PlainRun& run)
 
 int ended_early(std::string_view where)
 {
-    fmt::print(stderr, "ricochet: {} {}; the result is incomplete\n", Interrupts::cause(), where);
+    say("ricochet: {} {}; the result is incomplete\n", Interrupts::cause(), where);
     return Interrupts::status();
 }
 

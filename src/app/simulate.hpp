@@ -30,7 +30,8 @@ void claim_results(Claims& claims, const SimulateRequest& request);
 /// Ctrl-C, a request to terminate and memory that runs short end the run; what was computed until
 /// then is printed and written, marked as incomplete.
 ///
-/// @return 0 if the run reached its end; 130 or 143 if a signal ended it; 1 if it ended otherwise
+/// @return 0 if the run reached its end; 129, 130 or 143 if a signal ended it; 1 if it ended
+/// otherwise
 ///         (the result is printed and written all the same) or if the plot could not be drawn.
 /// @throws BadInput or ModelError before anything is printed or written.
 int simulate(const SimulateRequest& request);

@@ -38,7 +38,10 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         if (!record.acting) {
             search_.note_crossings(step_, bank_, i, last, resolution_, calls());
         }
-        if (has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
+        // One that acts and has left its side, but was located behind the set, has so by rounding
+        // of its value: its own event is still to come.
+        const bool to_come = record.acting && counts(record.side, record.info.crossing);
+        if (!to_come && has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
         const Side side = record.side;
         if (!with_set || side_of(last.value) != side) continue;
         if (!counts(side, record.info.crossing)) {

@@ -78,6 +78,12 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     const Mode mode = step_.mode();
     ahead = std::min(ahead, step_.until(options_.t_end));
     if (timed_) ahead = std::min(ahead, step_.until(time_event_));
+    // What else moves stands still while the time goes ahead to the limit: a floor that moves
+    // would leave other bodies, or pass them.
+    if (bank_.size() > 1 &&
+        ahead > 4 * std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value)) {
+        error += std::exchange(ahead, 0);
+    }
     const double t = step_.time(ahead);
     X after = before;
     const Mode mode_after = system_->rest(system_.door(), i, mode, t, after);

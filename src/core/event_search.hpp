@@ -132,6 +132,8 @@ public:
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_, record.info.boolean ? Path::restep : Path::dense);
         int stalled = 0;
+        int creeping = 0;
+        double reach = 0x1p-30 * std::fabs(step.h());
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch = bank.watch(i, step, end);
             const Finding finding = next_finding(probe, watch, bank, i);
@@ -151,10 +153,30 @@ public:
                     {.guard = i, .kind = kind_of(where), .side = finding.side, .where = where});
             }
             const bool stays = record.from > 0 && !(where.root > record.from);
+            const bool creeps = record.from > 0 && where.root - record.from <= reach;
+            creeping = creeps ? creeping + 1 : 0;
             pass(bank, i, side, where, probe);
             if (stays && ++stalled > 8) {  // noise around a flat root
                 record.next = side_of(end.value);
                 return;
+            }
+            // Zero by rounding at many offsets side by side, and rates that contradict it, as of
+            // a flow that jumps there: the search goes on behind it.
+            if (creeping > 8) {
+                const double behind = where.root + reach;
+                reach *= 2;
+                if (!(behind < end.s)) {
+                    record.next = side_of(end.value);
+                    return;
+                }
+                const Side there = side_of(probe.value(behind).value);
+                pass(bank, i, there == Side::plateau ? side : there,
+                     {.lo = behind,
+                      .hi = behind,
+                      .root = behind,
+                      .slope = std::numeric_limits<double>::quiet_NaN()},
+                     probe);
+                creeping = 0;
             }
         }
     }

@@ -259,7 +259,35 @@ TEST_F(Robust, APipeIsWaitedForUntilAnInterrupt)
     EXPECT_EQ(wait_for(child).status, 0);
 }
 
+/// A command of a shell, in the directory of the test; its status.
+int shell(const fs::path& directory, const std::string& command)
+{
+    const int status = std::system(("cd '" + directory.string() + "' && " + command).c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST_F(Robust, StandardErrorThatTakesNothingChangesNoStatus)
+{
+    const std::string bad = RICOCHET_APP " simulate bouncing-ball --rtol -1 ";
+    EXPECT_EQ(shell(work(), bad + "2>&-"), 2);
+    EXPECT_EQ(shell(work(), bad + "2>/dev/full"), 2);
+    // Closed outputs: no file takes their numbers.
+    const std::string good = RICOCHET_APP " simulate bouncing-ball --csv ";
+    EXPECT_EQ(shell(work(), good + "a.csv >/dev/null"), 0);
+    EXPECT_EQ(shell(work(), good + "b.csv >/dev/null 2>&-"), 0);
+    EXPECT_EQ(shell(work(), good + "c.csv <&- >&- 2>&-"), 1);
+    EXPECT_EQ(content(work() / "b.csv"), content(work() / "a.csv"));
+    EXPECT_EQ(content(work() / "c.csv"), content(work() / "a.csv"));
+}
+
 // --- interrupts ---
+
+TEST_F(Robust, ATerminalThatGoesAwayLosesNothing)
+{
+    expect_kept({"simulate", "stick-slip", "--t-end", "1e7", "--json", "--csv", "a.csv"}, SIGHUP,
+                "left by its terminal");
+    EXPECT_TRUE(content(work() / "a.csv").ends_with("\n# incomplete: left by its terminal\n"));
+}
 
 TEST_F(Robust, AnInterruptKeepsWhatWasComputed)
 {

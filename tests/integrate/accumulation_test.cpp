@@ -195,5 +195,89 @@ TEST(Accumulation, IntervalsThatShrinkByRoundingDoNotAccumulate)
     EXPECT_EQ(run.events.size(), 100u);
 }
 
+/// Two equal balls on a floor that moves, on which they come to rest; a bit of the mode each.
+struct PairOnMovingFloor {
+    using State = std::array<double, 4>;
+    static constexpr std::size_t guard_count = 2;
+    static constexpr std::size_t mode_count = 4;
+    double restitution = 0.5;
+    double speed = 0;               // of the floor
+    std::array<double, 2> floor{};  // at first
+
+    [[nodiscard]] double floor_at(std::size_t i, double t) const { return floor[i] + speed * t; }
+    [[nodiscard]] bool enabled(std::size_t i, Mode mode) const { return (mode >> i & 1) == 0; }
+    void flow(Mode mode, double, const State& x, State& dxdt) const
+    {
+        for (std::size_t i = 0; i < 2; ++i) {
+            dxdt[2 * i] = enabled(i, mode) ? x[2 * i + 1] : speed;
+            dxdt[2 * i + 1] = enabled(i, mode) ? -9.81 : 0;
+        }
+    }
+    [[nodiscard]] double guard(std::size_t i, Mode, double t, const State& x) const
+    {
+        return x[2 * i] - floor_at(i, t);
+    }
+    Mode reset(std::size_t i, Mode mode, double t, State& x) const
+    {
+        x[2 * i] = floor_at(i, t);
+        x[2 * i + 1] = speed - restitution * (x[2 * i + 1] - speed);
+        return mode;
+    }
+    Mode rest(std::size_t i, Mode mode, double t, State& x) const
+    {
+        x[2 * i] = floor_at(i, t);
+        x[2 * i + 1] = speed;
+        return mode | Mode(1) << i;
+    }
+    [[nodiscard]] static GuardInfo guard_info(std::size_t)
+    {
+        GuardInfo info;
+        info.unilateral = true;
+        return info;
+    }
+};
+
+TEST(Accumulation, BodiesThatComeToRestTogetherOnAMovingFloor)
+{
+    // The limit of the first lies ahead of its last impact by what rounding leaves of a flight,
+    // in which the floor would pass the second, or leave it.
+    for (const double speed : {0.161, -0.292}) {
+        for (const double floor : {0.0, 37.2}) {
+            const PairOnMovingFloor pair{
+                .restitution = 0.6, .speed = speed, .floor = {floor, floor}};
+            const auto run = integrate(
+                pair, PairOnMovingFloor::State{floor + 1, speed, floor + 1, speed}, {.t_end = 3});
+            ASSERT_EQ(run.outcome, Outcome::reached_end) << speed << " " << floor;
+            // t0 + 2 t0 e / (1 - e), and what the location of so many impacts leaves.
+            const double fall = std::sqrt(2 / 9.81);
+            const double limit = fall * (1 + 2 * 0.6 / 0.4);
+            int rests = 0;
+            for (const auto& event : run.events) {
+                if (event.kind != EventKind::accumulation) continue;
+                ++rests;
+                EXPECT_NEAR(event.t, limit, event.error + 1e-8);
+            }
+            EXPECT_EQ(rests, 2);
+        }
+    }
+}
+
+TEST(Accumulation, NoBodyFallsThroughWhereAnotherRebounds)
+{
+    // Thrown up together from two floors, so that impacts coincide but for rounding: at one of the
+    // first the second is a unit in the last place below its floor.
+    const PairOnMovingFloor pair{.restitution = 0.61225596540089211,
+                                 .speed = 0.27965981389702688,
+                                 .floor = {-0.16113326978938503, 1.3236337156829157}};
+    const double v = 1.8272878172954812 + pair.speed;
+    const auto run = integrate(pair, PairOnMovingFloor::State{pair.floor[0], v, pair.floor[1], v},
+                               {.t_end = 1.25});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.mode, 3U);
+    for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_NEAR(run.x[2 * i], pair.floor_at(i, run.t), 1e-12) << i;
+    }
+}
+
 }  // namespace
 }  // namespace ricochet

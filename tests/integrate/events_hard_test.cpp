@@ -662,5 +662,27 @@ TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
     EXPECT_EQ(times[3], times[1]);
 }
 
+/// A crest one unit in the last place high, where the guard is zero at a great many offsets; its
+/// rate is said to fall there, as that of a flow that jumps at the surface does.
+struct RoundedCrest {
+    static constexpr Crossing crossing = Crossing::either;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0] - 1; }
+    [[nodiscard]] double guard_rate(double, const X& x, const X& dxdt) const
+    {
+        return x[0] >= 1 ? -0.12975690807267726 : dxdt[0];
+    }
+};
+
+TEST(HardEvents, ARateThatContradictsASurfaceOfRoundingIsNotFollowedForEver)
+{
+    const double step = 5.2524596791578209e-08;
+    const auto run = integrate(RoundedCrest{}, X{0.99999999999999978, 3.1083531824869161e-08},
+                               {.t_end = 3 * step, .step = step}, FixedStep<Rk4>{});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    // Nine of a row, and a doubling of what is left out after each: 30 of them span the step.
+    EXPECT_LE(run.events.size(), 3 * 30 * 9U);
+}
+
 }  // namespace
 }  // namespace ricochet

@@ -142,6 +142,101 @@ TEST(EventHandOver, TwoFieldsThatPointAtEachOtherSlide)
     EXPECT_EQ(run.x[0], 0);
 }
 
+/// A mass on a spring, under two sines, on a surface that swings: w' = B w + load + friction.
+struct LoadedInclusion {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 1;
+    using Vector = Eigen::Vector2d;
+
+    double stiffness, damping, friction, weakening, swing;
+    std::array<double, 3> frequency, phase;  // of the loads and the swing
+    std::array<double, 2> amplitude;
+
+    void smooth(double t, const Vector& w, Vector& f) const
+    {
+        f[0] = w[1];
+        f[1] = -stiffness * w[0] - damping * w[1];
+        for (std::size_t i = 0; i < 2; ++i) {
+            f[1] += amplitude[i] * std::sin(frequency[i] * t + phase[i]);
+        }
+    }
+    void observe(Eigen::Matrix<double, 1, 2>& e) const { e << 0, 1; }
+    void offset(double t, Eigen::Matrix<double, 1, 1>& s) const
+    {
+        s[0] = swing * std::sin(frequency[2] * t + phase[2]);
+    }
+    void offset_rate(double t, Eigen::Matrix<double, 1, 1>& s) const
+    {
+        s[0] = swing * frequency[2] * std::cos(frequency[2] * t + phase[2]);
+    }
+    [[nodiscard]] double sliding(double t, const Vector& w) const
+    {
+        return w[1] - swing * std::sin(frequency[2] * t + phase[2]);
+    }
+    [[nodiscard]] sets::Box<1> reaction_set(double t, const Vector& w) const
+    {
+        const double bound = friction / (1 + weakening * std::abs(sliding(t, w)));
+        return sets::Box<1>({-bound}, {bound});
+    }
+    [[nodiscard]] double branch_bound(double t, const Vector& w, int, Branch branch) const
+    {
+        const double y = sliding(t, w);
+        return branch == Branch::upper ? friction / std::max(0.5, 1 - weakening * y)
+                                       : -friction / std::max(0.5, 1 + weakening * y);
+    }
+};
+
+/// The same with a recorded guard, whose crossings do not cut steps.
+struct LoadedBelt {
+    using State = std::array<double, 2>;
+    LoadedInclusion inclusion;
+    static constexpr Crossing crossing = Crossing::either;
+
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        Eigen::Vector2d f;
+        const Eigen::Vector2d w(x[0], x[1]);
+        inclusion.smooth(t, w, f);
+        const auto set = inclusion.reaction_set(t, w);
+        dxdt = {f[0], f[1] + (guard(t, x) >= 0 ? set.lower(0) : set.upper(0))};
+    }
+    [[nodiscard]] double guard(double t, const State& x) const
+    {
+        return inclusion.sliding(t, {x[0], x[1]});
+    }
+    [[nodiscard]] const LoadedInclusion& set_valued() const { return inclusion; }
+};
+
+/// The run agrees with that of the inclusion alone, and its sticking does not fill it with
+/// crossings: 201 to 401 at each of a few hand-overs.
+void expect_few_crossings(const LoadedBelt& belt, const LoadedBelt::State& x0, double t_end,
+                          double tolerance)
+{
+    const auto run = integrate(
+        belt, x0, {.t_end = t_end, .rtol = tolerance, .atol = tolerance / 10, .max_steps = 30'000});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_LE(run.events.size(), 401 * run.phases.size());
+    const auto alone = hand_over(belt.inclusion, Eigen::Vector2d(x0[0], x0[1]), {.t_end = t_end});
+    // A crossing within a step costs what a step may be off by, at each of some hundred.
+    EXPECT_NEAR(run.x[0], alone.state.w[0], 1e4 * tolerance);
+    EXPECT_NEAR(run.x[1], alone.state.w[1], 1e4 * tolerance);
+}
+
+TEST(EventHandOver, SwitchingWithinTheErrorOfStepsIsHandedOver)
+{
+    const LoadedInclusion inclusion{
+        .stiffness = 2.0943252172686426,
+        .damping = 0.20186324197356434,
+        .friction = 0.54675542816147193,
+        .weakening = 0,
+        .swing = -0.02717347791610919,
+        .frequency = {5.0616478650458143, 6.3717403728177855, 1.2336420966897188},
+        .phase = {3.6700139524012823, 0, 4.964970070137162},
+        .amplitude = {-0.89539949334101032, -0.86375976896689943}};
+    expect_few_crossings({inclusion}, {-0.11594614767161704, 0.026311280394670216},
+                         3.233838431914299, 1e-8);
+}
+
 TEST(EventHandOver, AnInclusionAloneNeedsNoOtherCall)
 {
     const auto run =

@@ -63,6 +63,41 @@ template <class To, class From>
     return like;
 }
 
+/// Whether a guard without a reset of the state switches within what the steps resolve: 200
+/// crossings in a row between which it goes, on average, no farther than a thousand times the
+/// error of a step. Error control then chooses how often it switches, not the motion.
+class SwitchingWatch {
+public:
+    /// Of the events recorded until now; `error` is what a step may be off by.
+    template <class X, class Error>
+    [[nodiscard]] bool operator()(const std::vector<Event<X>>& events, const Error& error)
+    {
+        for (; seen_ < events.size(); ++seen_) {
+            const Event<X>& event = events[seen_];
+            const bool switches =
+                event.kind == EventKind::crossing && same_state(event.after, event.before);
+            // A parabola between two zeros.
+            if (switches && count_ > 0) excursions_ += std::abs(event.slope * (event.t - t_)) / 4;
+            t_ = event.t;
+            if (!switches) count_ = 0;
+            if (switches) ++count_;
+            if (count_ > most_events) {
+                if (excursions_ <= most_events * 1000 * error()) return true;
+                count_ = 1;
+            }
+            if (count_ <= 1) excursions_ = 0;
+        }
+        return false;
+    }
+
+private:
+    static constexpr int most_events = 200;
+    std::size_t seen_ = 0;
+    int count_ = 0;
+    double t_ = 0;
+    double excursions_ = 0;
+};
+
 }  // namespace detail
 
 template <KnowsInclusion System, class X, class Stepping = ErrorControlled<Dopri5>,
@@ -132,9 +167,12 @@ private:
             return PhaseCause::stuck;
         }
         detail::ChatterWatch watch(run_.t, hand_over_.set_valued.step / 100);
+        detail::SwitchingWatch switches;
         bool chatters = false;
         while (!chatters && simulation->step()) {
-            chatters = watch(simulation->t(), simulation->run().statistics.events);
+            chatters =
+                watch(simulation->t(), simulation->run().statistics.events) ||
+                switches(simulation->run().events, [&] { return error_of(simulation->x()); });
         }
         Run<X> done = simulation->finish();
         run_.t = done.t;
@@ -184,6 +222,14 @@ private:
         }
         if constexpr (Moded<System, X>) run_.mode = system_.start_mode(run_.t, run_.x);
         return false;
+    }
+
+    /// What a step that ends at x may be off by.
+    [[nodiscard]] double error_of(const X& x) const
+    {
+        double largest = 0;
+        for (const double component : x) largest = std::max(largest, std::abs(component));
+        return options_.atol + options_.rtol * largest;
     }
 
     /// Of both kinds, attempts included.

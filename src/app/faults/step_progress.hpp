@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "ricochet/faults/fault_rupture.hpp"
+#include "say.hpp"
 
 namespace ricochet::app {
 
@@ -32,12 +33,12 @@ public:
         const std::string line =
             fmt::format("{}, {:.0f} %, {:.0f} s", label, 100 * std::clamp(done, 0.0, 1.0), now);
         if (terminal_) {
-            fmt::print(stderr, "\r{}\x1b[K", line);
+            say("\r{}\x1b[K", line);
             std::fflush(stderr);
             drawn_ = true;
             next_ = now + 0.1;
         } else {
-            fmt::print(stderr, "ricochet: {}\n", line);
+            say("ricochet: {}\n", line);
             next_ = now + std::max(patience, 0.2 * now);
         }
     }
@@ -45,7 +46,7 @@ public:
     /// The line is free again for something else.
     void clear()
     {
-        if (drawn_) fmt::print(stderr, "\r\x1b[K");
+        if (drawn_) say("\r\x1b[K");
         drawn_ = false;
     }
 

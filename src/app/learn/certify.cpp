@@ -21,6 +21,7 @@
 #include "ricochet/learn/certify.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "run_watch.hpp"
+#include "say.hpp"
 #include "timing.hpp"
 #include "train.hpp"
 
@@ -42,8 +43,8 @@ public:
     {
         if (now.boxes == 0) {
             clear();
-            fmt::print(stderr, "certifying level {} of {}, guard > {} below {:.6g}: {}\n",
-                       now.level + 1, now.levels, now.margin, now.threshold, text(now.estimate));
+            say("certifying level {} of {}, guard > {} below {:.6g}: {}\n", now.level + 1,
+                now.levels, now.margin, now.threshold, text(now.estimate));
             tenth_ = 0;
             return;
         }
@@ -53,20 +54,19 @@ public:
                         duration(now.seconds_left));
         if (terminal_) {
             const auto full = static_cast<std::size_t>(percent / 5);
-            fmt::print(stderr, "\r[{}{}] {}\x1b[K", std::string(full, '#'),
-                       std::string(20 - full, '.'), figures);
+            say("\r[{}{}] {}\x1b[K", std::string(full, '#'), std::string(20 - full, '.'), figures);
             std::fflush(stderr);
             drawn_ = true;
         } else if (percent / 10 != tenth_) {
             tenth_ = percent / 10;
-            fmt::print(stderr, "certifying: {}\n", figures);
+            say("certifying: {}\n", figures);
         }
     }
 
     /// The line is free again for something else.
     void clear()
     {
-        if (drawn_) fmt::print(stderr, "\n");
+        if (drawn_) say("\n");
         drawn_ = false;
     }
 
@@ -230,7 +230,7 @@ int certify(const CertifyRequest& request)
         std::error_code ignored;
         fs::remove(options.checkpoint, ignored);
     }
-    if (write) fmt::print(stderr, "ricochet: the model is in '{}'\n", out.string());
+    if (write) say("ricochet: the model is in '{}'\n", out.string());
     if (goes_on) {
         say_what_is_kept(options.checkpoint, report.checkpoint_trouble);
     }

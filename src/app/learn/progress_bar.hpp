@@ -14,6 +14,7 @@
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "ricochet/learn/classifier.hpp"
+#include "say.hpp"
 
 namespace ricochet::app {
 
@@ -58,10 +59,10 @@ public:
             const std::string line =
                 fmt::format("[{}{}] {}{}", std::string(full, '#'), std::string(width - full, '.'),
                             figures, trains ? "" : fmt::format("  {}", stage_));
-            fmt::print(stderr, "\r{}\x1b[K", line.substr(0, columns() - 1));
+            say("\r{}\x1b[K", line.substr(0, columns() - 1));
             std::fflush(stderr);
         } else if (percent / 10 != tenth_) {
-            fmt::print(stderr, "{}: {}\n", stage_, figures);
+            say("{}: {}\n", stage_, figures);
         }
         tenth_ = percent / 10;
     }
@@ -69,7 +70,7 @@ public:
     /// The line is free again for something else.
     void finish() const
     {
-        if (terminal_ && started_) fmt::print(stderr, "\n");
+        if (terminal_ && started_) say("\n");
     }
 
 private:

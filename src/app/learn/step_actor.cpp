@@ -17,6 +17,7 @@
 #include "report.hpp"
 #include "ricochet/learn/td3.hpp"
 #include "ricochet/learn/tqc.hpp"
+#include "say.hpp"
 #include "step_world.hpp"
 #include "timing.hpp"
 #include "train.hpp"
@@ -115,7 +116,7 @@ int train_actor(const TrainPolicyRequest& request)
             trained.steps, duration(trained.seconds), run.steps, run.solves, run.iterations,
             run.ended ? "" : " without coming to the end", run.error, run.final_error));
     }
-    fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
+    say("ricochet: the model is in '{}'\n", request.out.string());
     return 0;
 }
 

@@ -16,6 +16,7 @@
 #include "progress_bar.hpp"
 #include "report.hpp"
 #include "run_watch.hpp"
+#include "say.hpp"
 #include "timing.hpp"
 #include "train.hpp"
 
@@ -114,8 +115,7 @@ int train_policy(const TrainPolicyRequest& request)
         return 1;
     }
     if (!std::isfinite(trained.search.score)) {
-        fmt::print(stderr, "ricochet: {}, and no model was written\n",
-                   describe(trained.search.outcome));
+        say("ricochet: {}, and no model was written\n", describe(trained.search.outcome));
         return 1;
     }
     keep_model(trained.model, request.out, options.checkpoint);
@@ -139,7 +139,7 @@ int train_policy(const TrainPolicyRequest& request)
                           trained.search.score, family.problems.size(), others.problems.size()) +
               table(parts, family.judges_final));
     }
-    fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
+    say("ricochet: the model is in '{}'\n", request.out.string());
     return 0;
 }
 

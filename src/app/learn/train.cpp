@@ -19,6 +19,7 @@
 #include "report.hpp"
 #include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/nn/safetensors.hpp"
+#include "say.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {
@@ -156,8 +157,7 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
         if (report.iterations > 0 || training.resume) {
             say_what_is_kept(training.checkpoint, report.checkpoint_trouble);
         } else {
-            fmt::print(stderr,
-                       "ricochet: interrupted before the training began; nothing is kept\n");
+            say("ricochet: interrupted before the training began; nothing is kept\n");
         }
         return 1;
     }
@@ -176,22 +176,20 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
                  print(json_text(object));
              }});
     if (write) {
-        fmt::print(stderr, "ricochet: the model is in '{}'\n", request.out.string());
+        say("ricochet: the model is in '{}'\n", request.out.string());
         return 0;
     }
     if (diverged) {
-        fmt::print(stderr, "ricochet: {}, and no model was written\n", describe(report.outcome));
+        say("ricochet: {}, and no model was written\n", describe(report.outcome));
         return 1;
     }
-    fmt::print(stderr,
-               "ricochet: events are missed and no model was written; --allow-misses writes the "
-               "model all the same, with its miss rate\n");
+    say("ricochet: events are missed and no model was written; --allow-misses writes the "
+        "model all the same, with its miss rate\n");
     std::error_code error;
     if (fs::exists(training.checkpoint, error)) {
-        fmt::print(stderr,
-                   "ricochet: the best is kept in '{}'; the same command with --resume "
-                   "--allow-misses writes it\n",
-                   training.checkpoint.string());
+        say("ricochet: the best is kept in '{}'; the same command with --resume "
+            "--allow-misses writes it\n",
+            training.checkpoint.string());
     }
     return 1;
 }
@@ -233,18 +231,17 @@ int train(const TrainRequest& request)
              },
              [&] { print(request.json ? json(report, request.out, write) : text(report, last)); }});
     if (write) {
-        fmt::print(stderr, "ricochet: {} is in '{}'\n", stopped ? "the best so far" : "the model",
-                   request.out.string());
+        say("ricochet: {} is in '{}'\n", stopped ? "the best so far" : "the model",
+            request.out.string());
     } else {
-        fmt::print(stderr, "ricochet: {}\n", why_not_written(report));
+        say("ricochet: {}\n", why_not_written(report));
     }
     std::error_code error;
     const bool kept = fs::exists(training.checkpoint, error);
     if (!write && !diverged && !stopped && kept) {
-        fmt::print(stderr,
-                   "ricochet: the best is kept in '{}'; the same command with --resume "
-                   "--allow-misses writes it\n",
-                   training.checkpoint.string());
+        say("ricochet: the best is kept in '{}'; the same command with --resume "
+            "--allow-misses writes it\n",
+            training.checkpoint.string());
     }
     if (stopped) {
         say_what_is_kept(training.checkpoint, report.checkpoint_trouble);

@@ -1,0 +1,21 @@
+// Sentences on standard error.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <string>
+#include <utility>
+
+namespace ricochet::app {
+
+/// Prints to standard error. Where that is closed, full or a terminal that has gone, what would
+/// have been said is lost, and nothing else: `fmt::print` throws there.
+template <class... Values>
+void say(fmt::format_string<Values...> format, Values&&... values)
+{
+    const std::string text = fmt::format(format, std::forward<Values>(values)...);
+    std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+}  // namespace ricochet::app
