@@ -84,6 +84,9 @@ protected:
     /// Leaves the guards that fire at the start as members.
     void arm_at_start();
 
+    /// Whether a guard that was not a member is on its other side at a set by no more than rounding.
+    [[nodiscard]] bool is_flipped_by_rounding(std::size_t i, Side before);
+
     /// What rounding of the time and of the state, 8 units in the last place of each
     /// component, may make of guard i at the start of the step.
     [[nodiscard]] double rounding_of(std::size_t i);

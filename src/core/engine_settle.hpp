@@ -150,7 +150,9 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     }
     record.estimated = false;
     const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
-    const bool on_surface = std::fabs(g) <= band;
+    const bool rounded = std::fabs(g) > band && is_flipped_by_rounding(i, before);
+    if (rounded) record.band = std::fabs(g);
+    const bool on_surface = rounded || std::fabs(g) <= band;
     record.departs = on_surface || record.fired || record.newly_enabled;
     const Side side = on_surface ? heading(i) : side_of(g);
     bank_.arm(i, side);
@@ -181,6 +183,19 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     const bool outside = kept_out && !on_surface && g < 0 && is_new;
     if (outside) end(Outcome::outside_mode, i);
     return !outside;
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::is_flipped_by_rounding(std::size_t i, Side before)
+{
+    const GuardRecord& record = bank_[i];
+    const double g = bank_.g0(i);
+    if (record.fired || record.newly_enabled || record.info.boolean) return false;
+    if (before == Side::plateau || side_of(g) != opposite(before)) return false;
+    // Else another's reset has carried it across: what rounding leaves need not be asked.
+    const double moves = std::fabs(bank_.rate0(i)) * (std::fabs(step_.time(0)) + h_next_);
+    if (!(std::fabs(g) <= 0x1p-20 * std::max(bank_.scale(i, h_next_), moves))) return false;
+    return std::fabs(g) <= rounding_of(i);
 }
 
 template <class X, bool single>

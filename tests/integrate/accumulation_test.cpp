@@ -279,5 +279,70 @@ TEST(Accumulation, NoBodyFallsThroughWhereAnotherRebounds)
     }
 }
 
+/// Balls above floors that move together, side by side; a mode for each set of those at rest.
+struct BallsSideBySide {
+    using State = std::array<double, 4>;
+    static constexpr std::size_t guard_count = 2;
+    static constexpr std::size_t mode_count = 4;
+    static constexpr double gravity = 9.81;
+    double restitution;
+    std::array<double, 2> height;  ///< [m] of the floors at t = 0
+    double speed;                  ///< [m/s] of the floors, upward
+
+    [[nodiscard]] double floor(std::size_t i, double t) const { return height[i] + speed * t; }
+    void flow(Mode mode, double, const State& x, State& dxdt) const
+    {
+        for (std::size_t i = 0; i < 2; ++i) {
+            const bool rests = (mode >> i & 1) != 0;
+            dxdt[2 * i] = rests ? speed : x[2 * i + 1];
+            dxdt[2 * i + 1] = rests ? 0 : -gravity;
+        }
+    }
+    [[nodiscard]] double guard(std::size_t i, Mode, double t, const State& x) const
+    {
+        return x[2 * i] - floor(i, t);
+    }
+    [[nodiscard]] bool enabled(std::size_t i, Mode mode) const { return (mode >> i & 1) == 0; }
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
+    Mode reset(std::size_t i, Mode mode, double t, State& x) const
+    {
+        x[2 * i] = floor(i, t);
+        x[2 * i + 1] = speed - restitution * (x[2 * i + 1] - speed);
+        return mode;
+    }
+    Mode rest(std::size_t i, Mode mode, double t, State& x) const
+    {
+        x[2 * i] = floor(i, t);
+        x[2 * i + 1] = speed;
+        return mode | (Mode(1) << i);
+    }
+};
+
+TEST(Accumulation, OfBallsThatBounceTogetherIsThatOfEach)
+{
+    // Equal but for rounding: in a step of a few 1e-14 s one has its impact, and of the other,
+    // which has just had its own, rounding leaves the sign.
+    for (int k = 0; k < 300; ++k) {
+        const double u = std::fmod(0.618033988749895 * k, 1.0);
+        const double w = std::fmod(0.754877666246693 * k, 1.0);
+        const BallsSideBySide balls{.restitution = 0.05 + 0.7 * u,
+                                    .height = {0, 3 * w - 1.5},
+                                    .speed = k % 3 == 0 ? 0 : w - 0.5};
+        const double v = 0.5 + 3 * w;
+        const double limit = 2 * v / balls.gravity / (1 - balls.restitution);
+        const auto run = integrate(balls, {0, balls.speed + v, balls.height[1], balls.speed + v},
+                                   {.t_end = 1.5 * limit});
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
+        int rests = 0;
+        for (const auto& event : run.events) {
+            if (event.kind != EventKind::accumulation) continue;
+            ++rests;
+            // 1e-12: of the closed form, and of some 50 times that are sums of flights.
+            EXPECT_NEAR(event.t, limit, event.error + 1e-12) << k;
+        }
+        EXPECT_EQ(rests, 2) << k;
+    }
+}
+
 }  // namespace
 }  // namespace ricochet
