@@ -12,6 +12,7 @@
 // longer ones over operations alone.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -78,10 +79,9 @@ class TaylorSeries {
     using Tape = std::remove_cvref_t<decltype(tape)>;
     static constexpr int n = static_cast<int>(Tape::states);
     static constexpr int ops = static_cast<int>(Tape::ops_count);
-    using Coefficients = std::array<double, most + 1>;
 
     /// Of the series whose coefficients times their orders are wanted.
-    static constexpr auto has_slope = [] {
+    static constexpr auto slopes_wanted = [] {
         std::array<bool, Tape::ops_count> wanted{};
         for (std::size_t i = Tape::states + 1; i < Tape::ops_count; ++i) {
             switch (tape.ops[i].op) {
@@ -103,6 +103,8 @@ class TaylorSeries {
         }
         return wanted;
     }();
+    template <int i>
+    static constexpr bool has_slope = slopes_wanted[static_cast<std::size_t>(i)];
 
 public:
     /// out[k n + i] = coefficient k of component i, up to `order`: `most`, or one of those that are
@@ -128,7 +130,7 @@ private:
     explicit TaylorSeries(const double* constants) noexcept : constants_(constants)
     {
         if constexpr (!unrolled) {
-            for (Coefficients& series : c_) series.fill(0);
+            for (auto& series : c_) std::fill(series, series + most + 1, 0.0);
         }
     }
 
@@ -184,7 +186,7 @@ private:
     template <int a>
     [[nodiscard, gnu::always_inline]] const double* slope() const noexcept
     {
-        return slope_[a].data();
+        return slope_[a];
     }
 
     /// What a function of a number is at the start.
@@ -268,12 +270,8 @@ private:
                 c_[i][k] = coefficient<k, i>();
             }
         }
-        if constexpr (k > 0 && has_slope[i] && k <= degree(i)) slope_[i][k] = k * c_[i][k];
+        if constexpr (k > 0 && has_slope<i> && k <= degree(i)) slope_[i][k] = k * c_[i][k];
     }
-
-    /// Whether coefficient k of an operand is not zero for certain.
-    template <int k, int a>
-    static constexpr bool present = k <= degree(a);
 
     template <int k, int i>
     [[nodiscard, gnu::always_inline]] double coefficient() const
@@ -282,9 +280,9 @@ private:
         constexpr TapeOp op = op_at(i);
         constexpr int da = degree(larger(op.a, 0));
         constexpr int db = degree(larger(op.b, 0));
-        const double* const a = c_[larger(op.a, 0)].data();
-        const double* const b = c_[larger(op.b, 0)].data();
-        const double* const own = c_[i].data();
+        const double* const a = c_[larger(op.a, 0)];
+        const double* const b = c_[larger(op.b, 0)];
+        const double* const own = c_[i];
         // Ranges of j in sums of a_j b_{k-j}; with i's own coefficients, up to k - 1.
         constexpr int upto_a = smaller(da, k);
         constexpr int upto_b = smaller(db, k);
@@ -375,9 +373,9 @@ private:
     void advance_all(int k, double* out)
     {
         for (int i = 0; i < n; ++i) {
-            const auto rate = static_cast<std::size_t>(tape.outputs[static_cast<std::size_t>(i)]);
-            const double next = c_[rate][static_cast<std::size_t>(k)] / (k + 1);
-            c_[static_cast<std::size_t>(i)][static_cast<std::size_t>(k) + 1] = next;
+            const int rate = tape.outputs[static_cast<std::size_t>(i)];
+            const double next = c_[rate][k] / (k + 1);
+            c_[i][k + 1] = next;
             out[(k + 1) * n + i] = next;
         }
     }
@@ -403,9 +401,9 @@ private:
     template <int i>
     [[gnu::always_inline]] void compute_at(int k)
     {
-        if constexpr (i > n) c_[i][static_cast<std::size_t>(k)] = coefficient_at<i>(k);
-        if constexpr (has_slope[i]) {
-            slope_[i][static_cast<std::size_t>(k)] = k * c_[i][static_cast<std::size_t>(k)];
+        if constexpr (i > n) c_[i][k] = coefficient_at<i>(k);
+        if constexpr (has_slope<i>) {
+            slope_[i][k] = k * c_[i][k];
         }
     }
 
@@ -416,9 +414,9 @@ private:
         constexpr TapeOp op = op_at(i);
         constexpr int da = degree(larger(op.a, 0));
         constexpr int db = degree(larger(op.b, 0));
-        const double* const a = c_[larger(op.a, 0)].data();
-        const double* const b = c_[larger(op.b, 0)].data();
-        const double* const own = c_[i].data();
+        const double* const a = c_[larger(op.a, 0)];
+        const double* const b = c_[larger(op.b, 0)];
+        const double* const own = c_[i];
         const int upto_a = smaller(da, k);
         const int upto_b = smaller(db, k);
         switch (op.op) {
@@ -470,9 +468,9 @@ private:
 
     const double* constants_;
     // Unrolled, no coefficient is read that was not written.
-    std::array<Coefficients, ops> c_;
-    std::array<Coefficients, ops> slope_;
-    std::array<double, ops> inverse_;
+    double c_[ops][most + 1];      // NOLINT(*-avoid-c-arrays): indices are int
+    double slope_[ops][most + 1];  // NOLINT(*-avoid-c-arrays)
+    double inverse_[ops];          // NOLINT(*-avoid-c-arrays)
 };
 
 }  // namespace ricochet::detail
