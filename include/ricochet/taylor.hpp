@@ -223,16 +223,14 @@ struct StepperDoor<System, X, Taylor> : Door<System, X> {
     TaylorStep<n> step;
 
 private:
-    template <std::size_t mode>
-    static constexpr const auto& tape = taylor_tape<System, n, static_cast<Mode>(mode)>;
-
     static constexpr std::size_t most_constants = [] {
         if constexpr (!takes_series) {
             return std::size_t{0};
         } else {
             return []<std::size_t... mode>(std::index_sequence<mode...>)
             {
-                return std::max({std::size_t{0}, tape<mode>.ops.size()...});
+                return std::max({std::size_t{0},
+                                 taylor_tape<System, n, static_cast<Mode>(mode)>.ops.size()...});
             }
             (std::make_index_sequence<tape_count<System, n>()>{});
         }
@@ -253,14 +251,19 @@ private:
     }
 
     template <std::size_t... mode>
-    [[gnu::always_inline]] void dispatch(Mode at, double t, const double* x, int order, double* out,
-                                         std::index_sequence<mode...>)
+    void dispatch(Mode at, double t, const double* x, int order, double* out,
+                  std::index_sequence<mode...>)
     {
-        static_cast<void>((... || (sizeof...(mode) == 1 || at == static_cast<Mode>(mode)
-                                       ? (TaylorSeries<tape<mode>, most_taylor_order>::compute(
-                                              constants_[mode].data(), t, x, order, out),
-                                          true)
-                                       : false)));
+        constexpr bool one = sizeof...(mode) == 1;
+        static_cast<void>((... || ((one || at == static_cast<Mode>(mode)) &&
+                                   compute_in<static_cast<Mode>(mode)>(t, x, order, out))));
+    }
+    template <Mode mode>
+    bool compute_in(double t, const double* x, int order, double* out)
+    {
+        using Series = TaylorSeries<taylor_tape<System, n, mode>, most_taylor_order>;
+        Series::compute(constants_[static_cast<std::size_t>(mode)].data(), t, x, order, out);
+        return true;
     }
 
     std::array<std::array<double, most_constants>, tape_count<System, n>()> constants_{};

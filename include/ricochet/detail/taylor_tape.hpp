@@ -132,10 +132,10 @@ public:
     [[nodiscard]] constexpr const double* from() const noexcept { return from_; }
     [[nodiscard]] constexpr int index() const noexcept { return index_; }
 
-    /// What a double is made of a series for is either a function that was not found for series, or
-    /// a parameter declared as double.
+    /// A double is wanted of a series where a function was not found for series, or a parameter is
+    /// declared as double.
     template <class T>
-    requires std::is_arithmetic_v<T>
+    requires std::is_same_v<T, double>
     constexpr operator T() const  // NOLINT(google-explicit-constructor)
     {
         static_assert(is_never_series<T>,
