@@ -90,9 +90,10 @@ inline constexpr int most_taylor_order = 20;
 }
 
 /// The coefficients of the step in hand, and what they were computed from.
-template <std::size_t n>
+template <std::size_t n, std::size_t m>
 struct TaylorStep {
     alignas(16) std::array<double, (most_taylor_order + 1) * n> coefficients{};
+    std::array<double, (most_taylor_order + 1) * m> guards{};
     std::array<double, n> x{};
     Instant start;
     Mode mode = 0;
@@ -173,6 +174,8 @@ template <class System, std::size_t n>
 template <class System, class X>
 struct StepperDoor<System, X, Taylor> : Door<System, X> {
     static constexpr std::size_t n = fixed_size<X>();
+    /// Guards with series of their own.
+    static constexpr std::size_t m = series_guards<System, n>();
     static constexpr bool takes_series = [] {
         static_assert(n > 0,
                       "ricochet: found a state sized at run time for Taylor; expected "
@@ -212,15 +215,16 @@ struct StepperDoor<System, X, Taylor> : Door<System, X> {
         given_order = order;
     }
 
-    void compute(Mode mode, double t, const double* x, int order, double* out)
+    void compute(Mode mode, double t, const double* x, int order, double* out, double* guards)
     {
         if constexpr (takes_series) {
-            dispatch(mode, t, x, order, out, std::make_index_sequence<tape_count<System, n>()>{});
+            dispatch(mode, t, x, order, out, guards,
+                     std::make_index_sequence<tape_count<System, n>()>{});
         }
     }
 
     int given_order = 0;
-    TaylorStep<n> step;
+    TaylorStep<n, m> step;
 
 private:
     static constexpr std::size_t most_constants = [] {
@@ -251,18 +255,19 @@ private:
     }
 
     template <std::size_t... mode>
-    void dispatch(Mode at, double t, const double* x, int order, double* out,
+    void dispatch(Mode at, double t, const double* x, int order, double* out, double* guards,
                   std::index_sequence<mode...>)
     {
         constexpr bool one = sizeof...(mode) == 1;
         static_cast<void>((... || ((one || at == static_cast<Mode>(mode)) &&
-                                   compute_in<static_cast<Mode>(mode)>(t, x, order, out))));
+                                   compute_in<static_cast<Mode>(mode)>(t, x, order, out, guards))));
     }
     template <Mode mode>
-    bool compute_in(double t, const double* x, int order, double* out)
+    bool compute_in(double t, const double* x, int order, double* out, double* guards)
     {
         using Series = TaylorSeries<taylor_tape<System, n, mode>, most_taylor_order>;
-        Series::compute(constants_[static_cast<std::size_t>(mode)].data(), t, x, order, out);
+        Series::compute(constants_[static_cast<std::size_t>(mode)].data(), t, x, order, out,
+                        guards);
         return true;
     }
 
@@ -274,6 +279,7 @@ class KernelOf<System, X, Taylor> {
     using C = CoreState<X>;
     using State = StepState<C>;
     static constexpr std::size_t n = fixed_size<X>();
+    static constexpr std::size_t m = series_guards<System, n>();
     using Array = std::array<double, n>;
     using D = StepperDoor<System, X, Taylor>;
 
@@ -283,10 +289,11 @@ class KernelOf<System, X, Taylor> {
     }
 
     /// The coefficients of the step from the start in hand, if they are not those already.
-    [[gnu::always_inline]] static TaylorStep<n>& expand(void* door, const State& state, int order)
+    [[gnu::always_inline]] static TaylorStep<n, m>& expand(void* door, const State& state,
+                                                           int order)
     {
         D& of = at(door);
-        TaylorStep<n>& step = of.step;
+        TaylorStep<n, m>& step = of.step;
         bool same = step.order >= order && step.mode == state.mode &&
                     step.backward == state.backward && step.start.value == state.start.value &&
                     step.start.remainder == state.start.remainder;
@@ -297,14 +304,16 @@ class KernelOf<System, X, Taylor> {
 
     [[gnu::noinline]] static void expand_anew(D& of, const State& state, int order)
     {
-        TaylorStep<n>& step = of.step;
+        TaylorStep<n, m>& step = of.step;
         step.order = 0;  // until all is known, whatever the flow throws
         for (std::size_t i = 0; i < n; ++i) step.x[i] = state.x0[i];
         double* const c = step.coefficients.data();
-        of.compute(state.mode, state.start.value, step.x.data(), order, c);
+        double* const g = step.guards.data();
+        of.compute(state.mode, state.start.value, step.x.data(), order, c, g);
         if (state.backward) {
             for (std::size_t k = 1; k <= static_cast<std::size_t>(order); k += 2) {
                 for (std::size_t i = 0; i < n; ++i) c[k * n + i] = -c[k * n + i];
+                for (std::size_t i = 0; i < m; ++i) g[k * m + i] = -g[k * m + i];
             }
         }
         step.start = state.start;
@@ -339,11 +348,12 @@ class KernelOf<System, X, Taylor> {
         for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(state.x0[i]);
         double h = longest(size);
         // What begins near zero and moves away has the size of its end, as with other methods.
-        for (int again = 0; again < 2; ++again) {
+        // A length grows with a twelfth power of the size at most: less is not worth another root.
+        for (int again = 0; again < 3; ++again) {
             bool larger = false;
             for (std::size_t i = 0; i < n; ++i) {
                 const double end = std::fabs(state.x0[i] + std::min(h, 1e100) * c[n + i]);
-                larger = larger || end > 4 * size[i];
+                larger = larger || end > 16 * size[i];
                 size[i] = std::max(size[i], end);
             }
             if (!larger || !(h < infinity)) break;
@@ -355,7 +365,7 @@ class KernelOf<System, X, Taylor> {
     static double reach(void* door, State& state, double rtol, double atol)
     {
         const int order = taylor_order(at(door).given_order, rtol);
-        TaylorStep<n>& step = expand(door, state, order);
+        TaylorStep<n, m>& step = expand(door, state, order);
         const double* const c = step.coefficients.data();
         ++state.flow_calls;
         for (std::size_t i = 0; i < n; ++i) state.rate0[i] = c[n + i];
@@ -364,7 +374,7 @@ class KernelOf<System, X, Taylor> {
     }
 
     /// False where the end is not finite.
-    [[gnu::always_inline]] static bool go(const TaylorStep<n>& step, State& state, double h)
+    [[gnu::always_inline]] static bool go(const TaylorStep<n, m>& step, State& state, double h)
     {
         const double* const c = step.coefficients.data();
         state.h = h;
@@ -390,7 +400,7 @@ class KernelOf<System, X, Taylor> {
     static double attempt(void* door, State& state, double h, double rtol, double atol)
     {
         const int order = taylor_order(at(door).given_order, rtol);
-        const TaylorStep<n>& step = expand(door, state, order);
+        const TaylorStep<n, m>& step = expand(door, state, order);
         double longest = step.reach;
         if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
         if (!go(step, state, h)) return std::numeric_limits<double>::quiet_NaN();
@@ -407,7 +417,7 @@ class KernelOf<System, X, Taylor> {
 
     static void depart(void* door, State& state, double s, C& w, C& rate)
     {
-        const TaylorStep<n>& step = expand(door, state, at(door).step.order);
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
         Array w_own, rate_own;
         evaluate_departure<true>(step.coefficients.data(), step.order, s, w_own, rate_own);
         for (std::size_t i = 0; i < n; ++i) {
@@ -418,7 +428,7 @@ class KernelOf<System, X, Taylor> {
 
     static void departure(void* door, const State& state, double s, C& w)
     {
-        const TaylorStep<n>& step = expand(door, state, at(door).step.order);
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
         Array w_own, none;
         evaluate_departure<false>(step.coefficients.data(), step.order, s, w_own, none);
         for (std::size_t i = 0; i < n; ++i) w[i] = w_own[i];
@@ -426,8 +436,14 @@ class KernelOf<System, X, Taylor> {
 
     static SeriesTerms series(void* door, const State& state)
     {
-        const TaylorStep<n>& step = expand(door, state, at(door).step.order);
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
         return {step.coefficients.data(), step.order, n};
+    }
+
+    static SeriesTerms guard_series(void* door, const State& state)
+    {
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
+        return {step.guards.data(), step.order, m};
     }
 
     static constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -445,6 +461,7 @@ public:
         kernel.depart = &depart;
         kernel.departure = &departure;
         kernel.series = &series;
+        if constexpr (m > 0) kernel.guard_series = &guard_series;
         return kernel;
     }
 };

@@ -302,6 +302,13 @@ public:
         return kernel_->attempt(system_.door(), state_, h, rtol, atol);
     }
 
+    /// Whether guards have power series over the step.
+    [[nodiscard]] bool has_guard_series() const noexcept { return kernel_->guard_series; }
+    [[nodiscard]] SeriesTerms guard_series() const
+    {
+        return kernel_->guard_series(system_.door(), state_);
+    }
+
     /// Whether the length of a step is known before it is taken.
     [[nodiscard]] bool knows_reach() const noexcept { return kernel_->reach; }
     /// That length [s].

@@ -30,7 +30,7 @@ template <bool unrolled, class System, std::size_t n>
     EXPECT_EQ(match, TapeMatch::fits);
     std::array<std::array<double, n>, order + 1> out{};
     TaylorSeries<tape, order, unrolled>::compute(constants.data(), t, x.data(), order,
-                                                 out[0].data());
+                                                 out[0].data(), nullptr);
     return out;
 }
 

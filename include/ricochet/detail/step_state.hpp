@@ -125,6 +125,8 @@ struct StepKernel {
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
     /// The step in hand where it is a power series, or null.
     SeriesTerms (*series)(void* door, const StepState<X>& step) = nullptr;
+    /// The guards on it, all of them, or null.
+    SeriesTerms (*guard_series)(void* door, const StepState<X>& step) = nullptr;
     /// The state has another dimension. Null where nothing is kept.
     void (*renew)(void* door) = nullptr;
 

@@ -78,6 +78,7 @@ template <const auto& tape, int most, bool unrolled = is_unrolled<tape>>
 class TaylorSeries {
     using Tape = std::remove_cvref_t<decltype(tape)>;
     static constexpr int n = static_cast<int>(Tape::states);
+    static constexpr int m = static_cast<int>(Tape::guards);
     static constexpr int ops = static_cast<int>(Tape::ops_count);
 
     /// Of the series whose coefficients times their orders are wanted.
@@ -108,10 +109,11 @@ class TaylorSeries {
 
 public:
     /// out[k n + i] = coefficient k of component i, up to `order`: `most`, or one of those that are
-    /// 4 and 8 less.
-    static void compute(const double* constants, double t, const double* x, int order, double* out)
+    /// 4 and 8 less. The same of the m guards in `guards`.
+    static void compute(const double* constants, double t, const double* x, int order, double* out,
+                        double* guards)
     {
-        TaylorSeries series(constants);
+        TaylorSeries series(constants, guards);
         for (int i = 0; i < n; ++i) out[i] = series.c_[i][0] = x[i];
         series.c_[n][0] = t;
         series.c_[n][1] = 1;
@@ -122,12 +124,14 @@ public:
             for (int k = 1; k < order; ++k) {
                 series.loop(k, out, std::make_integer_sequence<int, ops>{});
             }
+            series.end_guards(order, std::make_integer_sequence<int, ops>{});
         }
     }
 
 private:
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): see below
-    explicit TaylorSeries(const double* constants) noexcept : constants_(constants)
+    TaylorSeries(const double* constants, double* guards) noexcept
+        : constants_(constants), guards_(guards)
     {
         if constexpr (!unrolled) {
             for (auto& series : c_) std::fill(series, series + most + 1, 0.0);
@@ -161,8 +165,44 @@ private:
             (advance<k, i>(out), ...);
         }
         (std::make_integer_sequence<int, n>{});
-        if constexpr (k + 1 == most - 4 || k + 1 == most - 8) return order == k + 1;
+        keep_guards<k>();
+        if constexpr (k + 1 == most || k + 1 == most - 4 || k + 1 == most - 8) {
+            if (order != k + 1) return false;
+            if constexpr (m > 0) {
+                run_for_guards<k + 1>(std::make_integer_sequence<int, ops>{});
+                keep_guards<k + 1>();
+            }
+            return true;
+        }
         return false;
+    }
+
+    template <int k>
+    [[gnu::always_inline]] void keep_guards()
+    {
+        [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
+        {
+            (keep_guard<k, i>(), ...);
+        }
+        (std::make_integer_sequence<int, m>{});
+    }
+    template <int k, int i>
+    [[gnu::always_inline]] void keep_guard()
+    {
+        constexpr int guard = tape.outputs[static_cast<std::size_t>(n + i)];
+        double value = 0;
+        if constexpr (k <= degree(guard)) value = c_[guard][k];
+        guards_[k * m + i] = value;
+    }
+    template <int k, int... i>
+    [[gnu::always_inline]] void run_for_guards(std::integer_sequence<int, i...>)
+    {
+        (compute_for_guards<k, i>(), ...);
+    }
+    template <int k, int i>
+    [[gnu::always_inline]] void compute_for_guards()
+    {
+        if constexpr (tape.for_guards[static_cast<std::size_t>(i)]) compute_op<k, i>();
     }
 
     template <int k, int... i>
@@ -378,6 +418,26 @@ private:
             c_[i][k + 1] = next;
             out[(k + 1) * n + i] = next;
         }
+        keep_guards_at(k);
+    }
+    void keep_guards_at(int k)
+    {
+        for (int i = 0; i < m; ++i) {
+            guards_[k * m + i] = c_[tape.outputs[static_cast<std::size_t>(n + i)]][k];
+        }
+    }
+    template <int... i>
+    [[gnu::always_inline]] void end_guards([[maybe_unused]] int k, std::integer_sequence<int, i...>)
+    {
+        if constexpr (m > 0) {
+            (end_op<i>(k), ...);
+            keep_guards_at(k);
+        }
+    }
+    template <int i>
+    [[gnu::always_inline]] void end_op(int k)
+    {
+        if constexpr (tape.for_guards[static_cast<std::size_t>(i)]) compute_at<i>(k);
     }
 
     /// sum of a_j b_{k-j} for j from lo to hi
@@ -467,6 +527,7 @@ private:
     }
 
     const double* constants_;
+    double* guards_;
     // Unrolled, no coefficient is read that was not written.
     double c_[ops][most + 1];      // NOLINT(*-avoid-c-arrays): indices are int
     double slope_[ops][most + 1];  // NOLINT(*-avoid-c-arrays)

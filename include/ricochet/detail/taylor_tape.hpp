@@ -21,6 +21,7 @@
 #include <utility>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/system.hpp"
 
 namespace ricochet::detail {
 
@@ -397,11 +398,39 @@ concept ModedScalarFlow = requires(const System& system, Mode mode, const Record
     system.flow(mode, t, x, dxdt);
 };
 
-/// Records the flow of `system`; inputs are the n components and the time, in this order. The
-/// rates are put at the end, in the canonical order of `ordered`.
+/// A guard, number `which` of those in `mode`, that takes any scalar.
 template <class System, std::size_t n>
+[[nodiscard]] constexpr auto scalar_guard(const System& system, [[maybe_unused]] std::size_t which,
+                                          [[maybe_unused]] Mode mode, const Recorded& t,
+                                          const std::array<Recorded, n>& x)
+{
+    if constexpr (requires { system.guard(which, mode, t, x); }) {
+        return system.guard(which, mode, t, x);
+    } else if constexpr (requires {
+                             requires CountsGuards<System>;
+                             system.guard(which, t, x);
+                         }) {
+        return system.guard(which, t, x);
+    } else if constexpr (requires { system.guard(mode, t, x); }) {
+        return system.guard(mode, t, x);
+    } else if constexpr (requires { system.guard(t, x); }) {
+        return system.guard(t, x);
+    }
+}
+
+/// Whether all guards take any scalar, and there is a constant number of them.
+template <class System, std::size_t n>
+concept ScalarGuards = fixed_guard_count<System, std::array<double, n>>()
+> 0 && std::is_same_v<Recorded, decltype(scalar_guard<System, n>(
+                                    std::declval<const System&>(), std::size_t{}, Mode{},
+                                    std::declval<const Recorded&>(),
+                                    std::declval<const std::array<Recorded, n>&>()))>;
+
+/// Records the flow of `system`, and its first m guards; inputs are the n components and the time,
+/// in this order, outputs the n rates and the guards.
+template <class System, std::size_t n, std::size_t m>
 constexpr void record_flow(const System& system, Mode mode, Recording& recording,
-                           std::array<int, n>& outputs)
+                           std::array<int, n + m>& outputs)
 {
     std::array<Recorded, n> x{};
     std::array<Recorded, n> dxdt{};
@@ -412,19 +441,24 @@ constexpr void record_flow(const System& system, Mode mode, Recording& recording
     } else {
         system.flow(t, x, dxdt);
     }
-    for (std::size_t i = 0; i < n; ++i) {
-        outputs[i] =
-            dxdt[i].is_constant()
-                ? recording.push_back(
-                      {.op = TaylorOp::constant, .value = dxdt[i].value(), .from = dxdt[i].from()})
-                : dxdt[i].index();
+    const auto index_of = [&](const Recorded& out) {
+        if (!out.is_constant()) return out.index();
+        return recording.push_back(
+            {.op = TaylorOp::constant, .value = out.value(), .from = out.from()});
+    };
+    for (std::size_t i = 0; i < n; ++i) outputs[i] = index_of(dxdt[i]);
+    if constexpr (m > 0) {
+        for (std::size_t i = 0; i < m; ++i) {
+            outputs[n + i] = index_of(scalar_guard<System, n>(system, i, mode, t, x));
+        }
     }
 }
 
-/// The operations that the rates depend on, numbered from the first rate: operands before results,
+/// The operations that the outputs depend on, numbered from the first one: operands before results,
 /// left before right. Inputs keep their numbers; `outputs` are renumbered.
-template <std::size_t n>
-constexpr void put_in_order(const Recording& from, Recording& to, std::array<int, n>& outputs)
+template <std::size_t n, std::size_t outputs_count>
+constexpr void put_in_order(const Recording& from, Recording& to,
+                            std::array<int, outputs_count>& outputs)
 {
     const int inputs = static_cast<int>(n) + 1;
     GrowingArray<int> number;  // in `to`, or -1
@@ -471,24 +505,26 @@ inline constexpr int no_degree = 1 << 20;
 /// first n are the components of the state, the next one is the time.
 /// @tparam size  number of operations
 /// @tparam recorded  the same of the recording
-template <std::size_t n, std::size_t size, std::size_t recorded>
+template <std::size_t n, std::size_t m, std::size_t size, std::size_t recorded>
 struct TaylorTape {
     static constexpr std::size_t states = n;
+    static constexpr std::size_t guards = m;
     static constexpr std::size_t ops_count = size;
     std::array<TapeOp, size> ops{};
-    std::array<int, n> outputs{};    ///< the rates of the state
-    std::array<int, size> degree{};  ///< in time, or `no_degree`
+    std::array<int, n + m> outputs{};     ///< the rates of the state, and the guards
+    std::array<bool, size> for_guards{};  ///< whether a guard depends on it
+    std::array<int, size> degree{};       ///< in time, or `no_degree`
     std::array<TapeOp, recorded> as_recorded{};
     std::array<int, recorded> place{};  ///< of a recorded operation on the tape
 };
 
 /// The same while it grows.
-template <std::size_t n>
+template <std::size_t n, std::size_t m>
 struct TapeDraft {
     Recording recording;  ///< in order
     Recording ops;
     GrowingArray<int> place;
-    std::array<int, n> outputs{};
+    std::array<int, n + m> outputs{};
 
     constexpr int add(const RecordedOp& op)
     {
@@ -538,11 +574,11 @@ private:
     }
 };
 
-template <class System, std::size_t n>
-constexpr void draft_tape(const System& system, Mode mode, TapeDraft<n>& draft)
+template <class System, std::size_t n, std::size_t m>
+constexpr void draft_tape(const System& system, Mode mode, TapeDraft<n, m>& draft)
 {
     Recording as_called;
-    record_flow<System, n>(system, mode, as_called, draft.outputs);
+    record_flow<System, n, m>(system, mode, as_called, draft.outputs);
     put_in_order<n>(as_called, draft.recording, draft.outputs);
     for (int i = 0; i < draft.recording.size(); ++i) {
         RecordedOp op = draft.recording[i];
@@ -611,27 +647,46 @@ constexpr void find_degrees(Tape& tape) noexcept
     }
 }
 
+/// Marks what guards depend on, partners included.
+template <class Tape>
+constexpr void mark_for_guards(Tape& tape) noexcept
+{
+    for (std::size_t i = 0; i < Tape::guards; ++i) {
+        tape.for_guards[static_cast<std::size_t>(tape.outputs[Tape::states + i])] = true;
+    }
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (std::size_t i = 0; i < Tape::ops_count; ++i) {
+            if (!tape.for_guards[i]) continue;
+            for (const int operand : {tape.ops[i].a, tape.ops[i].b}) {
+                if (operand < 0 || tape.for_guards[static_cast<std::size_t>(operand)]) continue;
+                tape.for_guards[static_cast<std::size_t>(operand)] = changed = true;
+            }
+        }
+    }
+}
+
 struct TapeSize {
     std::size_t ops;
     std::size_t recorded;
 };
 
-template <class System, std::size_t n, Mode mode>
+template <class System, std::size_t n, std::size_t m, Mode mode>
 [[nodiscard]] constexpr TapeSize tape_size()
 {
-    TapeDraft<n> draft;
-    draft_tape<System, n>(System(), mode, draft);
+    TapeDraft<n, m> draft;
+    draft_tape<System, n, m>(System(), mode, draft);
     return {static_cast<std::size_t>(draft.ops.size()),
             static_cast<std::size_t>(draft.recording.size())};
 }
 
-template <class System, std::size_t n, Mode mode>
+template <class System, std::size_t n, std::size_t m, Mode mode>
 [[nodiscard]] constexpr auto make_tape()
 {
-    constexpr TapeSize size = tape_size<System, n, mode>();
-    TaylorTape<n, size.ops, size.recorded> tape;
-    TapeDraft<n> draft;
-    draft_tape<System, n>(System(), mode, draft);
+    constexpr TapeSize size = tape_size<System, n, m, mode>();
+    TaylorTape<n, m, size.ops, size.recorded> tape;
+    TapeDraft<n, m> draft;
+    draft_tape<System, n, m>(System(), mode, draft);
     const auto plain = [](const RecordedOp& op) { return TapeOp{op.op, op.a, op.b, op.exponent}; };
     for (std::size_t i = 0; i < size.ops; ++i) tape.ops[i] = plain(draft.ops[static_cast<int>(i)]);
     for (std::size_t i = 0; i < size.recorded; ++i) {
@@ -640,6 +695,7 @@ template <class System, std::size_t n, Mode mode>
     }
     tape.outputs = draft.outputs;
     find_degrees(tape);
+    mark_for_guards(tape);
     return tape;
 }
 
@@ -647,11 +703,28 @@ template <class System, std::size_t n, Mode mode>
 template <class System, std::size_t n>
 concept RecordableFlow = requires
 {
-    typename std::integral_constant<std::size_t, tape_size<System, n, 0>().ops>;
+    typename std::integral_constant<std::size_t, tape_size<System, n, 0, 0>().ops>;
+};
+/// The same with the guards.
+template <class System, std::size_t n, std::size_t m>
+concept RecordableGuards = requires
+{
+    typename std::integral_constant<std::size_t, tape_size<System, n, m, 0>().ops>;
 };
 
+/// How many guards have series: all of them, or none.
+template <class System, std::size_t n>
+[[nodiscard]] constexpr std::size_t series_guards() noexcept
+{
+    if constexpr (ScalarGuards<System, n>) {
+        constexpr std::size_t m = fixed_guard_count<System, std::array<double, n>>();
+        if constexpr (RecordableGuards<System, n, m>) return m;
+    }
+    return 0;
+}
+
 template <class System, std::size_t n, Mode mode>
-inline constexpr auto taylor_tape = make_tape<System, n, mode>();
+inline constexpr auto taylor_tape = make_tape<System, n, series_guards<System, n>(), mode>();
 
 /// What is wrong with a recording of an object, beside the tape of its type.
 enum class TapeMatch : std::uint8_t { fits, differs, not_finite };
@@ -663,8 +736,9 @@ template <class System, std::size_t n, Mode mode, class Constants>
     constexpr const auto& tape = taylor_tape<System, n, mode>;
     Recording as_called;
     Recording recording;
-    std::array<int, n> outputs{};
-    record_flow<System, n>(system, mode, as_called, outputs);
+    constexpr std::size_t m = tape.guards;
+    std::array<int, n + m> outputs{};
+    record_flow<System, n, m>(system, mode, as_called, outputs);
     put_in_order<n>(as_called, recording, outputs);
     if (static_cast<std::size_t>(recording.size()) != tape.as_recorded.size()) {
         return TapeMatch::differs;
@@ -685,7 +759,7 @@ template <class System, std::size_t n, Mode mode, class Constants>
         constants[at] = value;
         known[at] = true;
     }
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; i < n + m; ++i) {
         const auto at = static_cast<std::size_t>(outputs[i]);
         if (tape.place[at] != tape.outputs[i]) return TapeMatch::differs;
     }
