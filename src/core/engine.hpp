@@ -68,6 +68,9 @@ protected:
           search_(x0, bank_.size(), finders_, resolution_),
           resets_(x0)
     {
+        const Screening screening = setup.detector.screening;
+        on_series_ = step_.has_guard_series() && !puts_off_ && !predicts_ &&
+                     (screening == Screening::extremum || screening == Screening::every);
         if (puts_off_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
     }
 
@@ -121,7 +124,7 @@ protected:
     /// the step, too; a second time where the first leaves doubts.
     [[nodiscard]] bool any_suspicious()
     {
-        if (!bank_.looks() || !options_.look_inside) return bank_.suspicious(step_.h());
+        if (on_series_ || !bank_.looks() || !options_.look_inside) return bank_.suspicious(step_.h());
         look_inside();
         return is_suspicious(error_controlled_ && hardly_moves());
     }
@@ -139,7 +142,7 @@ protected:
 
     void pass_on_clear() noexcept
     {
-        run_.statistics.evidence.add(finders_.detector.evidence);
+        run_.statistics.evidence.add(on_series_ ? Evidence::proved : finders_.detector.evidence);
         bank_.pass_on();
     }
 
@@ -419,6 +422,7 @@ protected:
     bool timed_;
     std::conditional_t<single, Never, bool> puts_off_;  ///< a plan is for the loop of any number
     bool predicts_;
+    bool on_series_ = false;  ///< guards are power series over each step
     Options options_;
     Metering meter_;
     EventResolution resolution_;

@@ -19,6 +19,7 @@
 #include "core/step.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/resolved_parts.hpp"
+#include "ricochet/detail/series_guard.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/event.hpp"
@@ -296,8 +297,54 @@ private:
     {
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
         if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
+        if (bank.has_series(i)) return heed(bank, i, watch, next_on_series(probe, watch, bank, i));
         if (!bank.looked()) return heed(bank, i, watch, finders_->examine(probe, watch));
         return heed(bank, i, watch, next_in_parts(probe, watch, bank, i));
+    }
+
+    /// What the power series of the guard says of a stretch. Where that is not sure, or other than
+    /// its values at the ends, the detector is asked.
+    [[gnu::noinline]] Finding next_on_series(Probe& probe, Watch& watch, const Bank& bank,
+                                             std::size_t i)
+    {
+        const Crossing crossing = bank[i].info.crossing;
+        const GuardSample end = watch.end;
+        double sign = sign_of(watch.side);
+        bool from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch;
+        const double ahead = from_surface ? watch.start.rate : watch.start.value;
+        if (!(sign * ahead > 0)) return finders_->examine(probe, watch);
+        for (;;) {
+            const SeriesStretch stretch =
+                first_leaving(bank.series(), i, sign, probe.step().h(), watch.start.s, end.s,
+                              bank[i].info.touch, from_surface);
+            if (stretch.kind == SeriesStretch::Kind::clear) break;
+            const GuardSample lo =
+                stretch.lo > watch.start.s ? probe.value_and_rate(stretch.lo) : watch.start;
+            const GuardSample hi = stretch.hi < end.s ? probe.value_and_rate(stretch.hi) : end;
+            from_surface = from_surface && lo.s == watch.start.s;
+            const bool agrees = (from_surface || sign * lo.value > 0) && sign * hi.value < 0;
+            watch.start = lo;
+            watch.end = hi;
+            if (stretch.kind == SeriesStretch::Kind::crossing && agrees) {
+                if (counts(watch.side, crossing)) return Finding::leaving(watch.side, lo, hi);
+                watch.side = opposite(watch.side);
+            } else {
+                judge_by_its_own_size(watch, bank, i);
+                const Finding finding = finders_->examine(probe, watch);
+                if (finding.hit || finding.touch) return finding;
+                watch.side = watch.side_after;
+            }
+            watch.side_after = watch.side;
+            if (!(hi.s < end.s)) return Finding::clear(evidence_);
+            watch.start = hi;
+            watch.end = end;
+            sign = sign_of(watch.side);
+            from_surface = false;
+            if (!(sign * hi.value > 0)) return finders_->examine(probe, watch);
+        }
+        if (!(sign * end.value > 0)) return finders_->examine(probe, watch);
+        watch.side_after = watch.side;
+        return Finding::clear(Evidence::proved);
     }
 
     /// The detector's answers on the parts of a stretch, up to the first that is not clear.

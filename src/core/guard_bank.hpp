@@ -127,6 +127,12 @@ public:
     /// A smooth phase starts at time t, with guards on their surfaces or not.
     void begin_phase(double t) noexcept { armed_at_ = t; }
 
+    /// The guards are power series over the step in hand.
+    void see_series(const Step<X>& step)
+    {
+        this->see(step.guard_series(), step.time(0) == armed_at_);
+    }
+
     /// What is left to look at of guard i in the step, of which `end` is the end.
     [[nodiscard]] Watch watch(std::size_t i, const Step<X>& step, const GuardSample& end) const
     {

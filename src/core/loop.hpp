@@ -350,6 +350,9 @@ private:
     /// False: the run has ended.
     [[nodiscard]] bool take_step(double remaining);
 
+    /// The next step is no longer than its method knows to be right.
+    [[gnu::noinline]] void limit_to_reach();
+
     /// Shorter only where the setup ends within the step, at the surface of a guard.
     [[nodiscard]] bool take_fixed_step(double h, bool failed = false);
 

@@ -50,6 +50,7 @@ inline bool Loop<X, single>::return_to_domain()
         h_next_ = error_controlled_ ? h : h_next_;
         step_.attempt(h);
         bank_.sample_end(step_, calls());
+        if (this->on_series_) bank_.see_series(step_);
     }
 }
 

@@ -123,6 +123,7 @@ inline void Loop<X, single>::accept()
 template <class X, bool single>
 inline bool Loop<X, single>::take_step(double remaining)
 {
+    if (step_.knows_reach()) limit_to_reach();
     double longest = remaining;
     time_event_due_ = false;
     if (timed_) {
@@ -137,6 +138,15 @@ inline bool Loop<X, single>::take_step(double remaining)
     is_last_ = to_the_end && longest == remaining;
     const double h = to_the_end ? longest : h_next_;
     return error_controlled_ ? take_controlled_step(h, h_next_) : take_fixed_step(h);
+}
+
+template <class X, bool single>
+void Loop<X, single>::limit_to_reach()
+{
+    if (!error_controlled_) return;
+    // No shorter than is sensible: what cannot be taken at that length is refused by its error.
+    const double reach = std::max(step_.reach(options_.rtol, options_.atol), smallest_step());
+    h_next_ = std::min(h_next_, reach);
 }
 
 template <class X, bool single>

@@ -16,6 +16,7 @@
 #include "core/step.hpp"
 #include "core/wide.hpp"
 #include "ricochet/detail/cubic_look.hpp"
+#include "ricochet/detail/series_guard.hpp"
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
@@ -42,6 +43,20 @@ protected:
 
 public:
     using Guards::size;
+
+    /// The guards are power series over the step in hand; or none are known.
+    /// `starts`: a smooth phase starts with the step.
+    void see(const SeriesTerms& series, bool starts) noexcept
+    {
+        series_ = series;
+        starts_phase_ = starts;
+        forget_screening();
+    }
+    [[nodiscard]] bool has_series(std::size_t i) const noexcept
+    {
+        return series_.coefficients && !records_[i].info.boolean;
+    }
+    [[nodiscard]] const SeriesTerms& series() const noexcept { return series_; }
 
     /// Evaluates all guards inside a step, at its state `x` there.
     void sample_inside(const Step<X>& step, const X& x, std::uint64_t& calls)
@@ -126,6 +141,7 @@ public:
     /// been evaluated.
     [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
     {
+        if (has_series(i)) return false;
         if (!looked()) return true;
         const CubicLook look = cubic(i, h);
         return 0x1p16 * deviation(look, i) <= look.size();
@@ -143,6 +159,7 @@ public:
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
         if (sign_[i] == 0) return false;
+        if (has_series(i)) return !is_clear_of_series(i, h);
         const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
         const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
             return screen.suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
@@ -309,7 +326,7 @@ protected:
     {
         suspects_.clear();
         screened_ = as_screened_ = true;
-        if (are_few() || bands_) {
+        if (are_few() || bands_ || series_.coefficients) {
             for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
             return;
         }
@@ -377,6 +394,20 @@ protected:
         return other <= e ? e : other;  // NaN stays
     }
 
+    /// Whether the series of guard i proves that it stays on its side, as its end says.
+    [[nodiscard]] bool is_clear_of_series(std::size_t i, double h) const noexcept
+    {
+        const double touch = records_[i].info.touch;
+        const bool departs = records_[i].departs && starts_phase_;
+        if (records_[i].from > 0 || !(sign_[i] * g1_[i] > touch)) return false;
+        if (!departs && sign_[i] * g0_[i] < 0) return false;
+        const bool from_surface = departs || sign_[i] * g0_[i] <= touch;
+        return series_clears(series_, i, sign_[i], h, touch, from_surface) ||
+               series_clears_closely(series_, i, sign_[i], h, touch, from_surface);
+    }
+
+    SeriesTerms series_;
+    bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
     bool bands_ = false;        ///< whether any guard declares one
     bool screened_ = false;     ///< whether `suspects_` is of the step in hand

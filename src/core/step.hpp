@@ -159,6 +159,14 @@ public:
     /// Its inner nodes are computed when it is first asked for.
     [[nodiscard]] DenseParts<X> dense() const
     {
+        if (kernel_->series) {
+            return {.nodes = DenseNodes::series,
+                    .h = state_.h,
+                    .x0 = &state_.x0,
+                    .remainder = &state_.remainder,
+                    .rate0 = &state_.rate0,
+                    .series = kernel_->series(system_.door(), state_)};
+        }
         if (!state_.has_middle) prepare_dense();
         DenseParts<X> parts{.nodes = dense_nodes(),
                             .h = state_.h,
@@ -292,6 +300,21 @@ public:
     [[nodiscard]] double attempt(double h, double rtol, double atol)
     {
         return kernel_->attempt(system_.door(), state_, h, rtol, atol);
+    }
+
+    /// Whether guards have power series over the step.
+    [[nodiscard]] bool has_guard_series() const noexcept { return kernel_->guard_series; }
+    [[nodiscard]] SeriesTerms guard_series() const
+    {
+        return kernel_->guard_series(system_.door(), state_);
+    }
+
+    /// Whether the length of a step is known before it is taken.
+    [[nodiscard]] bool knows_reach() const noexcept { return kernel_->reach; }
+    /// That length [s].
+    [[nodiscard]] double reach(double rtol, double atol)
+    {
+        return kernel_->reach(system_.door(), state_, rtol, atol);
     }
 
     /// The end of the step becomes the start of the next.

@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
-# Compiles every case of refused.cpp with every compiler given, and compares the first error
+# Compiles every case of refused*.cpp with every compiler given, and compares the first error
 # with the sentence that the case asks for.
 # usage: run.sh SOURCE_TREE INCLUDE_FLAGS COMPILER...
 set -uo pipefail
 source=$(realpath "$1") flags=$2
 shift 2
-file="$source/tests/messages/refused.cpp"
 failed=0
 
 # first_error COMPILER FLAGS...: nothing where it compiles.
@@ -27,14 +26,18 @@ expect() { # WHAT FOUND EXPECTED
 }
 
 for compiler in "$@"; do
-    expect "$compiler, case 0" "$(first_error "$compiler" -DCASE=0)" ''
-    while IFS= read -r line; do
-        number=${line%%:*} text=${line#*: }
-        extra=()
-        [[ $text == *fast-math* ]] && extra=(-ffast-math)
-        expect "$compiler, case $number" \
-            "$(first_error "$compiler" "-DCASE=$number" "${extra[@]}")" "$text"
-    done < <(sed -nE 's|^// CASE ([0-9]+: .*)|\1|p' "$file")
+    for file in "$source"/tests/messages/refused*.cpp; do
+        name=$(basename "$file")
+        expect "$compiler, $name, case 0" "$(first_error "$compiler" -DCASE=0)" ''
+        while IFS= read -r line; do
+            number=${line%%:*} text=${line#*: }
+            extra=()
+            [[ $text == *fast-math* ]] && extra=(-ffast-math)
+            expect "$compiler, $name, case $number" \
+                "$(first_error "$compiler" "-DCASE=$number" "${extra[@]}")" "$text"
+        done < <(sed -nE 's|^// CASE ([0-9]+: .*)|\1|p' "$file")
+    done
+    file="$source/tests/messages/refused.cpp"
     expect "$compiler, -ffinite-math-only" \
         "$(first_error "$compiler" -DCASE=0 -ffinite-math-only)" 'ricochet: compiled with'
     expect "$compiler, allowed" "$(first_error "$compiler" -DCASE=0 -ffast-math \

@@ -145,11 +145,19 @@ concept CallableAround =
     Name::template takes<System, Anything, Anything, Middle..., Anything> ||
     Name::template takes<System, Anything, Anything, Anything, Middle..., Anything>;
 
+/// Callable with a time of the scalar type of the state, as templates over that type are.
+template <class Name, class System, class... States>
+concept CallableWithTime =
+    Name::template takes<System, double, States...> ||
+    Name::template takes<System, Anything, double, States...> ||
+    Name::template takes<System, Anything, Anything, double, States...>;
+
 /// Callable somehow. States are given as such, and last nothing but arguments of any
 /// type, so that templates of a state are not tried with something that is none.
 template <class Name, class System, class X>
 concept CallableSomehow =
-    CallableAround<Name, System, X&, X&> || CallableAround<Name, System, X&> || CallableAround<Name, System>;
+    CallableAround<Name, System, X&, X&> || CallableAround<Name, System, X&> || CallableAround<Name, System> ||
+    CallableWithTime<Name, System, X&, X&> || CallableWithTime<Name, System, X&>;
 
 /// Of a function that fits no form, why.
 template <class Name, class System, class X>

@@ -25,6 +25,7 @@ enum class DenseNodes {
     middle_end,  ///< quartic: the middle without its slope, the end with it
     half_end,    ///< quintic: the middle and the end, with slopes
     thirds_end,  ///< degree 7: both thirds and the end, with slopes
+    series,      ///< none: the coefficients of a power series
 };
 
 [[nodiscard]] constexpr int degree_of(DenseNodes nodes) noexcept
@@ -34,6 +35,7 @@ enum class DenseNodes {
         case DenseNodes::middle_end: return 4;
         case DenseNodes::half_end: return 5;
         case DenseNodes::thirds_end: return 7;
+        case DenseNodes::series: break;
     }
     return 0;
 }
@@ -102,11 +104,31 @@ template <std::size_t n>
         case DenseNodes::half_end: return hermite_weights<2>({0.5, 1}, u, derivative);
         case DenseNodes::thirds_end:
             return hermite_weights<3>({1.0 / 3, 2.0 / 3, 1}, u, derivative);
+        case DenseNodes::series: break;
     }
     return {};
 }
 
 }  // namespace detail
+
+/// Coefficients of power series in the offset from the start of a step: that of s^k in component i
+/// is `coefficients[k stride + i]`.
+struct SeriesTerms {
+    const double* coefficients = nullptr;
+    int order = 0;
+    std::size_t stride = 0;
+
+    /// The departure from the tangent, or its derivative, at offset s.
+    [[nodiscard]] double departure(std::size_t i, double s, bool derivative) const noexcept
+    {
+        double sum = 0;
+        for (int k = order; k > 1; --k) {
+            const double c = coefficients[static_cast<std::size_t>(k) * stride + i];
+            sum = sum * s + (derivative ? k * c : c);
+        }
+        return derivative ? sum * s : sum * s * s;
+    }
+};
 
 /// The parts of a step's polynomial. Nodes are in ascending order, the end last.
 template <class X>
@@ -118,6 +140,12 @@ struct DenseParts {
     const X* rate0 = nullptr;
     std::array<const X*, 3> w{};      ///< departures at the nodes
     std::array<const X*, 3> slope{};  ///< their slopes per second; null where not used
+    SeriesTerms series{};             ///< in the place of nodes
+
+    [[nodiscard]] int degree() const noexcept
+    {
+        return nodes == DenseNodes::series ? series.order : degree_of(nodes);
+    }
 };
 
 /// x(s), or x'(s) if `derivative`, a component at a time. Valid while the step is.
@@ -141,6 +169,9 @@ public:
     {
         const auto i = static_cast<decltype(parts_.x0->size())>(index);
         double bent = 0;
+        if (parts_.series.order > 0) {
+            bent = parts_.series.departure(static_cast<std::size_t>(i), s_, derivative);
+        }
         for (std::size_t k = 0; k < 3 && parts_.w[k]; ++k) {
             bent += weights_.value[k] * (*parts_.w[k])[i];
             if (parts_.slope[k]) bent += weights_.slope[k] * (*parts_.slope[k])[i];

@@ -25,6 +25,7 @@ struct ErrorRule {
     /// h_new / h for a finite `error` >= 0.
     [[nodiscard]] double factor(double error, int order) const noexcept
     {
+        if (error == 0) return largest;
         double floor = 1;  // (safety / largest)^order: no power is taken below it
         for (int i = 0; i < order; ++i) {
             floor *= safety / largest;

@@ -118,8 +118,15 @@ struct StepKernel {
     /// The departure after a step of length s, with its rate where the method gives it; the step
     /// in hand stays as it is.
     void (*depart)(void* door, StepState<X>& step, double s, X& w, X& rate) = nullptr;
+    /// The length of the step from here that meets the tolerance; then `attempt` at no more than that
+    /// returns 0. Null where a length is known to be right only afterwards.
+    double (*reach)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
     /// w(s) on an interpolant of the method's own, or null.
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
+    /// The step in hand where it is a power series, or null.
+    SeriesTerms (*series)(void* door, const StepState<X>& step) = nullptr;
+    /// The guards on it, all of them, or null.
+    SeriesTerms (*guard_series)(void* door, const StepState<X>& step) = nullptr;
     /// The state has another dimension. Null where nothing is kept.
     void (*renew)(void* door) = nullptr;
 

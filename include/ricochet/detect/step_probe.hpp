@@ -243,7 +243,7 @@ public:
     {
         if constexpr (DenseStep<Step, State>) {
             if (has_polynomial(*step_)) {
-                return guard_->degree() * degree_of(step_->dense().nodes);
+                return guard_->degree() * step_->dense().degree();
             }
         }
         return 0;

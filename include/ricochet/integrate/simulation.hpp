@@ -86,6 +86,7 @@ public:
         : door_(system, x0), stepping_(stepping), detector_(detector), locator_(locator)
     {
         check_bound_declarations<System, X>();
+        if constexpr (requires { door_.prepare(stepping_.value); }) door_.prepare(stepping_.value);
     }
     PartsOfRun(const PartsOfRun&) = delete;
     PartsOfRun& operator=(const PartsOfRun&) = delete;

@@ -68,6 +68,12 @@ public:
             for (State* x : {&piece.x0, &piece.remainder, &piece.rate0}) visit.state(*x);
             for (State& x : piece.w) visit.state(x);
             for (State& x : piece.slope) visit.state(x);
+            if (piece.nodes == DenseNodes::series) {
+                std::size_t numbers = piece.series.size();
+                visit(numbers);
+                piece.series.resize(numbers);
+                for (double& number : piece.series) visit(number);
+            }
         }
     }
 
@@ -86,6 +92,11 @@ public:
         for (std::size_t k = 0; k < 3; ++k) {
             if (parts.w[k]) piece.w.push_back(*parts.w[k]);
             if (parts.w[k] && parts.slope[k]) piece.slope.push_back(*parts.slope[k]);
+        }
+        if (parts.nodes == DenseNodes::series) {
+            const double* const first = parts.series.coefficients;
+            const auto orders = static_cast<std::size_t>(parts.series.order) + 1;
+            piece.series.assign(first, first + orders * parts.series.stride);
         }
         pieces_.push_back(std::move(piece));
     }
@@ -111,7 +122,8 @@ public:
                                   .remainder = convert(piece.remainder),
                                   .rate0 = convert(piece.rate0),
                                   .w = all(piece.w),
-                                  .slope = all(piece.slope)});
+                                  .slope = all(piece.slope),
+                                  .series = piece.series});
         }
     }
 
@@ -132,6 +144,7 @@ private:
         DenseNodes nodes;
         State x0, remainder, rate0;
         std::vector<State> w{}, slope{};
+        std::vector<double> series{};
     };
 
     [[nodiscard]] static double offset(const Piece& piece, double t) noexcept
@@ -160,6 +173,9 @@ private:
             if (k >= without_slope) parts.slope[k] = &piece.slope[k - without_slope];
         }
         State x = piece.x0;
+        if (const auto n = static_cast<std::size_t>(x.size()); piece.series.size() >= 2 * n) {
+            parts.series = {piece.series.data(), static_cast<int>(piece.series.size() / n) - 1, n};
+        }
         const double s = std::clamp(offset(piece, t), 0.0, piece.length);
         if (s > 0) {
             const DenseView<State, false> view(parts, s);

@@ -1,0 +1,80 @@
+// Internal: what it declares may change without notice.
+//
+// A guard whose power series over a step is known.
+//
+// In the part u = s / h of the step p(u) = sum_k q_k u^k, positive on the armed side. The first
+// four terms in Bernstein form, less the sizes of all others and a bound of the rounding, are below
+// p everywhere: mostly that settles a step. Else the whole polynomial is brought into Bernstein
+// form and halved until each part has no change of sign, or one (Farouki 2012, section 5.3); what
+// rounding leaves in doubt is said to be in doubt.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "ricochet/detail/dense_polynomial.hpp"
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet::detail {
+
+/// What the polynomial of a guard does first in a stretch of a step, apart from a root at its
+/// start.
+struct SeriesStretch {
+    enum class Kind {
+        clear,     ///< stays on its side
+        crossing,  ///< has one root between `lo` and `hi`, and leaves its side there
+        unsure,    ///< is clear before `lo`, and not known up to `hi`
+    };
+    Kind kind = Kind::unsure;
+    double lo = 0;  ///< [s] offset in the step
+    double hi = 0;  ///< [s]
+};
+
+/// Whether guard i, times `sign`, stays above `touch` in (0, h], proved but for what its series
+/// leaves out. `from_surface`: it starts on its surface, and this root is divided out.
+[[nodiscard, gnu::always_inline]] inline bool series_clears(const SeriesTerms& terms, std::size_t i,
+                                                            double sign, double h, double touch,
+                                                            bool from_surface) noexcept
+{
+    const double* const g = terms.coefficients + i;
+    const std::size_t n = terms.stride;
+    const auto size_of = [&](int k) { return std::fabs(g[static_cast<std::size_t>(k) * n]); };
+    const double h2 = h * h;
+    const double h4 = h2 * h2;
+    double tail = size_of(terms.order);
+    for (int k = terms.order - 4; k >= 4; k -= 4) {
+        tail = tail * h4 +
+               ((size_of(k) + h * size_of(k + 1)) + h2 * (size_of(k + 2) + h * size_of(k + 3)));
+    }
+    tail *= h4;
+    const double q0 = sign * g[0];
+    const double q1 = sign * g[n] * h;
+    const double q2 = sign * g[2 * n] * h2;
+    const double q3 = sign * g[3 * n] * (h * h2);
+    // Some 50 roundings of at most the sum of all sizes.
+    const double size = ((std::fabs(q0) + std::fabs(q1)) + (std::fabs(q2) + std::fabs(q3))) + tail;
+    const double less = tail + 0x1p-47 * size;
+    if (from_surface) {
+        if (std::fabs(q0) > touch + 0x1p-44 * size) return false;
+        const double middle = q1 + 0.5 * q2;
+        return std::min(std::min(q1, middle), q1 + (q2 + q3)) - less > 0 &&
+               q0 + (q1 + (q2 + q3)) - less > touch;
+    }
+    const double b1 = q0 + (1.0 / 3) * q1;
+    const double b2 = q0 + (1.0 / 3) * (2 * q1 + q2);
+    const double b3 = q0 + (q1 + (q2 + q3));
+    return std::min(std::min(q0, b1), std::min(b2, b3)) - less > touch;
+}
+
+/// The same with more terms, up to all of them.
+[[nodiscard]] bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign,
+                                         double h, double touch, bool from_surface) noexcept;
+
+/// What guard i, times `sign`, does first between the offsets `from` and `to` of a step of length
+/// h.
+[[nodiscard]] SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign,
+                                          double h, double from, double to, double touch,
+                                          bool from_surface) noexcept;
+
+}  // namespace ricochet::detail

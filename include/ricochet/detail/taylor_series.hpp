@@ -1,0 +1,537 @@
+// Internal: what it declares may change without notice.
+//
+// Taylor coefficients of a motion, from the tape of its flow.
+//
+// With x(t0 + s) = sum_k x_k s^k and the same for every operation, the flow gives
+// (k + 1) x_{k+1} = f_k, and each operation has a recurrence for its own coefficient k from those
+// of its operands (Moore, Interval Analysis, 1966, chapter 11; Griewank and Walther, Evaluating
+// Derivatives, section 13.2). Coefficients are normalized: f_k is the k-th derivative over k!.
+//
+// Sums begin with their middle terms and end with the newest coefficients, so that only two
+// additions wait for the operation before. Short tapes are unrolled over operations and orders;
+// longer ones over operations alone.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <type_traits>
+#include <utility>
+
+#include "ricochet/detail/taylor_tape.hpp"
+
+namespace ricochet::detail {
+
+/// Term i of a sum from `lo` to `hi`, from the middle outward.
+[[nodiscard]] constexpr int outward(int lo, int hi, int i) noexcept
+{
+    const int middle = (lo + hi) / 2;
+    const bool above = i % 2 == 1;
+    // Of an even number of terms the middle lies below the half, of an odd one on it.
+    return above ? middle + (i + 1) / 2 : middle - i / 2;
+}
+
+/// Sums of products of coefficients, for an order k known to the compiler.
+template <int k>
+struct AtOrder {
+    static constexpr int value = k;
+
+    /// sum of a_j b_{k-j} for j from lo to hi
+    template <int lo, int hi>
+    [[nodiscard, gnu::always_inline]] static double convolve(const double* a, const double* b)
+    {
+        if constexpr (lo > hi) {
+            return 0;
+        } else {
+            return [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
+            {
+                return (... + (a[outward(lo, hi, i)] * b[k - outward(lo, hi, i)]));
+            }
+            (std::make_integer_sequence<int, hi - lo + 1>{});
+        }
+    }
+    /// sum of ((exponent + 1) j / k - 1) a_j p_{k-j} for j from 1 to hi
+    template <int hi>
+    [[nodiscard, gnu::always_inline]] static double power(double exponent, const double* a,
+                                                          const double* p)
+    {
+        return [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
+        {
+            return (... + (((exponent + 1) * outward(1, hi, i) / k - 1) * a[outward(1, hi, i)] *
+                           p[k - outward(1, hi, i)]));
+        }
+        (std::make_integer_sequence<int, hi>{});
+    }
+};
+
+/// Beyond this many operations only the operations are unrolled: over the orders, too, they take
+/// the compiler longer than they save.
+inline constexpr std::size_t most_unrolled_ops = 30;
+template <const auto& tape>
+inline constexpr bool is_unrolled = tape.ops.size() - tape.states - 1 <= most_unrolled_ops;
+
+/// The coefficients of one motion: `constants`, time and state in, those of the state out.
+/// @tparam tape  of type `TaylorTape`
+/// @tparam most  the largest order
+template <const auto& tape, int most, bool unrolled = is_unrolled<tape>>
+class TaylorSeries {
+    using Tape = std::remove_cvref_t<decltype(tape)>;
+    static constexpr int n = static_cast<int>(Tape::states);
+    static constexpr int m = static_cast<int>(Tape::guards);
+    static constexpr int ops = static_cast<int>(Tape::ops_count);
+
+    /// Of the series whose coefficients times their orders are wanted.
+    static constexpr auto slopes_wanted = [] {
+        std::array<bool, Tape::ops_count> wanted{};
+        for (std::size_t i = Tape::states + 1; i < Tape::ops_count; ++i) {
+            switch (tape.ops[i].op) {
+                case TaylorOp::exponential:
+                case TaylorOp::sine:
+                case TaylorOp::cosine:
+                case TaylorOp::hyperbolic_sine:
+                case TaylorOp::hyperbolic_cosine:
+                case TaylorOp::tangent:
+                case TaylorOp::hyperbolic_tangent:
+                    wanted[static_cast<std::size_t>(tape.ops[i].a)] = true;
+                    break;
+                case TaylorOp::logarithm:
+                case TaylorOp::arc_sine:
+                case TaylorOp::arc_cosine:
+                case TaylorOp::arc_tangent: wanted[i] = true; break;
+                default: break;
+            }
+        }
+        return wanted;
+    }();
+    template <int i>
+    static constexpr bool has_slope = slopes_wanted[static_cast<std::size_t>(i)];
+
+public:
+    /// out[k n + i] = coefficient k of component i, up to `order`: `most`, or one of those that are
+    /// 4 and 8 less. The same of the m guards in `guards`.
+    static void compute(const double* constants, double t, const double* x, int order, double* out,
+                        double* guards)
+    {
+        TaylorSeries series(constants, guards);
+        for (int i = 0; i < n; ++i) out[i] = series.c_[i][0] = x[i];
+        series.c_[n][0] = t;
+        series.c_[n][1] = 1;
+        if constexpr (unrolled) {
+            series.unroll(order, out, std::make_integer_sequence<int, most>{});
+        } else {
+            series.start(out, std::make_integer_sequence<int, ops>{});
+            for (int k = 1; k < order; ++k) {
+                series.loop(k, out, std::make_integer_sequence<int, ops>{});
+            }
+            series.end_guards(order, std::make_integer_sequence<int, ops>{});
+        }
+    }
+
+private:
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): see below
+    TaylorSeries(const double* constants, double* guards) noexcept
+        : constants_(constants), guards_(guards)
+    {
+        if constexpr (!unrolled) {
+            for (auto& series : c_) std::fill(series, series + most + 1, 0.0);
+        }
+    }
+
+    [[nodiscard]] static constexpr int degree(int i) noexcept
+    {
+        return tape.degree[static_cast<std::size_t>(i)];
+    }
+    [[nodiscard]] static constexpr TapeOp op_at(int i) noexcept
+    {
+        return tape.ops[static_cast<std::size_t>(i)];
+    }
+    [[nodiscard]] static constexpr int smaller(int a, int b) noexcept { return a < b ? a : b; }
+    [[nodiscard]] static constexpr int larger(int a, int b) noexcept { return a > b ? a : b; }
+
+    template <int... k>
+    [[gnu::always_inline]] void unroll(int order, double* out, std::integer_sequence<int, k...>)
+    {
+        // Stops where the coefficient k + 1 of the state was the last one wanted.
+        static_cast<void>((... || at_order<k>(order, out)));
+    }
+
+    template <int k>
+    [[gnu::always_inline]] bool at_order(int order, double* out)
+    {
+        run<k>(std::make_integer_sequence<int, ops>{});
+        [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
+        {
+            (advance<k, i>(out), ...);
+        }
+        (std::make_integer_sequence<int, n>{});
+        keep_guards<k>();
+        if constexpr (k + 1 == most || k + 1 == most - 4 || k + 1 == most - 8) {
+            if (order != k + 1) return false;
+            if constexpr (m > 0) {
+                run_for_guards<k + 1>(std::make_integer_sequence<int, ops>{});
+                keep_guards<k + 1>();
+            }
+            return true;
+        }
+        return false;
+    }
+
+    template <int k>
+    [[gnu::always_inline]] void keep_guards()
+    {
+        [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
+        {
+            (keep_guard<k, i>(), ...);
+        }
+        (std::make_integer_sequence<int, m>{});
+    }
+    template <int k, int i>
+    [[gnu::always_inline]] void keep_guard()
+    {
+        constexpr int guard = tape.outputs[static_cast<std::size_t>(n + i)];
+        double value = 0;
+        if constexpr (k <= degree(guard)) value = c_[guard][k];
+        guards_[k * m + i] = value;
+    }
+    template <int k, int... i>
+    [[gnu::always_inline]] void run_for_guards(std::integer_sequence<int, i...>)
+    {
+        (compute_for_guards<k, i>(), ...);
+    }
+    template <int k, int i>
+    [[gnu::always_inline]] void compute_for_guards()
+    {
+        if constexpr (tape.for_guards[static_cast<std::size_t>(i)]) compute_op<k, i>();
+    }
+
+    template <int k, int... i>
+    [[gnu::always_inline]] void run(std::integer_sequence<int, i...>)
+    {
+        (compute_op<k, i>(), ...);
+    }
+
+    /// x_{k+1} = f_k / (k + 1)
+    template <int k, int i>
+    [[gnu::always_inline]] void advance(double* out)
+    {
+        constexpr int rate = tape.outputs[static_cast<std::size_t>(i)];
+        double next = 0;
+        if constexpr (k <= degree(rate)) next = c_[rate][k] * (1.0 / (k + 1));
+        c_[i][k + 1] = next;
+        out[(k + 1) * n + i] = next;
+    }
+
+    /// j times coefficient j of series a
+    template <int a>
+    [[nodiscard, gnu::always_inline]] const double* slope() const noexcept
+    {
+        return slope_[a];
+    }
+
+    /// What a function of a number is at the start.
+    template <int i>
+    [[gnu::always_inline]] void begin_op()
+    {
+        constexpr TapeOp op = op_at(i);
+        double& out = c_[i][0];
+        const double c = has_constant(op.op) ? constants_[i] : 0;
+        const double a = op.a >= 0 ? c_[op.a][0] : 0;
+        const double b = op.b >= 0 ? c_[op.b][0] : 0;
+        if constexpr (op.op == TaylorOp::constant) {
+            out = c;
+        } else if constexpr (op.op == TaylorOp::sum) {
+            out = a + b;
+        } else if constexpr (op.op == TaylorOp::difference) {
+            out = a - b;
+        } else if constexpr (op.op == TaylorOp::negative) {
+            out = -a;
+        } else if constexpr (op.op == TaylorOp::product) {
+            out = a * b;
+        } else if constexpr (op.op == TaylorOp::square) {
+            out = a * a;
+        } else if constexpr (op.op == TaylorOp::quotient) {
+            out = a / b;
+            inverse_[i] = 1 / b;
+        } else if constexpr (op.op == TaylorOp::plus_constant) {
+            out = a + c;
+        } else if constexpr (op.op == TaylorOp::minus_constant) {
+            out = a - c;
+        } else if constexpr (op.op == TaylorOp::constant_minus) {
+            out = c - a;
+        } else if constexpr (op.op == TaylorOp::times_constant ||
+                             op.op == TaylorOp::over_constant) {
+            out = c * a;
+        } else if constexpr (op.op == TaylorOp::constant_over) {
+            out = c / a;
+            inverse_[i] = -1 / a;
+        } else if constexpr (op.op == TaylorOp::square_root) {
+            out = std::sqrt(a);
+            inverse_[i] = 0.5 / out;
+        } else if constexpr (op.op == TaylorOp::power) {
+            out = op.exponent == 1.0 / 3 ? std::cbrt(a) : std::pow(a, op.exponent);
+            inverse_[i] = 1 / a;
+        } else if constexpr (op.op == TaylorOp::exponential) {
+            out = std::exp(a);
+        } else if constexpr (op.op == TaylorOp::logarithm) {
+            out = std::log(a);
+            inverse_[i] = 1 / a;
+        } else if constexpr (op.op == TaylorOp::sine) {
+            out = std::sin(a);
+        } else if constexpr (op.op == TaylorOp::cosine) {
+            out = std::cos(a);
+        } else if constexpr (op.op == TaylorOp::hyperbolic_sine) {
+            out = std::sinh(a);
+        } else if constexpr (op.op == TaylorOp::hyperbolic_cosine) {
+            out = std::cosh(a);
+        } else if constexpr (op.op == TaylorOp::tangent) {
+            out = std::tan(a);
+        } else if constexpr (op.op == TaylorOp::hyperbolic_tangent) {
+            out = std::tanh(a);
+        } else if constexpr (op.op == TaylorOp::arc_sine) {
+            out = std::asin(a);
+            inverse_[i] = 1 / b;
+        } else if constexpr (op.op == TaylorOp::arc_cosine) {
+            out = std::acos(a);
+            inverse_[i] = 1 / b;
+        } else if constexpr (op.op == TaylorOp::arc_tangent) {
+            out = std::atan(a);
+            inverse_[i] = 1 / b;
+        }
+    }
+
+    template <int k, int i>
+    [[gnu::always_inline]] void compute_op()
+    {
+        if constexpr (i > n && k <= degree(i)) {
+            if constexpr (k == 0) {
+                begin_op<i>();
+            } else {
+                c_[i][k] = coefficient<k, i>();
+            }
+        }
+        if constexpr (k > 0 && has_slope<i> && k <= degree(i)) slope_[i][k] = k * c_[i][k];
+    }
+
+    template <int k, int i>
+    [[nodiscard, gnu::always_inline]] double coefficient() const
+    {
+        using Sum = AtOrder<k>;
+        constexpr TapeOp op = op_at(i);
+        constexpr int da = degree(larger(op.a, 0));
+        constexpr int db = degree(larger(op.b, 0));
+        const double* const a = c_[larger(op.a, 0)];
+        const double* const b = c_[larger(op.b, 0)];
+        const double* const own = c_[i];
+        // Ranges of j in sums of a_j b_{k-j}; with i's own coefficients, up to k - 1.
+        constexpr int upto_a = smaller(da, k);
+        constexpr int upto_b = smaller(db, k);
+        if constexpr (op.op == TaylorOp::sum) {
+            if constexpr (k > da) return b[k];
+            if constexpr (k > db) return a[k];
+            if constexpr (k <= da && k <= db) return a[k] + b[k];
+        } else if constexpr (op.op == TaylorOp::difference) {
+            if constexpr (k > da) return -b[k];
+            if constexpr (k > db) return a[k];
+            if constexpr (k <= da && k <= db) return a[k] - b[k];
+        } else if constexpr (op.op == TaylorOp::negative || op.op == TaylorOp::constant_minus) {
+            return -a[k];
+        } else if constexpr (op.op == TaylorOp::plus_constant ||
+                             op.op == TaylorOp::minus_constant) {
+            return a[k];
+        } else if constexpr (op.op == TaylorOp::times_constant ||
+                             op.op == TaylorOp::over_constant) {
+            return constants_[i] * a[k];
+        } else if constexpr (op.op == TaylorOp::product) {
+            return Sum::template convolve<larger(0, k - db), upto_a>(a, b);
+        } else if constexpr (op.op == TaylorOp::square) {
+            return square<k, larger(0, k - da)>(a);
+        } else if constexpr (op.op == TaylorOp::quotient) {
+            const double sum = Sum::template convolve<1, upto_b>(b, own);
+            if constexpr (k > da) return -sum * inverse_[i];
+            if constexpr (k <= da) return (a[k] - sum) * inverse_[i];
+        } else if constexpr (op.op == TaylorOp::constant_over) {
+            return Sum::template convolve<1, upto_a>(a, own) * inverse_[i];
+        } else if constexpr (op.op == TaylorOp::square_root) {
+            const double sum = square<k, 1>(own);
+            if constexpr (k > da) return -sum * inverse_[i];
+            if constexpr (k <= da) return (a[k] - sum) * inverse_[i];
+        } else if constexpr (op.op == TaylorOp::power) {
+            return Sum::template power<upto_a>(op.exponent, a, own) * inverse_[i];
+        } else if constexpr (op.op == TaylorOp::exponential) {
+            return Sum::template convolve<1, upto_a>(slope<op.a>(), own) * (1.0 / k);
+        } else if constexpr (op.op == TaylorOp::sine || op.op == TaylorOp::hyperbolic_sine ||
+                             op.op == TaylorOp::hyperbolic_cosine) {
+            return Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (1.0 / k);
+        } else if constexpr (op.op == TaylorOp::cosine) {
+            return Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (-1.0 / k);
+        } else if constexpr (op.op == TaylorOp::tangent) {
+            const double sum = Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (1.0 / k);
+            if constexpr (k > da) return sum;
+            if constexpr (k <= da) return a[k] + sum;
+        } else if constexpr (op.op == TaylorOp::hyperbolic_tangent) {
+            const double sum = Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (1.0 / k);
+            if constexpr (k > da) return -sum;
+            if constexpr (k <= da) return a[k] - sum;
+        } else if constexpr (op.op == TaylorOp::logarithm || op.op == TaylorOp::arc_sine ||
+                             op.op == TaylorOp::arc_cosine || op.op == TaylorOp::arc_tangent) {
+            // b g' = a', or -a'
+            constexpr bool log = op.op == TaylorOp::logarithm;
+            constexpr int d = log ? da : db;
+            const double sum =
+                Sum::template convolve<larger(1, k - d), k - 1>(slope<i>(), log ? a : b) *
+                (1.0 / k);
+            double first = 0;
+            if constexpr (k <= da) first = op.op == TaylorOp::arc_cosine ? -a[k] : a[k];
+            return (first - sum) * inverse_[i];
+        }
+    }
+
+    /// sum of a_j a_{k-j} for j from lo to k - lo
+    template <int k, int lo>
+    [[nodiscard, gnu::always_inline]] static double square(const double* a)
+    {
+        const double twice = 2 * AtOrder<k>::template convolve<lo, (k - 1) / 2>(a, a);
+        if constexpr (k % 2 == 0 && lo <= k / 2) return twice + a[k / 2] * a[k / 2];
+        return twice;
+    }
+
+    // --- loops over the orders ---
+
+    template <int... i>
+    [[gnu::always_inline]] void start(double* out, std::integer_sequence<int, i...>)
+    {
+        (compute_op<0, i>(), ...);
+        advance_all(0, out);
+    }
+    template <int... i>
+    [[gnu::always_inline]] void loop(int k, double* out, std::integer_sequence<int, i...>)
+    {
+        (compute_at<i>(k), ...);
+        advance_all(k, out);
+    }
+    void advance_all(int k, double* out)
+    {
+        for (int i = 0; i < n; ++i) {
+            const int rate = tape.outputs[static_cast<std::size_t>(i)];
+            const double next = c_[rate][k] / (k + 1);
+            c_[i][k + 1] = next;
+            out[(k + 1) * n + i] = next;
+        }
+        keep_guards_at(k);
+    }
+    void keep_guards_at(int k)
+    {
+        for (int i = 0; i < m; ++i) {
+            guards_[k * m + i] = c_[tape.outputs[static_cast<std::size_t>(n + i)]][k];
+        }
+    }
+    template <int... i>
+    [[gnu::always_inline]] void end_guards([[maybe_unused]] int k, std::integer_sequence<int, i...>)
+    {
+        if constexpr (m > 0) {
+            (end_op<i>(k), ...);
+            keep_guards_at(k);
+        }
+    }
+    template <int i>
+    [[gnu::always_inline]] void end_op(int k)
+    {
+        if constexpr (tape.for_guards[static_cast<std::size_t>(i)]) compute_at<i>(k);
+    }
+
+    /// sum of a_j b_{k-j} for j from lo to hi
+    [[nodiscard]] static double convolve(int k, int lo, int hi, const double* a, const double* b)
+    {
+        double even = 0, odd = 0;
+        int j = lo;
+        for (; j < hi; j += 2) {
+            even += a[j] * b[k - j];
+            odd += a[j + 1] * b[k - j - 1];
+        }
+        if (j == hi) even += a[j] * b[k - j];
+        return even + odd;
+    }
+    [[nodiscard]] static double square(int k, int lo, const double* a)
+    {
+        const double twice = 2 * convolve(k, lo, (k - 1) / 2, a, a);
+        return k % 2 == 0 && lo <= k / 2 ? twice + a[k / 2] * a[k / 2] : twice;
+    }
+
+    template <int i>
+    [[gnu::always_inline]] void compute_at(int k)
+    {
+        if constexpr (i > n) c_[i][k] = coefficient_at<i>(k);
+        if constexpr (has_slope<i>) {
+            slope_[i][k] = k * c_[i][k];
+        }
+    }
+
+    /// As `coefficient`; coefficients beyond a degree are zeros here.
+    template <int i>
+    [[nodiscard, gnu::always_inline]] double coefficient_at(int k) const
+    {
+        constexpr TapeOp op = op_at(i);
+        constexpr int da = degree(larger(op.a, 0));
+        constexpr int db = degree(larger(op.b, 0));
+        const double* const a = c_[larger(op.a, 0)];
+        const double* const b = c_[larger(op.b, 0)];
+        const double* const own = c_[i];
+        const int upto_a = smaller(da, k);
+        const int upto_b = smaller(db, k);
+        switch (op.op) {
+            case TaylorOp::sum: return a[k] + b[k];
+            case TaylorOp::difference: return a[k] - b[k];
+            case TaylorOp::negative:
+            case TaylorOp::constant_minus: return -a[k];
+            case TaylorOp::plus_constant:
+            case TaylorOp::minus_constant: return a[k];
+            case TaylorOp::times_constant:
+            case TaylorOp::over_constant: return constants_[i] * a[k];
+            case TaylorOp::product: return convolve(k, larger(0, k - db), upto_a, a, b);
+            case TaylorOp::square: return square(k, larger(0, k - da), a);
+            case TaylorOp::quotient: return (a[k] - convolve(k, 1, upto_b, b, own)) * inverse_[i];
+            case TaylorOp::constant_over: return convolve(k, 1, upto_a, a, own) * inverse_[i];
+            case TaylorOp::square_root: return (a[k] - square(k, 1, own)) * inverse_[i];
+            case TaylorOp::power: {
+                double sum = 0;
+                const double each = (op.exponent + 1) / k;
+                for (int j = 1; j <= upto_a; ++j) sum += (each * j - 1) * a[j] * own[k - j];
+                return sum * inverse_[i];
+            }
+            case TaylorOp::exponential:
+                return convolve(k, 1, upto_a, slope<larger(op.a, 0)>(), own) / k;
+            case TaylorOp::sine:
+            case TaylorOp::hyperbolic_sine:
+            case TaylorOp::hyperbolic_cosine:
+                return convolve(k, 1, upto_a, slope<larger(op.a, 0)>(), b) / k;
+            case TaylorOp::cosine: return -convolve(k, 1, upto_a, slope<larger(op.a, 0)>(), b) / k;
+            case TaylorOp::tangent:
+                return a[k] + convolve(k, 1, upto_a, slope<larger(op.a, 0)>(), b) / k;
+            case TaylorOp::hyperbolic_tangent:
+                return a[k] - convolve(k, 1, upto_a, slope<larger(op.a, 0)>(), b) / k;
+            case TaylorOp::logarithm:
+                return (a[k] - convolve(k, larger(1, k - da), k - 1, slope<i>(), a) / k) *
+                       inverse_[i];
+            case TaylorOp::arc_sine:
+            case TaylorOp::arc_tangent:
+                return (a[k] - convolve(k, larger(1, k - db), k - 1, slope<i>(), b) / k) *
+                       inverse_[i];
+            case TaylorOp::arc_cosine:
+                return (-a[k] - convolve(k, larger(1, k - db), k - 1, slope<i>(), b) / k) *
+                       inverse_[i];
+            case TaylorOp::input:
+            case TaylorOp::constant: break;
+        }
+        return 0;
+    }
+
+    const double* constants_;
+    double* guards_;
+    // Unrolled, no coefficient is read that was not written.
+    double c_[ops][most + 1];      // NOLINT(*-avoid-c-arrays): indices are int
+    double slope_[ops][most + 1];  // NOLINT(*-avoid-c-arrays)
+    double inverse_[ops];          // NOLINT(*-avoid-c-arrays)
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,170 @@
+#include "ricochet/detail/series_guard.hpp"
+
+#include <array>
+#include <limits>
+
+namespace ricochet::detail {
+
+namespace {
+
+constexpr int most_degree = 20;
+/// A part of 2^-10 of a step is a parabola to the last bit.
+constexpr int most_halvings = 10;
+using Coefficients = std::array<double, most_degree + 1>;
+
+/// 1 / C(n, k)
+inline constexpr auto inverse_binomials = [] {
+    std::array<Coefficients, most_degree + 1> out{};
+    for (std::size_t n = 0; n <= most_degree; ++n) {
+        double binomial = 1;
+        for (std::size_t k = 0; k <= n; ++k) {
+            out[n][k] = 1 / binomial;
+            binomial = binomial * static_cast<double>(n - k) / static_cast<double>(k + 1);
+        }
+    }
+    return out;
+}();
+
+/// The degree of the series of guard i without zeros at its end; at least 1.
+[[nodiscard]] int degree_of(const SeriesTerms& terms, std::size_t i) noexcept
+{
+    int degree = terms.order;
+    while (degree > 1 &&
+           terms.coefficients[static_cast<std::size_t>(degree) * terms.stride + i] == 0) {
+        --degree;
+    }
+    return degree;
+}
+
+class SeriesSearch {
+public:
+    SeriesSearch(int degree, double h, double touch) noexcept
+        : degree_(degree), h_(h), touch_(touch)
+    {
+    }
+
+    /// The sum of the sizes of all terms.
+    [[nodiscard]] double size() const noexcept { return size_; }
+
+    /// The coefficients in Bernstein form on [0, 1]; terms beyond the degree are errors.
+    void convert(const SeriesTerms& terms, std::size_t i, double sign, Coefficients& c) noexcept
+    {
+        const Coefficients& inverse = inverse_binomials[at(degree_)];
+        double power = sign;
+        double size = 0;
+        double tail = 0;
+        for (int k = 0; k <= terms.order; ++k) {
+            const double q =
+                power * terms.coefficients[static_cast<std::size_t>(k) * terms.stride + i];
+            size += std::fabs(q);
+            if (k <= degree_) {
+                c[at(k)] = q * inverse[at(k)];
+            } else {
+                tail += std::fabs(q);
+            }
+            power *= h_;
+        }
+        for (int r = 1; r <= degree_; ++r) {
+            for (int j = degree_; j >= r; --j) c[at(j)] += c[at(j - 1)];
+        }
+        // Each coefficient is a sum of `degree` terms that are together no larger than the size,
+        // with powers of as many roundings.
+        size_ = size;
+        error_ = tail + 4 * degree_ * std::numeric_limits<double>::epsilon() * size;
+    }
+
+    /// Replaces the coefficients on [0, 1] by those on [0, u], or [u, 1].
+    void keep_left(Coefficients& c, double u) noexcept
+    {
+        for (int r = 1; r <= degree_; ++r) {
+            for (int j = degree_; j >= r; --j) c[at(j)] = (1 - u) * c[at(j - 1)] + u * c[at(j)];
+        }
+    }
+    void keep_right(Coefficients& c, double u) noexcept
+    {
+        for (int r = 1; r <= degree_; ++r) {
+            for (int j = 0; j <= degree_ - r; ++j) c[at(j)] = (1 - u) * c[at(j)] + u * c[at(j + 1)];
+        }
+    }
+
+    /// @param a, b  where the coefficients belong to, as offsets [s]
+    /// @param root  there is one at a, which does not count
+    [[nodiscard]] SeriesStretch first(const Coefficients& c, double a, double b, bool root,
+                                      int depth) noexcept
+    {
+        using Kind = SeriesStretch::Kind;
+        const int from = root ? 1 : 0;
+        int changes = 0;
+        bool sure = true;
+        double least = c[at(from)];
+        double before = c[at(from)];
+        for (int j = from; j <= degree_; ++j) {
+            least = std::min(least, c[at(j)]);
+            sure = sure && std::fabs(c[at(j)]) > error_;
+            changes += (c[at(j)] < 0) != (before < 0);
+            before = c[at(j)];
+        }
+        // With a root at a, the others are coefficients of p(u) / u but for positive factors.
+        const bool ends_above = c[at(degree_)] - error_ > touch_;
+        if (root ? least - error_ > 0 && ends_above : least - error_ > touch_) {
+            return {Kind::clear, a, b};
+        }
+        if (sure && changes == 1 && c[at(from)] > 0 && touch_ == 0) return {Kind::crossing, a, b};
+        if (depth == 0 || !std::isfinite(least)) return {Kind::unsure, a, b};
+        const double middle = a + 0.5 * (b - a);
+        Coefficients half = c;
+        keep_left(half, 0.5);
+        const SeriesStretch left = first(half, a, middle, root, depth - 1);
+        if (left.kind != Kind::clear) return left;
+        half = c;
+        keep_right(half, 0.5);
+        const SeriesStretch right = first(half, middle, b, false, depth - 1);
+        return right.kind == Kind::clear ? SeriesStretch{Kind::clear, a, b} : right;
+    }
+
+private:
+    [[nodiscard]] static constexpr std::size_t at(int i) noexcept
+    {
+        return static_cast<std::size_t>(i);
+    }
+
+    int degree_;
+    double h_;
+    double touch_;
+    double error_ = 0;
+    double size_ = 0;
+};
+
+}  // namespace
+
+bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign, double h,
+                           double touch, bool from_surface) noexcept
+{
+    using Kind = SeriesStretch::Kind;
+    Coefficients c;
+    const int degree = degree_of(terms, i);
+    // A root at the start is one of all terms, not of the first.
+    constexpr int some = 8;
+    if (degree > some && !from_surface) {
+        SeriesSearch search(some, h, touch);
+        search.convert(terms, i, sign, c);
+        if (search.first(c, 0, h, false, 0).kind == Kind::clear) return true;
+    }
+    SeriesSearch search(degree, h, touch);
+    search.convert(terms, i, sign, c);
+    if (from_surface && std::fabs(c[0]) > touch + 0x1p-44 * search.size()) return false;
+    return search.first(c, 0, h, from_surface, most_halvings).kind == Kind::clear;
+}
+
+SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign, double h,
+                            double from, double to, double touch, bool from_surface) noexcept
+{
+    SeriesSearch search(degree_of(terms, i), h, touch);
+    Coefficients c;
+    search.convert(terms, i, sign, c);
+    if (to < h) search.keep_left(c, to / h);
+    if (from > 0) search.keep_right(c, from / to);
+    return search.first(c, from, to, from_surface, most_halvings);
+}
+
+}  // namespace ricochet::detail

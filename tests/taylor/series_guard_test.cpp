@@ -1,0 +1,141 @@
+#include "ricochet/detail/series_guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/taylor.hpp"
+
+namespace ricochet {
+namespace {
+
+using detail::first_leaving;
+using detail::series_clears;
+using detail::SeriesStretch;
+using Kind = SeriesStretch::Kind;
+
+/// The coefficients of the product of (s - root) over all roots, times `factor`, up to order 12.
+[[nodiscard]] std::vector<double> with_roots(const std::vector<double>& roots, double factor)
+{
+    std::vector<double> c(13);
+    c[0] = factor;
+    int degree = 0;
+    for (const double root : roots) {
+        ++degree;
+        for (int k = degree; k > 0; --k) {
+            c[static_cast<std::size_t>(k)] =
+                c[static_cast<std::size_t>(k) - 1] - root * c[static_cast<std::size_t>(k)];
+        }
+        c[0] *= -root;
+    }
+    return c;
+}
+[[nodiscard]] SeriesTerms terms_of(const std::vector<double>& c)
+{
+    return {c.data(), 12, 1};
+}
+
+TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
+{
+    // Random roots, one or two of them in the step: whatever is said to be clear has none there.
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> within(0.001, 0.999), outside(1.05, 6);
+    int cleared = 0;
+    for (int k = 0; k < 20'000; ++k) {
+        std::vector<double> roots;
+        const int inside = k % 3;
+        for (int i = 0; i < inside; ++i) roots.push_back(within(random));
+        for (int i = 0; i < 5; ++i) roots.push_back((i % 2 == 0 ? 1 : -1) * outside(random));
+        std::vector<double> c = with_roots(roots, 1);
+        const double sign = c[0] > 0 ? 1 : -1;
+        const bool clear = series_clears(terms_of(c), 0, sign, 1, 0, false);
+        EXPECT_FALSE(clear && inside > 0);
+        cleared += clear;
+        const SeriesStretch first = first_leaving(terms_of(c), 0, sign, 1, 0, 1, 0, false);
+        EXPECT_TRUE(inside > 0 || first.kind == Kind::clear);
+        if (inside == 1) {
+            EXPECT_EQ(first.kind, Kind::crossing);
+            EXPECT_LE(first.lo, roots[0]);
+            EXPECT_GE(first.hi, roots[0]);
+        }
+        if (inside == 2) {
+            EXPECT_NE(first.kind, Kind::clear);
+            const double root = std::min(roots[0], roots[1]);
+            EXPECT_LE(first.lo, root + 1e-12);
+            EXPECT_GE(first.hi, root - 1e-12);
+        }
+    }
+    EXPECT_GT(cleared, 500);
+}
+
+TEST(SeriesGuard, ARootAtTheStartIsDividedOut)
+{
+    const std::vector<double> c = with_roots({0, 0.75}, -1);
+    EXPECT_FALSE(series_clears(terms_of(c), 0, 1, 1, 0, true));
+    EXPECT_TRUE(series_clears(terms_of(c), 0, 1, 0.5, 0, true));
+    const SeriesStretch first = first_leaving(terms_of(c), 0, 1, 1, 0, 1, 0, true);
+    EXPECT_EQ(first.kind, Kind::crossing);
+    EXPECT_LE(first.lo, 0.75);
+    EXPECT_GE(first.hi, 0.75);
+}
+
+/// A rotation, and a wall that its first component reaches beyond by `depth`.
+struct Grazing {
+    using State = std::array<double, 2>;
+    static constexpr Crossing crossing = Crossing::either;
+    double depth = 0;
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+    template <class S>
+    [[nodiscard]] constexpr S guard(const S& /*t*/, const std::array<S, 2>& x) const
+    {
+        return (1.0 - x[0]) - depth;
+    }
+};
+
+TEST(SeriesGuard, PairsOfCrossingsAreFoundDownToRoundingAndNoneIsInvented)
+{
+    // cos(t - phase) is beyond 1 - depth for 2 sqrt(2 depth) around the phase. Steps of this motion
+    // are right to some 1e-16.
+    std::mt19937_64 random(2);
+    std::uniform_real_distribution<double> phases(1, 5);
+    for (const double depth : {1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13}) {
+        for (int k = 0; k < 50; ++k) {
+            const double phase = phases(random);
+            const Grazing::State x0{std::cos(phase), std::sin(phase)};
+            const Options options{.t_end = 6, .rtol = 1e-15, .atol = 1e-15};
+            const auto pair = integrate(Grazing{depth}, x0, options, ErrorControlled<Taylor>{});
+            ASSERT_EQ(pair.events.size(), 2U) << depth << " at " << phase;
+            const double half = std::acos(1 - depth);
+            // Half the width is sqrt(2 depth): an error of 5e-16 of the depth is one of
+            // 5e-16 / sqrt(2 depth) of the time.
+            const double tolerance = 1e-14 + 1e-15 / std::sqrt(depth);
+            EXPECT_NEAR(pair.events[0].t, phase - half, tolerance);
+            EXPECT_NEAR(pair.events[1].t, phase + half, tolerance);
+            const auto miss = integrate(Grazing{-depth}, x0, options, ErrorControlled<Taylor>{});
+            EXPECT_EQ(miss.events.size(), 0U) << -depth << " at " << phase;
+        }
+    }
+}
+
+TEST(SeriesGuard, StepsThatTheSeriesClearsAreProved)
+{
+    const auto run = integrate(Grazing{-1}, Grazing::State{1, 0}, {.t_end = 100, .rtol = 1e-12},
+                               ErrorControlled<Taylor>{});
+    EXPECT_EQ(run.statistics.evidence.proved, run.statistics.steps);
+    // A value and a difference for its rate at each end, and when it is armed.
+    EXPECT_LE(run.statistics.guard_calls, 3 * (run.statistics.steps + 4));
+}
+
+}  // namespace
+}  // namespace ricochet
