@@ -313,11 +313,16 @@ private:
         bool from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch;
         const double ahead = from_surface ? watch.start.rate : watch.start.value;
         if (!(sign * ahead > 0)) return finders_->examine(probe, watch);
-        for (;;) {
+        constexpr int most_doubts = 8;  // more of them, and the series tells nothing of the rest
+        for (int doubts = 0; doubts <= most_doubts;) {
             const SeriesStretch stretch =
-                first_leaving(bank.series(), i, sign, probe.step().h(), watch.start.s, end.s,
+                first_leaving(bank.series(), i, sign, probe.step().h(), watch.start, end,
                               bank[i].info.touch, from_surface);
-            if (stretch.kind == SeriesStretch::Kind::clear) break;
+            if (stretch.kind == SeriesStretch::Kind::clear) {
+                if (!(sign * end.value > 0)) break;
+                watch.side_after = watch.side;
+                return Finding::clear(Evidence::proved);
+            }
             const GuardSample lo =
                 stretch.lo > watch.start.s ? probe.value_and_rate(stretch.lo) : watch.start;
             const GuardSample hi = stretch.hi < end.s ? probe.value_and_rate(stretch.hi) : end;
@@ -329,6 +334,7 @@ private:
                 if (counts(watch.side, crossing)) return Finding::leaving(watch.side, lo, hi);
                 watch.side = opposite(watch.side);
             } else {
+                ++doubts;
                 judge_by_its_own_size(watch, bank, i);
                 const Finding finding = finders_->examine(probe, watch);
                 if (finding.hit || finding.touch) return finding;
@@ -342,9 +348,7 @@ private:
             from_surface = false;
             if (!(sign * hi.value > 0)) return finders_->examine(probe, watch);
         }
-        if (!(sign * end.value > 0)) return finders_->examine(probe, watch);
-        watch.side_after = watch.side;
-        return Finding::clear(Evidence::proved);
+        return finders_->examine(probe, watch);
     }
 
     /// The detector's answers on the parts of a stretch, up to the first that is not clear.

@@ -395,7 +395,7 @@ protected:
     }
 
     /// Whether the series of guard i proves that it stays on its side, as its end says.
-    [[nodiscard]] bool is_clear_of_series(std::size_t i, double h) const noexcept
+    [[nodiscard, gnu::noinline]] bool is_clear_of_series(std::size_t i, double h) const noexcept
     {
         const double touch = records_[i].info.touch;
         const bool departs = records_[i].departs && starts_phase_;

@@ -159,14 +159,7 @@ public:
     /// Its inner nodes are computed when it is first asked for.
     [[nodiscard]] DenseParts<X> dense() const
     {
-        if (kernel_->series) {
-            return {.nodes = DenseNodes::series,
-                    .h = state_.h,
-                    .x0 = &state_.x0,
-                    .remainder = &state_.remainder,
-                    .rate0 = &state_.rate0,
-                    .series = kernel_->series(system_.door(), state_)};
-        }
+        if (kernel_->series) return dense_series();
         if (!state_.has_middle) prepare_dense();
         DenseParts<X> parts{.nodes = dense_nodes(),
                             .h = state_.h,
@@ -486,6 +479,16 @@ private:
         if (component_atol_.empty()) return;
         component_atol_.resize(state_.x0.size(), atol_);
         state_.component_atol = component_atol_.data();
+    }
+
+    [[nodiscard, gnu::noinline]] DenseParts<X> dense_series() const
+    {
+        return {.nodes = DenseNodes::series,
+                .h = state_.h,
+                .x0 = &state_.x0,
+                .remainder = &state_.remainder,
+                .rate0 = &state_.rate0,
+                .series = kernel_->series(system_.door(), state_)};
     }
 
     /// w(s) on the method's own interpolant.

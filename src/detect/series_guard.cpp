@@ -8,8 +8,8 @@ namespace ricochet::detail {
 namespace {
 
 constexpr int most_degree = 20;
-/// A part of 2^-10 of a step is a parabola to the last bit.
-constexpr int most_halvings = 10;
+/// A part of 2^-10 of a step is a parabola to the last bit: it is not halved.
+constexpr double smallest_part = 0x1p-10;
 using Coefficients = std::array<double, most_degree + 1>;
 
 /// 1 / C(n, k)
@@ -41,6 +41,12 @@ public:
     SeriesSearch(int degree, double h, double touch) noexcept
         : degree_(degree), h_(h), touch_(touch)
     {
+    }
+
+    /// Takes the difference from the values at both ends for an error.
+    void blur(const Coefficients& c, double start, double end) noexcept
+    {
+        error_ += 2 * std::max(std::fabs(c[0] - start), std::fabs(c[at(degree_)] - end));
     }
 
     /// The sum of the sizes of all terms.
@@ -89,8 +95,7 @@ public:
 
     /// @param a, b  where the coefficients belong to, as offsets [s]
     /// @param root  there is one at a, which does not count
-    [[nodiscard]] SeriesStretch first(const Coefficients& c, double a, double b, bool root,
-                                      int depth) noexcept
+    [[nodiscard]] SeriesStretch first(const Coefficients& c, double a, double b, bool root) noexcept
     {
         using Kind = SeriesStretch::Kind;
         const int from = root ? 1 : 0;
@@ -110,15 +115,15 @@ public:
             return {Kind::clear, a, b};
         }
         if (sure && changes == 1 && c[at(from)] > 0 && touch_ == 0) return {Kind::crossing, a, b};
-        if (depth == 0 || !std::isfinite(least)) return {Kind::unsure, a, b};
+        if (!(b - a > smallest_part * h_) || !std::isfinite(least)) return {Kind::unsure, a, b};
         const double middle = a + 0.5 * (b - a);
         Coefficients half = c;
         keep_left(half, 0.5);
-        const SeriesStretch left = first(half, a, middle, root, depth - 1);
+        const SeriesStretch left = first(half, a, middle, root);
         if (left.kind != Kind::clear) return left;
         half = c;
         keep_right(half, 0.5);
-        const SeriesStretch right = first(half, middle, b, false, depth - 1);
+        const SeriesStretch right = first(half, middle, b, false);
         return right.kind == Kind::clear ? SeriesStretch{Kind::clear, a, b} : right;
     }
 
@@ -148,23 +153,26 @@ bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign,
     if (degree > some && !from_surface) {
         SeriesSearch search(some, h, touch);
         search.convert(terms, i, sign, c);
-        if (search.first(c, 0, h, false, 0).kind == Kind::clear) return true;
+        if (search.first(c, 0, h, false).kind == Kind::clear) return true;
     }
     SeriesSearch search(degree, h, touch);
     search.convert(terms, i, sign, c);
     if (from_surface && std::fabs(c[0]) > touch + 0x1p-44 * search.size()) return false;
-    return search.first(c, 0, h, from_surface, most_halvings).kind == Kind::clear;
+    return search.first(c, 0, h, from_surface).kind == Kind::clear;
 }
 
 SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign, double h,
-                            double from, double to, double touch, bool from_surface) noexcept
+                            const GuardSample& start, const GuardSample& end, double touch,
+                            bool from_surface) noexcept
 {
     SeriesSearch search(degree_of(terms, i), h, touch);
     Coefficients c;
     search.convert(terms, i, sign, c);
-    if (to < h) search.keep_left(c, to / h);
-    if (from > 0) search.keep_right(c, from / to);
-    return search.first(c, from, to, from_surface, most_halvings);
+    if (end.s < h) search.keep_left(c, end.s / h);
+    if (start.s > 0) search.keep_right(c, start.s / end.s);
+    search.blur(c, sign * start.value, sign * end.value);
+    const bool root = from_surface && std::fabs(c[0]) <= touch + 0x1p-44 * search.size();
+    return search.first(c, start.s, end.s, root);
 }
 
 }  // namespace ricochet::detail

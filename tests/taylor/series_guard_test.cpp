@@ -41,6 +41,15 @@ using Kind = SeriesStretch::Kind;
     return {c.data(), 12, 1};
 }
 
+/// What the polynomial does first in a step of length 1.
+[[nodiscard]] SeriesStretch first_of(const std::vector<double>& c, double sign, bool from_surface)
+{
+    double end = 0;
+    for (const double term : c) end += term;
+    return first_leaving(terms_of(c), 0, sign, 1, {.s = 0, .value = c[0]}, {.s = 1, .value = end},
+                         0, from_surface);
+}
+
 TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
 {
     // Random roots, one or two of them in the step: whatever is said to be clear has none there.
@@ -57,7 +66,7 @@ TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
         const bool clear = series_clears(terms_of(c), 0, sign, 1, 0, false);
         EXPECT_FALSE(clear && inside > 0);
         cleared += clear;
-        const SeriesStretch first = first_leaving(terms_of(c), 0, sign, 1, 0, 1, 0, false);
+        const SeriesStretch first = first_of(c, sign, false);
         EXPECT_TRUE(inside > 0 || first.kind == Kind::clear);
         if (inside == 1) {
             EXPECT_EQ(first.kind, Kind::crossing);
@@ -79,7 +88,7 @@ TEST(SeriesGuard, ARootAtTheStartIsDividedOut)
     const std::vector<double> c = with_roots({0, 0.75}, -1);
     EXPECT_FALSE(series_clears(terms_of(c), 0, 1, 1, 0, true));
     EXPECT_TRUE(series_clears(terms_of(c), 0, 1, 0.5, 0, true));
-    const SeriesStretch first = first_leaving(terms_of(c), 0, 1, 1, 0, 1, 0, true);
+    const SeriesStretch first = first_of(c, 1, true);
     EXPECT_EQ(first.kind, Kind::crossing);
     EXPECT_LE(first.lo, 0.75);
     EXPECT_GE(first.hi, 0.75);

@@ -119,7 +119,8 @@ struct SeriesTerms {
     std::size_t stride = 0;
 
     /// The departure from the tangent, or its derivative, at offset s.
-    [[nodiscard]] double departure(std::size_t i, double s, bool derivative) const noexcept
+    [[nodiscard, gnu::noinline]] double departure(std::size_t i, double s,
+                                                  bool derivative) const noexcept
     {
         double sum = 0;
         for (int k = order; k > 1; --k) {

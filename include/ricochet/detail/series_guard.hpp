@@ -14,6 +14,7 @@
 #include <cstddef>
 
 #include "ricochet/detail/dense_polynomial.hpp"
+#include "ricochet/detail/guard_view.hpp"
 #include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet::detail {
@@ -71,10 +72,12 @@ struct SeriesStretch {
 [[nodiscard]] bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign,
                                          double h, double touch, bool from_surface) noexcept;
 
-/// What guard i, times `sign`, does first between the offsets `from` and `to` of a step of length
-/// h.
+/// What guard i, times `sign`, does first between the samples `start` and `end` in a step of length
+/// h. Where these differ from the series, which leaves out its last terms, nothing smaller than
+/// that is sure.
 [[nodiscard]] SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign,
-                                          double h, double from, double to, double touch,
+                                          double h, const GuardSample& start,
+                                          const GuardSample& end, double touch,
                                           bool from_surface) noexcept;
 
 }  // namespace ricochet::detail
