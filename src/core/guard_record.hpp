@@ -88,7 +88,7 @@ struct GuardRecord {
     return side == Side::above ? 1 : side == Side::below ? -1 : 0;
 }
 
-/// Whether checks are put off. Without what it plans by, a detector is the exact one that it is
+/// Whether checks are deferred. Without what it plans by, a detector is the exact one that it is
 /// made around.
 template <class X>
 [[nodiscard]] bool puts_off(const DetectorTable<X>& detector, const SystemTable<X>& system)

@@ -23,7 +23,8 @@
 
 namespace ricochet::detail {
 
-/// Whether the run of a system is one of the loop for a single guard that is never put off.
+/// Whether the run of a system is one of the loop for a single guard whose checks are never
+/// deferred.
 template <class X>
 [[nodiscard]] bool has_single_guard(const RunSetup<X>& setup)
 {
@@ -46,8 +47,7 @@ struct KeptLoop final : KeptSetup<X>, Loop<X, single> {
 };
 
 template <class X>
-std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
-                                      const Options& options)
+std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0, const Options& options)
 {
     if constexpr (fixed_size<X>() > 0) {
         if (has_single_guard(setup)) {
@@ -59,8 +59,7 @@ std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
 
 template <class X, bool single>
 struct KeptMonitor final : KeptSetup<X>, MonitorLoop<X, single> {
-    KeptMonitor(const RunSetup<X>& setup, const X& like, const Options& options,
-                bool cuts_at_all)
+    KeptMonitor(const RunSetup<X>& setup, const X& like, const Options& options, bool cuts_at_all)
         : KeptSetup<X>{setup}, MonitorLoop<X, single>(this->kept, like, options, cuts_at_all)
     {
     }
@@ -113,8 +112,9 @@ const StepKernel<X>& kernel_by_name(MethodName name) noexcept
 #define RICOCHET_CORE(...)                                                                        \
     namespace ricochet::detail {                                                                  \
     using CoreStateHere = __VA_ARGS__;                                                            \
-    template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(                                   \
-        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                    \
+    template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(const RunSetup<CoreStateHere>&,    \
+                                                               const CoreStateHere&,              \
+                                                               const Options&);                   \
     template std::unique_ptr<AnyMonitor<CoreStateHere>> make_monitor(                             \
         const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, bool);              \
     template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \
