@@ -1,6 +1,9 @@
 // The loop for one type of state.
 #pragma once
 
+#include <algorithm>
+#include <array>
+
 #include "core/engine_apply.hpp"
 #include "core/engine_find.hpp"
 #include "core/engine_record.hpp"
@@ -20,6 +23,7 @@
 #include "core/planner_checks.hpp"
 #include "core/planner_close.hpp"
 #include "ricochet/detail/kernels.hpp"
+#include "ricochet/detect/extremum.hpp"
 
 namespace ricochet::detail {
 
@@ -88,23 +92,69 @@ Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options)
     return Loop<X, false>(setup, x0, options).take();
 }
 
+template <class X, class Method, class Screen>
+inline constexpr QuietKernel<X> quiet_by_pointer =
+    KernelOf<ByPointer, X, Method>::template quiet<true, Screen>();
+
+/// A kernel of ours that calls by pointer, with the quiet runs of systems without a guard and of
+/// those with one that `Extremum` screens.
+template <class X>
+struct NamedKernel {
+    StepKernel<X> step;
+    QuietKernel<X> unguarded = nullptr;
+    QuietKernel<X> screened = nullptr;
+};
+
+template <class X>
+[[nodiscard]] const std::array<NamedKernel<X>, 5>& named_kernels() noexcept
+{
+    static const std::array<NamedKernel<X>, 5> kernels = [] {
+        const auto fixed_only = []<class Method>(Method) {
+            return NamedKernel<X>{.step = KernelOf<ByPointer, X, Method>::make()};
+        };
+        const auto controlled = []<class Method>(Method) {
+            return NamedKernel<X>{.step = KernelOf<ByPointer, X, Method>::make(),
+                                  .unguarded = quiet_by_pointer<X, Method, void>,
+                                  .screened = quiet_by_pointer<X, Method, Extremum>};
+        };
+        if constexpr (fixed_size<X>() > 0) {
+            return std::array<NamedKernel<X>, 5>{fixed_only(Euler{}), fixed_only(Rk4{}),
+                                                 controlled(CashKarp54{}), controlled(Dopri5{}),
+                                                 controlled(Fehlberg78{})};
+        } else {
+            return std::array<NamedKernel<X>, 5>{{{LargeKernel<EulerTableau>::make()},
+                                                  {LargeKernel<Rk4Tableau>::make()},
+                                                  {LargeKernel<CashKarp54Tableau>::make()},
+                                                  {LargeKernel<Dopri5Tableau>::make()},
+                                                  {LargeKernel<Fehlberg78Tableau>::make()}}};
+        }
+    }();
+    return kernels;
+}
+
 template <class X>
 const StepKernel<X>& kernel_by_name(MethodName name) noexcept
 {
-    static const std::array<StepKernel<X>, 5> kernels = [] {
-        if constexpr (fixed_size<X>() > 0) {
-            return std::array<StepKernel<X>, 5>{
-                KernelOf<ByPointer, X, Euler>::make(), KernelOf<ByPointer, X, Rk4>::make(),
-                KernelOf<ByPointer, X, CashKarp54>::make(), KernelOf<ByPointer, X, Dopri5>::make(),
-                KernelOf<ByPointer, X, Fehlberg78>::make()};
-        } else {
-            return std::array<StepKernel<X>, 5>{
-                LargeKernel<EulerTableau>::make(), LargeKernel<Rk4Tableau>::make(),
-                LargeKernel<CashKarp54Tableau>::make(), LargeKernel<Dopri5Tableau>::make(),
-                LargeKernel<Fehlberg78Tableau>::make()};
-        }
-    }();
-    return kernels[static_cast<std::size_t>(name)];
+    return named_kernels<X>()[static_cast<std::size_t>(name)].step;
+}
+
+/// What takes the quiet runs of a set-up: its own kernel, or that of a method of ours.
+template <class X>
+QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
+{
+    const SystemTable<X>& system = *setup.system;
+    if (setup.quiet || !setup.error_controlled) return setup.quiet;
+    const auto& kernels = named_kernels<X>();
+    const auto named = std::find_if(kernels.begin(), kernels.end(), [&](const auto& kernel) {
+        return &kernel.step == setup.kernel;
+    });
+    if (named == kernels.end()) return nullptr;
+    if (!system.guarded) return named->unguarded;
+    const DetectorTable<X>& detector = setup.detector;
+    const bool alone = system.guard_alone && system.point;
+    const bool screened = detector.screening == Screening::extremum && !detector.clears &&
+                          !puts_off(detector, system);
+    return alone && screened && has_single_guard(setup) ? named->screened : nullptr;
 }
 
 }  // namespace ricochet::detail

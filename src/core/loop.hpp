@@ -31,6 +31,10 @@
 
 namespace ricochet::detail {
 
+/// What takes the quiet runs of a set-up; null: every step is one of the loop.
+template <class X>
+[[nodiscard]] QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept;
+
 template <class X, bool single>
 class Loop : public AnyLoop<X>, private EventEngine<X, single> {
     using Engine = EventEngine<X, single>;
@@ -39,7 +43,8 @@ public:
     /// Keeps a reference to `setup`.
     Loop(const RunSetup<X>& setup, const X& x0, const Options& options)
         : Engine(setup, x0, checked(setup, options, x0)),
-          components_(static_cast<std::size_t>(x0.size()))
+          components_(static_cast<std::size_t>(x0.size())),
+          quiet_(quiet_kernel(setup))
     {
         h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
         if (error_controlled_) {
@@ -109,6 +114,8 @@ public:
     /// One step that may end in the middle of a stretch of tentative steps if it looks ahead.
     void advance_once(bool look_ahead) override { advance_one({.look_ahead = look_ahead}); }
 
+    void run_to_end() override;
+
     /// `advance` shows only what happens from here on.
     void show_all() noexcept override
     {
@@ -118,7 +125,11 @@ public:
     }
 
     /// Goes on to the end and hands over all that was computed.
-    [[nodiscard]] Run<X> take() override;
+    [[nodiscard]] Run<X> take() override
+    {
+        run_to_end();
+        return finish();
+    }
 
     /// Hands over what has been computed so far; before the end its outcome is `cancelled`. The
     /// simulation is over.
@@ -164,13 +175,13 @@ private:
     using Engine::ended_;
     using Engine::error_controlled_;
     using Engine::finders_;
-    using Engine::on_time_;
     using Engine::guarded_;
     using Engine::h_next_;
     using Engine::infinity;
     using Engine::last_h_;
     using Engine::meter_;
     using Engine::newly_armed_;
+    using Engine::on_time_;
     using Engine::options_;
     using Engine::pending_;
     using Engine::planner_;
@@ -264,7 +275,7 @@ private:
 
     [[nodiscard]] bool may_run_quietly() const noexcept
     {
-        return setup_.quiet && !resting_ && run_.statistics.steps < next_review_ &&
+        return quiet_ && !resting_ && run_.statistics.steps < next_review_ &&
                !options_.record_steps && next_sample_ >= options_.sample_times.size() &&
                bank_.is_steady();
     }
@@ -454,10 +465,11 @@ private:
 
     static constexpr ErrorRule rule_{};
 
-    std::size_t components_;  ///< of the state at the start
-    double first_step_ = 0;    ///< [s]
-    double flight_start_ = 0;  ///< [s] time of the last event
-    double longest_step_ = 0;  ///< [s] after it
+    std::size_t components_;         ///< of the state at the start
+    QuietKernel<X> quiet_;           ///< null: every step is one of the loop
+    double first_step_ = 0;          ///< [s]
+    double flight_start_ = 0;        ///< [s] time of the last event
+    double longest_step_ = 0;        ///< [s] after it
     std::size_t careful_steps_ = 0;  ///< without looking ahead
     std::uint64_t next_review_ = 0;  ///< of the number of steps, against the options
     double reviewed_ = 0;            ///< [s] time of the last review

@@ -17,9 +17,10 @@ inline bool Loop<X, single>::run_quietly()
                    .looks = bank_.looks() && options_.look_inside,
                    .most_steps = next_review_ - run_.statistics.steps,
                    .cancelled = options_.cancelled,
+                   .system = system_.operator->(),
                    .h_next = h_next_};
     bank_.lend(quiet);
-    setup_.quiet(system_.door(), step_.lend(), quiet);
+    quiet_(system_.door(), step_.lend(), quiet);
     bank_.take_back(quiet);
     h_next_ = error_controlled_ || quiet.why == QuietEnd::due ? quiet.h_next : h_next_;
     if (quiet.steps > 0) last_h_ = step_.h();

@@ -25,7 +25,7 @@ inline bool Loop<X, single>::advance()
 }
 
 template <class X, bool single>
-inline Run<X> Loop<X, single>::take()
+inline void Loop<X, single>::run_to_end()
 {
     while (!ended_) {
         // Where one event follows the other a quiet run would be over at its first step.
@@ -34,7 +34,6 @@ inline Run<X> Loop<X, single>::take()
         advance_one({});
         calm_steps_ = run_.statistics.events == events ? calm_steps_ + 1 : 0;
     }
-    return finish();
 }
 
 template <class X, bool single>

@@ -32,8 +32,9 @@ template <class Refuse>
     const std::uintmax_t size = std::filesystem::file_size(file, error);
     if (error) refuse(error.message());
     if (size > longest) {
-        refuse("file: expected at most " + std::to_string(longest) + " bytes, found " +
-               std::to_string(size));
+        std::string text = "file: expected at most ";
+        text += std::to_string(longest) + " bytes, found " + std::to_string(size);
+        refuse(text);
     }
     std::ifstream in(file, std::ios::binary);
     const auto last_error = [] { return std::generic_category().message(errno); };

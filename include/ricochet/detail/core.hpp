@@ -24,7 +24,7 @@ struct RunSetup {
     const SystemTable<X>* system = nullptr;
     void* door = nullptr;
     const StepKernel<X>* kernel = nullptr;
-    QuietKernel<X> quiet = nullptr;  ///< null: every step is one of the loop
+    QuietKernel<X> quiet = nullptr;  ///< with flow and guard inlined; may be null
     bool error_controlled = true;
     bool method_by_name = false;
     const char* stepping = "";  ///< its type, as the compiler writes it
@@ -55,6 +55,8 @@ public:
     virtual void show_all() noexcept = 0;
     /// One step, which may be one of a stretch that is closed later if it looks ahead.
     virtual void advance_once(bool look_ahead) = 0;
+    /// The fastest way to the end, which `step` and `advance` do not take.
+    virtual void run_to_end() = 0;
     [[nodiscard]] virtual Run<X> take() = 0;
     [[nodiscard]] virtual Run<X> finish() = 0;
     /// What has been computed so far, with its time, state and counts up to date.

@@ -418,6 +418,19 @@ class KernelOf {
         return std::max(h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
     }
 
+    [[nodiscard, gnu::always_inline]] static auto guard_of(void* door, QuietRun& run,
+                                                           const Caller& caller)
+    {
+        if constexpr (std::is_same_v<System, ByPointer>) {
+            static constexpr GuardInfo unused{};
+            const SystemAt<C> system(*static_cast<const SystemTable<C>*>(run.system), door);
+            return CoreGuard<C>(system, run.guard_calls, 0, caller.mode, unused, caller.backward);
+        } else {
+            return GuardView<System, X>(at(door).system(), run.guard_calls, 0, caller.mode,
+                                        Crossing::falling, caller.backward);
+        }
+    }
+
     /// @tparam Screen  `Ends` or `Extremum`; void without a guard
     template <bool controlled, class Screen>
     RICOCHET_BY_ONES static void run_quietly(void* door, State& step, QuietRun& run)
@@ -481,9 +494,7 @@ class KernelOf {
                 break;
             }
             if constexpr (guarded) {
-                using Guard = GuardView<System, X>;
-                const Guard guard(at(door).system(), run.guard_calls, 0, caller.mode,
-                                  Crossing::falling, caller.backward);
+                const auto guard = guard_of(door, run, caller);
                 const double t1 = caller.time(h);
                 g1 = guard.value(t1, x1);
                 if constexpr (rates) g_rate1 = guard.rate(t1, x1, rate1, h);

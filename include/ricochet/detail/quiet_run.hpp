@@ -3,7 +3,7 @@
 // Steps in a row in which nothing happens.
 //
 // Of a small state with at most one guard the loop enters a function of the system's own, with
-// flow and guard inlined, that goes on until a step deserves a look, or the end is near. Bits and
+// flow and guard inlined, or one of the library's that calls them by pointer, which goes on until a step deserves a look, or the end is near. Bits and
 // counts are those of the loop.
 #pragma once
 
@@ -32,6 +32,7 @@ struct QuietRun {
     bool looks = false;  ///< inside each step, once
     std::uint64_t most_steps = 0;
     const std::atomic<bool>* cancelled = nullptr;
+    const void* system = nullptr;  ///< the SystemTable, for kernels that call by pointer
 
     // --- the guard, and the next step; brought up to date ---
     double sign = 0;

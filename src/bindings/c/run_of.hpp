@@ -32,7 +32,7 @@ public:
     void run_to_end() override
     {
         loop_->show_all();
-        while (!loop_->ended()) loop_->advance_once(true);
+        loop_->run_to_end();
         loop_->show_all();
         finished(false);
     }

@@ -25,7 +25,7 @@ using Loop = detail::AnyLoop<State>;
 void drive(Loop& loop, Trajectory<State>* steps)
 {
     if (!steps) {
-        while (!loop.ended()) loop.advance_once(true);
+        loop.run_to_end();
         return;
     }
     const auto push = [&](double t, const State& x) {
@@ -150,7 +150,7 @@ public:
     {
         use([&] {
             loop_->show_all();
-            while (!loop_->ended()) loop_->advance_once(true);
+            loop_->run_to_end();
             return true;
         });
         return finish();
