@@ -14,23 +14,70 @@
 #pragma once
 
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "ricochet/detail/adam.hpp"
 #include "ricochet/detail/gate.hpp"
+#include "ricochet/detail/random.hpp"
+#include "ricochet/hybrid/system.hpp"
 #include "ricochet/learn/classifier.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::learn {
+
+/// Where a run starts.
+template <class X>
+struct RunStart {
+    double t = 0;  ///< [s]
+    X x{};
+    Mode mode = 0;
+};
+
+/// Deals out starts. One that the system refuses (behind a unilateral guard) is drawn again.
+template <class X>
+using Starts = std::function<RunStart<X>(Random&)>;
+
+/// Starts that are uniform in a box of states, and in time.
+/// @throws std::invalid_argument if a side of the box is negative or not finite.
+template <class X>
+[[nodiscard]] Starts<X> from_box(const X& lower, const X& upper, double t_lower = 0,
+                                 double t_upper = 0, Mode mode = 0)
+{
+    const auto n = static_cast<std::size_t>(lower.size());
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!(lower[i] <= upper[i]) || !std::isfinite(upper[i] - lower[i])) {
+            throw std::invalid_argument("from_box: component " + std::to_string(i) +
+                                        " of the box runs from " + std::to_string(lower[i]) +
+                                        " to " + std::to_string(upper[i]));
+        }
+    }
+    return [=](Random& random) {
+        RunStart<X> start{.t = random.uniform(t_lower, t_upper), .x = lower, .mode = mode};
+        for (std::size_t i = 0; i < n; ++i) start.x[i] = random.uniform(lower[i], upper[i]);
+        return start;
+    };
+}
+
+/// Horizons [s] of so many steps.
+[[nodiscard]] inline std::vector<double> horizons(double step,
+                                                  std::initializer_list<std::size_t> steps)
+{
+    std::vector<double> out;
+    for (const std::size_t n : steps) out.push_back(static_cast<double>(n) * step);
+    return out;
+}
 
 enum class GateKind { horizon, level };
 

@@ -1,0 +1,595 @@
+// Internal: what it declares may change without notice.
+//
+// The loop of a hand-over for N components and M reactions, whatever the system.
+#pragma once
+
+#include <optional>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detail/branch_modes.hpp"
+#include "ricochet/detail/event_loop.hpp"
+#include "ricochet/detail/hand_over_watches.hpp"
+#include "ricochet/detail/held_reactions.hpp"
+#include "ricochet/detail/law.hpp"
+#include "ricochet/nonsmooth/hand_over_run.hpp"
+
+namespace ricochet::detail {
+
+/// The options as they will be used.
+/// @throws std::invalid_argument naming the option.
+[[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
+
+void add(Statistics& sum, const Statistics& more) noexcept;
+void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
+
+/// Of an inclusion without branches: nothing.
+struct NoModes {
+    template <class Inclusion>
+    explicit NoModes(const Inclusion& /*inclusion*/)
+    {
+    }
+};
+struct NoneHeld {};
+
+/// `HandOver`, whatever the system.
+template <int N, int M>
+class RICOCHET_ALIGNED AnyHandOver {
+    static constexpr bool can_branch = has_modes<N, M>;
+
+public:
+    using Vector = Eigen::Matrix<double, N, 1>;
+    using Reaction = Eigen::Matrix<double, M, 1>;
+    using State = StateWithReaction<N, M>;
+
+    AnyHandOver(const AnyInclusion<N, M>& inclusion, const Vector& w0,
+                const HandOverOptions& options, const EventStepping<N, M>& stepping);
+    AnyHandOver(const AnyInclusion<N, M>& inclusion, const State& start,
+                const HandOverOptions& options, const EventStepping<N, M>& stepping);
+    AnyHandOver(const AnyHandOver&) = delete;
+    AnyHandOver& operator=(const AnyHandOver&) = delete;
+
+    [[nodiscard]] AnyHandOverRun<N, M> take();
+
+private:
+    using Modes = std::conditional_t<can_branch, AnyModes<N, M>, NoModes>;
+    using Held = std::conditional_t<can_branch, HeldReactions<N, M>, NoneHeld>;
+
+    [[nodiscard]] static bool branches(const InclusionTraits& traits) noexcept
+    {
+        return can_branch && traits.box && traits.of_reactions();
+    }
+
+    [[nodiscard]] static HandOverOptions at_time(HandOverOptions options, double t)
+    {
+        options.t_start = t;
+        return options;
+    }
+
+    void begin()
+    {
+        if constexpr (can_branch) {
+            if (branching_) {
+                const Mode mode = modes_.mode_at(run_.state.t, run_.state.w);
+                if (mode < Modes::branch_modes) return go_by_events(mode, PhaseCause::start);
+                return go_by_steps(cause_of(mode));
+            }
+        }
+        go_by_steps(PhaseCause::no_modes);
+    }
+
+    [[nodiscard]] static PhaseCause cause_of(Mode mode) noexcept requires can_branch
+    {
+        return mode == Modes::several ? PhaseCause::several : PhaseCause::no_flow;
+    }
+
+    void end_with(Outcome outcome)
+    {
+        run_.outcome = outcome;
+        ended_ = true;
+    }
+
+    [[nodiscard]] std::uint64_t steps_taken() const noexcept
+    {
+        return run_.statistics.event_driven.steps + motion_.statistics().attempted;
+    }
+
+    // --- event-driven ---
+
+    void go_by_events(Mode mode, PhaseCause cause)
+    {
+        run_.mode = mode;
+        set_valued_ = false;
+        if (cause == PhaseCause::released) ++run_.statistics.to_events;
+        run_.phases.push_back({.from = run_.state.t, .set_valued = false, .cause = cause});
+    }
+
+    void follow_events() requires can_branch
+    {
+        if (steps_taken() >= options_.max_steps) return end_with(Outcome::step_limit);
+        typename Modes::State x;
+        Eigen::Map<Vector>(x.data()) = run_.state.w;
+        std::unique_ptr<EventLoop<N>> simulation;
+        try {
+            simulation = stepping_.make(modes_, x, event_options());
+        } catch (const std::invalid_argument&) {
+            return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
+        }
+        ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
+        FlutterWatch unresolved;
+        bool chatters = false;
+        bool flutters = false;
+        bool released = false;
+        Place before;
+        held_.forget();
+        while (!chatters && !flutters && !released) {
+            note_place(*simulation, before);
+            const bool going = simulation->step();
+            if (Modes::holds(before.mode) && !follows_held(before, *simulation)) {
+                go_back(simulation->finish(), before);
+                if (held_.starts_beyond()) go_by_steps(PhaseCause::contradiction);
+                return;
+            }
+            if (contradicts(simulation->mode(), simulation->t(), simulation->x())) {
+                go_back(simulation->finish(), before);
+                return go_by_steps(PhaseCause::contradiction);
+            }
+            if (!going || simulation->mode() >= Modes::branch_modes) break;
+            released = options_.until_released &&
+                       is_released(Modes::branches_of(simulation->mode()), simulation->t(),
+                                   Modes::vector(simulation->x()));
+            chatters = watch(simulation->t(), simulation->run().statistics.events);
+            const auto& events = simulation->run().events;
+            if (!events.empty()) {
+                flutters = unresolved(events.size(), events.back().t, resolution(simulation->x()),
+                                      [&] { return speed_after(events.back()); });
+            }
+            if (!chatters && !flutters && !released && may_lengthen()) {
+                note_place(*simulation, before);
+                return go_back(simulation->finish(), before);
+            }
+        }
+        finish_events(simulation->finish(), chatters, flutters);
+        if (released && !set_valued_) end_with(Outcome::released);
+    }
+
+    /// Where an event-driven step begins, and what had been recorded until then.
+    struct Place {
+        double t = 0;
+        Vector w;
+        Mode mode = 0;
+        std::size_t events = 0;
+        std::size_t samples = 0;
+    };
+
+    template <class Loop>
+    static void note_place(const Loop& simulation, Place& place)
+    {
+        place.t = simulation.t();
+        place.w = Modes::vector(simulation.x());
+        place.mode = simulation.mode();
+        place.events = simulation.run().events.size();
+        place.samples = simulation.run().trajectory.t.size();
+    }
+
+    /// Whether a step was short enough for the reactions that hold; if not, steps are as short
+    /// as that takes from now on.
+    template <class Loop>
+    [[nodiscard]] bool follows_held(const Place& before, const Loop& simulation)
+    {
+        const double fraction =
+            held_.fraction(modes_, before.mode, before.t, before.w, simulation.t(),
+                           Modes::vector(simulation.x()), options_.event_tolerance);
+        if (held_.starts_beyond()) return false;
+        if (fraction == 1) return true;
+        const double shorter = fraction * (simulation.t() - before.t);
+        // Below that the motion has no smoothness that steps could follow.
+        if (shorter <= 1e-9 * (options_.t_end - options_.t_start)) return true;
+        longest_step_ = shorter;
+        easy_steps_ = 0;
+        return false;
+    }
+
+    /// Of the y whose zero was an event; infinite where the event was another.
+    template <class X>
+    [[nodiscard]] double speed_after(const Event<X>& event) const
+    {
+        if (event.guard % 4 >= 2 || event.mode_after >= Modes::branch_modes) {
+            return std::numeric_limits<double>::infinity();
+        }
+        X rate;
+        modes_.flow(event.mode_after, event.t, event.after, rate);
+        const auto i = static_cast<Eigen::Index>(event.guard / 4);
+        return std::abs(modes_.matrices().observe().row(i).dot(Modes::vector(rate)));
+    }
+
+    /// What a step resolves of y.
+    template <class X>
+    [[nodiscard]] double resolution(const X& x) const
+    {
+        return options_.atol + options_.rtol * largest_component(x);
+    }
+
+    /// Whether a y is on the wrong side of its reaction, which is at a bound, by more than the
+    /// error of a step.
+    template <class X>
+    [[nodiscard]] bool contradicts(Mode mode, double t, const X& x) const
+    {
+        if (mode >= Modes::branch_modes) return false;
+        const Vector w = Modes::vector(x);
+        const Reaction y = modes_.observed(t, w);
+        Mode rest = mode;
+        for (Eigen::Index i = 0; i < y.size(); ++i, rest /= 3) {
+            if (rest % 3 == 0 ? !(y[i] < 0) : rest % 3 == 1 || !(y[i] > 0)) continue;
+            if (std::abs(y[i]) > 10 * resolution(x)) return true;
+        }
+        return false;
+    }
+
+    /// Whether so many steps in a row were shorter than need be that longer ones are tried.
+    [[nodiscard]] bool may_lengthen() noexcept requires can_branch
+    {
+        if (std::isinf(longest_step_)) return false;
+        easy_steps_ = held_.is_easy() ? easy_steps_ + 1 : 0;
+        if (easy_steps_ < 8) return false;
+        easy_steps_ = 0;
+        longest_step_ *= 2;
+        if (longest_step_ > options_.t_end - run_.state.t) {
+            longest_step_ = std::numeric_limits<double>::infinity();
+        }
+        return true;
+    }
+
+    /// Goes on from `before` with steps of another length; what was recorded later is dropped.
+    template <class X>
+    void go_back(Run<X>&& done, const Place& before)
+    {
+        done.statistics.events -= done.events.size() - before.events;
+        done.events.resize(before.events);
+        done.trajectory.t.resize(before.samples);
+        done.trajectory.x.resize(before.samples);
+        collect(done);
+        run_.state.t = before.t;
+        run_.state.w = before.w;
+        run_.mode = before.mode;
+    }
+
+    [[nodiscard]] Options event_options() const
+    {
+        Options options =
+            detail::event_options(options_, run_.state.t, run_.trajectory.t.size(), steps_taken());
+        options.mode = run_.mode;
+        if (!stepping_.error_controlled) {
+            options.step = std::min(options_.set_valued.step, longest_step_);
+        } else if (longest_step_ < options_.h_max) {
+            options.step = options.h_max = longest_step_;
+        }
+        return options;
+    }
+
+    template <class X>
+    void finish_events(Run<X>&& done, bool chatters, bool flutters)
+    {
+        const std::size_t fluttering = flutters ? done.events.back().guard : no_guard;
+        collect(done);
+        Vector& w = run_.state.w;
+        run_.state.t = done.t;
+        w = Modes::vector(done.x);
+        if (done.mode == Modes::empty) return end_with_empty_set();
+        if (done.mode >= Modes::branch_modes) {
+            return go_by_steps(cause_of(done.mode));
+        }
+        if (chatters) return go_by_steps(PhaseCause::chattering);
+        const auto accumulate = [&](std::size_t guard) {
+            auto branches = Modes::branches_of(done.mode);
+            branches[static_cast<Eigen::Index>(guard / 4)] = Branch::inside;
+            modes_.hold(branches, done.t, w);
+        };
+        if (flutters) {
+            accumulate(fluttering);
+            return go_by_steps(PhaseCause::accumulation);
+        }
+        if (const auto cause = cause_after(done.outcome)) {
+            if (*cause == PhaseCause::accumulation && done.guard != no_guard) {
+                accumulate(done.guard);
+            }
+            return go_by_steps(*cause);
+        }
+        run_.mode = done.mode;
+        if (w.allFinite()) run_.state.reaction = modes_.reaction(done.mode, done.t, w);
+        end_with(done.outcome);
+    }
+
+    /// What an event-driven phase recorded.
+    template <class X>
+    void collect(const Run<X>& done)
+    {
+        if (run_.events.empty()) run_.events.reserve(done.events.size());
+        std::uint64_t idle = 0;
+        for (const Event<X>& event : done.events) {
+            // A load that hardly passes the bound lets y rest on zero by rounding, and its guard
+            // find it there again and again: the reaction stays at its bound.
+            const bool stays =
+                event.mode_after == event.mode_before && same_state(event.after, event.before);
+            idle += stays;
+            if (!stays && event.mode_after != Modes::empty) {
+                run_.events.push_back(converted(event));
+            }
+        }
+        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
+            run_.trajectory.t.push_back(done.trajectory.t[i]);
+            run_.trajectory.x.push_back(Modes::vector(done.trajectory.x[i]));
+        }
+        add(run_.statistics.event_driven, done.statistics);
+        run_.statistics.event_driven.events -= idle;
+    }
+
+    void end_with_empty_set() requires can_branch
+    {
+        run_.failure.set = modes_.faulty(run_.state.t, run_.state.w);
+        end_with(Outcome::not_converged);
+    }
+
+    template <class X>
+    [[nodiscard]] static Event<Vector> converted(const Event<X>& from)
+    {
+        Event<Vector> event;
+        event.t = from.t;
+        event.guard = from.guard / 4;
+        event.mode_before = from.mode_before;
+        event.mode_after = from.mode_after;
+        event.before = Modes::vector(from.before);
+        event.after = Modes::vector(from.after);
+        event.bracket = from.bracket;
+        event.slope = from.slope;
+        event.error = from.error;
+        const bool held = from.guard % 4 >= 2;
+        const bool holds = from.mode_after >= Modes::branch_modes ||
+                           Modes::branch(event.guard, from.mode_after) == Branch::inside;
+        event.kind = kind_of(held, holds);
+        return event;
+    }
+
+    [[nodiscard]] static EventKind kind_of(bool held, bool holds) noexcept
+    {
+        return held ? EventKind::slip : holds ? EventKind::stick : EventKind::mode;
+    }
+
+    // --- set-valued ---
+
+    void go_by_steps(PhaseCause cause)
+    {
+        if (branching_) {
+            // Who is back at once stays longer.
+            const double lasted = run_.phases.empty() ? std::numeric_limits<double>::infinity()
+                                                      : run_.state.t - run_.phases.back().from;
+            const bool at_once = lasted < 10 * options_.set_valued.step;
+            patience_ = at_once ? std::min(2 * patience_, most_patience) : 1;
+            if constexpr (can_branch) run_.mode = Modes::several;
+            chatters_ = cause == PhaseCause::chattering;
+            motion_.locate_switches(!chatters_);
+            if (chatters_) {
+                patience_ = chatter_patience_;
+                chatter_patience_ = std::min(2 * chatter_patience_, most_patience);
+            }
+        }
+        if (options_.events_only) return end_with(Outcome::not_handed_over);
+        set_valued_ = true;
+        ++run_.statistics.to_set_valued;
+        run_.phases.push_back({.from = run_.state.t, .set_valued = true, .cause = cause});
+        if (std::exchange(keeps_reaction_, false)) return;
+        try {
+            motion_.restart(run_.state.t, run_.state.w);
+        } catch (const std::invalid_argument&) {
+            end_with(run_.state.w.allFinite() ? Outcome::not_converged : Outcome::non_finite);
+        }
+    }
+
+    void follow_inclusion()
+    {
+        const double from = motion_.state().t;
+        emit_samples(true);
+        auto branches = motion_.branches();
+        for (std::uint64_t steps = 1; !ended_; ++steps) {
+            const std::uint64_t switches = motion_.statistics().switches;
+            const Outcome outcome = motion_.advance();
+            const bool switched = motion_.statistics().switches != switches;
+            emit_samples(false);
+            if (switched) record_switch();
+            if (outcome != Outcome::not_converged && breaks_law()) {
+                end_with(Outcome::law_violated);
+            } else if (outcome != Outcome::running) {
+                if (outcome == Outcome::not_converged) run_.failure = motion_.failure();
+                end_with(outcome);
+            } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+                end_with(Outcome::cancelled);
+            } else if (steps_taken() >= options_.max_steps) {
+                end_with(Outcome::step_limit);
+            }
+            // Over switches that are not located: as many steps without any as patience asks for.
+            if (chatters_ && motion_.branches() != branches) {
+                branches = motion_.branches();
+                steps = 0;
+                continue;
+            }
+            if constexpr (can_branch) {
+                if (!branching_) continue;
+                if (!ended_ && options_.until_released &&
+                    is_released(motion_.branches(), motion_.state().t, motion_.state().w)) {
+                    run_.mode = Modes::mode_of(motion_.branches());
+                    end_with(Outcome::released);
+                }
+                if (!ended_ && steps >= patience_ && is_plain(switched) && release()) break;
+            }
+        }
+        run_.statistics.set_valued_time += motion_.state().t - from;
+        if (set_valued_) run_.state = motion_.state();
+    }
+
+    /// Solvers leave a millionth of a millionth.
+    [[nodiscard]] bool breaks_law() const
+    {
+        const State& now = motion_.state();
+        return law_violation(motion_.matrices(), now.t, now.w, now.reaction,
+                             options_.set_valued.step) > 1e-6;
+    }
+
+    /// Whether the branches are those of a mode that flows, and no y so near to zero that its
+    /// sign is an accident.
+    [[nodiscard]] bool is_plain(bool switched) requires can_branch
+    {
+        auto branches = motion_.branches();
+        if (!modes_.flows(Modes::mode_of(branches))) return false;
+        // Of the y that has just been left the branch says which way it goes.
+        if (switched) {
+            branches[static_cast<Eigen::Index>(motion_.last_switch().reaction)] = Branch::inside;
+        }
+        return are_clear(branches, motion_.state().t, motion_.state().w);
+    }
+
+    /// Whether every y of a reaction at a bound is farther from zero than errors reach.
+    template <class Branches>
+    [[nodiscard]] bool are_clear(const Branches& branches, double t,
+                                 const Vector& w) const requires can_branch
+    {
+        const Reaction y = modes_.observed(t, w);
+        const double size = w.template lpNorm<Eigen::Infinity>();
+        const double least = 1e3 * (options_.atol + options_.rtol * size);
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            if (branches[i] != Branch::inside && std::abs(y[i]) < least) return false;
+        }
+        return true;
+    }
+
+    template <class Branches>
+    [[nodiscard]] bool is_released(const Branches& branches, double t,
+                                   const Vector& w) const requires can_branch
+    {
+        return !(branches.array() == Branch::inside).any() && are_clear(branches, t, w);
+    }
+
+    /// Hands back to events, unless rates and reactions do not tell how the motion goes on.
+    [[nodiscard]] bool release() requires can_branch
+    {
+        auto branches = motion_.branches();
+        double t = motion_.state().t;
+        Vector w = motion_.state().w;
+        const Reaction y = modes_.observed(t, w);
+        // A y that has just been left is zero; which way it goes, its branch says.
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            const bool wrong = branches[i] == Branch::lower ? y[i] < 0 : y[i] > 0;
+            if (wrong) branches[i] = Branch::inside;
+        }
+        modes_.hold(branches, t, w);
+        Mode mode = Modes::several;
+        try {
+            mode = modes_.mode_at(t, w);
+        } catch (const std::invalid_argument&) {
+        }
+        if (mode >= Modes::branch_modes) return false;
+        run_.state = motion_.state();
+        run_.state.w = w;
+        go_by_events(mode, PhaseCause::released);
+        return true;
+    }
+
+    void record_switch()
+    {
+        const State& now = motion_.state();
+        const auto& change = motion_.last_switch();
+        Event<Vector> event;
+        event.t = now.t;
+        event.kind = kind_of(change.before == Branch::inside, change.after == Branch::inside);
+        event.guard = change.reaction;
+        event.before = event.after = now.w;
+        event.bracket = {now.t, now.t};
+        event.slope = std::numeric_limits<double>::quiet_NaN();
+        if constexpr (can_branch) {
+            if (branching_) {
+                event.mode_after = Modes::mode_of(motion_.branches());
+                auto before = motion_.branches();
+                before[static_cast<Eigen::Index>(change.reaction)] = change.before;
+                event.mode_before = Modes::mode_of(before);
+            }
+        }
+        run_.events.push_back(std::move(event));
+    }
+
+    // --- samples ---
+
+    /// Within the last step, or at its start: by steps of their own.
+    void emit_samples(bool at_start)
+    {
+        const State& now = motion_.state();
+        while (run_.trajectory.t.size() < options_.sample_times.size()) {
+            const double t = options_.sample_times[run_.trajectory.t.size()];
+            if (t > now.t) return;
+            const State& before = motion_.before();
+            const bool inside = !at_start && t > before.t && t < now.t &&
+                                motion_.stepper().take(before, t - before.t, sample_).converged;
+            run_.trajectory.t.push_back(t);
+            run_.trajectory.x.push_back(inside ? sample_.w : now.w);
+        }
+    }
+
+    HandOverOptions options_;
+    EventStepping<N, M> stepping_;
+    bool branching_;
+    Modes modes_;
+    AnyMotion<N, M> motion_;
+    State sample_;
+    AnyHandOverRun<N, M> run_;
+    static constexpr std::uint64_t most_patience = std::uint64_t{1} << 20;
+    [[no_unique_address]] Held held_;
+    double longest_step_ = std::numeric_limits<double>::infinity();  // of the event-driven kind
+    int easy_steps_ = 0;
+    std::uint64_t patience_ = 1;
+    std::uint64_t chatter_patience_ = 10;  // by trial; 1 hands back amid the chattering
+    bool chatters_ = false;
+    bool set_valued_ = false;
+    bool keeps_reaction_ = false;
+    bool ended_ = false;
+};
+
+template <int N, int M>
+AnyHandOver<N, M>::AnyHandOver(const AnyInclusion<N, M>& inclusion, const Vector& w0,
+                               const HandOverOptions& options, const EventStepping<N, M>& stepping)
+    : options_(completed(options, branches(inclusion.traits))),
+      stepping_(stepping),
+      branching_(branches(inclusion.traits)),
+      modes_(inclusion),
+      motion_(inclusion, w0, options_.set_valued),
+      sample_(motion_.state())
+{
+    run_.state = motion_.state();
+}
+
+template <int N, int M>
+AnyHandOver<N, M>::AnyHandOver(const AnyInclusion<N, M>& inclusion, const State& start,
+                               const HandOverOptions& options, const EventStepping<N, M>& stepping)
+    : AnyHandOver(inclusion, start.w, at_time(options, start.t), stepping)
+{
+    motion_.restart(start);
+    run_.state = start;
+    keeps_reaction_ = true;
+}
+
+template <int N, int M>
+AnyHandOverRun<N, M> AnyHandOver<N, M>::take()
+{
+    begin();
+    while (!ended_) {
+        if constexpr (can_branch) {
+            if (!set_valued_) {
+                follow_events();
+                continue;
+            }
+        }
+        follow_inclusion();
+    }
+    run_.statistics.set_valued = motion_.statistics();
+    return std::move(run_);
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,96 @@
+// Internal: what it declares may change without notice.
+//
+// The event-driven phases of a hand-over: a simulation of the branches, whatever its stepper.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "ricochet/detail/branch_modes.hpp"
+#include "ricochet/integrate/simulation.hpp"
+#include "ricochet/nonsmooth/hand_over_run.hpp"
+
+namespace ricochet::detail {
+
+/// Of the event-driven phase that begins at t, after so many samples and steps.
+[[nodiscard]] Options event_options(const HandOverOptions& options, double t, std::size_t samples,
+                                    std::uint64_t steps);
+
+/// What an event-driven phase ended with, as a reason for a set-valued one; nothing if the
+/// run is over.
+[[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
+
+/// A simulation with N components, whatever its system and stepper.
+template <int N>
+class EventLoop {
+public:
+    using X = std::array<double, static_cast<std::size_t>(N)>;
+
+    virtual ~EventLoop() = default;
+    virtual bool step() = 0;
+    [[nodiscard]] virtual Run<X> finish() = 0;
+
+    // After the last step, at hand.
+    [[nodiscard]] double t() const noexcept { return t_; }
+    [[nodiscard]] const X& x() const noexcept { return *x_; }
+    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] const Run<X>& run() const noexcept { return *run_; }
+
+protected:
+    double t_ = 0;
+    const X* x_ = nullptr;
+    Mode mode_ = 0;
+    const Run<X>* run_ = nullptr;
+};
+
+template <int N, class System, class Stepping>
+class EventLoopBy final : public EventLoop<N> {
+public:
+    using X = typename EventLoop<N>::X;
+
+    EventLoopBy(const System& system, const X& x, const Options& options)
+        : simulation_(system, x, options)
+    {
+        refresh();
+    }
+    bool step() override
+    {
+        const bool going = simulation_.step();
+        refresh();
+        return going;
+    }
+    [[nodiscard]] Run<X> finish() override { return simulation_.finish(); }
+
+private:
+    void refresh()
+    {
+        this->t_ = simulation_.t();
+        this->run_ = &simulation_.run();
+        this->x_ = &simulation_.x();
+        this->mode_ = simulation_.mode();
+    }
+
+    Simulation<System, X, Stepping> simulation_;
+};
+
+/// Makes loops of one stepper.
+template <int N, int M>
+struct EventStepping {
+    std::unique_ptr<EventLoop<N>> (*make)(const AnyModes<N, M>& modes,
+                                          const std::array<double, static_cast<std::size_t>(N)>& x,
+                                          const Options& options) = nullptr;
+    bool error_controlled = true;
+};
+
+template <int N, int M, class Stepping>
+std::unique_ptr<EventLoop<N>> make_event_loop(const AnyModes<N, M>& modes,
+                                              const typename EventLoop<N>::X& x,
+                                              const Options& options)
+{
+    return std::make_unique<EventLoopBy<N, AnyModes<N, M>, Stepping>>(modes, x, options);
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,59 @@
+// Internal: what it declares may change without notice.
+//
+// When following events does not pay any longer.
+#pragma once
+
+#include <cstdint>
+
+namespace ricochet::detail {
+
+/// Whether events come so close upon one another that locating them does not pay: more than
+/// 200 within `span` [s].
+class ChatterWatch {
+public:
+    ChatterWatch(double t, double span) noexcept : marked_(t), span_(span) {}
+
+    /// At time t, after so many events of the phase.
+    [[nodiscard]] bool operator()(double t, std::uint64_t events) noexcept
+    {
+        if (events < mark_ + most_events) return false;
+        const bool chatters = t - marked_ < span_;
+        mark_ = events;
+        marked_ = t;
+        return chatters;
+    }
+
+private:
+    static constexpr std::uint64_t most_events = 200;
+    double marked_;
+    double span_;
+    std::uint64_t mark_ = 0;
+};
+
+/// Whether a y that switches stays within the error of the steps: more than 400 events in a row
+/// between which it goes no farther from zero. Their times are then accidents of rounding, and the
+/// events of an accumulation need not become denser.
+class FlutterWatch {
+public:
+    /// After so many events, the last of them at t; `speed()` is then that of the y concerned, and
+    /// `resolved` what a step resolves of it.
+    template <class Speed>
+    [[nodiscard]] bool operator()(std::uint64_t events, double t, double resolved,
+                                  const Speed& speed)
+    {
+        if (events == seen_) return false;
+        // A parabola between two zeros.
+        const bool flutters = events == seen_ + 1 && speed() * (t - t_) / 4 <= resolved;
+        in_a_row_ = flutters ? in_a_row_ + 1 : 0;
+        seen_ = events;
+        t_ = t;
+        return in_a_row_ > 400;
+    }
+
+private:
+    std::uint64_t seen_ = 0;
+    int in_a_row_ = 0;
+    double t_ = 0;
+};
+
+}  // namespace ricochet::detail

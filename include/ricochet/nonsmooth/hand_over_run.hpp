@@ -1,0 +1,101 @@
+// What a hand-over is asked for, and what comes of it: phases of events and of set-valued steps.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+
+namespace ricochet {
+
+/// Why a phase began.
+enum class PhaseCause {
+    start,
+    no_modes,       ///< the set is no box, or has more than four reactions
+    no_flow,        ///< y' = 0 does not determine the held reactions
+    several,        ///< changes coincide, and rates do not tell what follows
+    accumulation,   ///< infinitely many switchings in finite time
+    chattering,     ///< more switchings in a short time than can be worth locating
+    stuck,          ///< the event-driven loop could not go on
+    contradiction,  ///< an event-driven step contradicted the law of a reaction
+    released,       ///< event-driven again: every branch is plain
+};
+
+[[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
+
+struct Phase {
+    double from = 0;  ///< [s]
+    bool set_valued = false;
+    PhaseCause cause = PhaseCause::start;
+};
+
+struct HandOverOptions {
+    double t_start = 0;
+    double t_end = std::numeric_limits<double>::quiet_NaN();
+
+    /// Of the event-driven phases, as in `Options`.
+    double rtol = 1e-10;
+    double atol = 1e-12;
+    double h_max = std::numeric_limits<double>::infinity();
+    double event_tolerance = 0;
+
+    /// The run ends, as `not_handed_over`, where a set-valued phase would begin.
+    bool events_only = false;
+
+    /// The run ends, as `released`, where every reaction is at a bound and no y so near to zero
+    /// that its sign is an accident.
+    bool until_released = false;
+
+    /// Of the set-valued phases; their times are those of the run. A step of zero is a
+    /// thousandth of the run. Changes are located where the set is a box.
+    SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
+
+    std::vector<double> sample_times{};     ///< ascending
+    std::uint64_t max_steps = 100'000'000;  ///< of both kinds, attempts included
+    const std::atomic<bool>* cancelled = nullptr;
+};
+
+struct HandOverStatistics {
+    Statistics event_driven;
+    SetValuedStatistics set_valued;
+    std::uint64_t to_set_valued = 0;  ///< hand-overs, a start there included
+    std::uint64_t to_events = 0;
+    double set_valued_time = 0;  ///< [s] of the motion
+};
+
+namespace detail {
+
+template <int N, int M>
+struct RICOCHET_ALIGNED AnyHandOverRun {
+    using Vector = Eigen::Matrix<double, N, 1>;
+
+    Outcome outcome = Outcome::reached_end;
+    StateWithReaction<N, M> state;  ///< at the time reached, with its reaction
+    Mode mode = 0;                  ///< in a set-valued phase `BranchModes::several`
+    std::vector<Event<Vector>> events;
+    std::vector<Phase> phases;
+    Trajectory<Vector> trajectory;  ///< at the sample times
+    HandOverStatistics statistics;
+    StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
+};
+
+}  // namespace detail
+
+/// `Event::guard` is the reaction that changed; modes are those of `BranchModes`.
+template <Inclusion System>
+struct HandOverRun : detail::AnyHandOverRun<state_size<System>, reaction_size<System>> {
+};
+
+/// From the options of `integrate`.
+/// @throws std::invalid_argument for those that a hand-over does not have: `stop_at_event`,
+/// `record_steps`, a run backward.
+[[nodiscard]] HandOverOptions hand_over_options(const Options& options);
+
+}  // namespace ricochet

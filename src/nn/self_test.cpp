@@ -1,0 +1,110 @@
+#include "self_test.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace ricochet::model_file {
+namespace {
+
+/// How far two evaluations of the model may lie apart, per output.
+///
+/// With unit roundoff u, a sum of n products and a bias in any order is off by at
+/// most (n + 2) u (|W| |x| + |b|) to first order. Errors e of its input arrive as
+/// |W| e, and neither activation amplifies them; 8 u |y| allows for the tanh itself.
+/// The first e allows for features that are normalised in the network's precision.
+/// Twice the bound, as both evaluations may be off.
+std::vector<double> self_test_tolerance(const Model& model)
+{
+    const bool single = model.precision == Precision::f32;
+    const double u = single ? 0x1p-24 : 0x1p-53;
+    const double tiny =
+        single ? std::numeric_limits<float>::min() : std::numeric_limits<double>::min();
+
+    const std::vector<double>& features = model.self_test.input;
+    std::vector<double> x(features.size());
+    std::vector<double> e(features.size());
+    for (std::size_t i = 0; i < features.size(); ++i) {
+        const double scale = model.scale[i];
+        x[i] = (features[i] - model.offset[i]) * scale;
+        e[i] = 4 * u * (std::abs(features[i]) + std::abs(model.offset[i])) * std::abs(scale);
+    }
+    for (const DenseLayer& layer : model.layers) {
+        const bool last = &layer == &model.layers.back();
+        std::vector<double> y(layer.outputs);
+        std::vector<double> e_y(layer.outputs);
+        for (std::size_t j = 0; j < layer.outputs; ++j) {
+            double sum = layer.bias[j];
+            double magnitude = std::abs(layer.bias[j]);
+            double inherited = 0;
+            for (std::size_t i = 0; i < layer.inputs; ++i) {
+                const double w = layer.weight[j * layer.inputs + i];
+                sum += w * x[i];
+                magnitude += std::abs(w) * (std::abs(x[i]) + e[i]);
+                inherited += std::abs(w) * e[i];
+            }
+            y[j] = sum;
+            if (!last)
+                y[j] = model.activation == Activation::relu ? std::max(0.0, sum) : std::tanh(sum);
+            e_y[j] = inherited + static_cast<double>(layer.inputs + 2) * u * magnitude +
+                     8 * u * std::abs(y[j]) + tiny;
+        }
+        x = std::move(y);
+        e = std::move(e_y);
+    }
+    for (double& value : e) value *= 2;
+    return e;
+}
+
+}  // namespace
+
+Classifier classifier_of(const Model& model, const Refusal& refuse)
+{
+    try {
+        return Classifier(model);
+    } catch (const std::invalid_argument& error) {
+        refuse(error.what());
+    }
+}
+
+void repeat_self_test(const Model& model, const Refusal& refuse)
+{
+    const Classifier classifier = classifier_of(model, refuse);
+    std::vector<double> found(classifier.outputs());
+    classifier.logits(model.self_test.input.data(), found.data());
+    const std::vector<double> tolerance = self_test_tolerance(model);
+    for (std::size_t j = 0; j < found.size(); ++j) {
+        const double expected = model.self_test.output[j];
+        const bool same = found[j] == expected || (std::isnan(found[j]) && std::isnan(expected));
+        const bool close =
+            std::isfinite(tolerance[j]) && std::abs(found[j] - expected) <= tolerance[j];
+        if (!same && !close) {
+            refuse("self-test: output " + std::to_string(j), decimal(expected), decimal(found[j]));
+        }
+    }
+}
+
+SelfTest make_self_test(const Model& model, const Refusal& refuse)
+{
+    const Classifier classifier = classifier_of(model, refuse);
+    SelfTest test;
+    for (std::size_t i = 0; i < classifier.inputs(); ++i) {
+        const double fraction = std::fmod(0.6180339887498949 * static_cast<double>(i + 1), 1.0);
+        double value = model.offset[i] + fraction / model.scale[i];
+        if (i < model.domain.size()) {
+            const Interval& range = model.domain[i];
+            const double inside = range.lower + fraction * (range.upper - range.lower);
+            if (std::isfinite(inside)) value = inside;
+        }
+        test.input.push_back(std::isfinite(value) ? value : model.offset[i]);
+    }
+    test.output.resize(classifier.outputs());
+    classifier.logits(test.input.data(), test.output.data());
+    return test;
+}
+
+}  // namespace ricochet::model_file
