@@ -647,6 +647,21 @@ constexpr void find_degrees(Tape& tape) noexcept
     }
 }
 
+/// The largest degree in time of states and guards, rounded up to a multiple of 4.
+template <class Tape>
+[[nodiscard]] constexpr int polynomial_order(const Tape& tape) noexcept
+{
+    int most = 1;
+    for (std::size_t i = 0; i < Tape::states; ++i) {
+        most = most > tape.degree[i] ? most : tape.degree[i];
+    }
+    for (std::size_t i = 0; i < Tape::guards; ++i) {
+        const int degree = tape.degree[static_cast<std::size_t>(tape.outputs[Tape::states + i])];
+        most = most > degree ? most : degree;
+    }
+    return (most + 3) / 4 * 4;
+}
+
 /// Marks what guards depend on, partners included.
 template <class Tape>
 constexpr void mark_for_guards(Tape& tape) noexcept
