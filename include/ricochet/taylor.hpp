@@ -14,7 +14,8 @@
 //         dxdt[1] = cos(frequency * t) - x[0];
 //     }
 //
-// It may use + - * / sqrt cbrt pow exp log sin cos tan asin acos atan sinh cosh tanh hypot, and
+// It may use + - * / sqrt cbrt pow exp log sin cos tan asin acos atan atan2 sinh cosh tanh
+// hypot, and
 // must be the same operations whatever the values are: no comparisons, no kinks. A system with
 // modes takes the mode first, and its `mode_count` is a constant. The system has a constexpr
 // default constructor; the parameters of the object are those of the run.
