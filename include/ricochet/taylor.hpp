@@ -14,7 +14,8 @@
 //         dxdt[1] = cos(frequency * t) - x[0];
 //     }
 //
-// It may use + - * / sqrt cbrt pow exp log sin cos tan asin acos atan sinh cosh tanh hypot, and
+// It may use + - * / sqrt cbrt pow exp log sin cos tan asin acos atan atan2 sinh cosh tanh
+// hypot, and
 // must be the same operations whatever the values are: no comparisons, no kinks. A system with
 // modes takes the mode first, and its `mode_count` is a constant. The system has a constexpr
 // default constructor; the parameters of the object are those of the run.
@@ -31,9 +32,15 @@
 #include <string>
 #include <type_traits>
 
+#include "ricochet/detail/guard_view.hpp"
 #include "ricochet/detail/kernels.hpp"
+#include "ricochet/detail/quiet_run.hpp"
+#include "ricochet/detail/series_guard.hpp"
+#include "ricochet/detail/series_root.hpp"
 #include "ricochet/detail/taylor_series.hpp"
+#include "ricochet/detail/taylor_step.hpp"
 #include "ricochet/detail/taylor_tape.hpp"
+#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
@@ -55,87 +62,6 @@ struct Taylor {
 };
 
 namespace detail {
-
-inline constexpr int most_taylor_order = 20;
-
-[[nodiscard]] constexpr int taylor_order(int given, double rtol) noexcept
-{
-    if (given != 0) return given;
-    return rtol >= 1e-8 ? 12 : rtol >= 1e-11 ? 16 : 20;
-}
-
-/// log2 of a positive normal number, to 1e-3: a step from its twelfth part is right to 1e-4.
-[[nodiscard]] inline double rough_log2(double x) noexcept
-{
-    const auto bits = std::bit_cast<std::uint64_t>(x);
-    const auto exponent = static_cast<double>(static_cast<std::int64_t>(bits >> 52) - 1023);
-    const double m =
-        std::bit_cast<double>((bits & 0xfffffffffffffULL) | 0x3ff0000000000000ULL);  // in [1, 2)
-    // Through log2 at the four Chebyshev nodes of [1, 2].
-    return (exponent - 2.1362320654130670) +
-           m * ((3.0111621508367876 - 1.0268049073983060 * m) + 0.1527002847975194 * (m * m));
-}
-
-/// 2^x for |x| < 1000, to 1e-4.
-[[nodiscard]] inline double rough_exp2(double x) noexcept
-{
-    constexpr double shift = 0x1.8p52;  // rounds to a whole number
-    const double whole = (x + shift) - shift;
-    const double y = x - whole;
-    // Through 2^y at the four Chebyshev nodes of [-1/2, 1/2].
-    const double part = (0.9999245569508709 + 0.6931367338836214 * y) +
-                        y * y * (0.2426394785462585 + 0.0558382829462201 * y);
-    return part * std::bit_cast<double>(
-                      static_cast<std::uint64_t>(static_cast<std::int64_t>(whole) + 1023) << 52);
-}
-
-/// The coefficients of the step in hand, and what they were computed from.
-template <std::size_t n, std::size_t m>
-struct TaylorStep {
-    alignas(16) std::array<double, (most_taylor_order + 1) * n> coefficients{};
-    std::array<double, (most_taylor_order + 1) * m> guards{};
-    std::array<double, n> x{};
-    Instant start;
-    Mode mode = 0;
-    bool backward = false;
-    int order = 0;
-    double reach = std::numeric_limits<double>::quiet_NaN();  ///< [s]; see `StepKernel::reach`
-};
-
-/// w(s) = sum of coefficients k of degree 2 and more, and its derivative.
-template <bool with_rate, std::size_t n>
-[[gnu::always_inline]] inline void evaluate_departure(const double* c, int order, double s,
-                                                      std::array<double, n>& w,
-                                                      std::array<double, n>& rate)
-{
-    // Four coefficients at a time: a quarter of Horner's additions wait for each other.
-    const double s2 = s * s;
-    const double s4 = s2 * s2;
-    const auto at = [c](int k, std::size_t i) { return c[static_cast<std::size_t>(k) * n + i]; };
-    for (std::size_t i = 0; i < n; ++i) w[i] = at(order, i);
-    if constexpr (with_rate) rate.fill(0);
-    for (int k = order - 4; k > 0; k -= 4) {
-        for (std::size_t i = 0; i < n; ++i) {
-            w[i] = w[i] * s4 +
-                   ((at(k, i) + s * at(k + 1, i)) + s2 * (at(k + 2, i) + s * at(k + 3, i)));
-        }
-        if constexpr (with_rate) {
-            const double d = k;
-            for (std::size_t i = 0; i < n; ++i) {
-                rate[i] =
-                    rate[i] * s4 + (((d + 1) * at(k + 1, i) + s * ((d + 2) * at(k + 2, i))) +
-                                    s2 * ((d + 3) * at(k + 3, i) + s * ((d + 4) * at(k + 4, i))));
-            }
-        }
-    }
-    for (std::size_t i = 0; i < n; ++i) w[i] = w[i] * s4 + s2 * (at(2, i) + s * at(3, i));
-    if constexpr (with_rate) {
-        for (std::size_t i = 0; i < n; ++i) {
-            rate[i] =
-                rate[i] * s4 + (s * (2 * at(2, i)) + s2 * (3 * at(3, i) + s * (4 * at(4, i))));
-        }
-    }
-}
 
 [[noreturn]] inline void throw_structure_differs(const std::string& name)
 {
@@ -215,12 +141,15 @@ struct StepperDoor<System, X, Taylor> : Door<System, X> {
         given_order = order;
     }
 
-    void compute(Mode mode, double t, const double* x, int order, double* out, double* guards)
+    /// The coefficients up to `order`, or all of them where these are fewer; returns how many.
+    int compute(Mode mode, double t, const double* x, int order, double* out, double* guards)
     {
+        int computed = order;
         if constexpr (takes_series) {
-            dispatch(mode, t, x, order, out, guards,
+            dispatch(mode, t, x, computed, out, guards,
                      std::make_index_sequence<tape_count<System, n>()>{});
         }
+        return computed;
     }
 
     int given_order = 0;
@@ -255,7 +184,7 @@ private:
     }
 
     template <std::size_t... mode>
-    void dispatch(Mode at, double t, const double* x, int order, double* out, double* guards,
+    void dispatch(Mode at, double t, const double* x, int& order, double* out, double* guards,
                   std::index_sequence<mode...>)
     {
         constexpr bool one = sizeof...(mode) == 1;
@@ -263,9 +192,13 @@ private:
                                    compute_in<static_cast<Mode>(mode)>(t, x, order, out, guards))));
     }
     template <Mode mode>
-    bool compute_in(double t, const double* x, int order, double* out, double* guards)
+    bool compute_in(double t, const double* x, int& order, double* out, double* guards)
     {
-        using Series = TaylorSeries<taylor_tape<System, n, mode>, most_taylor_order>;
+        constexpr int degree = polynomial_order(taylor_tape<System, n, mode>);
+        constexpr bool is_polynomial = degree <= least_taylor_order;
+        if (is_polynomial) order = degree;
+        using Series =
+            TaylorSeries<taylor_tape<System, n, mode>, is_polynomial ? degree : most_taylor_order>;
         Series::compute(constants_[static_cast<std::size_t>(mode)].data(), t, x, order, out,
                         guards);
         return true;
@@ -294,7 +227,7 @@ class KernelOf<System, X, Taylor> {
     {
         D& of = at(door);
         TaylorStep<n, m>& step = of.step;
-        bool same = step.order >= order && step.mode == state.mode &&
+        bool same = step.asked >= order && step.order > 0 && step.mode == state.mode &&
                     step.backward == state.backward && step.start.value == state.start.value &&
                     step.start.remainder == state.start.remainder;
         for (std::size_t i = 0; i < n; ++i) same = same && step.x[i] == state.x0[i];
@@ -309,9 +242,9 @@ class KernelOf<System, X, Taylor> {
         for (std::size_t i = 0; i < n; ++i) step.x[i] = state.x0[i];
         double* const c = step.coefficients.data();
         double* const g = step.guards.data();
-        of.compute(state.mode, state.start.value, step.x.data(), order, c, g);
+        const int computed = of.compute(state.mode, state.start.value, step.x.data(), order, c, g);
         if (state.backward) {
-            for (std::size_t k = 1; k <= static_cast<std::size_t>(order); k += 2) {
+            for (std::size_t k = 1; k <= static_cast<std::size_t>(computed); k += 2) {
                 for (std::size_t i = 0; i < n; ++i) c[k * n + i] = -c[k * n + i];
                 for (std::size_t i = 0; i < m; ++i) g[k * m + i] = -g[k * m + i];
             }
@@ -319,47 +252,9 @@ class KernelOf<System, X, Taylor> {
         step.start = state.start;
         step.mode = state.mode;
         step.backward = state.backward;
-        step.order = order;
+        step.order = computed;
+        step.asked = order;
         step.reach = std::numeric_limits<double>::quiet_NaN();
-    }
-
-    /// The largest h at which the last two terms stay within atol + rtol |x|.
-    [[nodiscard, gnu::always_inline]] static double find_reach(const State& state, const double* c,
-                                                               int order, double rtol, double atol)
-    {
-        const double* const each = state.component_atol;
-        const auto longest = [&](const Array& size) {
-            double last = 0, before = 0;
-            const double* const cp = c + static_cast<std::size_t>(order) * n;
-            for (std::size_t i = 0; i < n; ++i) {
-                const double scale = 1 / ((each ? each[i] : atol) + rtol * size[i]);
-                last = std::max(last, std::fabs(cp[i]) * scale);
-                before = std::max(before, std::fabs(cp[i - n]) * scale);
-            }
-            // Nothing in the last two terms: a polynomial, as far as can be seen.
-            const double least = std::numeric_limits<double>::min();
-            if (!(last > least) && !(before > least)) return infinity;
-            const double most = std::numeric_limits<double>::max();
-            const double by_last = rough_log2(std::clamp(last, least, most)) / order;
-            const double by_before = rough_log2(std::clamp(before, least, most)) / (order - 1);
-            return rough_exp2(-std::max(by_last, by_before));
-        };
-        Array size;
-        for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(state.x0[i]);
-        double h = longest(size);
-        // What begins near zero and moves away has the size of its end, as with other methods.
-        // A length grows with a twelfth power of the size at most: less is not worth another root.
-        for (int again = 0; again < 3; ++again) {
-            bool larger = false;
-            for (std::size_t i = 0; i < n; ++i) {
-                const double end = std::fabs(state.x0[i] + std::min(h, 1e100) * c[n + i]);
-                larger = larger || end > 16 * size[i];
-                size[i] = std::max(size[i], end);
-            }
-            if (!larger || !(h < infinity)) break;
-            h = longest(size);
-        }
-        return h;
     }
 
     static double reach(void* door, State& state, double rtol, double atol)
@@ -369,7 +264,7 @@ class KernelOf<System, X, Taylor> {
         const double* const c = step.coefficients.data();
         ++state.flow_calls;
         for (std::size_t i = 0; i < n; ++i) state.rate0[i] = c[n + i];
-        step.reach = find_reach(state, c, step.order, rtol, atol);
+        step.reach = find_reach<n>(state.x0, state.component_atol, c, step.order, rtol, atol);
         return step.reach;
     }
 
@@ -405,19 +300,19 @@ class KernelOf<System, X, Taylor> {
         if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
         if (!go(step, state, h)) return std::numeric_limits<double>::quiet_NaN();
         // The last millionths are those by which a step is stretched to the end of a run.
-        return h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, order);
+        return h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
     }
 
     static bool take(void* door, State& state, double h)
     {
-        const int order = at(door).step.order;  // that of the run, where it has begun
+        const int order = at(door).step.asked;  // that of the run, where it has begun
         const int given = at(door).given_order;
         return go(expand(door, state, given ? given : order ? order : most_taylor_order), state, h);
     }
 
     static void depart(void* door, State& state, double s, C& w, C& rate)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
         Array w_own, rate_own;
         evaluate_departure<true>(step.coefficients.data(), step.order, s, w_own, rate_own);
         for (std::size_t i = 0; i < n; ++i) {
@@ -428,7 +323,7 @@ class KernelOf<System, X, Taylor> {
 
     static void departure(void* door, const State& state, double s, C& w)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
         Array w_own, none;
         evaluate_departure<false>(step.coefficients.data(), step.order, s, w_own, none);
         for (std::size_t i = 0; i < n; ++i) w[i] = w_own[i];
@@ -436,19 +331,235 @@ class KernelOf<System, X, Taylor> {
 
     static SeriesTerms series(void* door, const State& state)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
         return {step.coefficients.data(), step.order, n};
     }
 
     static SeriesTerms guard_series(void* door, const State& state)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.order);
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
         return {step.guards.data(), step.order, m};
     }
 
-    static constexpr double infinity = std::numeric_limits<double>::infinity();
+    // --- crossings ---
+
+    using Guard = GuardView<System, X>;
+
+    /// As `StepKernel::cross`.
+    static bool cross(void* door, State& state, SeriesCrossing& crossing)
+    {
+        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
+        const double sign = crossing.side == Side::above ? 1 : -1;
+        SeriesRoot root;
+        if (!find_first_root({step.guards.data(), step.order, m}, crossing.which, sign, state.h,
+                             sign * crossing.end, crossing.from_surface, root)) {
+            return false;
+        }
+        const Guard guard(at(door).system(), crossing.calls, crossing.which, state.mode,
+                          Crossing::falling, state.backward);
+        const double* const c = step.coefficients.data();
+        Array w, rate;
+        X x;
+        double correction = 0;
+        for (int k = 0;; ++k) {
+            evaluate_departure<true>(c, step.order, root.s, w, rate);
+            for (std::size_t i = 0; i < n; ++i) {
+                w[i] += state.remainder[i];
+                x[i] = step.x[i] + (root.s * c[n + i] + w[i]);
+                rate[i] += c[n + i];
+            }
+            // The guard itself has the last word: its series leaves out its last terms.
+            correction = -guard.value(state.time(root.s), x) / root.slope;
+            if (std::fabs(correction) <= straight_part * root.s) break;
+            root.s += correction;
+            if (k == most_corrections || !(root.s > 0 && root.s < state.h)) return false;
+        }
+        const OnLine line{guard, state, x, rate, root};
+        if (!close_in(line, correction, crossing)) return false;
+        const double ahead = (crossing.root - root.s) + crossing.root_remainder;
+        for (std::size_t i = 0; i < n; ++i) {
+            state.at[i] = step.x[i] + (root.s * c[n + i] + (w[i] + ahead * rate[i]));
+        }
+        return true;
+    }
+    /// Of a root: its square is rounding, so that the motion is straight for as long.
+    static constexpr double straight_part = 0x1p-26;
+    static constexpr int most_corrections = 3;
+
+    /// The guard near a root, along the flow there.
+    struct OnLine {
+        const Guard& guard;
+        const State& state;
+        const X& x;
+        const Array& rate;
+        const SeriesRoot& near;
+
+        [[nodiscard]] double operator()(double s) const
+        {
+            X there;
+            for (std::size_t i = 0; i < n; ++i) there[i] = x[i] + (s - near.s) * rate[i];
+            return guard.value(state.time(s), there);
+        }
+    };
+
+    /// Brackets the root as closely as doubles lie, or as the guard's rounding allows.
+    static bool close_in(const OnLine& value, double correction, SeriesCrossing& crossing)
+    {
+        const TwoSum root = two_sum(value.near.s, correction);
+        const double h = value.state.h;
+        double margin = 0.75 * finest_bracket(root.value, h);
+        double lo = root.value - margin, hi = root.value + margin;
+        double beyond = value(hi);
+        for (int k = 0; !has_left(crossing.side, beyond); ++k) {
+            if (k == most_widenings) return false;
+            lo = hi;
+            hi += margin *= 2;
+            beyond = value(hi);
+        }
+        for (int k = 0; lo < root.value && has_left(crossing.side, value(lo)); ++k) {
+            if (k == most_widenings) return false;
+            hi = lo;
+            beyond = value(hi);
+            lo -= margin *= 2;
+        }
+        if (!(lo > 0 && hi < h)) return false;
+        const TwoSum at = root.value < lo ? TwoSum{lo, 0} : root.value > hi ? TwoSum{hi, 0} : root;
+        crossing.lo = lo;
+        crossing.hi = hi;
+        crossing.root = at.value;
+        crossing.root_remainder = at.remainder;
+        crossing.slope = value.near.slope;
+        crossing.error = std::max(std::fabs(beyond / value.near.slope), hi - lo);
+        return true;
+    }
+    static constexpr int most_widenings = 8;
+
+    // --- quiet runs ---
+
+    [[nodiscard]] static double smallest_step(double h_min, double t) noexcept
+    {
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(t);
+        return std::max(h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
+    }
+
+    /// As `Step::accept`.
+    [[gnu::always_inline]] static void accept(State& state)
+    {
+        state.start = state.start.after(state.in_time(state.h));
+        if constexpr (is_small<C>) {
+            for (std::size_t i = 0; i < n; ++i) {
+                const TwoSum sum = two_sum(
+                    state.x0[i], state.h * state.rate0[i] + (state.w[i] + state.remainder[i]));
+                state.x0[i] = sum.value;
+                state.remainder[i] = sum.remainder;
+                state.rate0[i] = state.rate1[i];
+            }
+        } else {
+            std::swap(state.x0, state.x1);
+            std::swap(state.remainder, state.large.remainder1);
+            std::swap(state.rate0, state.rate1);
+        }
+    }
+
+    /// Whether the guard has no event in the step in hand, of which `run.g1` is the end.
+    [[gnu::always_inline]] static bool is_clear(const TaylorStep<n, m>& step, const State& state,
+                                                const QuietRun& run)
+    {
+        if (!(run.sign * run.g1 > 0) || (!run.departs && run.sign * run.g0 < 0)) return false;
+        const bool from_surface = run.departs || run.sign * run.g0 <= 0;
+        const SeriesTerms terms{step.guards.data(), step.order, m};
+        return series_clears(terms, 0, run.sign, state.h, 0, from_surface) ||
+               series_clears_closely(terms, 0, run.sign, state.h, 0, from_surface);
+    }
+
+    template <bool controlled>
+    static void take_quiet_steps(void* door, State& state, QuietRun& run)
+    {
+        const int given = at(door).given_order;
+        const int order = controlled                ? taylor_order(given, run.rtol)
+                          : given                   ? given
+                          : at(door).step.asked > 0 ? at(door).step.asked
+                                                    : most_taylor_order;
+        run.why = QuietEnd::due;
+        run.repeated = false;
+        for (;;) {
+            if (run.steps == run.most_steps) return;
+            if (run.cancelled && run.cancelled->load(std::memory_order_relaxed)) return;
+            TaylorStep<n, m>& step = expand(door, state, order);
+            double h = run.h_next;
+            if constexpr (controlled) {
+                step.reach = find_reach<n>(state.x0, state.component_atol, step.coefficients.data(),
+                                           step.order, run.rtol, run.atol);
+                // A step that is too long even so is refused by the loop.
+                if (!(step.reach >= smallest_step(run.h_min, state.start.value))) return;
+                h = std::min(h, step.reach);
+            }
+            const double until = state.start.until(run.end);
+            if (h * (1 + 1e-6) >= (state.backward ? -until : until)) return;
+            if constexpr (controlled) ++state.flow_calls;
+            if (!go(step, state, h)) {
+                run.why = QuietEnd::failed;
+                run.error = std::numeric_limits<double>::quiet_NaN();
+                run.h_next = h;
+                return;
+            }
+            const double next = controlled ? std::min(10 * h, run.h_max) : h;
+            if constexpr (m > 0) {
+                const Guard guard(at(door).system(), run.guard_calls, 0, state.mode,
+                                  Crossing::falling, state.backward);
+                run.g1 = guard.value(state.time(h), loaded(state.x1));
+                if (!is_clear(step, state, run)) {
+                    run.why = QuietEnd::doubt;
+                    run.h_next = next;
+                    return;
+                }
+                run.g0 = run.g1;
+                run.rate0 = std::numeric_limits<double>::quiet_NaN();
+                run.departs = false;
+            }
+            accept(state);
+            ++run.steps;
+            run.h_next = next;
+        }
+    }
+
+    [[nodiscard, gnu::always_inline]] static decltype(auto) loaded(const C& x)
+    {
+        if constexpr (std::is_same_v<X, C>) {
+            return (x);
+        } else {
+            X out;
+            for (std::size_t i = 0; i < n; ++i) out[i] = x[i];
+            return out;
+        }
+    }
+
+    template <bool controlled>
+    static void run_quietly(void* door, State& state, QuietRun& run)
+    {
+        const Instant start = state.start;
+        const C x0 = state.x0, remainder = state.remainder, rate0 = state.rate0;
+        try {
+            take_quiet_steps<controlled>(door, state, run);
+        } catch (...) {
+            state.start = start;
+            state.x0 = x0;
+            state.remainder = remainder;
+            state.rate0 = rate0;
+            throw;
+        }
+    }
 
 public:
+    /// Whether guards have series.
+    static constexpr bool on_series = m > 0;
+
+    template <bool controlled>
+    [[nodiscard]] static constexpr QuietKernel<C> quiet() noexcept
+    {
+        return &run_quietly<controlled>;
+    }
+
     [[nodiscard]] static constexpr StepKernel<C> make()
     {
         StepKernel<C> kernel;
@@ -461,7 +572,10 @@ public:
         kernel.depart = &depart;
         kernel.departure = &departure;
         kernel.series = &series;
-        if constexpr (m > 0) kernel.guard_series = &guard_series;
+        if constexpr (m > 0) {
+            kernel.guard_series = &guard_series;
+            kernel.cross = &cross;
+        }
         return kernel;
     }
 };

@@ -132,6 +132,14 @@ protected:
     /// The same after a look inside, if there is one; `moves` hardly: at several places more.
     [[nodiscard]] bool is_suspicious(bool hardly_moves);
 
+    /// On series no rates are needed until a search asks for them.
+    void sample_end()
+    {
+        if (!on_series_) return bank_.sample_end(step_, calls());
+        bank_.sample_values_at_end(step_, calls());
+        bank_.see_series(step_);
+    }
+
     void look_inside();
 
     /// Whether the state hardly changes in the step, which error control then does not limit.
@@ -140,9 +148,14 @@ protected:
     /// Whether the network predicts that the step is free of events.
     [[nodiscard]] bool ask_network();
 
+    [[nodiscard]] Evidence evidence_of_clear() const noexcept
+    {
+        return on_series_ ? Evidence::proved : finders_.detector.evidence;
+    }
+
     void pass_on_clear() noexcept
     {
-        run_.statistics.evidence.add(on_series_ ? Evidence::proved : finders_.detector.evidence);
+        run_.statistics.evidence.add(evidence_of_clear());
         bank_.pass_on();
     }
 

@@ -20,8 +20,7 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
         }
     }
     if (bank_.size() == 0) return false;
-    bank_.sample_end(step_, calls());
-    if (on_series_) bank_.see_series(step_);
+    sample_end();
     if (any_suspicious()) return true;
     if (asked_ && !cleared) ++run_.statistics.false_alarms;
     pass_on_clear();

@@ -8,6 +8,7 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline void EventEngine<X, single>::note_crossings(double s)
 {
+    if (!bank_.suspects().empty()) bank_.complete_rates(step_, calls());
     for (const std::size_t i : bank_.suspects()) {
         if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
         search_.note_crossings(step_, bank_, i, bank_.end(i, s), resolution_, calls());
@@ -18,6 +19,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::note_crossings_to_set()
 {
     if (search_.members().size() == bank_.size()) return;
+    bank_.complete_rates(step_, calls());
     for (const std::size_t i : bank_.suspects()) {
         GuardRecord& record = bank_[i];
         if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "core/event_hit.hpp"
@@ -116,6 +117,11 @@ public:
             last = i;
         }
         if (suspects == 0) return false;
+        if (suspects == 1 && find_by_series(step, bank, last, calls)) {
+            settle_place(step, resolution, time_event_due);
+            return true;
+        }
+        bank.complete_rates(step, calls);
         if (suspects == 1) {
             if (!find_only(step, bank, last, resolution, calls)) return false;
         } else if (!find_among(step, bank, resolution, calls)) {
@@ -304,52 +310,14 @@ private:
 
     /// What the power series of the guard says of a stretch. Where that is not sure, or other than
     /// its values at the ends, the detector is asked.
-    [[gnu::noinline]] Finding next_on_series(Probe& probe, Watch& watch, const Bank& bank,
-                                             std::size_t i)
-    {
-        const Crossing crossing = bank[i].info.crossing;
-        const GuardSample end = watch.end;
-        double sign = sign_of(watch.side);
-        bool from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch;
-        const double ahead = from_surface ? watch.start.rate : watch.start.value;
-        if (!(sign * ahead > 0)) return finders_->examine(probe, watch);
-        constexpr int most_doubts = 8;  // more of them, and the series tells nothing of the rest
-        for (int doubts = 0; doubts <= most_doubts;) {
-            const SeriesStretch stretch =
-                first_leaving(bank.series(), i, sign, probe.step().h(), watch.start, end,
-                              bank[i].info.touch, from_surface);
-            if (stretch.kind == SeriesStretch::Kind::clear) {
-                if (!(sign * end.value > 0)) break;
-                watch.side_after = watch.side;
-                return Finding::clear(Evidence::proved);
-            }
-            const GuardSample lo =
-                stretch.lo > watch.start.s ? probe.value_and_rate(stretch.lo) : watch.start;
-            const GuardSample hi = stretch.hi < end.s ? probe.value_and_rate(stretch.hi) : end;
-            from_surface = from_surface && lo.s == watch.start.s;
-            const bool agrees = (from_surface || sign * lo.value > 0) && sign * hi.value < 0;
-            watch.start = lo;
-            watch.end = hi;
-            if (stretch.kind == SeriesStretch::Kind::crossing && agrees) {
-                if (counts(watch.side, crossing)) return Finding::leaving(watch.side, lo, hi);
-                watch.side = opposite(watch.side);
-            } else {
-                ++doubts;
-                judge_by_its_own_size(watch, bank, i);
-                const Finding finding = finders_->examine(probe, watch);
-                if (finding.hit || finding.touch) return finding;
-                watch.side = watch.side_after;
-            }
-            watch.side_after = watch.side;
-            if (!(hi.s < end.s)) return Finding::clear(evidence_);
-            watch.start = hi;
-            watch.end = end;
-            sign = sign_of(watch.side);
-            from_surface = false;
-            if (!(sign * hi.value > 0)) return finders_->examine(probe, watch);
-        }
-        return finders_->examine(probe, watch);
-    }
+    [[nodiscard]] Finding next_on_series(Probe& probe, Watch& watch, const Bank& bank,
+                                         std::size_t i);
+
+    /// Where the guard turns between two samples on the same side, toward which it falls and from
+    /// which it rises; nothing where what it is there is a matter of rounding.
+    [[nodiscard]] static std::optional<GuardSample> turn_between(Probe& probe,
+                                                                 const GuardSample& lo,
+                                                                 const GuardSample& hi);
 
     /// The detector's answers on the parts of a stretch, up to the first that is not clear.
     [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank, std::size_t i)
@@ -545,6 +513,10 @@ private:
         }
         return find_only_carefully(step, bank, i, resolution, calls);
     }
+
+    /// As `find_only`, where the series of the guard says where it leaves its side first.
+    [[nodiscard]] bool find_by_series(const CurrentStep& step, Bank& bank, std::size_t i,
+                                      std::uint64_t& calls);
 
     [[gnu::noinline]] bool find_only_carefully(const CurrentStep& step, Bank& bank, std::size_t i,
                                                const EventResolution& resolution,

@@ -96,15 +96,35 @@ public:
         forget_screening();
     }
 
+    /// As `sample_end`, without rates.
+    void sample_values_at_end(const Step<X>& step, std::uint64_t& calls)
+    {
+        sample_values(step.mode(), step.time(step.h()), step.x1(), calls, g1_);
+        leave_rates_out();
+        forget_screening();
+    }
+    /// Samples the rates at both ends of the step that were left out.
+    void complete_rates(const Step<X>& step, std::uint64_t& calls)
+    {
+        if (!std::exchange(rates_left_out_, false)) return;
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (std::isnan(rate0_[i]))
+                rate0_[i] = rate_at(i, step, 0, step.x0(), step.rate0(), calls);
+            rate1_[i] = rate_at(i, step, step.h(), step.x1(), step.rate1(), calls);
+        }
+    }
+
     /// Whether nothing but the values and rates of the guard decides whether a step holds events.
     [[nodiscard]] bool is_steady() const noexcept
     {
         if (size() == 0) return true;
         return single && sign_[0] != 0 && !waiting_ && !bands_ && !selective_;
     }
-    void lend(QuietRun& run) const noexcept
+    /// @param t  [s] where the next step starts
+    void lend(QuietRun& run, double t) const noexcept
     {
         if (size() == 0) return;
+        run.departs = records_[0].departs && t == armed_at_;
         run.sign = sign_[0];
         run.g0 = g0_[0];
         run.rate0 = rate0_[0];
@@ -126,6 +146,18 @@ public:
 
     /// A smooth phase starts at time t, with guards on their surfaces or not.
     void begin_phase(double t) noexcept { armed_at_ = t; }
+
+    /// As `take_back`, of a run on series: the guard has not been cleared.
+    void take_back_on_series(const QuietRun& run, const Step<X>& step)
+    {
+        if (size() == 0) return;
+        g0_[0] = run.g0;
+        rate0_[0] = run.rate0;
+        g1_[0] = run.g1;
+        leave_rates_out();
+        see_series(step);
+        this->suspect_all();
+    }
 
     /// The guards are power series over the step in hand.
     void see_series(const Step<X>& step)
@@ -318,6 +350,20 @@ public:
     [[nodiscard]] bool waiting() const noexcept { return waiting_; }
 
 private:
+    void leave_rates_out() noexcept
+    {
+        rates_left_out_ = true;
+        for (std::size_t i = 0; i < size(); ++i) {
+            rate1_[i] = std::numeric_limits<double>::quiet_NaN();
+        }
+    }
+    [[nodiscard]] double rate_at(std::size_t i, const Step<X>& step, double s, const X& x,
+                                 const X& dxdt, std::uint64_t& calls)
+    {
+        if (!records_[i].enabled) return 0;
+        return this->rate_of(i, step.mode(), step.time(s), x, dxdt, step.h(), calls);
+    }
+
     using Guards::any_of;
     using Guards::as_screened_;
     using Guards::backward_;
@@ -363,6 +409,7 @@ private:
         return rules_.uses_rates ? rate : std::numeric_limits<double>::quiet_NaN();
     }
 
+    bool rates_left_out_ = false;  ///< at the end of the step in hand
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     Doubles sizes_{};
 };

@@ -49,8 +49,7 @@ inline bool Loop<X, single>::return_to_domain()
         is_last_ = time_event_due_ = false;
         h_next_ = error_controlled_ ? h : h_next_;
         step_.attempt(h);
-        bank_.sample_end(step_, calls());
-        if (this->on_series_) bank_.see_series(step_);
+        this->sample_end();
     }
 }
 

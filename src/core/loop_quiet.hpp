@@ -14,21 +14,25 @@ inline bool Loop<X, single>::run_quietly()
                    .atol = options_.atol,
                    .h_min = options_.h_min,
                    .h_max = options_.h_max,
-                   .looks = bank_.looks() && options_.look_inside,
+                   .looks = bank_.looks() && options_.look_inside && !this->on_series_,
                    .most_steps = next_review_ - run_.statistics.steps,
                    .cancelled = options_.cancelled,
                    .system = system_.operator->(),
                    .h_next = h_next_};
-    bank_.lend(quiet);
+    bank_.lend(quiet, step_.time(0));
     quiet_(system_.door(), step_.lend(), quiet);
-    bank_.take_back(quiet);
+    if (this->on_series_) {
+        bank_.take_back_on_series(quiet, step_);
+    } else {
+        bank_.take_back(quiet);
+    }
     h_next_ = error_controlled_ || quiet.why == QuietEnd::due ? quiet.h_next : h_next_;
     if (quiet.steps > 0) last_h_ = step_.h();
     Statistics& counts = run_.statistics;
     counts.steps += quiet.steps;
     counts.rejected += quiet.rejected;
     counts.guard_calls += quiet.guard_calls;
-    if (bank_.size() > 0) this->add_evidence(finders_.detector.evidence, quiet.steps);
+    if (bank_.size() > 0) this->add_evidence(this->evidence_of_clear(), quiet.steps);
     if (quiet.why == QuietEnd::due) return false;
     if (mark_) {
         end_quiet_run_resumably(quiet);
@@ -51,7 +55,7 @@ inline void Loop<X, single>::end_quiet_run(const QuietRun& quiet)
             calm_steps_ = 0;
             return;
         }
-    } else if (this->is_suspicious(quiet.why == QuietEnd::moving)) {
+    } else if (this->on_series_ || this->is_suspicious(quiet.why == QuietEnd::moving)) {
         if (search(false)) {
             calm_steps_ = 0;
             return;

@@ -27,10 +27,10 @@ inline const Options& Loop<X, single>::checked(const RunSetup<X>& setup, const O
 template <class X, bool single>
 inline std::vector<RunProperty> Loop<X, single>::properties() const
 {
-    const std::string by_name =
-        setup_.method_by_name ? " of order " + std::to_string(step_.order()) : "";
+    const int order = setup_.method_by_name ? step_.order() : setup_.order;
+    const std::string of_order = order > 0 ? " of order " + std::to_string(order) : "";
     return properties_of_run({.system = system_->name(system_.door()),
-                              .stepping = plain_type_name(setup_.stepping) + by_name,
+                              .stepping = plain_type_name(setup_.stepping) + of_order,
                               .detector = plain_type_name(finders_.detector.type),
                               .locator = plain_type_name(finders_.locator.type),
                               .components = components_,

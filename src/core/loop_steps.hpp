@@ -30,7 +30,8 @@ inline void Loop<X, single>::run_to_end()
     while (!ended_) {
         // Where one event follows the other a quiet run would be over at its first step.
         const std::uint64_t events = run_.statistics.events;
-        if (calm_steps_ > 1 && may_run_quietly() && run_quietly()) continue;
+        const bool calm = calm_steps_ > 1 || setup_.quiet_on_series;
+        if (calm && may_run_quietly() && run_quietly()) continue;
         advance_one({});
         calm_steps_ = run_.statistics.events == events ? calm_steps_ + 1 : 0;
     }

@@ -58,6 +58,13 @@ public:
     }
     [[nodiscard]] const SeriesTerms& series() const noexcept { return series_; }
 
+    /// Whether guard i, with a series, starts on its surface.
+    [[nodiscard]] bool starts_on_surface(std::size_t i) const noexcept
+    {
+        const bool departs = records_[i].departs && starts_phase_;
+        return departs || sign_[i] * g0_[i] <= records_[i].info.touch;
+    }
+
     /// Evaluates all guards inside a step, at its state `x` there.
     void sample_inside(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
@@ -321,6 +328,14 @@ protected:
         });
     }
 
+    /// Every guard deserves a search, as is known.
+    void suspect_all() noexcept
+    {
+        suspects_.clear();
+        for (std::size_t i = 0; i < size(); ++i) suspects_.push_back(i);
+        screened_ = as_screened_ = true;
+    }
+
     /// Finds the guards that deserve a search.
     [[gnu::noinline]] void screen(double h) noexcept
     {
@@ -401,7 +416,7 @@ protected:
         const bool departs = records_[i].departs && starts_phase_;
         if (records_[i].from > 0 || !(sign_[i] * g1_[i] > touch)) return false;
         if (!departs && sign_[i] * g0_[i] < 0) return false;
-        const bool from_surface = departs || sign_[i] * g0_[i] <= touch;
+        const bool from_surface = starts_on_surface(i);
         return series_clears(series_, i, sign_[i], h, touch, from_surface) ||
                series_clears_closely(series_, i, sign_[i], h, touch, from_surface);
     }

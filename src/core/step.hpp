@@ -302,6 +302,14 @@ public:
         return kernel_->guard_series(system_.door(), state_);
     }
 
+    /// See `StepKernel::cross`. @param before  the state at the root
+    [[nodiscard]] bool cross(SeriesCrossing& crossing, X& before) const
+    {
+        if (!kernel_->cross(system_.door(), state_, crossing)) return false;
+        assign(before, state_.at);
+        return true;
+    }
+
     /// Whether the length of a step is known before it is taken.
     [[nodiscard]] bool knows_reach() const noexcept { return kernel_->reach; }
     /// That length [s].

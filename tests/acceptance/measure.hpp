@@ -16,9 +16,9 @@ struct Measured {
     std::vector<std::string> details{};  ///< printed below it
 };
 
-inline constexpr std::array<std::string_view, 12> topics = {
+inline constexpr std::array<std::string_view, 13> topics = {
     "ball",  "core",  "network",  "events", "guards", "nonsmooth",
-    "steps", "fault", "friction", "files",  "c",     "hosts"};
+    "steps", "fault", "friction", "files",  "c",     "hosts",  "taylor"};
 
 struct Check {
     std::string_view topic;  ///< one of `topics`
@@ -40,6 +40,9 @@ struct Check {
 
 /// The monitor in other people's integrators; none without SUNDIALS.
 [[nodiscard]] std::vector<Check> host_checks();
+
+/// Taylor's method.
+[[nodiscard]] std::vector<Check> taylor_checks();
 
 /// The network: kernels, models, training, gate.
 [[nodiscard]] std::vector<Check> network_checks();

@@ -89,6 +89,15 @@ public:
     {
         return a.integral(std::atan(a[0]), 1 / (1 + a * a));
     }
+    friend SeriesReference atan2(const SeriesReference& y, const SeriesReference& x)
+    {
+        // Turned to where the angle is small: the series of the quotient there, and the turn.
+        const Number angle = std::atan2(y[0], x[0]), c = std::cos(angle), s = std::sin(angle);
+        SeriesReference out = atan((SeriesReference(c) * y - SeriesReference(s) * x) /
+                                   (SeriesReference(c) * x + SeriesReference(s) * y));
+        out[0] = angle;
+        return out;
+    }
     friend SeriesReference hypot(const SeriesReference& a, const SeriesReference& b)
     {
         return sqrt(a * a + b * b);

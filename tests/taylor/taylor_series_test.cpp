@@ -98,6 +98,26 @@ struct Inverse {
     }
 };
 
+/// Angles in all quadrants, of two series, of a series and a number.
+struct Angles {
+    template <class S>
+    constexpr void flow(const S& t, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        using std::atan2, std::sin;
+        dxdt[0] = atan2(x[1], x[0]) - 0.5 * atan2(sin(t), -1.5);
+        dxdt[1] = x[0] - 0.3 * atan2(2.0, x[1]) + atan2(1.0 + x[0] * x[0], t);
+    }
+};
+
+TEST(TaylorSeries, AnglesAgreeInEveryQuadrant)
+{
+    expect_reference_series(Angles{}, 0.7, Two{0.4, -1.1});
+    expect_reference_series(Angles{}, 0.7, Two{-0.4, -1.1});
+    expect_reference_series(Angles{}, -0.7, Two{-1.4, 0.3});
+    expect_reference_series(Angles{}, 0.7, Two{1.2, 0.9});
+    expect_reference_series(Angles{}, 0.2, Two{0, 1.5});  // no quotient there
+}
+
 TEST(TaylorSeries, CoefficientsOfEveryFunctionAgreeWithComposedSeriesInLongDouble)
 {
     expect_reference_series(Trigonometric{}, 0.7, Two{0.4, -1.1});

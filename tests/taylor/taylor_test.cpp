@@ -399,6 +399,53 @@ TEST(Taylor, ARunThatIsSavedAndOneInSingleStepsHaveTheBitsOfOneInAPiece)
     EXPECT_EQ(whole.events.back().t, in_a_piece.events.back().t);
 }
 
+TEST(Taylor, ASnapshotKnowsTheOrderThatItsRunWasGiven)
+{
+    const Impact system;
+    const Options options{.t_end = 60, .rtol = 1e-12, .atol = 1e-12};
+    const auto of_order = [&](int order) {
+        return Simulation(system, Two{0, 0}, options, ErrorControlled<Taylor>{{.order = order}});
+    };
+    auto first = of_order(16);
+    for (int i = 0; i < 7; ++i) first.step();
+    const Snapshot saved = first.save();
+    auto same = of_order(16), other = of_order(20), by_tolerance = of_order(0);
+    same.restore(saved);
+    EXPECT_EQ(same.t(), first.t());
+    EXPECT_THROW(other.restore(saved), std::invalid_argument);
+    EXPECT_THROW(by_tolerance.restore(saved), std::invalid_argument);
+}
+
+/// A guard that fails once, after some calls.
+struct Failing : Impact {
+    mutable int left = -1;
+    template <class S>
+    [[nodiscard]] constexpr S guard(const S& t, const std::array<S, 2>& x) const
+    {
+        if constexpr (std::is_same_v<S, double>) {
+            if (left >= 0 && left-- == 0) throw std::runtime_error("the guard fails");
+        }
+        return Impact::guard(t, x);
+    }
+};
+
+TEST(Taylor, ARunGoesOnAfterAnExceptionWithTheBitsOfOneWithoutIt)
+{
+    const Options options{.t_end = 60, .rtol = 1e-12, .atol = 1e-12};
+    const auto whole = integrate(Failing{}, Two{0, 0}, options, ErrorControlled<Taylor>{});
+    for (const int calls : {10, 17, 23, 38, 51}) {
+        const Failing system;
+        Simulation simulation(system, Two{0, 0}, options, ErrorControlled<Taylor>{});
+        system.left = calls;
+        EXPECT_THROW(static_cast<void>(simulation.take()), std::runtime_error);
+        const auto run = simulation.take();
+        EXPECT_EQ(run.x, whole.x);
+        EXPECT_EQ(run.statistics.steps, whole.statistics.steps);
+        ASSERT_EQ(run.events.size(), whole.events.size());
+        EXPECT_EQ(run.events.back().t, whole.events.back().t);
+    }
+}
+
 struct Rooted {
     using State = std::array<double, 1>;
     template <class S>

@@ -25,8 +25,10 @@ struct RunSetup {
     void* door = nullptr;
     const StepKernel<X>* kernel = nullptr;
     QuietKernel<X> quiet = nullptr;  ///< with flow and guard inlined; may be null
+    bool quiet_on_series = false;    ///< it clears guards by their series
     bool error_controlled = true;
     bool method_by_name = false;
+    int order = 0;              ///< that the method was given, where it takes one
     const char* stepping = "";  ///< its type, as the compiler writes it
     DetectorTable<X> detector;
     const void* detecting = nullptr;

@@ -71,6 +71,8 @@ struct LocatorTable {
     Location (*locate)(const void* self, GuardPath& path, double lo, double lo_value,
                        double lo_rate, double hi, double hi_value, double hi_rate,
                        double tolerance) = nullptr;
+    /// Where the guard's series tells a root, it need not be asked.
+    bool yields_to_series = false;
 };
 
 }  // namespace ricochet::detail

@@ -4,11 +4,13 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/door.hpp"
 #include "ricochet/detail/meter.hpp"
 #include "ricochet/detect/planned.hpp"
+#include "ricochet/locate/newton.hpp"
 
 namespace ricochet::detail {
 
@@ -141,7 +143,8 @@ template <class Locator>
             return static_cast<const Locator*>(self)->locate(
                 path, GuardSample{lo, lo_value, lo_rate}, GuardSample{hi, hi_value, hi_rate},
                 tolerance);
-        }};
+        },
+        .yields_to_series = std::is_same_v<Locator, Newton>};
 }
 
 }  // namespace ricochet::detail

@@ -27,9 +27,10 @@ struct QuietRun {
     double end = 0;  ///< [s] of the run, or of the next time event: no step reaches it
     double rtol = 0;
     double atol = 0;
-    double h_min = 0;    ///< [s]
-    double h_max = 0;    ///< [s]
-    bool looks = false;  ///< inside each step, once
+    double h_min = 0;      ///< [s]
+    double h_max = 0;      ///< [s]
+    bool looks = false;    ///< inside each step, once
+    bool departs = false;  ///< the guard starts on its surface
     std::uint64_t most_steps = 0;
     const std::atomic<bool>* cancelled = nullptr;
     const void* system = nullptr;  ///< the SystemTable, for kernels that call by pointer

@@ -101,6 +101,19 @@ struct StepState {
     [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }
 };
 
+/// The first crossing of a guard in a step, where its series tells.
+struct SeriesCrossing {
+    std::size_t which = 0;
+    Side side = Side::plateau;  ///< that the guard leaves
+    double end = 0;             ///< its value at the end of the step
+    bool from_surface = false;  ///< it starts there
+    std::uint64_t calls = 0;    ///< of the guard
+
+    // --- offsets [s] in the step, as in `Location` ---
+    double lo = 0, hi = 0, root = 0, root_remainder = 0;
+    double slope = 0, error = 0;
+};
+
 /// A method for one system. Without functions it is a host's.
 template <class X>
 struct StepKernel {
@@ -127,6 +140,9 @@ struct StepKernel {
     SeriesTerms (*series)(void* door, const StepState<X>& step) = nullptr;
     /// The guards on it, all of them, or null.
     SeriesTerms (*guard_series)(void* door, const StepState<X>& step) = nullptr;
+    /// Locates a crossing by a guard's series, and leaves the state there in `at`; false where that
+    /// is not sure. Null where guards have no series.
+    bool (*cross)(void* door, StepState<X>& step, SeriesCrossing& crossing) = nullptr;
     /// The state has another dimension. Null where nothing is kept.
     void (*renew)(void* door) = nullptr;
 

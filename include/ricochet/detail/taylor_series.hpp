@@ -116,6 +116,11 @@ class TaylorSeries {
                 case TaylorOp::arc_sine:
                 case TaylorOp::arc_cosine:
                 case TaylorOp::arc_tangent: wanted[i] = true; break;
+                case TaylorOp::angle:
+                    wanted[i] = true;
+                    wanted[static_cast<std::size_t>(tape.ops[i].a)] = true;
+                    wanted[static_cast<std::size_t>(tape.ops[i].b)] = true;
+                    break;
                 default: break;
             }
         }
@@ -141,7 +146,7 @@ public:
             for (int k = 1; k < order; ++k) {
                 series.loop(k, out, std::make_integer_sequence<int, ops>{});
             }
-            series.end_guards(order, std::make_integer_sequence<int, ops>{});
+            series.end_guards(std::max(order, 1), std::make_integer_sequence<int, ops>{});
         }
     }
 
@@ -314,6 +319,9 @@ private:
         } else if constexpr (op.op == TaylorOp::arc_tangent) {
             out = std::atan(a);
             inverse_[i] = 1 / b;
+        } else if constexpr (op.op == TaylorOp::angle) {
+            out = std::atan2(a, b);
+            inverse_[i] = 1 / c_[op.c][0];
         }
     }
 
@@ -401,6 +409,15 @@ private:
             double first = 0;
             if constexpr (k <= da) first = op.op == TaylorOp::arc_cosine ? -a[k] : a[k];
             return (first - sum) * inverse_[i];
+        } else if constexpr (op.op == TaylorOp::angle) {
+            // c g' = a' b - b' a
+            constexpr int dc = degree(larger(op.c, 0));
+            const double turn =
+                Sum::template convolve<larger(1, k - db), upto_a>(slope<op.a>(), b) -
+                Sum::template convolve<larger(1, k - da), upto_b>(slope<op.b>(), a);
+            const double sum =
+                Sum::template convolve<larger(1, k - dc), k - 1>(slope<i>(), c_[op.c]);
+            return (turn - sum) * (inverse_[i] * (1.0 / k));
         }
     }
 
@@ -531,6 +548,14 @@ private:
             case TaylorOp::arc_cosine:
                 return (-a[k] - convolve(k, larger(1, k - db), k - 1, slope<i>(), b) / k) *
                        inverse_[i];
+            case TaylorOp::angle: {
+                const double* const c = c_[larger(op.c, 0)];
+                const double turn =
+                    convolve(k, larger(1, k - db), upto_a, slope<larger(op.a, 0)>(), b) -
+                    convolve(k, larger(1, k - da), upto_b, slope<larger(op.b, 0)>(), a);
+                const int from = larger(1, k - degree(larger(op.c, 0)));
+                return (turn - convolve(k, from, k - 1, slope<i>(), c)) * inverse_[i] / k;
+            }
             case TaylorOp::input:
             case TaylorOp::constant: break;
         }

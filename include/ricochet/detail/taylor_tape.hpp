@@ -53,6 +53,7 @@ enum class TaylorOp : std::uint8_t {
     arc_sine,            ///< asin(a), with b = sqrt(1 - a^2)
     arc_cosine,          ///< acos(a), with b = sqrt(1 - a^2)
     arc_tangent,         ///< atan(a), with b = 1 + a^2
+    angle,               ///< atan2(a, b), with c = a^2 + b^2
 };
 
 /// Whether the operation has a constant of the object.
@@ -107,6 +108,7 @@ struct RecordedOp {
     TaylorOp op = TaylorOp::input;
     int a = -1;
     int b = -1;
+    int c = -1;
     double exponent = 0;
     double value = 0;              ///< of its constant
     const double* from = nullptr;  ///< where the constant was read; only ever compared
@@ -247,6 +249,29 @@ public:
         if (!a.is_constant()) return of(TaylorOp::arc_tangent, a, 1.0 + a * a);
         return folded(std::is_constant_evaluated() ? 1 : std::atan(a.value_));
     }
+    friend constexpr Recorded atan2(const Recorded& y, const Recorded& x)
+    {
+        if (y.is_constant() && x.is_constant()) {
+            return folded(std::is_constant_evaluated() ? 1 : std::atan2(y.value_, x.value_));
+        }
+        const Recorded& series = y.is_constant() ? x : y;
+        const Recorded a = series.beside(y), b = series.beside(x), c = a * a + b * b;
+        return {*a.recording_,
+                a.recording_->push_back(
+                    {.op = TaylorOp::angle, .a = a.index_, .b = b.index_, .c = c.index_})};
+    }
+    template <class T>
+    requires std::is_arithmetic_v<T>
+    friend constexpr Recorded atan2(const Recorded& y, const T& x)
+    {
+        return atan2(y, number(x));
+    }
+    template <class T>
+    requires std::is_arithmetic_v<T>
+    friend constexpr Recorded atan2(const T& y, const Recorded& x)
+    {
+        return atan2(number(y), x);
+    }
     friend constexpr Recorded hypot(const Recorded& a, const Recorded& b)
     {
         return sqrt(a * a + b * b);
@@ -312,6 +337,14 @@ private:
     {
         return {*a.recording_, a.recording_->push_back(
                                    {.op = TaylorOp::power, .a = a.index_, .exponent = exponent})};
+    }
+    /// `other` as a series in the recording of this one.
+    [[nodiscard]] constexpr Recorded beside(const Recorded& other) const
+    {
+        if (!other.is_constant()) return other;
+        return {*recording_,
+                recording_->push_back(
+                    {.op = TaylorOp::constant, .value = other.value_, .from = other.from_})};
     }
     /// An operation with the constant c.
     [[nodiscard]] static constexpr Recorded with(TaylorOp op, const Recorded& a, const Recorded& c)
@@ -476,10 +509,13 @@ constexpr void put_in_order(const Recording& from, Recording& to,
                 open.push_back(op.a);
             } else if (op.b >= 0 && number[op.b] < 0) {
                 open.push_back(op.b);
+            } else if (op.c >= 0 && number[op.c] < 0) {
+                open.push_back(op.c);
             } else {
                 RecordedOp out = op;
                 if (op.a >= 0) out.a = number[op.a];
                 if (op.b >= 0) out.b = number[op.b];
+                if (op.c >= 0) out.c = number[op.c];
                 number[i] = to.push_back(out);
                 open.pop_back();
             }
@@ -495,6 +531,7 @@ struct TapeOp {
     TaylorOp op = TaylorOp::input;
     int a = -1;
     int b = -1;
+    int c = -1;
     double exponent = 0;
 };
 
@@ -530,7 +567,7 @@ struct TapeDraft {
     {
         for (int i = static_cast<int>(n) + 1; i < ops.size(); ++i) {
             const RecordedOp& other = ops[i];
-            if (other.op != op.op || other.a != op.a || other.b != op.b ||
+            if (other.op != op.op || other.a != op.a || other.b != op.b || other.c != op.c ||
                 other.exponent != op.exponent) {
                 continue;
             }
@@ -588,6 +625,7 @@ constexpr void draft_tape(const System& system, Mode mode, TapeDraft<n, m>& draf
         }
         if (op.a >= 0) op.a = draft.place[op.a];
         if (op.b >= 0) op.b = draft.place[op.b];
+        if (op.c >= 0) op.c = draft.place[op.c];
         if (op.op == TaylorOp::product && op.a == op.b) {
             op.op = TaylorOp::square;
             op.b = -1;
@@ -619,6 +657,7 @@ template <class Tape>
         case TaylorOp::product: return finite(a + b);
         case TaylorOp::square: return finite(2 * a);
         case TaylorOp::quotient: return b == 0 ? a : no_degree;
+        case TaylorOp::angle: return a == 0 && b == 0 ? 0 : no_degree;
         default: return a == 0 ? 0 : no_degree;
     }
 }
@@ -647,6 +686,21 @@ constexpr void find_degrees(Tape& tape) noexcept
     }
 }
 
+/// The largest degree in time of states and guards, rounded up to a multiple of 4.
+template <class Tape>
+[[nodiscard]] constexpr int polynomial_order(const Tape& tape) noexcept
+{
+    int most = 1;
+    for (std::size_t i = 0; i < Tape::states; ++i) {
+        most = most > tape.degree[i] ? most : tape.degree[i];
+    }
+    for (std::size_t i = 0; i < Tape::guards; ++i) {
+        const int degree = tape.degree[static_cast<std::size_t>(tape.outputs[Tape::states + i])];
+        most = most > degree ? most : degree;
+    }
+    return (most + 3) / 4 * 4;
+}
+
 /// Marks what guards depend on, partners included.
 template <class Tape>
 constexpr void mark_for_guards(Tape& tape) noexcept
@@ -658,7 +712,7 @@ constexpr void mark_for_guards(Tape& tape) noexcept
         changed = false;
         for (std::size_t i = 0; i < Tape::ops_count; ++i) {
             if (!tape.for_guards[i]) continue;
-            for (const int operand : {tape.ops[i].a, tape.ops[i].b}) {
+            for (const int operand : {tape.ops[i].a, tape.ops[i].b, tape.ops[i].c}) {
                 if (operand < 0 || tape.for_guards[static_cast<std::size_t>(operand)]) continue;
                 tape.for_guards[static_cast<std::size_t>(operand)] = changed = true;
             }
@@ -687,7 +741,9 @@ template <class System, std::size_t n, std::size_t m, Mode mode>
     TaylorTape<n, m, size.ops, size.recorded> tape;
     TapeDraft<n, m> draft;
     draft_tape<System, n, m>(System(), mode, draft);
-    const auto plain = [](const RecordedOp& op) { return TapeOp{op.op, op.a, op.b, op.exponent}; };
+    const auto plain = [](const RecordedOp& op) {
+        return TapeOp{op.op, op.a, op.b, op.c, op.exponent};
+    };
     for (std::size_t i = 0; i < size.ops; ++i) tape.ops[i] = plain(draft.ops[static_cast<int>(i)]);
     for (std::size_t i = 0; i < size.recorded; ++i) {
         tape.as_recorded[i] = plain(draft.recording[static_cast<int>(i)]);
@@ -748,7 +804,7 @@ template <class System, std::size_t n, Mode mode, class Constants>
         const RecordedOp& found = recording[static_cast<int>(i)];
         const TapeOp& expected = tape.as_recorded[i];
         if (found.op != expected.op || found.a != expected.a || found.b != expected.b ||
-            found.exponent != expected.exponent) {
+            found.c != expected.c || found.exponent != expected.exponent) {
             return TapeMatch::differs;
         }
         if (!has_constant(found.op)) continue;

@@ -57,6 +57,17 @@ class PartsOfRun {
                       fixed_guard_count<System, X>() == 1,
                   "ricochet: a network predicts the events of one guard");
 
+    /// Whether the method is a power series.
+    static constexpr bool by_series = [] {
+        if constexpr (NameOf<Method>::known || by_name) return false;
+        if constexpr (!NameOf<Method>::known && !by_name) {
+            return requires
+            {
+                KernelOf<System, X, Method>::on_series;
+            };
+        }
+    }();
+
     [[nodiscard]] static constexpr QuietKernel<C> quiet() noexcept
     {
 #ifdef __OPTIMIZE__
@@ -75,9 +86,26 @@ class PartsOfRun {
                     return Kernel::template quiet<error_controlled, Ends>();
                 }
             }
+        } else if constexpr (by_series) {
+            // Guards that have no series are sampled, which the loop does.
+            constexpr bool proves =
+                screening == Screening::extremum || screening == Screening::every;
+            constexpr bool one = fixed_guard_count<System, X>() == 1 && !D::predicts &&
+                                 !puts_off_checks<Detector, System, X>();
+            if constexpr (!Guarded<System, X> ||
+                          (proves && one && KernelOf<System, X, Method>::on_series)) {
+                return KernelOf<System, X, Method>::template quiet<error_controlled>();
+            }
         }
 #endif
         return nullptr;
+    }
+
+    /// The order that the method was given.
+    [[nodiscard]] int order() const noexcept
+    {
+        if constexpr (requires { door_.given_order; }) return door_.given_order;
+        return 0;
     }
 
 public:
@@ -101,8 +129,10 @@ public:
                 .door = static_cast<Door<System, X>*>(&door_),
                 .kernel = &kernel_for<System, X>(stepping_.value),
                 .quiet = quiet(),
+                .quiet_on_series = by_series,
                 .error_controlled = error_controlled,
                 .method_by_name = by_name,
+                .order = order(),
                 .stepping = written_type<Stepping>(),
                 .detector = DetectorTableOf<Detector, System, X>::make(detector_),
                 .detecting = &detector_,

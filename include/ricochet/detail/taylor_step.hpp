@@ -1,0 +1,144 @@
+// Internal: what it declares may change without notice.
+//
+// A step of Taylor's method: its coefficients, its length, its polynomial.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "ricochet/detail/instant.hpp"
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet::detail {
+
+inline constexpr int most_taylor_order = 20;
+inline constexpr int least_taylor_order = 12;
+
+[[nodiscard]] constexpr int taylor_order(int given, double rtol) noexcept
+{
+    if (given != 0) return given;
+    return rtol >= 1e-8 ? 12 : rtol >= 1e-11 ? 16 : 20;
+}
+
+/// log2 of a positive normal number, to 1e-3: a step from its twelfth part is right to 1e-4.
+[[nodiscard]] inline double rough_log2(double x) noexcept
+{
+    const auto bits = std::bit_cast<std::uint64_t>(x);
+    const auto exponent = static_cast<double>(static_cast<std::int64_t>(bits >> 52) - 1023);
+    const double m =
+        std::bit_cast<double>((bits & 0xfffffffffffffULL) | 0x3ff0000000000000ULL);  // in [1, 2)
+    // Through log2 at the four Chebyshev nodes of [1, 2].
+    return (exponent - 2.1362320654130670) +
+           m * ((3.0111621508367876 - 1.0268049073983060 * m) + 0.1527002847975194 * (m * m));
+}
+
+/// 2^x for |x| < 1000, to 1e-4.
+[[nodiscard]] inline double rough_exp2(double x) noexcept
+{
+    constexpr double shift = 0x1.8p52;  // rounds to a whole number
+    const double whole = (x + shift) - shift;
+    const double y = x - whole;
+    // Through 2^y at the four Chebyshev nodes of [-1/2, 1/2].
+    const double part = (0.9999245569508709 + 0.6931367338836214 * y) +
+                        y * y * (0.2426394785462585 + 0.0558382829462201 * y);
+    return part * std::bit_cast<double>(
+                      static_cast<std::uint64_t>(static_cast<std::int64_t>(whole) + 1023) << 52);
+}
+
+/// The largest h at which the last two terms stay within atol + rtol |x|.
+/// @param each  absolute tolerances of the components in the place of `atol`, or null
+template <std::size_t n, class X>
+[[nodiscard, gnu::always_inline]] inline double find_reach(const X& x0, const double* each,
+                                                           const double* c, int order, double rtol,
+                                                           double atol)
+{
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    const double by_last = -1.0 / order, by_before = -1.0 / (order - 1);
+    const auto longest = [&](const std::array<double, n>& size) {
+        double last = 0, before = 0;
+        const double* const cp = c + static_cast<std::size_t>(order) * n;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double scale = 1 / ((each ? each[i] : atol) + rtol * size[i]);
+            last = std::max(last, std::fabs(cp[i]) * scale);
+            before = std::max(before, std::fabs(cp[i - n]) * scale);
+        }
+        // Nothing in the last two terms: a polynomial, as far as can be seen.
+        const double least = std::numeric_limits<double>::min();
+        if (!(last > least) && !(before > least)) return infinity;
+        const double most = std::numeric_limits<double>::max();
+        return rough_exp2(std::min(rough_log2(std::clamp(last, least, most)) * by_last,
+                                   rough_log2(std::clamp(before, least, most)) * by_before));
+    };
+    std::array<double, n> size;
+    for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(x0[i]);
+    double h = longest(size);
+    // What begins near zero and moves away has the size of its end, as with other methods.
+    // A length grows with a twelfth power of the size at most: less is not worth another root.
+    for (int again = 0; again < 3; ++again) {
+        bool larger = false;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double end = std::fabs(x0[i] + std::min(h, 1e100) * c[n + i]);
+            larger = larger || end > 16 * size[i];
+            size[i] = std::max(size[i], end);
+        }
+        if (!larger || !(h < infinity)) break;
+        h = longest(size);
+    }
+    return h;
+}
+
+/// The coefficients of the step in hand, and what they were computed from.
+template <std::size_t n, std::size_t m>
+struct TaylorStep {
+    alignas(16) std::array<double, (most_taylor_order + 1) * n> coefficients{};
+    std::array<double, (most_taylor_order + 1) * m> guards{};
+    std::array<double, n> x{};
+    Instant start;
+    Mode mode = 0;
+    bool backward = false;
+    int order = 0;  ///< of what is known; 0: nothing
+    int asked = 0;  ///< of the run; larger where the motion is a polynomial
+    double reach = std::numeric_limits<double>::quiet_NaN();  ///< [s]; see `StepKernel::reach`
+};
+
+/// w(s) = sum of coefficients k of degree 2 and more, and its derivative.
+template <bool with_rate, std::size_t n>
+[[gnu::always_inline]] inline void evaluate_departure(const double* c, int order, double s,
+                                                      std::array<double, n>& w,
+                                                      std::array<double, n>& rate)
+{
+    // Four coefficients at a time: a quarter of Horner's additions wait for each other.
+    const double s2 = s * s;
+    const double s4 = s2 * s2;
+    const auto at = [c](int k, std::size_t i) { return c[static_cast<std::size_t>(k) * n + i]; };
+    for (std::size_t i = 0; i < n; ++i) w[i] = at(order, i);
+    if constexpr (with_rate) rate.fill(0);
+    for (int k = order - 4; k > 0; k -= 4) {
+        for (std::size_t i = 0; i < n; ++i) {
+            w[i] = w[i] * s4 +
+                   ((at(k, i) + s * at(k + 1, i)) + s2 * (at(k + 2, i) + s * at(k + 3, i)));
+        }
+        if constexpr (with_rate) {
+            const double d = k;
+            for (std::size_t i = 0; i < n; ++i) {
+                rate[i] =
+                    rate[i] * s4 + (((d + 1) * at(k + 1, i) + s * ((d + 2) * at(k + 2, i))) +
+                                    s2 * ((d + 3) * at(k + 3, i) + s * ((d + 4) * at(k + 4, i))));
+            }
+        }
+    }
+    for (std::size_t i = 0; i < n; ++i) w[i] = w[i] * s4 + s2 * (at(2, i) + s * at(3, i));
+    if constexpr (with_rate) {
+        for (std::size_t i = 0; i < n; ++i) {
+            rate[i] =
+                rate[i] * s4 + (s * (2 * at(2, i)) + s2 * (3 * at(3, i) + s * (4 * at(4, i))));
+        }
+    }
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,105 @@
+// What the power series of a guard says of a step.
+#pragma once
+
+#include "core/event_search.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const Bank& bank,
+                                               std::size_t i)
+{
+    const Crossing crossing = bank[i].info.crossing;
+    const GuardSample end = watch.end;
+    double sign = sign_of(watch.side);
+    bool from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch;
+    const double ahead = from_surface ? watch.start.rate : watch.start.value;
+    if (!(sign * ahead > 0)) return finders_->examine(probe, watch);
+    constexpr int most_doubts = 8;  // more of them, and the series tells nothing of the rest
+    for (int doubts = 0; doubts <= most_doubts;) {
+        const SeriesStretch stretch =
+            first_leaving(bank.series(), i, sign, probe.step().h(), watch.start, end,
+                          bank[i].info.touch, from_surface);
+        if (stretch.kind == SeriesStretch::Kind::clear) {
+            if (!(sign * end.value > 0)) break;
+            watch.side_after = watch.side;
+            return Finding::clear(Evidence::proved);
+        }
+        const GuardSample lo =
+            stretch.lo > watch.start.s ? probe.value_and_rate(stretch.lo) : watch.start;
+        GuardSample hi = stretch.hi < end.s ? probe.value_and_rate(stretch.hi) : end;
+        from_surface = from_surface && lo.s == watch.start.s;
+        const auto turn = bank[i].info.touch == 0 ? turn_between(probe, lo, hi) : std::nullopt;
+        const bool passes = turn && sign * turn->value > 0 && sign * lo.value > 0;
+        const bool dips = turn && sign * turn->value < 0 && sign * lo.value > 0;
+        if (dips) hi = *turn;
+        const bool agrees = (from_surface || sign * lo.value > 0) && sign * hi.value < 0;
+        watch.start = lo;
+        watch.end = hi;
+        if (dips || (stretch.kind == SeriesStretch::Kind::crossing && agrees)) {
+            if (counts(watch.side, crossing)) return Finding::leaving(watch.side, lo, hi);
+            watch.side = opposite(watch.side);
+        } else if (!passes) {
+            ++doubts;
+            judge_by_its_own_size(watch, bank, i);
+            const Finding finding = finders_->examine(probe, watch);
+            if (finding.hit || finding.touch) return finding;
+            watch.side = watch.side_after;
+        }
+        watch.side_after = watch.side;
+        if (!(hi.s < end.s)) return Finding::clear(evidence_);
+        watch.start = hi;
+        watch.end = end;
+        sign = sign_of(watch.side);
+        from_surface = false;
+        if (!(sign * hi.value > 0)) return finders_->examine(probe, watch);
+    }
+    return finders_->examine(probe, watch);
+}
+
+template <class X, bool single>
+std::optional<GuardSample> EventSearch<X, single>::turn_between(Probe& probe, const GuardSample& lo,
+                                                                const GuardSample& hi)
+{
+    if (!(lo.value * hi.value > 0 && lo.value * lo.rate < 0 && hi.value * hi.rate > 0)) return {};
+    GuardSample a = lo, b = hi, turn = lo;
+    // On a parabola the secant of the rates is right at once.
+    for (int k = 0; k < 4; ++k) {
+        const double s = a.s - a.rate * ((b.s - a.s) / (b.rate - a.rate));
+        if (!(s > a.s && s < b.s)) break;
+        turn = probe.value_and_rate(s);
+        if (turn.value * lo.value < 0) break;  // beyond the surface, wherever it turns
+        ((turn.rate > 0) == (a.rate > 0) ? a : b) = turn;
+    }
+    if (turn.s == lo.s || !(std::fabs(turn.value) > probe.rounding(turn.s))) return {};
+    return turn;
+}
+
+template <class X, bool single>
+bool EventSearch<X, single>::find_by_series(const CurrentStep& step, Bank& bank, std::size_t i,
+                                            std::uint64_t& calls)
+{
+    const GuardRecord& record = bank[i];
+    if (!finest_ || !bank.has_series(i) || !finders_->locator.yields_to_series) return false;
+    if (record.from > 0 || !counts(record.side, record.info.crossing)) return false;
+    if (record.info.touch > 0) return false;
+    SeriesCrossing crossing{.which = i,
+                            .side = record.side,
+                            .end = bank.end(i, step.h()).value,
+                            .from_surface = bank.starts_on_surface(i)};
+    if (!has_left(crossing.side, crossing.end)) return false;
+    const bool found = step.cross(crossing, space_.x);
+    calls += crossing.calls;
+    if (!found) return false;
+    keep_only(i, record.side,
+              {.lo = crossing.lo,
+               .hi = crossing.hi,
+               .root = crossing.root,
+               .root_remainder = crossing.root_remainder,
+               .slope = crossing.slope,
+               .error = crossing.error},
+              space_.x);
+    return true;
+}
+
+}  // namespace ricochet::detail
