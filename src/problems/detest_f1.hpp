@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -21,7 +22,8 @@ namespace ricochet {
 ///
 /// Known solution: the roots of the characteristic polynomial are 0.1 +- i pi, so that
 /// over a second the state's distance from the equilibrium +-1 / (pi² + 0.01) is
-/// multiplied by -exp(0.1); see `solution`. Functions are generic in the state type.
+/// multiplied by -exp(0.1); see `solution`. Functions are generic in the state and its
+/// scalar.
 class DetestF1 {
 public:
     using State = std::array<double, 2>;
@@ -39,7 +41,7 @@ public:
     }
 
     template <class X>
-    void flow(Mode mode, double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(Mode mode, const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = x[1];
         dxdt[1] = 0.2 * x[1] - stiffness * x[0] + (mode == even ? 1 : -1);

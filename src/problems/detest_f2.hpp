@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -21,7 +22,8 @@ namespace ricochet {
 /// methods, ACM Transactions on Mathematical Software 13, 1987, pages 1 to 27.)
 ///
 /// Known solution: exponentials toward 110/3 and 110; see `solution`. Functions are
-/// generic in the state type.
+/// generic in the state and its
+/// scalar.
 class DetestF2 {
 public:
     using State = std::array<double, 1>;
@@ -39,7 +41,7 @@ public:
     }
 
     template <class X>
-    void flow(Mode mode, double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(Mode mode, const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = 55 - (mode == even ? 1.5 : 0.5) * x[0];
     }

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -27,7 +28,8 @@ namespace ricochet {
 /// 0.05, or it steps over the pulse.
 ///
 /// Known solution: y = 1 - 2 t / 21 + (1 + 4 (t - 5)²)⁻¹⁵ - 101⁻¹⁵ up to y(10) = 1/21,
-/// then exp(-2 (t - 10)) / 21; see `solution`. Functions are generic in the state type.
+/// then exp(-2 (t - 10)) / 21; see `solution`. Functions are generic in the state and its
+/// scalar.
 class DetestF4 {
 public:
     using State = std::array<double, 1>;
@@ -46,14 +48,14 @@ public:
     }
 
     template <class X>
-    void flow(Mode mode, double t, const X& x, X& dxdt) const noexcept
+    constexpr void flow(Mode mode, const ScalarOf<X>& t, const X& x, X& dxdt) const noexcept
     {
         if (mode == decay) {
             dxdt[0] = -2 * x[0];
             return;
         }
-        const double s = t - 5;
-        double power = 1 + 4 * s * s;
+        const ScalarOf<X> s = t - 5;
+        ScalarOf<X> power = 1 + 4 * s * s;
         for (int i = 0; i < 4; ++i) power *= power;
         dxdt[0] = -2.0 / 21 - 120 * s / power;
     }

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -19,7 +20,7 @@ namespace ricochet {
 ///
 /// Known solution: from y = 1 in mode grow, which lies on the surface of the guard that
 /// is not looked at, the modes take log 2 and 2 log 2, so that the switches are at log 2
-/// times 1, 3, 4, 6, 7, 9, ... Functions are generic in the state type.
+/// times 1, 3, 4, 6, 7, 9, ... Functions are generic in the state and its scalar.
 class GrowDecay {
 public:
     using State = std::array<double, 1>;
@@ -39,7 +40,7 @@ public:
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t which) noexcept
     {
-        return {.name = which == full ? "full" : "empty", .degree = 1};
+        return {.name = which == full ? "full" : "empty"};
     }
 
     [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
@@ -48,22 +49,16 @@ public:
     }
 
     template <class X>
-    void flow(Mode mode, double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(Mode mode, const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = mode == grow ? x[0] : -x[0] / 2;
     }
 
     template <class X>
-    [[nodiscard]] double guard(std::size_t which, double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(std::size_t which, const ScalarOf<X>& /*t*/,
+                                              const X& x) const noexcept
     {
         return which == full ? 2 - x[0] : x[0] - 1;
-    }
-
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(std::size_t which, double /*t*/, const X& /*x*/,
-                                    const D& dxdt) const noexcept
-    {
-        return which == full ? -dxdt[0] : dxdt[0];
     }
 
     template <class X>

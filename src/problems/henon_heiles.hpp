@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -21,7 +22,8 @@ namespace ricochet {
 /// numerical experiments, Astronomical Journal 69, 1964, pages 73 to 79.)
 ///
 /// Known solution: the energy is conserved, and from `start`, on the level 0.083333,
-/// the first six passages are at `section_times`. Functions are generic in the state type.
+/// the first six passages are at `section_times`. Functions are generic in the state and its
+/// scalar.
 class HenonHeiles {
 public:
     using State = std::array<double, 4>;
@@ -38,11 +40,11 @@ public:
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t /*which*/) noexcept
     {
-        return {.name = "section", .crossing = Crossing::rising, .degree = 1};
+        return {.name = "section", .crossing = Crossing::rising};
     }
 
     template <class X>
-    void flow(double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = -x[2] - 2 * x[2] * x[3];
         dxdt[1] = -x[3] - x[2] * x[2] + x[3] * x[3];
@@ -51,15 +53,9 @@ public:
     }
 
     template <class X>
-    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         return x[2];
-    }
-
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(double /*t*/, const X& /*x*/, const D& dxdt) const noexcept
-    {
-        return dxdt[2];
     }
 
     /// Kinetic and potential energy, conserved.

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -19,7 +20,7 @@ namespace ricochet {
 /// From `start` at `t_start` it is y = (t + 6) (t + 2) (t - 2), which has its zeros at
 /// `zeros`. Every method of order three or more is exact on it, so that error control
 /// takes long steps, and a step that holds two zeros has y of one sign at both ends.
-/// Functions are generic in the state type.
+/// Functions are generic in the state and its scalar.
 class HiddenPair {
 public:
     using State = std::array<double, 1>;
@@ -32,25 +33,19 @@ public:
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t /*which*/) noexcept
     {
-        return {.name = "zero", .crossing = Crossing::either, .degree = 1};
+        return {.name = "zero", .crossing = Crossing::either};
     }
 
     template <class X>
-    void flow(double t, const X& /*x*/, X& dxdt) const noexcept
+    constexpr void flow(const ScalarOf<X>& t, const X& /*x*/, X& dxdt) const noexcept
     {
         dxdt[0] = (3 * t + 12) * t - 4;
     }
 
     template <class X>
-    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         return x[0];
-    }
-
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(double /*t*/, const X& /*x*/, const D& dxdt) const noexcept
-    {
-        return dxdt[0];
     }
 };
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -24,7 +25,7 @@ namespace ricochet {
 ///     depth < 0    nothing
 ///
 /// The smaller the depth, the nearer the passages and the less well-conditioned: the
-/// slope is sin of the half-width between them. Functions are generic in the state type.
+/// slope is sin of the half-width between them. Functions are generic in the state and its scalar.
 class NearTangent {
 public:
     using State = std::array<double, 2>;
@@ -47,12 +48,11 @@ public:
 
     [[nodiscard]] GuardInfo guard_info(std::size_t /*which*/) const noexcept
     {
-        return {
-            .name = "level", .crossing = Crossing::either, .degree = 1, .touch = parameters_.touch};
+        return {.name = "level", .crossing = Crossing::either, .touch = parameters_.touch};
     }
 
     template <class X>
-    void flow(double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = x[1];
         dxdt[1] = -x[0];
@@ -60,15 +60,9 @@ public:
 
     /// y - 1 is exact near the crest, where 1 - depth would lose digits of the depth.
     template <class X>
-    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         return (x[0] - 1) + parameters_.depth;
-    }
-
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(double /*t*/, const X& /*x*/, const D& dxdt) const noexcept
-    {
-        return dxdt[0];
     }
 
     /// Time [s] from a crest to a passage; NaN for a negative depth.

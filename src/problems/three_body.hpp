@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -27,7 +28,7 @@ namespace ricochet {
 ///
 /// Known solution: `jacobi` is conserved, and from `start` with the default mass ratio
 /// the orbit is closed, with one event half way and one at the end. Functions are
-/// generic in the state type.
+/// generic in the state and its scalar.
 class ThreeBody {
 public:
     using State = std::array<double, 4>;
@@ -36,7 +37,7 @@ public:
         double mass_ratio = 1 / 82.45;  ///< Moon over both, in (0, 1/2]
     };
 
-    ThreeBody() : ThreeBody(Parameters{}) {}
+    constexpr ThreeBody() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit ThreeBody(const Parameters& parameters);
@@ -56,15 +57,16 @@ public:
     }
 
     template <class X>
-    void flow(double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
+        using std::sqrt;
         const double moon = mass_ratio_;
         const double earth = 1 - moon;
-        const double y2 = x[1] * x[1];
-        const double from_earth = std::sqrt((x[0] + moon) * (x[0] + moon) + y2);
-        const double from_moon = std::sqrt((x[0] - earth) * (x[0] - earth) + y2);
-        const double a1 = earth / (from_earth * from_earth * from_earth);
-        const double a2 = moon / (from_moon * from_moon * from_moon);
+        const ScalarOf<X> y2 = x[1] * x[1];
+        const ScalarOf<X> from_earth = sqrt((x[0] + moon) * (x[0] + moon) + y2);
+        const ScalarOf<X> from_moon = sqrt((x[0] - earth) * (x[0] - earth) + y2);
+        const ScalarOf<X> a1 = earth / (from_earth * from_earth * from_earth);
+        const ScalarOf<X> a2 = moon / (from_moon * from_moon * from_moon);
         dxdt[0] = x[2];
         dxdt[1] = x[3];
         dxdt[2] = x[0] + 2 * x[3] - a1 * (x[0] + moon) - a2 * (x[0] - earth);
@@ -72,7 +74,7 @@ public:
     }
 
     template <class X>
-    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         return 2 * ((x[0] - start[0]) * x[2] + (x[1] - start[1]) * x[3]);
     }
@@ -94,7 +96,7 @@ public:
     }
 
 private:
-    double mass_ratio_;
+    double mass_ratio_ = Parameters{}.mass_ratio;
 };
 
 }  // namespace ricochet

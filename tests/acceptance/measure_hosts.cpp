@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <fstream>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "hosts/sundials_setup.hpp"
 #include "measure.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/rosenbrock.hpp"
 #include "timing.hpp"
 
 namespace ricochet::bench {
@@ -313,6 +315,61 @@ Measured run_stiff_systems()
     return out;
 }
 
+/// Events of the implicit method and of CVODE's BDF with the monitor, at the same tolerances, and
+/// their times in turns.
+template <class System>
+void compare_implicit(const char* name, const System& system, const std::array<double, 3>& x0,
+                      Mode mode, double t_end, double atol, Measured& out)
+{
+    const double rtol = 1e-6;
+    const auto run_to = [=](double relative, double absolute) {
+        return integrate(system, x0,
+                         {.t_end = t_end, .mode = mode, .rtol = relative, .atol = absolute},
+                         ErrorControlled<Rosenbrock4>{});
+    };
+    const auto times_of = [](const auto& run) {
+        std::vector<double> times;
+        for (const auto& event : run.events) times.push_back(event.t);
+        return times;
+    };
+    const std::vector<double> exact = times_of(run_to(1e-4 * rtol, 1e-4 * atol));
+    const auto error_of = [&](const std::vector<double>& times) {
+        if (times.size() != exact.size()) return std::numeric_limits<double>::infinity();
+        double error = 0;
+        for (std::size_t k = 0; k < times.size(); ++k) {
+            error = std::max(error, std::fabs(times[k] / exact[k] - 1));
+        }
+        return error;
+    };
+    const auto ours = [=] { return run_to(rtol, atol); };
+    const auto theirs = [=] { return by_bdf(system, x0, mode, t_end, {rtol, atol}); };
+    const auto run = ours();
+    const Stiff other = theirs();
+    const double error = error_of(times_of(run));
+    const auto timings = time_in_turns(std::vector<Work>{repeated(ours), repeated(theirs)},
+                                       {.budget = 1, .fewest = 11, .most = 201});
+    const double ratio = timings[0].median / timings[1].median;
+    out.details.push_back(fmt::format(
+        "{}: {} events, error {:.1e}, {} steps, {} flow calls, {:.0f} us; BDF {} events, error "
+        "{:.1e}, {} flow calls, {:.0f} us",
+        name, run.events.size(), error, run.statistics.steps, run.statistics.flow_calls,
+        1e6 * timings[0].median, other.times.size(), error_of(other.times), other.flows,
+        1e6 * timings[1].median));
+    out.pass = out.pass && error <= rtol && ratio <= 1;
+    out.text += fmt::format("{}{} {:.1e} in {:.2f} of BDF's time", out.text.empty() ? "" : "; ",
+                            name, error, ratio);
+}
+
+Measured run_implicit_method()
+{
+    Measured out{.pass = true, .text = {}};
+    compare_implicit("Robertson with a valve", RobertsonValve{}, {1, 0, 0}, RobertsonValve::closed,
+                     2000, 1e-10, out);
+    compare_implicit("buck converter", BuckConverter{}, {0, 0, 0}, BuckConverter::switched_on,
+                     25.5 * BuckConverter::half_period, 1e-5, out);
+    return out;
+}
+
 // --- adapters ---
 
 /// Lines of code, without comments, includes and empty ones.
@@ -360,6 +417,13 @@ std::vector<Check> host_checks()
              "stiff hybrid systems by CVODE's BDF at rtol 1e-6: error, and time beside dopri5",
          .target = "error <= 1e-4",
          .run = run_stiff_systems},
+        {.topic = "hosts",
+         .id = "rosenbrock",
+         .sentence =
+             "stiff hybrid systems by Rosenbrock4 at rtol 1e-6: relative error of an event, "
+             "and time beside CVODE's BDF with the monitor",
+         .target = "<= 1e-6, no more time",
+         .run = run_implicit_method},
         {.topic = "hosts",
          .id = "adapter-lines",
          .sentence = "lines of code of each adapter",

@@ -124,14 +124,9 @@ public:
         thermostat_.flow(mode, t, x, dxdt);
     }
     template <class X>
-    [[nodiscard]] double guard(std::size_t which, double t, const X& x) const
+    [[nodiscard]] ScalarOf<X> guard(std::size_t which, const ScalarOf<X>& t, const X& x) const
     {
         return thermostat_.guard(1 - which, t, x);
-    }
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(std::size_t which, double t, const X& x, const D& dxdt) const
-    {
-        return thermostat_.guard_rate(1 - which, t, x, dxdt);
     }
     template <class X>
     [[nodiscard]] Mode reset(std::size_t which, Mode mode, double t, X& x) const

@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet::hosts_test {
 
@@ -18,16 +19,20 @@ struct RobertsonValve {
     static constexpr std::size_t guard_count = 2;
     static constexpr double inflow = 0.02;  ///< [1/s]
 
-    void flow(Mode mode, double /*t*/, const State& y, State& rate) const
+    template <class X>
+    constexpr void flow(Mode mode, const ScalarOf<X>& /*t*/, const X& y, X& rate) const
     {
-        const double slow = 0.04 * y[0];
-        const double back = 1e4 * y[1] * y[2];
-        const double fast = 3e7 * y[1] * y[1];
+        const ScalarOf<X> slow = 0.04 * y[0];
+        const ScalarOf<X> back = 1e4 * y[1] * y[2];
+        const ScalarOf<X> fast = 3e7 * y[1] * y[1];
         const double in = mode == open ? inflow : 0;
-        rate = {in - slow + back, slow - back - fast, fast - in};
+        rate[0] = in - slow + back;
+        rate[1] = slow - back - fast;
+        rate[2] = fast - in;
     }
     template <class X>
-    [[nodiscard]] double guard(std::size_t which, Mode /*mode*/, double /*t*/, const X& y) const
+    [[nodiscard]] constexpr ScalarOf<X> guard(std::size_t which, Mode /*mode*/,
+                                              const ScalarOf<X>& /*t*/, const X& y) const
     {
         return which == closed ? y[0] - 0.5 : 0.7 - y[0];
     }
@@ -47,17 +52,21 @@ struct BuckConverter {
     static constexpr std::size_t guard_count = 2;
     static constexpr double half_period = 5e-5;  ///< [s]
 
-    void flow(Mode mode, double /*t*/, const State& x, State& dxdt) const
+    template <class X>
+    constexpr void flow(Mode mode, const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const
     {
+        using S = ScalarOf<X>;
         const double resistance = 0.1;
-        const double through_switch = mode & switched_on ? (24 - x[2]) / resistance : 0;
-        const double through_diode = mode & conducts ? -x[2] / resistance : 0;
-        dxdt = {(x[2] - x[1]) / 5e-4, (x[0] - x[1] / 5) / 1e-4,
-                (through_switch + through_diode - x[0] - x[2] / 1e5) / 1e-9};
+        const S through_switch = mode & switched_on ? S((24 - x[2]) / resistance) : S(0);
+        const S through_diode = mode & conducts ? S(-x[2] / resistance) : S(0);
+        dxdt[0] = (x[2] - x[1]) / 5e-4;
+        dxdt[1] = (x[0] - x[1] / 5) / 1e-4;
+        dxdt[2] = (through_switch + through_diode - x[0] - x[2] / 1e5) / 1e-9;
     }
     /// The diode conducts while the node is below ground.
     template <class X>
-    [[nodiscard]] double guard(std::size_t which, Mode /*mode*/, double /*t*/, const X& x) const
+    [[nodiscard]] constexpr ScalarOf<X> guard(std::size_t which, Mode /*mode*/,
+                                              const ScalarOf<X>& /*t*/, const X& x) const
     {
         return which == 0 ? x[2] : -x[2];
     }

@@ -36,7 +36,7 @@ struct BallisticLine {
         const double h = step.h();
         const double value = guard.value(t, step.x0());
         const double rate = guard.rate(t, step.x0(), step.rate0(), h);
-        const double curvature = guard.system().guard_curvature(t, step.x0());
+        const double curvature = detail::curvature_of(guard.system(), t, step.x0());
         return value + h * (rate + 0.5 * h * curvature) > 0;
     }
 

@@ -15,6 +15,7 @@
 #include <string>
 #include <string_view>
 
+#include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
@@ -46,14 +47,32 @@ enum class Recipe {
     return recipe == Recipe::state ? state_size : 2;
 }
 
-/// The curvature d2g/dt2 of a guard along the flow is known in closed form.
+namespace detail {
 template <class System, class X>
-concept CurvedGuard = RatedGuard<System, X> && requires(const System& system, double t, const X& x)
+concept CurvatureWritten = requires(const System& system, double t, const X& x)
 {
     {
         system.guard_curvature(t, x)
         } -> std::convertible_to<double>;
 };
+
+/// The curvature of the guard along the flow.
+template <class System, class X>
+[[nodiscard]] double curvature_of(const System& system, double t, const X& x)
+{
+    if constexpr (CurvatureWritten<System, X>) {
+        return system.guard_curvature(t, x);
+    } else {
+        return curvature_by_duals(system, t, x);
+    }
+}
+}  // namespace detail
+
+/// The curvature d2g/dt2 of a guard along the flow is written by the system, or dual numbers have
+/// it.
+template <class System, class X>
+concept CurvedGuard = RatedGuard<System, X> &&
+    (detail::CurvatureWritten<System, X> || detail::curvature_takes_duals<System, X>);
 
 /// Whether `recipe` can be computed for states of type X of a system.
 template <class System, class X>
@@ -121,9 +140,9 @@ void features(Recipe recipe, const System& system, double t, const X& x, const X
     if constexpr (CurvedGuard<System, X>) {
         const double per_step = detail::saturated_reciprocal(h);
         const double per_speed =
-            detail::saturated_reciprocal(std::abs(system.guard_curvature(t, x)) * h);
+            detail::saturated_reciprocal(std::abs(detail::curvature_of(system, t, x)) * h);
         out[0] = slog(system.guard(t, x) * per_speed * per_step);
-        out[1] = slog(system.guard_rate(t, x, dxdt) * per_speed);
+        out[1] = slog(detail::call_rate(system, 0, 0, t, x, dxdt) * per_speed);
     } else {
         out[0] = out[1] = std::numeric_limits<double>::quiet_NaN();
     }

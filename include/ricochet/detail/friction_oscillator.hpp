@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -33,7 +34,8 @@ namespace ricochet {
 /// At the onset of slip with static_friction = friction the guard `stop` has a double zero:
 /// its rate is zero too, and the second derivative, stiffness |b| / mass, is positive
 /// since the guard is signed by the direction of slip. The exact u⁺ keeps rounding from
-/// giving the rate a sign of its own. Functions are generic in the state type.
+/// giving the rate a sign of its own. Functions are generic in the state and
+/// its scalar.
 class FrictionOscillator {
 public:
     using State = std::array<double, 2>;
@@ -67,8 +69,7 @@ public:
     {
         return {.name = which == stop          ? "stop"
                         : which == pulled_left ? "pulled-left"
-                                               : "pulled-right",
-                .degree = 1};
+                                               : "pulled-right"};
     }
 
     [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
@@ -77,10 +78,10 @@ public:
     }
 
     template <class X>
-    void flow(Mode mode, double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(Mode mode, const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
-        const double sliding = x[1] - p_.belt_speed;
-        dxdt[0] = mode == stick ? p_.belt_speed : x[1];
+        const ScalarOf<X> sliding = x[1] - p_.belt_speed;
+        dxdt[0] = mode == stick ? ScalarOf<X>(p_.belt_speed) : x[1];
         switch (mode) {
             case slip_left: dxdt[1] = (spring(x[0]) + kinetic(-sliding)) / p_.mass; return;
             case slip_right: dxdt[1] = (spring(x[0]) - kinetic(sliding)) / p_.mass; return;
@@ -89,24 +90,13 @@ public:
     }
 
     template <class X>
-    [[nodiscard]] double guard(std::size_t which, Mode mode, double /*t*/,
-                               const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(std::size_t which, Mode mode,
+                                              const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         switch (which) {
             case pulled_left: return p_.static_friction + spring(x[0]);
             case pulled_right: return p_.static_friction - spring(x[0]);
             default: return mode == slip_left ? p_.belt_speed - x[1] : x[1] - p_.belt_speed;
-        }
-    }
-
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double /*t*/, const X& /*x*/,
-                                    const D& dxdt) const noexcept
-    {
-        switch (which) {
-            case pulled_left: return spring(dxdt[0]);
-            case pulled_right: return -spring(dxdt[0]);
-            default: return mode == slip_left ? -dxdt[1] : dxdt[1];
         }
     }
 
@@ -127,11 +117,17 @@ public:
 
 private:
     /// Force of the spring [N], to the right.
-    [[nodiscard]] double spring(double u) const noexcept { return -p_.stiffness * u; }
-
-    [[nodiscard]] double kinetic(double sliding) const noexcept
+    template <class S>
+    [[nodiscard]] constexpr S spring(const S& u) const noexcept
     {
-        return p_.friction / std::max(1 + p_.weakening * sliding, 0.5);
+        return -p_.stiffness * u;
+    }
+
+    template <class S>
+    [[nodiscard]] constexpr S kinetic(const S& sliding) const noexcept
+    {
+        using std::max;
+        return p_.friction / max(1 + p_.weakening * sliding, S(0.5));
     }
 
     Parameters p_;

@@ -138,14 +138,17 @@ public:
         }
     }
 
-    /// The rate at (t, x) with x' = dxdt: `guard_rate` of the system, else the central
+    /// The rate at (t, x) with x' = dxdt: `guard_rate` of the system, else by dual numbers through
+    /// its guard where that takes any scalar, else the central
     /// difference along the flow over 1e-5 of the time `scale` [s] to either side:
     /// its truncation error is 1e-10 scale^2 / 6 times the third derivative, and it
     /// magnifies rounding in g by 1e5 / scale.
     template <class V, class D>
     [[nodiscard]] double rate(double t, const V& x, const D& dxdt, double scale) const
     {
-        if constexpr (detail::RateAlone<System, V, D>) {
+        if constexpr (detail::RateByDuals<System, V> && !detail::RateWritten<System, V, D>) {
+            return detail::rate_by_duals(*system_, which_, mode_, t, backward_ ? -1 : 1, x, dxdt);
+        } else if constexpr (detail::RateAlone<System, V, D>) {
             if (!backward_) return detail::call_rate(*system_, which_, mode_, t, x, dxdt);
             if constexpr (sees_rate<V, D>) {
                 const detail::NegatedView<D> forward(dxdt);

@@ -1,6 +1,7 @@
 // Internal: what it declares may change without notice.
 //
-// A system and its derivatives: exact where it declares them, else by differences.
+// A system and its derivatives: those that it declares, else by dual numbers where its functions
+// take any scalar (hybrid/scalar.hpp), else by differences.
 //
 //     flow_derivative([mode,] t, x, s, ds)              ds = (df/dx) s
 //     guard_derivative([which,] [mode,] t, x, s)        (dg/dx) s
@@ -20,11 +21,12 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/hybrid/event.hpp"
-#include "ricochet/detail/scratch.hpp"
-#include "ricochet/hybrid/system.hpp"
 #include "ricochet/detail/differences.hpp"
 #include "ricochet/detail/directions.hpp"
+#include "ricochet/detail/dual_derivatives.hpp"
+#include "ricochet/detail/scratch.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/system.hpp"
 
 namespace ricochet::detail {
 
@@ -50,6 +52,9 @@ template <class System, class X>
         return true;
     } else if constexpr (requires { system.flow_derivative(t, x, s, ds); }) {
         system.flow_derivative(t, x, s, ds);
+        return true;
+    } else if constexpr (flow_takes_duals<System, X>) {
+        flow_by_duals(system, mode, t, 0, x, s, ds);
         return true;
     } else {
         return false;
@@ -80,6 +85,9 @@ template <class System, class X, class... Which>
         return true;
     } else if constexpr (requires { system.reset_derivative(which..., t, x, dt, s); }) {
         system.reset_derivative(which..., t, x, dt, s);
+        return true;
+    } else if constexpr (reset_takes_duals<System, X, Which...>) {
+        reset_by_duals(system, mode, t, dt, x, s, which...);
         return true;
     } else {
         return false;
@@ -244,19 +252,24 @@ struct TimeReset {
     {
         return call_time_reset(system, mode, t, x);
     }
-    /// Exact where nothing is reset.
     template <class System, class X>
-    [[nodiscard]] static bool derive(const System& system, [[maybe_unused]] Mode mode, double t,
-                                     const X&, double, X& s)
+    [[nodiscard]] static bool derive([[maybe_unused]] const System& system,
+                                     [[maybe_unused]] Mode mode, [[maybe_unused]] double t,
+                                     [[maybe_unused]] const X& x, [[maybe_unused]] double dt,
+                                     [[maybe_unused]] X& s)
     {
-        return !(
-            requires { system.time_reset(mode, t, s); } || requires { system.time_reset(t, s); });
+        if constexpr (!TimeResetting<System, X>) return true;
+        if constexpr (TimeResetting<System, X> && time_reset_takes_duals<System, X>) {
+            time_reset_by_duals(system, mode, t, dt, x, s);
+            return true;
+        }
+        return false;
     }
 };
 
 /// Flow, guards and resets of a system, and their derivatives along directions (f_x s)
-/// and by its parameters (f_p). The fields on both sides of a surface are taken to be
-/// smooth across it, since differences look beyond it.
+/// and by its parameters (f_p), the latter by differences. The fields on both sides of a surface
+/// are taken to be smooth across it, since differences look beyond it.
 template <class System, class X>
 class Linearization {
 public:
@@ -329,6 +342,8 @@ public:
     {
         if constexpr (has_exact_guard) {
             return exact_guard(system_, which, mode, t, x, s);
+        } else if constexpr (RateByDuals<System, X>) {
+            return rate_by_duals(system_, which, mode, t, 0, x, s);
         } else {
             const double h = step_along(differences_, x, s);
             if (!std::isfinite(h)) return 0;
@@ -346,7 +361,7 @@ public:
             j, [&](const System& system) { return guard_of(system, which, mode, t, x); });
     }
 
-    /// dg/dt + (dg/dx) f along x' = f: `guard_rate`, else by differences.
+    /// dg/dt + (dg/dx) f along x' = f.
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const X& x,
                                     const X& f) const
     {

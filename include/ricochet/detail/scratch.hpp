@@ -20,7 +20,10 @@ namespace ricochet::detail {
 template <class X, std::size_t n, bool fixed = (fixed_size<X>() > 0)>
 class Scratch {
 public:
-    explicit Scratch(const X& /*like*/) noexcept {}
+    template <class Like>
+    explicit Scratch(const Like& /*like*/) noexcept
+    {
+    }
     [[nodiscard]] X& operator[](std::size_t i) noexcept { return states_[i]; }
 
 private:
@@ -31,13 +34,16 @@ template <class X, std::size_t n>
 class Scratch<X, n, false> {
 public:
     /// Room for n states of the size of `like`.
-    explicit Scratch(const X& like)
+    template <class Like>
+    explicit Scratch(const Like& like)
     {
         auto& rooms = loans().rooms;
         if (loans().lent == rooms.size()) rooms.push_back(std::make_unique<Room>());
         room_ = rooms[loans().lent].get();
         for (X& x : *room_) {
-            if (x.size() != like.size()) x = like;
+            using Size = decltype(x.size());
+            const auto size = static_cast<Size>(like.size());
+            if (x.size() != size) x.resize(size);
         }
         ++loans().lent;
     }

@@ -2,7 +2,9 @@
 //
 //     flow(t, x, dxdt)          x' = f(t, x)                       always
 //     guard(t, x)               g, positive inside the mode        for events
-//     guard_rate(t, x, dxdt)    dg/dt along the flow               optional
+//     guard_rate(t, x, dxdt)    dg/dt along the flow               optional; not needed where
+//                                                                  the guard takes any scalar
+//                                                                  (hybrid/scalar.hpp)
 //     guard_curvature(t, x)     d2g/dt2 along the flow             for some networks
 //     reset(t, x)               x⁻ becomes x⁺, in place            optional
 //     rest(t, x)                where infinitely many events end   optional
@@ -60,7 +62,11 @@
 #include <type_traits>
 
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/degree.hpp"
+#include "ricochet/detail/dual_rate.hpp"
+#include "ricochet/detail/counts.hpp"
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -101,26 +107,6 @@ private:
 };
 
 namespace detail {
-
-// --- how many guards ---
-
-template <class System>
-concept CountsGuardsFixed = requires {
-    requires std::is_same_v<decltype(&System::guard_count), const std::size_t*>;
-};
-
-template <class System>
-concept CountsGuardsByMember = !CountsGuardsFixed<System> && requires(const System& system) {
-    { system.guard_count } -> std::convertible_to<std::size_t>;
-};
-
-template <class System>
-concept CountsGuardsByCall = !CountsGuardsFixed<System> && requires(const System& system) {
-    { system.guard_count() } -> std::convertible_to<std::size_t>;
-};
-
-template <class System>
-concept CountsGuards = CountsGuardsFixed<System> || CountsGuardsByMember<System> || CountsGuardsByCall<System>;
 
 // --- flow ---
 
@@ -196,8 +182,12 @@ concept PlainSingleRate = !CountsGuards<System> && requires(const System& system
     { system.guard_rate(t, x, dxdt) } -> std::convertible_to<double>;
 };
 
+/// The system writes the rate of one guard.
 template <class System, class X, class D = X>
-concept RateAlone = ModedRateOf<System, X, D> || PlainRateOf<System, X, D> || ModedSingleRate<System, X, D> || PlainSingleRate<System, X, D>;
+concept RateWritten = ModedRateOf<System, X, D> || PlainRateOf<System, X, D> || ModedSingleRate<System, X, D> || PlainSingleRate<System, X, D>;
+/// It does, or dual numbers through its guard have the rate.
+template <class System, class X, class D = X>
+concept RateAlone = RateWritten<System, X, D> || RateByDuals<System, X>;
 
 template <class System, class X>
 concept ModedRates = CountsGuards<System> && requires(const System& system, Mode mode, double t, const X& x, std::span<double> rates) {
@@ -390,20 +380,10 @@ template <class X, class System>
             info.boolean = true;
         }
     }
-    return info;
-}
-
-/// The number of modes where the system declares it, else 0.
-template <class System>
-[[nodiscard]] constexpr std::size_t mode_count_of(const System& system)
-{
-    if constexpr (requires { { system.mode_count() } -> std::convertible_to<std::size_t>; }) {
-        return static_cast<std::size_t>(system.mode_count());
-    } else if constexpr (requires { { system.mode_count } -> std::convertible_to<std::size_t>; }) {
-        return static_cast<std::size_t>(system.mode_count);
-    } else {
-        return 0;
+    if constexpr (detail::DegreeKnown<System, X>) {
+        if (info.degree == 0 && !info.boolean) info.degree = detail::inferred_degree<X>(system, which);
     }
+    return info;
 }
 
 namespace detail {
@@ -475,10 +455,13 @@ template <class System, class X>
     }
 }
 
+/// The rate of one guard with x' = dxdt.
 template <class System, class X, class D>
 [[gnu::always_inline]] [[nodiscard]] inline double call_rate(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x, const D& dxdt)
 {
-    if constexpr (ModedRateOf<System, X, D>) {
+    if constexpr (!RateWritten<System, X, D>) {
+        return rate_by_duals(system, which, mode, t, 1, x, dxdt);
+    } else if constexpr (ModedRateOf<System, X, D>) {
         return system.guard_rate(which, mode, t, x, dxdt);
     } else if constexpr (PlainRateOf<System, X, D>) {
         return system.guard_rate(which, t, x, dxdt);
@@ -554,19 +537,6 @@ template <class System, class X>
         return mode;
     } else {
         return mode;
-    }
-}
-
-/// Whether a guard is looked at in a mode.
-template <class System>
-[[nodiscard]] constexpr bool call_enabled_in(const System& system, [[maybe_unused]] std::size_t which, Mode mode)
-{
-    if constexpr (CountsGuards<System> && requires { { system.enabled(which, mode) } -> std::convertible_to<bool>; }) {
-        return system.enabled(which, mode);
-    } else if constexpr (!CountsGuards<System> && requires { { system.enabled(mode) } -> std::convertible_to<bool>; }) {
-        return system.enabled(mode);
-    } else {
-        return true;
     }
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -20,7 +21,7 @@ namespace ricochet {
 ///
 /// (Saunders, Steyer and Kuether, SAND2023-06682C, eqs. 1 and 2.) For 0 <
 /// restitution < 1 the impacts accumulate at `zeno_time`. Functions are generic
-/// in the state type.
+/// in the state and its scalar.
 class BouncingBall {
 public:
     using State = std::array<double, 2>;
@@ -31,7 +32,7 @@ public:
     };
 
     /// The source paper's ball.
-    BouncingBall() : BouncingBall(Parameters{}) {}
+    constexpr BouncingBall() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit BouncingBall(const Parameters& parameters);
@@ -53,33 +54,20 @@ public:
     static constexpr bool unilateral = true;
 
     template <class X>
-    void flow(double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = x[1];
         dxdt[1] = -gravity_;
     }
 
     template <class X>
-    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         return x[0];
     }
 
     template <class X>
-    [[nodiscard]] double guard_rate(double /*t*/, const X& /*x*/, const X& dxdt) const noexcept
-    {
-        return dxdt[0];
-    }
-
-    /// d2g/dt2 along the flow [m/s²].
-    template <class X>
-    [[nodiscard]] double guard_curvature(double /*t*/, const X& /*x*/) const noexcept
-    {
-        return -gravity_;
-    }
-
-    template <class X>
-    void reset(double /*t*/, X& x) const noexcept
+    constexpr void reset(const ScalarOf<X>& /*t*/, X& x) const noexcept
     {
         x[0] = 0;
         x[1] *= -restitution_;
@@ -87,7 +75,7 @@ public:
 
     /// After infinitely many impacts the ball lies on the floor.
     template <class X>
-    void rest(double /*t*/, X& x) const noexcept
+    constexpr void rest(const ScalarOf<X>& /*t*/, X& x) const noexcept
     {
         x[0] = 0;
         x[1] = 0;
@@ -104,8 +92,8 @@ public:
     [[nodiscard]] double zeno_time(double height, double velocity = 0) const noexcept;
 
 private:
-    double gravity_;
-    double restitution_;
+    double gravity_ = Parameters{}.gravity;
+    double restitution_ = Parameters{}.restitution;
 };
 
 }  // namespace ricochet

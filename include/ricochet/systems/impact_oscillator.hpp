@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -25,7 +26,7 @@ namespace ricochet {
 ///
 /// Known solution: between impacts the motion is the sum of a forced and a damped free
 /// oscillation in closed form, and `impacts` follows it from rest. Functions are generic
-/// in the state type.
+/// in the state and its scalar.
 class ImpactOscillator {
 public:
     using State = std::array<double, 2>;
@@ -37,7 +38,7 @@ public:
         double damping = 0.1;      ///< twice Lehr's damping ratio, in (0, 2)
     };
 
-    ImpactOscillator() : ImpactOscillator(Parameters{}) {}
+    constexpr ImpactOscillator() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit ImpactOscillator(const Parameters& parameters);
@@ -47,30 +48,25 @@ public:
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t /*which*/) noexcept
     {
-        return {.name = "wall", .unilateral = true, .degree = 1};
+        return {.name = "wall", .unilateral = true};
     }
 
     template <class X>
-    void flow(double t, const X& x, X& dxdt) const noexcept
+    constexpr void flow(const ScalarOf<X>& t, const X& x, X& dxdt) const noexcept
     {
+        using std::cos;
         dxdt[0] = x[1];
-        dxdt[1] = std::cos(p_.frequency * t) - x[0] - p_.damping * x[1];
+        dxdt[1] = cos(p_.frequency * t) - x[0] - p_.damping * x[1];
     }
 
     template <class X>
-    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         return p_.wall - x[0];
     }
 
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(double /*t*/, const X& /*x*/, const D& dxdt) const noexcept
-    {
-        return -dxdt[0];
-    }
-
     template <class X>
-    void reset(double /*t*/, X& x) const noexcept
+    constexpr void reset(const ScalarOf<X>& /*t*/, X& x) const noexcept
     {
         x[0] = p_.wall;
         x[1] *= -p_.restitution;
@@ -87,7 +83,7 @@ public:
     [[nodiscard]] std::vector<double> impacts(double t_end) const;
 
 private:
-    Parameters p_;
+    Parameters p_{};
 };
 
 }  // namespace ricochet

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -24,7 +25,8 @@ namespace ricochet {
 ///
 /// where agm is the arithmetic-geometric mean (Gauss; Legendre's complete elliptic
 /// integral K(sin(a0 / 2)) equals pi / 2 over that mean). The first of them is the
-/// start itself, which is no event. Functions are generic in the state type.
+/// start itself, which is no event. Functions are generic in the state and its
+/// scalar.
 class Pendulum {
 public:
     using State = std::array<double, 2>;
@@ -34,7 +36,7 @@ public:
         double length = 1;     ///< [m], positive
     };
 
-    Pendulum() : Pendulum(Parameters{}) {}
+    constexpr Pendulum() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit Pendulum(const Parameters& parameters);
@@ -44,33 +46,28 @@ public:
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t /*which*/) noexcept
     {
-        return {.name = "turning-point", .crossing = Crossing::either, .degree = 1};
+        return {.name = "turning-point", .crossing = Crossing::either};
     }
 
     template <class X>
-    void flow(double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
+        using std::sin;
         dxdt[0] = x[1];
-        dxdt[1] = -stiffness_ * std::sin(x[0]);
+        dxdt[1] = -stiffness_ * sin(x[0]);
     }
 
     template <class X>
-    [[nodiscard]] double guard(double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(const ScalarOf<X>& /*t*/, const X& x) const noexcept
     {
         return x[1];
-    }
-
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(double /*t*/, const X& /*x*/, const D& dxdt) const noexcept
-    {
-        return dxdt[1];
     }
 
     /// Time [s] between turning points at +-`amplitude` [rad], which is in (-pi, pi).
     [[nodiscard]] double half_period(double amplitude = start[0]) const noexcept;
 
 private:
-    double stiffness_;  ///< [1/s²]
+    double stiffness_ = Parameters{}.gravity / Parameters{}.length;  ///< [1/s²]
 };
 
 }  // namespace ricochet

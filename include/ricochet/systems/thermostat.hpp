@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 
@@ -23,7 +24,7 @@ namespace ricochet {
 /// Known solution: exponentials, so that the heater is off for
 /// log((high - ambient) / (low - ambient)) / rate and on for
 /// log((heated - low) / (heated - high)) / rate, in turn; see `switch_time`. Functions
-/// are generic in the state type.
+/// are generic in the state and its scalar.
 class Thermostat {
 public:
     using State = std::array<double, 1>;
@@ -39,7 +40,7 @@ public:
         double high = 22;    ///< [degrees], where it is switched off; above low
     };
 
-    Thermostat() : Thermostat(Parameters{}) {}
+    constexpr Thermostat() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit Thermostat(const Parameters& parameters);
@@ -56,7 +57,7 @@ public:
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t which) noexcept
     {
-        return {.name = which == too_cold ? "too-cold" : "too-warm", .degree = 1};
+        return {.name = which == too_cold ? "too-cold" : "too-warm"};
     }
 
     [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
@@ -65,27 +66,21 @@ public:
     }
 
     template <class X>
-    void flow(Mode mode, double /*t*/, const X& x, X& dxdt) const noexcept
+    constexpr void flow(Mode mode, const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const noexcept
     {
         dxdt[0] = -p_.rate * (x[0] - (mode == off ? p_.ambient : p_.heated));
     }
 
     template <class X>
-    [[nodiscard]] double guard(std::size_t which, double /*t*/, const X& x) const noexcept
+    [[nodiscard]] constexpr ScalarOf<X> guard(std::size_t which, const ScalarOf<X>& /*t*/,
+                                              const X& x) const noexcept
     {
         return which == too_cold ? x[0] - p_.low : p_.high - x[0];
     }
 
-    template <class X, class D>
-    [[nodiscard]] double guard_rate(std::size_t which, double /*t*/, const X& /*x*/,
-                                    const D& dxdt) const noexcept
-    {
-        return which == too_cold ? dxdt[0] : -dxdt[0];
-    }
-
     template <class X>
-    [[nodiscard]] Mode reset(std::size_t which, Mode /*mode*/, double /*t*/,
-                             X& /*x*/) const noexcept
+    [[nodiscard]] constexpr Mode reset(std::size_t which, Mode /*mode*/, const ScalarOf<X>& /*t*/,
+                                       X& /*x*/) const noexcept
     {
         return which == too_cold ? on : off;
     }
@@ -95,7 +90,7 @@ public:
     [[nodiscard]] double switch_time(int n, double temperature = start[0]) const noexcept;
 
 private:
-    Parameters p_;
+    Parameters p_{};
 };
 
 }  // namespace ricochet

@@ -96,7 +96,8 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
             return use(chosen<System, X>(Verified<Extremum>(settings.network.value())));
         }
     }
-    if constexpr (CurvedGuard<System, X>) {
+    // Lines and networks are of systems that tell their parameters.
+    if constexpr (CurvedGuard<System, X> && requires(const System& s) { s.parameter(""); }) {
         if (settings.detector == DetectorKind::line) {
             return use(chosen<System, X>(BallisticLine{}));
         }

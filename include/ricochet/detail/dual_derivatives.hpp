@@ -1,0 +1,159 @@
+// Internal: what it declares may change without notice.
+//
+// Derivatives of flow and resets along a direction of state and time, by dual numbers, of functions
+// that take any scalar (hybrid/scalar.hpp).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <type_traits>
+#include <vector>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/scalar_probe.hpp"
+#include "ricochet/detail/scratch.hpp"
+#include "ricochet/dual.hpp"
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet::detail {
+
+template <class S>
+using VectorOf = std::vector<S>;
+
+/// States like X with components of type S: arrays, or vectors where the size is known at run time.
+template <class X, class S>
+using WithScalar =
+    std::conditional_t<(fixed_size<X>() > 0), std::array<S, fixed_size<X>()>, VectorOf<S>>;
+
+template <class System, class X>
+inline constexpr bool flow_takes_duals = [] {
+    constexpr std::size_t n = fixed_size<X>();
+    if constexpr (n > 0) {
+        return FlowOfScalars<System, ArraysOf<n>::template Of>;
+    } else {
+        return FlowOfScalars<System, VectorOf>;
+    }
+}();
+
+template <class System, class X, class... Which>
+inline constexpr bool reset_takes_duals = [] {
+    constexpr std::size_t n = fixed_size<X>();
+    if constexpr (n > 0) {
+        return ResetOfScalars<System, ArraysOf<n>::template Of, Which...>;
+    } else {
+        return ResetOfScalars<System, VectorOf, Which...>;
+    }
+}();
+
+template <class System, class X>
+inline constexpr bool time_reset_takes_duals = [] {
+    constexpr std::size_t n = fixed_size<X>();
+    if constexpr (n > 0) {
+        return TimeResetOfScalars<System, ArraysOf<n>::template Of>;
+    } else {
+        return TimeResetOfScalars<System, VectorOf>;
+    }
+}();
+
+/// The flow with a scalar S.
+template <class System, class S, class X>
+[[gnu::always_inline]] inline void flow_of_scalar(const System& system, [[maybe_unused]] Mode mode,
+                                                  const S& t, const X& x, X& dxdt)
+{
+    if constexpr (requires { system.flow(mode, t, x, dxdt); }) {
+        system.flow(mode, t, x, dxdt);
+    } else {
+        system.flow(t, x, dxdt);
+    }
+}
+
+/// ds = (df/dx) s + (df/dt) dt.
+template <class System, class X>
+void flow_by_duals(const System& system, Mode mode, double t, double dt, const X& x, const X& s,
+                   X& ds)
+{
+    using D = Dual<1>;
+    Scratch<WithScalar<X, D>, 2> room(x);
+    for_each_component(x, [&](auto i) { room[0][static_cast<std::size_t>(i)] = {x[i], {s[i]}}; });
+    flow_of_scalar(system, mode, D(t, {dt}), room[0], room[1]);
+    for_each_component(x, [&](auto i) { ds[i] = room[1][static_cast<std::size_t>(i)].slope[0]; });
+}
+
+/// The state x, which moves with s.
+template <class X>
+[[nodiscard]] WithScalar<X, Dual<1>> dual_state(const X& x, const X& s)
+{
+    WithScalar<X, Dual<1>> state{};
+    if constexpr (fixed_size<X>() == 0) state.resize(static_cast<std::size_t>(x.size()));
+    for_each_component(x, [&](auto i) { state[static_cast<std::size_t>(i)] = {x[i], {s[i]}}; });
+    return state;
+}
+
+/// What the state moves with, into s.
+template <class X>
+void put_slopes(const WithScalar<X, Dual<1>>& state, X& s)
+{
+    if constexpr (fixed_size<X>() == 0) s.resize(static_cast<decltype(s.size())>(state.size()));
+    for_each_component(s, [&](auto i) { s[i] = state[static_cast<std::size_t>(i)].slope[0]; });
+}
+
+/// s becomes (dR/dx) s + (dR/dt) dt, of the reset R of a guard or of a set.
+template <class System, class X, class... Which>
+void reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, double dt,
+                    const X& x, X& s, const Which&... which)
+{
+    const Dual<1> time(t, {dt});
+    auto state = dual_state(x, s);
+    if constexpr (requires { system.reset(which..., mode, time, state); }) {
+        static_cast<void>(system.reset(which..., mode, time, state));
+    } else {
+        system.reset(which..., time, state);
+    }
+    put_slopes(state, s);
+}
+
+/// The same of the reset at a time event.
+template <class System, class X>
+void time_reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, double dt,
+                         const X& x, X& s)
+{
+    const Dual<1> time(t, {dt});
+    auto state = dual_state(x, s);
+    if constexpr (requires { system.time_reset(mode, time, state); }) {
+        static_cast<void>(system.time_reset(mode, time, state));
+    } else {
+        system.time_reset(time, state);
+    }
+    put_slopes(state, s);
+}
+
+/// The curvature of the one guard of a system without modes can be had from duals of duals.
+template <class System, class X>
+inline constexpr bool curvature_takes_duals = [] {
+    if constexpr (fixed_size<X>() > 0 && requires(const System& s, double t, const X& x, X& f) {
+                      s.guard(t, x);
+                      s.flow(t, x, f);
+                  }) {
+        return flow_takes_duals<System, X> && GuardOfScalarArrays<System, fixed_size<X>()>;
+    } else {
+        return false;
+    }
+}();
+
+/// d2g/dt2 along the flow.
+template <class System, class X>
+[[nodiscard]] double curvature_by_duals(const System& system, double t, const X& x)
+{
+    using D = Dual<1, Dual<1>>;
+    X f = x;
+    X rate = x;
+    system.flow(t, x, f);
+    flow_by_duals(system, 0, t, 1, x, f, rate);
+    WithScalar<X, D> state{};
+    for_each_component(x, [&](auto i) {
+        state[static_cast<std::size_t>(i)] = {{x[i], {f[i]}}, {Dual<1>(f[i], {rate[i]})}};
+    });
+    return guard_of_scalar(system, 0, 0, D({t, {1}}, {Dual<1>(1, {0})}), state).slope[0].slope[0];
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,59 @@
+// Internal: what it declares may change without notice.
+//
+// The rate of a guard along the flow, by dual numbers.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/scalar_probe.hpp"
+#include "ricochet/dual.hpp"
+#include "ricochet/hybrid/guard.hpp"
+
+namespace ricochet::detail {
+
+/// A state and its rate as dual numbers, a component at a time.
+template <class V, class D>
+class DualView {
+public:
+    DualView(const V& x, const D& dxdt) noexcept : x_(&x), dxdt_(&dxdt) {}
+    template <class Index>
+    [[nodiscard, gnu::always_inline]] Dual<1> operator[](Index i) const noexcept
+    {
+        return {(*x_)[static_cast<decltype(x_->size())>(i)],
+                {(*dxdt_)[static_cast<decltype(dxdt_->size())>(i)]}};
+    }
+    [[nodiscard]] auto size() const noexcept { return x_->size(); }
+
+private:
+    const V* x_;
+    const D* dxdt_;
+};
+
+/// Whether dual numbers through the guard have its rate at states, or views, like V.
+template <class System, class V>
+concept RateByDuals = GuardOfScalarViews<System> || GuardOfScalarArrays < System,
+        fixed_size<V>()
+> ;
+
+/// The rate of a guard where x' = dxdt and t' = `clock`.
+template <class System, class V, class D>
+[[gnu::always_inline]] [[nodiscard]] inline double rate_by_duals(const System& system,
+                                                                 std::size_t which, Mode mode,
+                                                                 double t, double clock, const V& x,
+                                                                 const D& dxdt)
+{
+    const Dual<1> time(t, {clock});
+    if constexpr (GuardOfScalarViews<System>) {
+        const DualView<V, D> state(x, dxdt);
+        return guard_of_scalar(system, which, mode, time, state).slope[0];
+    } else {
+        std::array<Dual<1>, fixed_size<V>()> state;
+        const DualView<V, D> view(x, dxdt);
+        for (std::size_t i = 0; i < state.size(); ++i) state[i] = view[i];
+        return guard_of_scalar(system, which, mode, time, state).slope[0];
+    }
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,478 @@
+// An implicit method for stiff motion, without iterations.
+//
+//     #include "ricochet/rosenbrock.hpp"
+//     integrate(system, x0, {.t_end = 100, .rtol = 1e-6}, ErrorControlled<Rosenbrock4>{});
+//
+// A step solves six linear systems with one matrix, I / (gamma h) - J. The Jacobian J is, in this
+// order, the one that the system writes, row by row,
+//
+//     void jacobian([Mode,] double t, const X& x, std::span<double> rows) const
+//
+// the one that dual numbers have where the flow takes any scalar (hybrid/scalar.hpp), or forward
+// differences, whose error of 1e-8 costs the method its order at tolerances below that. The matrix
+// is dense: the method is for states of up to a few dozen components.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detail/dual_derivatives.hpp"
+#include "ricochet/detail/kernels.hpp"
+#include "ricochet/dual.hpp"
+#include "ricochet/hybrid/system.hpp"
+
+namespace ricochet {
+
+/// The method RODAS, of order 4 with an error estimate of order 3 and an interpolant of order 3;
+/// L-stable and stiffly accurate (E. Hairer and G. Wanner, Solving Ordinary Differential Equations
+/// II, 2nd edition, section IV.7). Steps are those of odeint's rosenbrock4 where the flow does not
+/// depend on the time; there odeint's is of order 1, by the sign of one coefficient (d4).
+///
+/// The polynomial of a step is its cubic interpolant; samples and events that act are on steps of
+/// their own. Rates at the ends of a step are those of the interpolant: where motion is stiff, the
+/// flow at a computed state is its error times the fastest rate.
+struct Rosenbrock4 {
+    template <class State>
+    struct Stepper {
+        static constexpr bool estimates_error = true;
+        static constexpr bool fsal = true;
+        static constexpr bool has_dense_output = true;
+    };
+};
+
+namespace detail {
+
+struct RodasTableau {
+    static constexpr double gamma = 0.25;
+    static constexpr std::array<double, 5> c = {0, 0.386, 0.21, 0.63, 1};
+    static constexpr std::array<double, 4> d = {0.25, -0.1043, 0.1035, -0.3620000000000023e-01};
+    using Row = std::array<double, 5>;
+    static constexpr std::array<Row, 5> a = {
+        {{},
+         {0.1544000000000000e+01},
+         {0.9466785280815826e+00, 0.2557011698983284e+00},
+         {0.3314825187068521e+01, 0.2896124015972201e+01, 0.9986419139977817e+00},
+         {0.1221224509226641e+01, 0.6019134481288629e+01, 0.1253708332932087e+02,
+          -0.6878860361058950e+00}}};
+    static constexpr std::array<Row, 6> m = {  // of stages over h
+        {{},
+         {-0.5668800000000000e+01},
+         {-0.2430093356833875e+01, -0.2063599157091915e+00},
+         {-0.1073529058151375e+00, -0.9594562251023355e+01, -0.2047028614809616e+02},
+         {0.7496443313967647e+01, -0.1024680431464352e+02, -0.3399990352819905e+02,
+          0.1170890893206160e+02},
+         {0.8083246795921522e+01, -0.7981132988064893e+01, -0.3152159432874371e+02,
+          0.1631930543123136e+02, -0.6058818238834054e+01}}};
+    /// The interpolant is x0 (1 - u) + u (x1 + (1 - u) (dense[0] + u dense[1])).
+    static constexpr std::array<Row, 2> dense = {
+        {{0.1012623508344586e+02, -0.7487995877610167e+01, -0.3480091861555747e+02,
+          -0.7992771707568823e+01, 0.1025137723295662e+01},
+         {-0.6762803392801253e+00, 0.6087714651680015e+01, 0.1643084320892478e+02,
+          0.2476722511418386e+02, -0.6594389125716872e+01}}};
+};
+
+/// The system writes its Jacobian.
+template <class System, class X>
+concept JacobianWritten = requires(const System& system, Mode mode, double t, const X& x,
+                                   std::span<double> rows)
+{
+    system.jacobian(mode, t, x, rows);
+}
+|| requires(const System& system, double t, const X& x, std::span<double> rows)
+{
+    system.jacobian(t, x, rows);
+};
+
+/// There is a function of that name, which nothing calls.
+template <class System, class X>
+concept JacobianMisfits = !JacobianWritten<System, X> && requires
+{
+    &System::jacobian;
+};
+
+/// Fixed or sized at run time, as C is.
+template <class C>
+using MatrixLike =
+    std::conditional_t<(fixed_size<C>() > 0), std::array<double, fixed_size<C>() * fixed_size<C>()>,
+                       std::vector<double>>;
+
+/// A = L U in place, with row exchanges; false where it is singular or not finite.
+[[nodiscard]] inline bool factorize(std::size_t n, double* a, std::size_t* rows) noexcept
+{
+    for (std::size_t i = 0; i < n; ++i) {
+        std::size_t pivot = i;
+        for (std::size_t k = i + 1; k < n; ++k) {
+            if (std::fabs(a[k * n + i]) > std::fabs(a[pivot * n + i])) pivot = k;
+        }
+        rows[i] = pivot;
+        if (pivot != i) std::swap_ranges(a + i * n, a + (i + 1) * n, a + pivot * n);
+        const double inverse = 1 / a[i * n + i];
+        if (!std::isfinite(inverse)) return false;
+        for (std::size_t k = i + 1; k < n; ++k) {
+            const double factor = a[k * n + i] *= inverse;
+            if (factor == 0) continue;
+            for (std::size_t j = i + 1; j < n; ++j) a[k * n + j] -= factor * a[i * n + j];
+        }
+    }
+    return true;
+}
+
+/// b becomes A^-1 b.
+template <class C>
+void substitute(std::size_t n, const double* a, const std::size_t* rows, C& b) noexcept
+{
+    for (std::size_t i = 0; i < n; ++i) std::swap(b[i], b[rows[i]]);
+    for (std::size_t i = 1; i < n; ++i) {
+        for (std::size_t j = 0; j < i; ++j) b[i] -= a[i * n + j] * b[j];
+    }
+    for (std::size_t i = n; i-- > 0;) {
+        for (std::size_t j = i + 1; j < n; ++j) b[i] -= a[i * n + j] * b[j];
+        b[i] /= a[i * n + i];
+    }
+}
+
+/// What a step of Rosenbrock's method keeps.
+template <class C>
+struct RosenbrockRoom {
+    explicit RosenbrockRoom(const C& like)
+        : x(like), rate(like), by_time(like), at(like), flow(like), increment(like), error(like)
+    {
+        stages.fill(like);
+        if constexpr (fixed_size<C>() == 0) {
+            const std::size_t n = like.size();
+            jacobian.resize(n * n);
+            factors.resize(n * n);
+            rows.resize(n);
+            series.resize(4 * n);
+        }
+    }
+
+    // The start of the steps: what is known there serves all their lengths.
+    Instant start;
+    Mode mode = 0;
+    bool backward = false;
+    bool known = false;
+    C x, rate, by_time;  ///< f and df/ds
+    MatrixLike<C> jacobian{};
+
+    // One step from there.
+    C at, flow, increment, error;
+    std::array<C, 5> stages;
+    MatrixLike<C> factors{};
+    std::conditional_t<(fixed_size<C>() > 0), std::array<std::size_t, fixed_size<C>()>,
+                       std::vector<std::size_t>>
+        rows{};
+
+    // The step in hand: its interpolant as a power series, and its length.
+    std::conditional_t<(fixed_size<C>() > 0), std::array<double, 4 * fixed_size<C>()>,
+                       std::vector<double>>
+        series{};
+    double h = std::numeric_limits<double>::quiet_NaN();
+};
+
+template <class System, class X>
+struct StepperDoor<System, X, Rosenbrock4> : Door<System, X> {
+    static_assert(
+        !JacobianMisfits<System, X>,
+        "ricochet: found a jacobian whose parameters do not fit, or that is not const; "
+        "expected void jacobian([Mode,] double t, const State& x, std::span<double> rows) "
+        "const");
+
+    StepperDoor(const System& system, const X& like)
+        : Door<System, X>(system, like), room(core_state(like))
+    {
+    }
+    RosenbrockRoom<CoreState<X>> room;
+};
+
+template <class System, class X>
+class KernelOf<System, X, Rosenbrock4> {
+    using C = CoreState<X>;
+    using State = StepState<C>;
+    using D = StepperDoor<System, X, Rosenbrock4>;
+    using Room = RosenbrockRoom<C>;
+    using Table = RodasTableau;
+
+    static constexpr bool by_duals = flow_takes_duals<System, X>;
+
+    [[nodiscard]] static D& at(void* door) noexcept
+    {
+        return *static_cast<D*>(static_cast<Door<System, X>*>(door));
+    }
+
+    /// dx/ds at offset s and state x.
+    static void flow(D& door, State& state, double s, const C& x, C& rate)
+    {
+        ++state.flow_calls;
+        state.flow_fits &= door.flow(state.mode, state.time(s), x, rate);
+        if (state.backward) {
+            for_each_component(x, [&](auto i) { rate[i] = -rate[i]; });
+        }
+    }
+
+    // --- the Jacobian ---
+
+    static void jacobian_written(D& door, const State& state)
+    {
+        Room& room = door.room;
+        const std::span<double> rows(room.jacobian.data(), room.jacobian.size());
+        const X& x = door.read(state.x0, 0);
+        const double t = state.start.value;
+        if constexpr (requires { door.system().jacobian(state.mode, t, x, rows); }) {
+            door.system().jacobian(state.mode, t, x, rows);
+        } else {
+            door.system().jacobian(t, x, rows);
+        }
+    }
+
+    /// Columns of the Jacobian, and after them the derivative by time, four at a time.
+    static void jacobian_by_duals(D& door, State& state)
+    {
+        constexpr std::size_t width = 4;
+        using S = Dual<width>;
+        Room& room = door.room;
+        const std::size_t n = state.x0.size();
+        Scratch<WithScalar<X, S>, 2> states(state.x0);
+        for (std::size_t first = 0; first <= n; first += width) {
+            S time(state.start.value);
+            if (first <= n && n < first + width) time.slope[n - first] = 1;
+            for (std::size_t i = 0; i < n; ++i) {
+                S& x = states[0][i] = S(state.x0[i]);
+                if (first <= i && i < first + width) x.slope[i - first] = 1;
+            }
+            ++state.flow_calls;
+            flow_of_scalar(door.system(), state.mode, time, states[0], states[1]);
+            for (std::size_t k = 0; k < width && first + k <= n; ++k) {
+                for (std::size_t i = 0; i < n; ++i) {
+                    double& to =
+                        first + k == n ? room.by_time[i] : room.jacobian[i * n + first + k];
+                    to = states[1][i].slope[k];
+                }
+            }
+        }
+    }
+
+    static void jacobian_by_differences(D& door, State& state)
+    {
+        Room& room = door.room;
+        const std::size_t n = state.x0.size();
+        for (std::size_t j = 0; j < n; ++j) {
+            room.at = state.x0;
+            const double moved = state.x0[j] + std::copysign(reach_of(state.x0[j]), room.rate[j]);
+            room.at[j] = moved;
+            const double delta = moved - state.x0[j];
+            flow(door, state, 0, room.at, room.flow);
+            for (std::size_t i = 0; i < n; ++i) {
+                room.jacobian[i * n + j] = (room.flow[i] - room.rate[i]) / delta;
+            }
+        }
+    }
+
+    /// Ahead of the start, where the flow exists.
+    static void by_time_by_differences(D& door, State& state)
+    {
+        Room& room = door.room;
+        const double later = state.start.plus(state.in_time(reach_of(state.start.value)));
+        const double delta = state.in_time(later - state.start.value);
+        flow(door, state, delta, state.x0, room.flow);
+        for_each_component(
+            state.x0, [&](auto i) { room.by_time[i] = (room.flow[i] - room.rate[i]) / delta; });
+    }
+
+    [[nodiscard]] static double reach_of(double x) noexcept
+    {
+        return std::sqrt(std::numeric_limits<double>::epsilon() * std::max(1e-5, std::fabs(x)));
+    }
+
+    /// f, df/ds and J at the start, if they are not those already.
+    static void prepare(D& door, State& state)
+    {
+        Room& room = door.room;
+        bool same = room.known && room.start.value == state.start.value &&
+                    room.start.remainder == state.start.remainder && room.mode == state.mode &&
+                    room.backward == state.backward && room.x.size() == state.x0.size();
+        if (same)
+            for_each_component(state.x0, [&](auto i) { same = same && room.x[i] == state.x0[i]; });
+        if (same) return;
+        if (room.x.size() != state.x0.size()) room = Room(state.x0);
+        room.known = false;  // until all is known, whatever the flow throws
+        room.h = std::numeric_limits<double>::quiet_NaN();
+        flow(door, state, 0, state.x0, room.rate);
+        const double sign = state.backward ? -1 : 1;
+        const auto turn = [&] {
+            for (double& each : room.jacobian) each *= sign;
+        };
+        if constexpr (JacobianWritten<System, X>) {
+            jacobian_written(door, state);
+            turn();
+            by_time_by_differences(door, state);
+        } else if constexpr (by_duals) {
+            jacobian_by_duals(door, state);
+            turn();  // df/ds changes its sign twice
+        } else {
+            jacobian_by_differences(door, state);
+            by_time_by_differences(door, state);
+        }
+        room.x = state.x0;
+        room.start = state.start;
+        room.mode = state.mode;
+        room.backward = state.backward;
+        room.known = true;
+    }
+
+    // --- steps ---
+
+    /// Increment and error of a step of length h; false where it cannot be solved.
+    static bool solve(D& door, State& state, double h)
+    {
+        prepare(door, state);
+        Room& room = door.room;
+        const std::size_t n = state.x0.size();
+        for (std::size_t i = 0; i < n * n; ++i) room.factors[i] = -room.jacobian[i];
+        for (std::size_t i = 0; i < n; ++i) room.factors[i * n + i] += 1 / (Table::gamma * h);
+        if (!factorize(n, room.factors.data(), room.rows.data())) return false;
+        for (std::size_t k = 0; k < 5; ++k) {
+            if (k > 0) {
+                assign(room.at, state.x0);
+                for (std::size_t j = 0; j < k; ++j) add(room.at, Table::a[k][j], room.stages[j]);
+                flow(door, state, Table::c[k] * h, room.at, room.flow);
+            }
+            C& stage = room.stages[k];
+            assign(stage, k > 0 ? room.flow : room.rate);
+            if (k < 4) add(stage, h * Table::d[k], room.by_time);
+            for (std::size_t j = 0; j < k; ++j) add(stage, Table::m[k][j] / h, room.stages[j]);
+            substitute(n, room.factors.data(), room.rows.data(), stage);
+        }
+        add(room.at, 1, room.stages[4]);
+        flow(door, state, h, room.at, room.error);
+        for (std::size_t j = 0; j < 5; ++j) add(room.error, Table::m[5][j] / h, room.stages[j]);
+        substitute(n, room.factors.data(), room.rows.data(), room.error);
+        for_each_component(state.x0, [&](auto i) {
+            double sum = room.error[i] + room.stages[4][i];
+            for (std::size_t j = 0; j < 4; ++j) sum += Table::a[4][j] * room.stages[j][i];
+            room.increment[i] = sum;
+        });
+        return true;
+    }
+
+    /// Coefficient k = 1, 2, 3 of the interpolant in s, from the last step solved.
+    struct Terms {
+        double first, second, third;
+    };
+    template <class Index>
+    [[nodiscard]] static Terms terms(const Room& room, Index i, double h) noexcept
+    {
+        double p = 0;
+        double q = 0;
+        for (std::size_t j = 0; j < 5; ++j) {
+            p += Table::dense[0][j] * room.stages[j][i];
+            q += Table::dense[1][j] * room.stages[j][i];
+        }
+        const double r = 1 / h;
+        return {(room.increment[i] + p) * r, (q - p) * r * r, -q * r * r * r};
+    }
+
+    static void add(C& to, double factor, const C& what)
+    {
+        for_each_component(to, [&](auto i) { to[i] += factor * what[i]; });
+    }
+
+    /// The step in hand; false where it is not finite.
+    static bool go(void* door, State& state, double h)
+    {
+        D& of = at(door);
+        state.h = h;
+        state.has_middle = false;
+        state.asked_alone = 0;
+        if (!solve(of, state, h)) return false;
+        Room& room = of.room;
+        const std::size_t n = state.x0.size();
+        double sum = 0;
+        for_each_component(state.x0, [&](auto i) {
+            const auto c = static_cast<std::size_t>(i);
+            const Terms term = terms(room, i, h);
+            room.series[n + c] = term.first;
+            room.series[2 * n + c] = term.second;
+            room.series[3 * n + c] = term.third;
+            state.rate0[i] = term.first;
+            state.w[i] = room.increment[i] - h * term.first;
+            state.w_rate1[i] = h * (2 * term.second + h * (3 * term.third));
+            const TwoSum end =
+                two_sum(state.x0[i], h * term.first + (state.w[i] + state.remainder[i]));
+            state.x1[i] = end.value;
+            state.rate1[i] = term.first + state.w_rate1[i];
+            if constexpr (!is_small<C>) state.large.remainder1[i] = end.remainder;
+            sum += 0 * (state.x1[i] + state.rate1[i]);
+        });
+        room.h = h;
+        return sum == 0;
+    }
+
+    static bool take(void* door, State& state, double h) { return go(door, state, h); }
+
+    static double attempt(void* door, State& state, double h, double rtol, double atol)
+    {
+        if (!go(door, state, h)) return std::numeric_limits<double>::quiet_NaN();
+        const C& error = at(door).room.error;
+        const double* const each = state.component_atol;
+        double worst = 0;
+        double lost = 0;
+        for_each_component(state.x0, [&](auto i) {
+            const double size = std::max(std::fabs(state.x0[i]), std::fabs(state.x1[i]));
+            const double allowed = (each ? each[i] : atol) + rtol * size;
+            const double ratio = error[i] == 0 ? 0 : std::fabs(error[i]) / allowed;
+            worst = std::max(worst, ratio);
+            lost += 0 * ratio;
+        });
+        return worst + lost;
+    }
+
+    /// The method's own step of another length from the same start.
+    static void depart(void* door, State& state, double s, C& w, C& rate)
+    {
+        D& of = at(door);
+        if (s == 0 || !solve(of, state, s)) {
+            const double lost = s == 0 ? 0 : std::numeric_limits<double>::quiet_NaN();
+            for_each_component(w, [&](auto i) { w[i] = rate[i] = lost; });
+            return;
+        }
+        for_each_component(w, [&](auto i) {
+            const Terms term = terms(of.room, i, s);
+            w[i] = of.room.increment[i] - s * state.rate0[i];
+            rate[i] = (term.first - state.rate0[i]) + s * (2 * term.second + s * (3 * term.third));
+        });
+    }
+
+    static SeriesTerms series(void* door, const State& state)
+    {
+        return {at(door).room.series.data(), 3, static_cast<std::size_t>(state.x0.size())};
+    }
+
+    static void renew(void* door) { at(door).room.known = false; }
+
+public:
+    [[nodiscard]] static constexpr StepKernel<C> make()
+    {
+        StepKernel<C> kernel;
+        kernel.order = 4;
+        kernel.error_order = 3;
+        kernel.end_rate = true;
+        kernel.take = &take;
+        kernel.attempt = &attempt;
+        kernel.depart = &depart;
+        kernel.series = &series;
+        kernel.renew = &renew;
+        return kernel;
+    }
+};
+
+}  // namespace detail
+
+}  // namespace ricochet
