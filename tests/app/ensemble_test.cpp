@@ -331,7 +331,7 @@ TEST_F(EnsembleApp, RequestsThatContradictThemselvesAreRefused)
     };
     refused({}, {"SYSTEM", "--merge"});
     refused({"trebuchet", "--table", "t.csv", "--out", "o"}, {"trebuchet"});
-    refused({"fault", "--table", "t.csv", "--out", "o"}, {"fault", "too large"});
+    refused({"fault", "--table", "t.csv", "--out", "o"}, {"fault", "simulate alone"});
     refused({"bouncing-ball", "--out", "o"}, {"--table", "--count"});
     refused({"bouncing-ball", "--table", "t.csv"}, {"--out"});
     refused({"bouncing-ball", "--table", "t.csv", "--count", "3", "--out", "o"},

@@ -154,6 +154,18 @@ public:
         if (!all.failures.empty()) std::rethrow_exception(all.failures.front().exception);
     }
 
+    /// Runs blocks that `next` numbers until there are no more, but for those that are `kept`.
+    void run_dealt(const std::function<std::size_t()>& next, const AllBlocks& kept)
+    {
+        for (std::size_t b = next(); b < runs_.blocks(); b = next()) {
+            if (kept.has(b)) continue;
+            std::string block;
+            for (std::size_t i = 0; i < rows_of(b); ++i) runs_.run_row(b * block_rows + i, block);
+            if (Interrupts::any()) return;
+            file_.append(b, block);
+        }
+    }
+
     [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
     [[nodiscard]] std::size_t rows_run() const noexcept { return rows_run_; }
     [[nodiscard]] const EnsembleTally& tally() const noexcept { return tally_; }
@@ -239,15 +251,22 @@ std::vector<std::string> result_files(const fs::path& directory)
     return {(directory / "results.npy").string(), (directory / "results.csv").string()};
 }
 
-int run_share(const EnsembleRequest& request)
+EnsembleRuns runs_of(const EnsembleRequest& request)
 {
     if (request.system.empty()) throw BadInput("ensemble needs a SYSTEM, or --merge DIR");
     const SystemEntry& system = find_system(request.system);
     if (system.run == nullptr) {
         throw BadInput(
-            fmt::format("{} is too large for an ensemble; ricochet simulate runs it", system.name));
+            fmt::format("{} is run by ricochet{} simulate alone", system.name,
+                        system.program.empty() ? "" : fmt::format("-{}", system.program)));
     }
-    const EnsembleRuns runs(system, request.run, table_of(system, request));
+    return {system, request.run, table_of(system, request)};
+}
+
+int run_share(const EnsembleRequest& request)
+{
+    const EnsembleRuns runs = runs_of(request);
+    const SystemEntry& system = runs.system();
     const Share share = chosen_share(request.share);
     const fs::path directory = claim_directory(request, share);
 
@@ -320,12 +339,8 @@ Merged read_shares(const fs::path& directory)
     return out;
 }
 
-int merge(const EnsembleRequest& request)
+int merge(const fs::path& directory, bool json)
 {
-    if (request != EnsembleRequest{.merge = request.merge, .json = request.json}) {
-        throw BadInput("--merge runs nothing; expected it alone, or with --json");
-    }
-    const fs::path& directory = *request.merge;
     Merged all = read_shares(directory);
     for (std::size_t b = 0; b < all.blocks->size(); ++b) {
         if (all.blocks->has(b)) continue;
@@ -344,7 +359,7 @@ int merge(const EnsembleRequest& request)
                           .rows_kept = rows,
                           .tally = all.tally,
                           .files = result_files(directory)};
-    print(request.json ? summary.json() : summary.text(true));
+    print(json ? summary.json() : summary.text(true));
     return 0;
 }
 
@@ -352,7 +367,32 @@ int merge(const EnsembleRequest& request)
 
 int run_ensemble(const EnsembleRequest& request)
 {
-    return request.merge ? merge(request) : run_share(request);
+    if (!request.merge) return run_share(request);
+    if (request != EnsembleRequest{.merge = request.merge, .json = request.json}) {
+        throw BadInput("--merge runs nothing; expected it alone, or with --json");
+    }
+    return merge(*request.merge, request.json);
+}
+
+int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer)
+{
+    if (request.share || request.merge || request.threads) {
+        throw BadInput(
+            "blocks are dealt to processes of one thread; --share, --merge and --threads "
+            "are for ricochet ensemble");
+    }
+    const EnsembleRuns runs = runs_of(request);
+    const fs::path directory = claim_directory(request, dealer.place);
+    const Interrupts interrupts;
+    {
+        ShareRun work(runs, dealer.place, directory);
+        dealer.wait_for_all();  // all files are there
+        const Merged there = read_shares(directory);
+        work.run_dealt(dealer.next, *there.blocks);
+    }
+    dealer.wait_for_all();  // all of them are complete
+    if (Interrupts::any()) return ended_early("and the same call goes on");
+    return dealer.place.index == 1 ? merge(directory, request.json) : 0;
 }
 
 }  // namespace ricochet::app

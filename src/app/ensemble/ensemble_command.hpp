@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "../settings.hpp"
+#include "share.hpp"
 
 namespace ricochet::app {
 
@@ -38,5 +40,15 @@ struct EnsembleRequest {
 ///         signal ended it
 /// @throws BadInput, ModelError, WriteError
 int run_ensemble(const EnsembleRequest& request);
+
+/// Processes that share the blocks as they become free, in place of shares that are fixed.
+struct BlockDealer {
+    Share place;                         ///< the file of this process
+    std::function<std::size_t()> next;   ///< 0, 1, 2, ..., each to one process alone
+    std::function<void()> wait_for_all;  ///< until all processes have called it
+};
+
+/// The same with a dealer; the first process writes the results and prints.
+int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer);
 
 }  // namespace ricochet::app
