@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdio>
 #include <random>
-#include <ranges>
 
 #include <ricochet/ensemble.hpp>
 #include <ricochet/ricochet.hpp>
@@ -17,7 +16,7 @@ int main()
     };
 
     // The numbers of a row follow from its seed alone: the same for any number of threads.
-    const auto drop = [](int, const ricochet::EnsembleRow& row) {
+    const auto drop = [](const ricochet::EnsembleRow& row) {
         std::mt19937_64 random(row.seed);
         const double height = std::uniform_real_distribution(1.0, 10.0)(random);  // [m]
         const double restitution = std::uniform_real_distribution(0.7, 0.9)(random);
@@ -25,7 +24,7 @@ int main()
         const auto run = ricochet::integrate(ball, {height, 0}, {.t_end = 5});
         return End{.height = run.x[0], .impacts = run.events.size()};
     };
-    const auto balls = ricochet::ensemble(std::views::iota(0, 1000), drop, {.seed = 1});
+    const auto balls = ricochet::ensemble(1000, drop, {.seed = 1});
 
     std::size_t impacts = 0;
     double highest = 0;  // [m]

@@ -7,9 +7,10 @@
 //         return integrate(ball, {row.height, 0}, {.t_end = 20.5}).x;
 //     });
 //
-// A table has `size()` and `[i]`: a vector of structures, of states, or std::views::iota. What is
-// done with a row is a function of the row and of its seed alone, so that the results have the same
-// bits for any number of threads; the function is called from several threads at a time.
+// A table has `size()` and `[i]`, such as a vector of structures or of states, or is a number of
+// rows. What is done with a row is a function of the row and of its seed alone, so that the results
+// have the same bits for any number of threads; the function is called from several threads at a
+// time.
 #pragma once
 
 #include <atomic>
@@ -94,6 +95,10 @@ struct RowsRun {
 /// An exception that a row throws is kept in `failures`; the other rows are run all the same.
 /// @throws std::invalid_argument for options out of range.
 template <class Table, class Run>
+requires requires(const Table& table)
+{
+    table.size(), table[0];
+}
 [[nodiscard]] auto ensemble(const Table& table, const Run& run, const EnsembleOptions& options = {})
 {
     const auto at = [&](const EnsembleRow& row) {
@@ -113,6 +118,20 @@ template <class Table, class Run>
     out.failures = std::move(all.failures);
     out.complete = all.complete;
     return out;
+}
+
+/// The same without a table: calls `run(EnsembleRow)` for so many rows.
+template <class Run>
+requires std::is_invocable_v<const Run&, const EnsembleRow&>
+[[nodiscard]] auto ensemble(std::size_t rows, const Run& run, const EnsembleOptions& options = {})
+{
+    struct Numbers {
+        std::size_t count;
+        [[nodiscard]] std::size_t size() const { return count; }
+        std::size_t operator[](std::size_t i) const { return i; }
+    };
+    const auto numbered = [&](std::size_t, const EnsembleRow& row) { return run(row); };
+    return ensemble(Numbers{rows}, numbered, options);
 }
 
 }  // namespace ricochet

@@ -124,7 +124,7 @@ public:
     /// Runs what is missing.
     void run(unsigned threads)
     {
-        std::vector<std::string> results(missing_.size());
+        std::vector<std::unique_ptr<std::string>> results(missing_.size());  // of blocks in hand
         // Chunks of rows are blocks: only the last of the table may be shorter, and it is the last
         // of its share.
         const std::size_t rows =
@@ -135,9 +135,9 @@ public:
             // A row that was interrupted is run again.
             if (Interrupts::any()) return false;
             const std::size_t chunk = now.first / block_rows;
-            const std::string block = std::exchange(results[chunk], {});
-            file_.append(missing_[chunk], block);
-            tally_.add(fields_, block);
+            const auto block = std::exchange(results[chunk], nullptr);
+            file_.append(missing_[chunk], *block);
+            tally_.add(fields_, *block);
             rows_run_ += now.count;
             progress.show(now);
             return true;
@@ -146,11 +146,18 @@ public:
             rows,
             [&](const EnsembleRow& row) {
                 const std::size_t chunk = row.index / block_rows;
-                runs_.run_row(missing_[chunk] * block_rows + row.index % block_rows,
-                              results[chunk]);
+                if (!results[chunk]) results[chunk] = std::make_unique<std::string>();
+                try {
+                    runs_.run_row(missing_[chunk] * block_rows + row.index % block_rows,
+                                  *results[chunk]);
+                } catch (...) {
+                    // Beside the runs themselves there is only memory to run out of: this block
+                    // lacks a row, and is not to be kept.
+                    Interrupts::raise_for(Cause::memory);
+                    throw;
+                }
             },
             options);
-        // Beside the runs themselves there is only memory to run out of.
         if (!all.failures.empty()) std::rethrow_exception(all.failures.front().exception);
     }
 
