@@ -39,6 +39,11 @@ OPTIONS = {
                  "--integrator": ["handover", "event", "bathe", "time-stepping", "explicit"],
                  "--controller": ["constant", "error", "heuristic", "pi", "filter", "learned"],
                  "--json": None, "--csv": FILES, "--plot": FILES, "--kernel": FILES},
+    "ensemble": {"--table": ["t.csv"] + FILES, "--count": NUMBERS + ["3"], "--out": FILES,
+                 "--vary": ["height=1:2", "x=1:2", "angle=0:1", "height=2:1", "=:", "a=b:c"],
+                 "--seed": NUMBERS, "--share": ["1/2", "0/1", "2/1", "x"], "--merge": FILES,
+                 "--threads": NUMBERS, "--set": "set", "--t-end": NUMBERS, "--rtol": NUMBERS,
+                 "--max-steps": ["1000"], "--json": None},
     "compare": {"--set": "set", "--json": None, "--csv": FILES, "--system": ["fault", "x"]},
     "train": {"--out": FILES, "--kind": ["any-step", "gate"], "--set": "set", "--step": NUMBERS,
               "--seed": NUMBERS, "--checkpoint": FILES, "--resume": None, "--allow-misses": None,
@@ -51,7 +56,7 @@ OPTIONS = {
                 "--resume": None, "--json": None},
     "systems": {"--json": None},
 }
-WEIGHTS = [70, 6, 10, 5, 8, 1]
+WEIGHTS = [65, 10, 6, 10, 5, 8, 1]
 OUTPUTS = ("--csv", "--plot", "--out", "--checkpoint")
 
 
@@ -71,7 +76,8 @@ class Generator:
         pick = self.random
         command = pick.choices(list(OPTIONS), WEIGHTS)[0]
         system = pick.choice(list(self.parameters) + ["nope"])
-        words = {"simulate": [system], "compare": [system], "systems": []}.get(command)
+        words = {"simulate": [system], "ensemble": [system], "compare": [system],
+                 "systems": []}.get(command)
         if command == "train":
             system = pick.choice(["bouncing-ball", "pendulum", "thermostat", "step-policy", "nope"])
             words = [system, "--iterations", "2", "--states", "1000", "--fresh", "100"]
@@ -105,6 +111,8 @@ def fresh(root, models, kernel):
     for name in ("readonly", "m.safetensors.checkpoint"):
         with open(os.path.join(work, name), "w", encoding="utf-8") as file:
             file.write("keep")
+    with open(work + "/t.csv", "w", encoding="utf-8") as file:
+        file.write("height\n1\n2\n")
     os.symlink("in.safetensors", work + "/link")
     os.symlink("nowhere", work + "/dangling")
     os.mkfifo(work + "/pipe")

@@ -8,6 +8,7 @@ class Ready:
 
     _name = ""
     modes = None
+    state = ()  #: the names of its components
 
     def __init__(self, **parameters):
         self._parameters = {name: float(value) for name, value in parameters.items()}
@@ -49,6 +50,8 @@ class BouncingBall(Ready):
     """
 
     _name = "bouncing-ball"
+    state = ("height", "velocity")
+    start = (10.0, 0.0)
 
     def __init__(self, *, gravity=9.81, restitution=0.9):
         super().__init__(gravity=gravity, restitution=restitution)
@@ -69,6 +72,7 @@ class Pendulum(Ready):
     """
 
     _name = "pendulum"
+    state = ("angle", "rate")
     start = (-0.05, 0.0)
 
     def __init__(self, *, gravity=9.8, length=1.0):
@@ -87,6 +91,7 @@ class ImpactOscillator(Ready):
     """
 
     _name = "impact-oscillator"
+    state = ("position", "velocity")
     start = (0.0, 0.0)
 
     def __init__(self, *, frequency=0.7, wall=1.0, restitution=0.8, damping=0.1):
@@ -105,6 +110,7 @@ class CoulombOscillator(Ready):
     """
 
     _name = "coulomb-oscillator"
+    state = ("position", "velocity")
     modes = ("slip-left", "slip-right", "stick")
     start = (2.0, 0.0)
 
@@ -128,6 +134,7 @@ class StickSlip(Ready):
     """
 
     _name = "stick-slip"
+    state = ("position", "velocity")
     modes = ("slip-left", "slip-right", "stick")
     start = (1.0, 0.2)
     period = 12.001031294830578647  #: [s] with the default parameters
@@ -144,6 +151,7 @@ class Thermostat(Ready):
     """
 
     _name = "thermostat"
+    state = ("temperature",)
     modes = ("off", "on")
     start = (20.0,)
 

@@ -57,7 +57,8 @@ mode_t creation_mask()
     return mask;
 }
 
-/// Writes everything to an open file; false: errno says why not.
+}  // namespace
+
 bool write_all(int descriptor, std::string_view content)
 {
     while (!content.empty()) {
@@ -67,8 +68,6 @@ bool write_all(int descriptor, std::string_view content)
     }
     return true;
 }
-
-}  // namespace
 
 namespace {
 
@@ -212,20 +211,40 @@ void write_file(const fs::path& file, std::string_view content)
         if (!written || !closed) fail();
         return;
     }
-    std::string name = target.string() + ".XXXXXX";
-    const int descriptor = mkstemp(name.data());
-    if (descriptor < 0) fail();
-    const bool written =
-        write_all(descriptor, content) && fchmod(descriptor, 0666 & ~creation_mask()) == 0;
-    const int why = errno;
-    const bool closed = close(descriptor) == 0;
-    if (!written || !closed || std::rename(name.c_str(), target.c_str()) != 0) {
-        if (!written) errno = why;
-        const int reason = errno;
-        unlink(name.c_str());
-        errno = reason;
-        fail();
-    }
+    NewFile out(file);
+    out.write(content);
+    out.keep();
+}
+
+NewFile::NewFile(const fs::path& file)
+    : file_(file), target_(behind_links(file)), name_(target_.string() + ".XXXXXX")
+{
+    descriptor_ = mkstemp(name_.data());
+    if (descriptor_ < 0) fail();
+}
+
+NewFile::~NewFile()
+{
+    if (descriptor_ >= 0) close(descriptor_);
+    if (!name_.empty()) unlink(name_.c_str());
+}
+
+void NewFile::fail() const
+{
+    throw WriteError(fmt::format("cannot write '{}': {}", file_.string(), last_error()));
+}
+
+void NewFile::write(std::string_view content)
+{
+    if (!write_all(descriptor_, content)) fail();
+}
+
+void NewFile::keep()
+{
+    if (fchmod(descriptor_, 0666 & ~creation_mask()) != 0) fail();
+    if (close(std::exchange(descriptor_, -1)) != 0) fail();
+    if (std::rename(name_.c_str(), target_.c_str()) != 0) fail();
+    name_.clear();
 }
 
 void deliver(std::initializer_list<std::function<void()>> parts)

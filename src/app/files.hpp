@@ -45,6 +45,30 @@ private:
     std::vector<Claim> claims_;
 };
 
+/// Writes everything to an open file; false: errno says why not.
+[[nodiscard]] bool write_all(int descriptor, std::string_view content);
+
+/// A file that is written piece by piece beside the one whose place it takes in the end.
+/// Everything throws WriteError naming the file and what the system said.
+class NewFile {
+public:
+    explicit NewFile(const std::filesystem::path& file);
+    ~NewFile();
+    NewFile(const NewFile&) = delete;
+    NewFile& operator=(const NewFile&) = delete;
+
+    void write(std::string_view content);
+    /// Takes its place. Without, it is removed.
+    void keep();
+
+private:
+    [[noreturn]] void fail() const;
+
+    std::filesystem::path file_, target_;
+    std::string name_;
+    int descriptor_ = -1;
+};
+
 /// Writes a neighbouring file and renames it. Devices and pipes are written to.
 /// @throws WriteError naming the file and what the system said.
 void write_file(const std::filesystem::path& file, std::string_view content);

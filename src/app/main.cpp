@@ -1,5 +1,5 @@
-// The command line `ricochet`: `systems`, `simulate`, `inspect` and `compare`, which need the core
-// only. Everything else is done by further programs, `ricochet-<name>`, that stand beside it.
+// The command line `ricochet`: `systems`, `simulate`, `ensemble`, `inspect` and `compare`, which
+// need the core only. Everything else is done by further programs, `ricochet-<name>`, that stand beside it.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -46,6 +46,14 @@ int simulate_here_or_there(const SimulateRequest& request)
                                   : run_instead(system.program, all_arguments + 1);
 }
 
+int ensemble_here_or_there(const EnsembleRequest& request)
+{
+    const bool there =
+        !request.merge && !request.system.empty() &&
+        find_system(request.system).program == nonsmooth;
+    return there ? run_instead(nonsmooth, all_arguments + 1) : run_ensemble(request);
+}
+
 int compare_here_or_there(const CompareRequest& request)
 {
     for (const std::string_view study : {"fault", "rate-and-state", "step-control"}) {
@@ -69,6 +77,7 @@ void add_commands(CLI::App& app, int& status)
 {
     add_systems(app, status, list_systems);
     add_simulate(app, status, simulate_here_or_there);
+    add_ensemble(app, status, ensemble_here_or_there);
     add_program(app, programs[0].name, programs[0].meaning);
     add_inspect(app, status, inspect);
     add_program(app, programs[1].name, programs[1].meaning);

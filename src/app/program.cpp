@@ -41,7 +41,7 @@ void check_value(std::string_view of, std::string_view value)
 }
 
 /// All values of a command, before anything is made of them: every option that takes one has one,
-/// once (but --set, which may be repeated); none is empty, or the option that follows.
+/// once (but --set and --vary, which may be repeated); none is empty, or the option that follows.
 void check_values(const CLI::App& command, const std::vector<std::string>& arguments)
 {
     std::set<std::string> given;
@@ -55,7 +55,7 @@ void check_values(const CLI::App& command, const std::vector<std::string>& argum
             check_value("an argument", argument);
             continue;
         }
-        if (name != "--set" && !given.insert(name).second) {
+        if (name != "--set" && name != "--vary" && !given.insert(name).second) {
             throw BadInput(fmt::format("{} is given twice", name));
         }
         if (option->get_items_expected_min() == 0) {
@@ -161,12 +161,11 @@ void add_program(CLI::App& app, std::string_view name, std::string_view meaning)
     app.add_subcommand(std::string(name), std::string(meaning));
 }
 
-void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
+namespace {
+
+/// What `simulate` and `ensemble` have in common.
+void add_run_options(CLI::App& command, RunRequest& run)
 {
-    CLI::App& command = *app.add_subcommand("simulate", "Run a system and print its events");
-    auto request = std::make_shared<SimulateRequest>();
-    RunRequest& run = request->run;
-    add_system(command, request->system);
     command.add_option("--set", run.set, "a parameter of the system; may be repeated")
         ->type_name("name=value ...");
     add_number(command, "--t-start", run.t_start, "T",
@@ -201,6 +200,16 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
     add_whole_number(command, "--max-steps", run.max_steps, 1,
                      std::numeric_limits<std::uint64_t>::max(),
                      "end the run after N steps, as step_limit; default 10 million");
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
+{
+    CLI::App& command = *app.add_subcommand("simulate", "Run a system and print its events");
+    auto request = std::make_shared<SimulateRequest>();
+    add_system(command, request->system);
+    add_run_options(command, request->run);
     add_whole_number(
         command, "--samples", request->samples, 2, 10'000'000,
         "points of the trajectory in --csv and --plot, default 1001, and in --json if given");
@@ -221,6 +230,41 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
         "  gated     a calibrated network skipped the check, within its miss rate\n"
         "  assumed   only the ends were looked at (ends), or a network was believed\n"
         "A late event was found at a step after the one that held it.");
+    command.callback([&status, request, handler] { status = handler(*request); });
+}
+
+void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler)
+{
+    CLI::App& command =
+        *app.add_subcommand("ensemble", "Run a system for every row of a table, on all cores");
+    auto request = std::make_shared<EnsembleRequest>();
+    command.add_option("SYSTEM", request->system, "its name; `ricochet systems` lists them")
+        ->type_name("");
+    add_text(command, "--table", request->table, "FILE",
+             "comma-separated values; columns are parameters and components of the start");
+    add_whole_number(command, "--count", request->count, 1, 1'000'000'000,
+                     "random rows in place of a table");
+    command
+        .add_option("--vary", request->vary, "an interval that --count draws from; may be repeated")
+        ->type_name("name=lowest:highest ...");
+    add_whole_number(command, "--seed", request->seed, 0,
+                     std::numeric_limits<std::uint64_t>::max(), "of random rows, default 1");
+    add_text(command, "--out", request->out, "DIR", "where the results are kept; made if needed");
+    add_text(command, "--share", request->share, "K/N",
+             "run share K of N only; default: by the ranks of Open MPI, PMI or Slurm, or all");
+    add_text(command, "--merge", request->merge, "DIR", "join the shares there, and run nothing");
+    add_whole_number(command, "--threads", request->threads, 1, 1024,
+                     "default: one for each core that may be used");
+    command.add_flag("--json", request->json, "print JSON");
+    add_run_options(command, request->run);
+    command.footer(
+        "Examples:\n"
+        "  ricochet ensemble bouncing-ball --count 1000 --vary height=1:10 --out balls\n"
+        "  ricochet ensemble bouncing-ball --table balls.csv --out balls --t-end 20\n"
+        "  mpirun -n 4 ricochet ensemble bouncing-ball --table balls.csv --out balls\n"
+        "  ricochet ensemble --merge balls\n\n"
+        "A call that was ended early is repeated as it was, and goes on where it ended. The\n"
+        "results, results.npy and results.csv in DIR, are the same for any shares and threads.");
     command.callback([&status, request, handler] { status = handler(*request); });
 }
 

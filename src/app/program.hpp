@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "compare.hpp"
+#include "ensemble/ensemble_command.hpp"
 #include "inspect.hpp"
 #include "simulate.hpp"
 #include "systems.hpp"
@@ -27,12 +28,14 @@ using SystemsHandler = int (*)(ListFormat format);
 using InspectHandler = int (*)(const InspectRequest& request);
 using SimulateHandler = int (*)(const SimulateRequest& request);
 using CompareHandler = int (*)(const CompareRequest& request);
+using EnsembleHandler = int (*)(const EnsembleRequest& request);
 
 void add_systems(CLI::App& app, int& status, SystemsHandler handler);
 void add_inspect(CLI::App& app, int& status, InspectHandler handler);
 
-/// `simulate` and `compare` with all their options, which several programs take.
+/// `simulate`, `ensemble` and `compare` with all their options, which several programs take.
 void add_simulate(CLI::App& app, int& status, SimulateHandler handler);
+void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler);
 void add_compare(CLI::App& app, int& status, CompareHandler handler);
 
 /// A command that is a program of its own, for the list of commands.

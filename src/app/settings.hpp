@@ -1,6 +1,7 @@
 // How a run is to be done: the choices that the command line offers, by name.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -49,6 +50,7 @@ struct SetValuedSettings {
 /// Everything a system needs to be run.
 struct RunSettings {
     std::vector<double> parameters;  ///< in the order of the system's
+    std::vector<double> start{};     ///< in place of what the parameters give; empty: not given
     Options options;
     MethodName stepper = MethodName::dopri5;
     bool fixed_step = false;  ///< else error control
@@ -60,6 +62,14 @@ struct RunSettings {
     std::optional<SetValuedSettings> set_valued{};
 };
 
+/// The start that the settings give, or else x0.
+template <class X>
+[[nodiscard]] X chosen_start(X x0, const RunSettings& settings)
+{
+    for (std::size_t i = 0; i < settings.start.size(); ++i) x0[i] = settings.start[i];
+    return x0;
+}
+
 /// A run as it was asked for. What is absent has a default.
 struct RunRequest {
     std::vector<std::string> set{};  ///< name=value
@@ -69,6 +79,8 @@ struct RunRequest {
     std::optional<double> step{}, rtol{}, atol{}, event_tolerance{};
     std::optional<std::uint64_t> max_steps{};
     std::optional<std::string> integrator{}, controller{};  ///< of set-valued systems
+
+    friend bool operator==(const RunRequest&, const RunRequest&) = default;
 };
 
 /// The values of a system's parameters, in its order, after "name=value"s.

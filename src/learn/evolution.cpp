@@ -10,9 +10,9 @@
 #include <string>
 
 #include "../checks/require.hpp"
+#include "../ensemble/workers.hpp"
 #include "checkpoint_file.hpp"
 #include "ricochet/detail/random.hpp"
-#include "workers.hpp"
 
 namespace ricochet::learn {
 
@@ -389,7 +389,7 @@ private:
     const Objective& score_;
     const EvolutionOptions& options_;
     Rates rates_;
-    Workers workers_;
+    ricochet::detail::Workers workers_;
     State s_;
     std::uint64_t fingerprint_ = 0;
     std::vector<double> scores_;                ///< of this generation

@@ -5,8 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "../ensemble/workers.hpp"
 #include "ricochet/detail/random.hpp"
-#include "workers.hpp"
 
 namespace ricochet::learn {
 
@@ -104,7 +104,7 @@ StepScore::StepScore(const StepFamily& family, unsigned threads) : family_(famil
         groups[problem.group].problems.push_back(&problem);
     }
     const std::vector<double> fine = fine_tolerances();
-    Workers team(threads);
+    ricochet::detail::Workers team(threads);
     for (auto& [number, group] : groups) {
         group.number = number;
         for (const bool constant : {false, true}) {

@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "../checks/require.hpp"
+#include "../ensemble/workers.hpp"
 #include "off_policy.hpp"
 #include "td3_losses.hpp"
 #include "trained_vector.hpp"
-#include "workers.hpp"
 
 namespace ricochet::learn {
 
@@ -216,7 +216,7 @@ private:
     const Td3Options& options_;
     Td3Losses<float> losses_;
     Random random_;
-    Workers workers_;
+    ricochet::detail::Workers workers_;
     TrainedVector actor_;
     TrainedVector critics_;
     Buffer<float> actor_transposed_, critics_transposed_;

@@ -7,10 +7,10 @@
 #include <limits>
 
 #include "../checks/require.hpp"
+#include "../ensemble/workers.hpp"
 #include "off_policy.hpp"
 #include "tqc_losses.hpp"
 #include "trained_vector.hpp"
-#include "workers.hpp"
 
 namespace ricochet::learn {
 
@@ -267,7 +267,7 @@ private:
     const TqcOptions& options_;
     TqcLosses<float> losses_;
     Random random_;
-    Workers workers_;
+    ricochet::detail::Workers workers_;
     TrainedVector actor_;
     TrainedVector critics_;
     Buffer<float> critics_transposed_;

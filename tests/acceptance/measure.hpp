@@ -122,6 +122,9 @@ struct Check {
 /// The energy of a ball that loses none.
 [[nodiscard]] Measured keep_elastic_energy();
 
+/// An ensemble of 1e5 balls on one, two and four threads.
+[[nodiscard]] Measured run_ensemble_of_balls();
+
 /// Saving and restoring at random points.
 [[nodiscard]] Measured restore_anywhere();
 

@@ -272,6 +272,11 @@ std::vector<Check> core_checks()
          .sentence = "impacts of 1, 10, 100, 1000 balls in one state",
          .target = "<= 60 flow calls an impact, ahead of Odeint by hand, twice at 1000",
          .run = time_large_impacts},
+        {.topic = "core",
+         .id = "ensemble",
+         .sentence = "100 000 balls on two threads over one; bits on 1, 2, 4",
+         .target = ">= 1.8 times faster on two free cores, the same bits",
+         .run = run_ensemble_of_balls},
     };
 }
 

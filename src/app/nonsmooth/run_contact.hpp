@@ -127,11 +127,15 @@ template <class System, class Vector>
 }
 
 template <class System, class Vector>
-[[nodiscard]] TimedRun run_contact(const System& system, const Vector& q, const Vector& v,
+[[nodiscard]] TimedRun run_contact(const System& system, Vector q, Vector v,
                                    const RunSettings& settings, int repeats)
 {
     if (settings.stepper == MethodName::fehlberg78) {
         throw BadInput("--stepper of this system can only be dopri5");
+    }
+    for (std::size_t i = 0; i < settings.start.size(); ++i) {
+        const auto k = static_cast<Eigen::Index>(i);
+        (k < q.size() ? q[k] : v[k - q.size()]) = settings.start[i];
     }
     TimedRun out;
     const auto start = std::chrono::steady_clock::now();

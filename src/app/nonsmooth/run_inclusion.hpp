@@ -177,18 +177,19 @@ template <class... Steppers, class System>
     const std::string& integrator = settings.set_valued->integrator;
     const bool steps = integrator == "bathe" || integrator == "time-stepping";
     TimedRun out;
+    const StateOf<System> from = chosen_start(w0, settings);
     const auto start = std::chrono::steady_clock::now();
     for (int i = 0; i < repeats; ++i) {
         if (steps) {
-            out = run_by_steps(system, w0, settings);
+            out = run_by_steps(system, from, settings);
         } else if (settings.stepper == MethodName::fehlberg78) {
             if constexpr (sizeof...(Steppers) > 0) {
-                out = run_by_hand_over<System, ErrorControlled<Steppers>...>(system, w0, settings);
+                out = run_by_hand_over<System, ErrorControlled<Steppers>...>(system, from, settings);
             } else {
                 throw BadInput("--stepper of this system can only be dopri5");
             }
         } else {
-            out = run_by_hand_over<System, ErrorControlled<Dopri5>>(system, w0, settings);
+            out = run_by_hand_over<System, ErrorControlled<Dopri5>>(system, from, settings);
         }
     }
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;

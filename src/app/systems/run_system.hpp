@@ -162,14 +162,15 @@ template <class System, class X>
         detail::PartsOfRun<System, X, ErrorControlled<MethodByName>, Extremum, ChosenLocator>;
     return with_detector<System, X>(settings, [&](const ChosenDetector<Core>& chosen) {
         Run<Core> run;
+        const X from = chosen_start(x0, settings);
         const auto start = std::chrono::steady_clock::now();
         for (int i = 0; i < repeats; ++i) {
-            Parts parts(system, x0, {{settings.stepper}}, {}, {settings.locator});
+            Parts parts(system, from, {{settings.stepper}}, {}, {settings.locator});
             detail::RunSetup<Core> setup = parts.setup();
             setup.error_controlled = !settings.fixed_step;
             setup.detector = chosen.table;
             setup.detecting = chosen.detector;
-            run = detail::run_whole(setup, detail::core_state(x0), settings.options);
+            run = detail::run_whole(setup, detail::core_state(from), settings.options);
         }
         const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
         return TimedRun{.run = with_plain_states(std::move(run)),

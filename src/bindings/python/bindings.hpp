@@ -8,6 +8,7 @@ namespace ricochet::python {
 void bind_results(pybind11::module_& module);
 void bind_runs(pybind11::module_& module);
 void bind_monitor(pybind11::module_& module);
+void bind_ensemble(pybind11::module_& module);
 void bind_network(pybind11::module_& module);
 
 }  // namespace ricochet::python

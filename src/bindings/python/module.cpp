@@ -56,4 +56,5 @@ PYBIND11_MODULE(_ricochet, module)
     bind_network(module);
     bind_runs(module);
     bind_monitor(module);
+    bind_ensemble(module);
 }

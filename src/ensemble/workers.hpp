@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace ricochet::learn {
+namespace ricochet::detail {
 
 /// A team that does task after task together with the caller.
 ///
@@ -44,4 +44,4 @@ private:
     std::vector<std::thread> threads_;
 };
 
-}  // namespace ricochet::learn
+}  // namespace ricochet::detail

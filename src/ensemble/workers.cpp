@@ -2,7 +2,7 @@
 
 #include <system_error>
 
-namespace ricochet::learn {
+namespace ricochet::detail {
 
 namespace {
 
@@ -98,4 +98,4 @@ void Workers::finish(std::size_t parts)
     if (unfinished_.fetch_sub(parts) == parts) unfinished_.notify_all();
 }
 
-}  // namespace ricochet::learn
+}  // namespace ricochet::detail

@@ -1,4 +1,4 @@
-#include "learn/workers.hpp"
+#include "ensemble/workers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace ricochet::learn {
+namespace ricochet::detail {
 namespace {
 
 TEST(Workers, DoEveryPartOnce)
@@ -43,4 +43,4 @@ TEST(Workers, PassOnWhatAPartThrowsAndGoOnWithTheNextTask)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::detail

@@ -1,0 +1,405 @@
+#include "ensemble_command.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "../files.hpp"
+#include "../input.hpp"
+#include "../interrupt.hpp"
+#include "../joined.hpp"
+#include "../report.hpp"
+#include "../say.hpp"
+#include "../timing.hpp"
+#include "ensemble_runs.hpp"
+#include "results.hpp"
+#include "ricochet/ensemble.hpp"
+#include "share.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// The table that was asked for.
+Table table_of(const SystemEntry& system, const EnsembleRequest& request)
+{
+    if (request.table && request.count) {
+        throw BadInput("--table and --count both give the rows; expected one or the other");
+    }
+    if (request.table) {
+        if (!request.vary.empty()) throw BadInput("--vary is for random rows, and needs --count");
+        if (request.seed) throw BadInput("--seed is for random rows, and needs --count");
+        return read_table(system, *request.table);
+    }
+    if (!request.count) {
+        throw BadInput("the rows are missing: expected --table FILE, or --count N with --vary");
+    }
+    if (request.vary.empty()) {
+        throw BadInput("--count needs at least one --vary name=lowest:highest");
+    }
+    return random_table(system, request.vary, *request.count, request.seed.value_or(1));
+}
+
+/// The directory of the results, made if it is not there.
+/// @throws BadInput where it cannot be, or keeps an ensemble in another number of shares.
+fs::path claim_directory(const EnsembleRequest& request, const Share& share)
+{
+    if (!request.out) throw BadInput("--out DIR is missing: where the results are kept");
+    const fs::path& directory = *request.out;
+    const auto refuse = [&](std::string_view why) {
+        throw BadInput(fmt::format("--out must be a directory that can be written, got '{}': {}",
+                                   shortened(directory.string()), why));
+    };
+    std::error_code error;
+    fs::create_directory(directory, error);
+    if (!fs::is_directory(directory)) refuse(error ? error.message() : "it is none");
+    if (access(directory.c_str(), W_OK | X_OK) != 0) {
+        refuse(std::generic_category().message(errno));
+    }
+    for (const Share& other : shares_in(directory)) {
+        if (other.count == share.count) continue;
+        throw BadInput(fmt::format(
+            "'{}' keeps share {}, and this is share {}; expected shares of one number, or another "
+            "directory",
+            shortened(directory.string()), to_string(other), to_string(share)));
+    }
+    return directory;
+}
+
+/// Says on standard error how far the rows are, where somebody may wait for them.
+class RowProgress {
+public:
+    void show(const EnsembleProgress& now)
+    {
+        const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+        if (seconds < next_) return;
+        next_ = seconds + (terminal_ ? 0.2 : 10.0);
+        const double left =
+            seconds * static_cast<double>(now.rows - now.done) / static_cast<double>(now.done);
+        say("{}ricochet: {} of {} rows, {:.0f} s left{}", terminal_ ? "\r" : "", now.done, now.rows,
+            left, terminal_ ? "\x1b[K" : "\n");
+        shown_ = true;
+    }
+    ~RowProgress()
+    {
+        if (terminal_ && shown_) say("\n");
+    }
+
+private:
+    Clock::time_point start_ = Clock::now();
+    bool terminal_ = isatty(STDERR_FILENO) == 1;
+    bool shown_ = false;
+    double next_ = 2;  ///< [s]
+};
+
+/// A share in the works.
+class ShareRun {
+public:
+    ShareRun(const EnsembleRuns& runs, const Share& share, const fs::path& directory)
+        : runs_(runs),
+          setup_(runs.setup()),
+          fields_(fields_from(setup_["fields"])),
+          file_(directory, share, setup_,
+                [this](std::string_view rows) { tally_.add(fields_, rows); })
+    {
+        std::vector<bool> kept(runs.blocks(), false);
+        for (const BlockPlace& place : file_.blocks()) {
+            if (place.block < kept.size()) kept[place.block] = true;
+        }
+        for (std::size_t b = share.index - 1; b < kept.size(); b += share.count) {
+            rows_ += rows_of(b);
+            if (!kept[b]) missing_.push_back(b);
+        }
+    }
+
+    /// Runs what is missing.
+    void run(unsigned threads)
+    {
+        std::vector<std::unique_ptr<std::string>> results(missing_.size());  // of blocks in hand
+        // Chunks of rows are blocks: only the last of the table may be shorter, and it is the last
+        // of its share.
+        const std::size_t rows =
+            missing_.empty() ? 0 : (missing_.size() - 1) * block_rows + rows_of(missing_.back());
+        RowProgress progress;
+        EnsembleOptions options{.threads = threads, .cancelled = Interrupts::flag()};
+        options.progress = [&](const EnsembleProgress& now) {
+            // A row that was interrupted is run again.
+            if (Interrupts::any()) return false;
+            const std::size_t chunk = now.first / block_rows;
+            const auto block = std::exchange(results[chunk], nullptr);
+            file_.append(missing_[chunk], *block);
+            tally_.add(fields_, *block);
+            rows_run_ += now.count;
+            progress.show(now);
+            return true;
+        };
+        const auto all = ricochet::detail::run_rows(
+            rows,
+            [&](const EnsembleRow& row) {
+                const std::size_t chunk = row.index / block_rows;
+                if (!results[chunk]) results[chunk] = std::make_unique<std::string>();
+                try {
+                    runs_.run_row(missing_[chunk] * block_rows + row.index % block_rows,
+                                  *results[chunk]);
+                } catch (...) {
+                    // Beside the runs themselves there is only memory to run out of: this block
+                    // lacks a row, and is not to be kept.
+                    Interrupts::raise_for(Cause::memory);
+                    throw;
+                }
+            },
+            options);
+        if (!all.failures.empty()) std::rethrow_exception(all.failures.front().exception);
+    }
+
+    /// Runs blocks that `next` numbers until there are no more, but for those that are `kept`.
+    void run_dealt(const std::function<std::size_t()>& next, const AllBlocks& kept)
+    {
+        for (std::size_t b = next(); b < runs_.blocks(); b = next()) {
+            if (kept.has(b)) continue;
+            std::string block;
+            for (std::size_t i = 0; i < rows_of(b); ++i) runs_.run_row(b * block_rows + i, block);
+            if (Interrupts::any()) return;
+            file_.append(b, block);
+        }
+    }
+
+    [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
+    [[nodiscard]] std::size_t rows_run() const noexcept { return rows_run_; }
+    [[nodiscard]] const EnsembleTally& tally() const noexcept { return tally_; }
+    [[nodiscard]] std::size_t rows_kept() const
+    {
+        std::size_t out = 0;
+        for (const auto& [outcome, count] : tally_.outcomes) out += count;
+        return out;
+    }
+
+    /// Writes the results where this is the only share.
+    void write(const fs::path& directory) const
+    {
+        AllBlocks blocks(runs_.blocks());
+        blocks.add(directory / file_name({}), file_.blocks());
+        write_results(directory, fields_, runs_.table().rows, blocks);
+    }
+
+private:
+    [[nodiscard]] std::size_t rows_of(std::size_t block) const
+    {
+        return std::min(block_rows, runs_.table().rows - block * block_rows);
+    }
+
+    const EnsembleRuns& runs_;
+    Json setup_;
+    std::vector<Field> fields_;
+    EnsembleTally tally_;
+    ShareFile file_;
+    std::size_t rows_ = 0;      ///< of the share
+    std::size_t rows_run_ = 0;  ///< by this process
+    std::vector<std::size_t> missing_;
+};
+
+/// What a command has done, for people and as JSON.
+struct Summary {
+    std::string system;
+    Share share;
+    std::size_t rows = 0;
+    std::size_t rows_run = 0;
+    std::size_t rows_kept = 0;
+    EnsembleTally tally;
+    double seconds = 0;
+    std::vector<std::string> files{};
+
+    [[nodiscard]] std::string json() const
+    {
+        return json_text({{"system", system},
+                          {"share", {share.index, share.count}},
+                          {"rows", rows},
+                          {"rows_kept", rows_kept},
+                          {"rows_run", rows_run},
+                          {"outcomes", tally.outcomes},
+                          {"events", tally.events},
+                          {"first_failure", tally.first_failure},
+                          {"files", files},
+                          {"seconds", seconds}});
+    }
+
+    [[nodiscard]] std::string text(bool merged) const
+    {
+        std::vector<std::string> ends;
+        for (const auto& [outcome, count] : tally.outcomes) {
+            ends.push_back(fmt::format("{} {}", count, outcome));
+        }
+        std::string out = fmt::format("{}: {} of {} rows", system, rows_kept, rows);
+        if (share.count > 1) out += fmt::format(" of share {}", to_string(share));
+        out += fmt::format("; {}; {} events\n", joined(ends, ", "), tally.events);
+        if (!tally.first_failure.empty()) {
+            out += fmt::format("first failure: {}\n", tally.first_failure);
+        }
+        if (rows_run > 0) {
+            out += fmt::format("{} rows in {}\n", rows_run, duration(seconds));
+        } else if (!merged) {
+            out += "all of them were there\n";
+        }
+        return out + (files.empty() ? "" : fmt::format("results: {}\n", joined(files, ", ")));
+    }
+};
+
+std::vector<std::string> result_files(const fs::path& directory)
+{
+    return {(directory / "results.npy").string(), (directory / "results.csv").string()};
+}
+
+EnsembleRuns runs_of(const EnsembleRequest& request)
+{
+    if (request.system.empty()) throw BadInput("ensemble needs a SYSTEM, or --merge DIR");
+    const SystemEntry& system = find_system(request.system);
+    if (system.run == nullptr) {
+        throw BadInput(
+            fmt::format("{} is run by ricochet{} simulate alone", system.name,
+                        system.program.empty() ? "" : fmt::format("-{}", system.program)));
+    }
+    return {system, request.run, table_of(system, request)};
+}
+
+int run_share(const EnsembleRequest& request)
+{
+    const EnsembleRuns runs = runs_of(request);
+    const SystemEntry& system = runs.system();
+    const Share share = chosen_share(request.share);
+    const fs::path directory = claim_directory(request, share);
+
+    const Interrupts interrupts;
+    ShareRun work(runs, share, directory);
+    const auto start = Clock::now();
+    work.run(request.threads.value_or(0));
+    const std::chrono::duration<double> spent = Clock::now() - start;
+    Summary summary{.system = std::string(system.name),
+                    .share = share,
+                    .rows = work.rows(),
+                    .rows_run = work.rows_run(),
+                    .rows_kept = work.rows_kept(),
+                    .tally = work.tally(),
+                    .seconds = spent.count()};
+    const bool complete = summary.rows_kept == summary.rows;
+    if (complete && share.count == 1) {
+        work.write(directory);
+        summary.files = result_files(directory);
+    }
+    print(request.json ? summary.json() : summary.text(false));
+    if (!complete) {
+        return ended_early(fmt::format("after {} of {} rows, and the same call goes on from there",
+                                       summary.rows_kept, summary.rows));
+    }
+    if (share.count > 1 && !request.json) {
+        print(
+            fmt::format("once all shares are: ricochet ensemble --merge {}\n", directory.string()));
+    }
+    return 0;
+}
+
+/// The set-up of all shares of a directory, and where their blocks are.
+struct Merged {
+    Json setup;
+    std::size_t shares = 0;
+    std::optional<AllBlocks> blocks;
+    EnsembleTally tally;
+};
+
+/// @throws BadInput where the shares are of different set-ups.
+Merged read_shares(const fs::path& directory)
+{
+    const std::vector<Share> shares = shares_in(directory);
+    if (shares.empty()) {
+        throw BadInput(
+            fmt::format("there is no share of an ensemble in '{}'", shortened(directory.string())));
+    }
+    if (shares.front().count != shares.back().count) {
+        throw BadInput(fmt::format(
+            "'{}' keeps share {} and share {}; expected shares of one number",
+            shortened(directory.string()), to_string(shares.front()), to_string(shares.back())));
+    }
+    Merged out;
+    out.shares = shares.front().count;
+    for (const Share& share : shares) {
+        // Tallied below, where no block counts twice.
+        ShareContent content = read_share(directory / file_name(share), [](std::string_view) {});
+        if (!out.blocks) {
+            out.setup = content.setup;
+            const std::size_t rows = out.setup["rows"];
+            out.blocks.emplace((rows + block_rows - 1) / block_rows);
+        }
+        if (const std::string other = difference(content.setup, out.setup); !other.empty()) {
+            throw BadInput(fmt::format("share {} in '{}' is of another set-up: {}",
+                                       to_string(share), shortened(directory.string()), other));
+        }
+        out.blocks->add(content.file, content.blocks);
+    }
+    return out;
+}
+
+int merge(const fs::path& directory, bool json)
+{
+    Merged all = read_shares(directory);
+    for (std::size_t b = 0; b < all.blocks->size(); ++b) {
+        if (all.blocks->has(b)) continue;
+        const Share share{.index = b % all.shares + 1, .count = all.shares};
+        throw BadInput(fmt::format("share {} in '{}' is not complete: its call is to be repeated",
+                                   to_string(share), shortened(directory.string())));
+    }
+    const std::vector<Field> fields = fields_from(all.setup["fields"]);
+    for (std::size_t b = 0; b < all.blocks->size(); ++b) all.tally.add(fields, all.blocks->rows(b));
+    const std::size_t rows = all.setup["rows"];
+    write_results(directory, fields, rows, *all.blocks);
+    const Summary summary{.system = all.setup["system"],
+                          .share = {},
+                          .rows = rows,
+                          .rows_run = 0,
+                          .rows_kept = rows,
+                          .tally = all.tally,
+                          .files = result_files(directory)};
+    print(json ? summary.json() : summary.text(true));
+    return 0;
+}
+
+}  // namespace
+
+int run_ensemble(const EnsembleRequest& request)
+{
+    if (!request.merge) return run_share(request);
+    if (request != EnsembleRequest{.merge = request.merge, .json = request.json}) {
+        throw BadInput("--merge runs nothing; expected it alone, or with --json");
+    }
+    return merge(*request.merge, request.json);
+}
+
+int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer)
+{
+    if (request.share || request.merge || request.threads) {
+        throw BadInput(
+            "blocks are dealt to processes of one thread; --share, --merge and --threads "
+            "are for ricochet ensemble");
+    }
+    const EnsembleRuns runs = runs_of(request);
+    const fs::path directory = claim_directory(request, dealer.place);
+    const Interrupts interrupts;
+    {
+        ShareRun work(runs, dealer.place, directory);
+        dealer.wait_for_all();  // all files are there
+        const Merged there = read_shares(directory);
+        work.run_dealt(dealer.next, *there.blocks);
+    }
+    dealer.wait_for_all();  // all of them are complete
+    if (Interrupts::any()) return ended_early("and the same call goes on");
+    return dealer.place.index == 1 ? merge(directory, request.json) : 0;
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,54 @@
+// `ricochet ensemble`: a run of a system for every row of a table.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../settings.hpp"
+#include "share.hpp"
+
+namespace ricochet::app {
+
+struct EnsembleRequest {
+    std::string system{};
+    RunRequest run{};
+    std::optional<std::filesystem::path> table{};
+    std::optional<std::size_t> count{};  ///< of random rows
+    std::vector<std::string> vary{};     ///< name=lowest:highest
+    std::optional<std::uint64_t> seed{};
+    std::optional<std::filesystem::path> out{};
+    std::optional<std::string> share{};  ///< k/n
+    std::optional<std::filesystem::path> merge{};
+    std::optional<unsigned> threads{};
+    bool json = false;
+
+    friend bool operator==(const EnsembleRequest&, const EnsembleRequest&) = default;
+};
+
+/// Runs the rows of this process's share that are not kept yet, and prints how they ended; the only
+/// share writes the results, too. With `merge` nothing is run, and the results are written from the
+/// shares.
+///
+/// Ctrl-C and a request to terminate end it between blocks of rows; the same call goes on.
+///
+/// @return 0 if every row of the share has been run, however its run ended; 129, 130 or 143 if a
+///         signal ended it
+/// @throws BadInput, ModelError, WriteError
+int run_ensemble(const EnsembleRequest& request);
+
+/// Processes that share the blocks as they become free, in place of shares that are fixed.
+struct BlockDealer {
+    Share place;                         ///< the file of this process
+    std::function<std::size_t()> next;   ///< 0, 1, 2, ..., each to one process alone
+    std::function<void()> wait_for_all;  ///< until all processes have called it
+};
+
+/// The same with a dealer; the first process writes the results and prints.
+int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer);
+
+}  // namespace ricochet::app
