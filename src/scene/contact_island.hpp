@@ -1,0 +1,289 @@
+// A connected group of bodies and walls in lasting contact, in the plane.
+//
+// The scene's loop hands a group over where impacts accumulate or a contact is pressed together,
+// and takes it back where nothing is in contact any more. Bodies are discs without spin (points are
+// discs of radius 0): two coordinates each, so that friction acts on centres and a force at a rim
+// exerts no torque. A disc on an incline slides like a block and does not roll; angular momentum is
+// not kept in the friction of a pair.
+//
+// A step of length h is implicit in velocities, contacts, springs, dampers and drag, and explicit
+// in gravity (Moreau's rule over Signorini's and Coulomb's laws; with the gap in the law as in M.
+// Anitescu and F. A. Potra, Formulating dynamic multi-rigid-body contact problems with friction as
+// solvable linear complementarity problems, Nonlinear Dynamics 14, 1997):
+//
+//     M (v+ - v) = h F + G' p,    q+ = q + h v+
+//     0 <= p_n,  n.(v+ - w) + g(q)/h >= 0, complementary;  friction on t.(v+ - w)
+//
+// with w the velocity of a wall. Restitution is 0 in it. Three things follow:
+//
+//  - distances of discs from discs, lines and segments are convex, and their linear model is below
+//    them: no gap of a step's end is negative beyond rounding, whatever the step;
+//  - with walls at rest the energy never grows beyond rounding: a step loses |v+ - v|^2 M / 2, the
+//    work of friction and p_n g/h. This costs the order: it is 1;
+//  - a step is a straight line q + s v+, with the velocity v + s (v+ - v)/h, which may be cut at
+//  any
+//    s in [0, h]: energy is convex along it. The scene meets members in closed form.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "scene/contact_law.hpp"
+
+namespace ricochet::detail {
+
+struct IslandBody {
+    std::uint32_t id = 0;        ///< the scene's; islands of the same bodies have the same bits
+                                 ///< whatever the ids
+    std::array<double, 2> at{};  ///< [m] centre
+    std::array<double, 2> velocity{};  ///< [m/s]
+    double mass = 1;                   ///< [kg]
+    double radius = 0;                 ///< [m]
+    double drag = 0;                   ///< [kg/s]
+    std::uint32_t material = 0;
+    std::uint32_t patience = 1;  ///< steps without contact after which it is handed back
+};
+
+/// How a wall moves: without turning.
+struct WallMotion {
+    std::function<std::array<double, 2>(double t)> displacement;  ///< [m]
+    /// Until when the wall stands still that does so at t; t where it moves.
+    std::function<double(double t)> still_until;
+};
+
+/// A line that bodies are on one side of, or a segment that is met from both, its ends included.
+struct IslandWall {
+    std::uint32_t id = 0;
+    bool is_segment = false;
+    std::array<double, 2> point{};   ///< [m] of the line, or where the segment begins
+    std::array<double, 2> normal{};  ///< of the line, of length 1
+    std::array<double, 2> end{};     ///< [m] of the segment
+    std::uint32_t material = 0;
+    const WallMotion* motion = nullptr;  ///< outlives the island
+};
+
+struct IslandSpring {
+    std::uint32_t first = 0, second = 0;  ///< ids of bodies
+    double rest = 0, stiffness = 0, damping = 0;
+};
+
+/// Where two materials meet.
+struct ContactCoefficients {
+    double restitution = 0;
+    double friction = 0;
+};
+
+struct IslandSetup {
+    std::vector<IslandBody> bodies{};
+    std::vector<IslandWall> walls{};
+    std::vector<IslandSpring> springs{};
+    std::array<double, 2> gravity{};
+    std::function<ContactCoefficients(std::uint32_t, std::uint32_t)> coefficients{};
+};
+
+struct IslandOptions {
+    double step = 1e-3;             ///< [s]
+    double tolerance = 1e-10;       ///< of the contact law, as a fraction
+    double sleep_speed = 0;         ///< [m/s] islands slower than this for `sleep_after` sleep
+    double sleep_after = 0.5;       ///< [s]
+    bool estimate_error = false;    ///< takes every step of `advance` by halves, too
+    double largest_overlap = 1e-6;  ///< of a start, as a fraction of the coordinates
+};
+
+/// A gap no larger than this fraction of the coordinates is closed.
+inline constexpr double closed_gap = 1e-12;
+
+enum class IslandOutcome {
+    reached,        ///< the time that was asked for
+    asleep,         ///< at rest until struck or woken: its time is the one asked for
+    released,       ///< nothing has been in contact for `patience` steps: to be handed back
+    impact,         ///< two of `arrivals` meet at a speed from which they would rebound
+    not_converged,  ///< the contact law was not solved, see `failure`
+    non_finite,
+};
+
+/// A contact of the last step.
+struct IslandContact {
+    std::uint32_t first = 0;  ///< id of the body that the normal pushes
+    bool with_wall = false;
+    std::uint32_t second = 0;  ///< id of the other body or wall
+    std::array<double, 2> normal{};
+    double gap = 0;                   ///< [m] where the step began
+    std::array<double, 2> impulse{};  ///< [N s] normal and tangential
+};
+
+struct IslandStatistics {
+    std::uint64_t steps = 0;
+    std::uint64_t problems = 0;    ///< contact laws solved, those of repeated steps included
+    std::uint64_t iterations = 0;  ///< of Newton's method in them
+    std::uint64_t factors = 0;
+    std::uint64_t sweeps = 0;
+    std::uint64_t dense = 0;     ///< problems that only the dense solver could solve
+    std::uint64_t halvings = 0;  ///< steps tried again at half the length
+    std::uint64_t spent = 0;     ///< arrivals whose rebound would have been shorter than a step
+    std::uint64_t slept = 0;
+    std::uint64_t slept_by_speed = 0;  ///< of these below `sleep_speed`, not at exact rest
+    double largest_residual = 0;
+    double largest_error = 0;  ///< [m] of a step, where errors are estimated
+    double sum_of_errors = 0;  ///< [m]
+    double projected = 0;      ///< [m] the farthest that a body was moved onto its surface
+};
+
+/// What `ContactIsland::strike` did.
+struct StrikeReport {
+    bool refused = false;  ///< nothing was changed
+    std::string message;
+    LawReport law;
+    double energy_before = 0, energy_after = 0;  ///< [J] kinetic
+};
+
+/// Patience of a body that is handed over at `t` and was handed back at `released_at`: twice as
+/// long where that was within ten steps, so that nothing goes back and forth for long.
+[[nodiscard]] constexpr std::uint32_t next_patience(std::uint32_t patience, double released_at,
+                                                    double t, double step) noexcept
+{
+    const bool at_once = t - released_at < 10 * step;
+    return !at_once ? 1 : patience < (1U << 20) ? 2 * patience : patience;
+}
+
+class ContactIsland {
+public:
+    /// Bodies and walls are put into an order that depends on where they are, not on ids. What lies
+    /// behind a surface by no more than `largest_overlap` is put onto it, moving least by mass.
+    ///
+    /// @throws std::invalid_argument for an overlap beyond that (which, and by how much), a mass or
+    /// step that is not positive, an unknown body of a spring, what is not finite.
+    ContactIsland(IslandSetup setup, const IslandOptions& options, double t);
+
+    /// Steps until `until`, or until something else ends it, exactly then.
+    IslandOutcome advance(double until);
+
+    /// The same under the scene's eyes: a step no farther than `until`, which nothing has changed
+    /// yet. `length` is 0 where it was not `reached`, and where the island sleeps the time until it
+    /// wakes or `until`; with `impact` the time until the arrival.
+    struct Plan {
+        IslandOutcome outcome = IslandOutcome::reached;
+        double length = 0;  ///< [s]
+    };
+    Plan plan(double until);
+    /// The planned motion: at + s chord.
+    [[nodiscard]] std::array<double, 2> chord(std::uint32_t id) const;
+    /// Goes to s, no farther than the length of the plan.
+    void commit(double s);
+
+    [[nodiscard]] double t() const noexcept { return t_; }
+    [[nodiscard]] bool asleep() const noexcept { return asleep_; }
+    /// When a wall begins to move; infinite where none does.
+    [[nodiscard]] double wake_time() const;
+    void wake();
+
+    [[nodiscard]] std::size_t size() const noexcept { return bodies_.size(); }
+    [[nodiscard]] IslandBody body(std::uint32_t id) const;
+    /// After an impact. Wakes the island.
+    void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity);
+
+    /// Newton's law of impact and Coulomb's of friction at all contacts that touch and approach,
+    /// together. Refused where the two together would raise the energy, or are not solved.
+    StrikeReport strike();
+
+    /// Those that ended `advance` as `impact`.
+    [[nodiscard]] const std::vector<IslandContact>& arrivals() const noexcept { return arrivals_; }
+    /// Of the last step, those that pushed; kept asleep.
+    [[nodiscard]] std::vector<IslandContact> contacts() const;
+    /// [s] length of the step whose impulses these are.
+    [[nodiscard]] double contact_step() const noexcept { return warm_step_; }
+    /// Ids of bodies that contacts that push, or springs, connect: where there are several groups,
+    /// they are islands of their own.
+    [[nodiscard]] std::vector<std::vector<std::uint32_t>> groups() const;
+
+    /// Kinetic, of gravity and of springs [J].
+    [[nodiscard]] double energy() const;
+    [[nodiscard]] const IslandStatistics& statistics() const noexcept { return statistics_; }
+    [[nodiscard]] const LawReport& failure() const noexcept { return failure_; }
+
+private:
+    using Point = std::array<double, 2>;
+    struct Touch {
+        int body = 0, other = 0;  ///< places; of a body or of a wall
+        bool wall = false;
+        bool at_end = false;  ///< of a segment: which one
+        Point normal{}, end{};
+        double gap = 0;
+        ContactCoefficients law{};
+        friend bool same(const Touch& a, const Touch& b)
+        {
+            return a.body == b.body && a.other == b.other && a.wall == b.wall;
+        }
+    };
+
+    void check(const IslandSetup& setup) const;
+    void sort_members(IslandSetup setup);
+    void project();
+    [[nodiscard]] std::string name_of(const Touch& touch) const;
+    [[nodiscard]] double size_of(int body) const;
+    [[nodiscard]] int place_of(std::uint32_t id) const;
+
+    void find_touches(const std::vector<double>& reach);
+    void pair_touches(const std::vector<double>& reach);
+    void wall_touches(int body, double reach);
+    bool wall_touch(const Point& at, const Point& moved, Touch& touch) const;
+    [[nodiscard]] std::array<double, 2> wall_displacement(int wall, double from, double to) const;
+
+    bool attempt(double h);
+    void assemble(double h, const Eigen::VectorXd& v);
+    void couple_springs(double h);
+    [[nodiscard]] LawContact law_contact(const Touch& touch, double h) const;
+    bool solve_touches(double h);
+    [[nodiscard]] bool stays_within(const std::vector<double>& reach, double h) const;
+    [[nodiscard]] Eigen::VectorXd warm_impulses(double h) const;
+    [[nodiscard]] double relative_normal(const Touch& touch, const Eigen::VectorXd& v) const;
+    bool exclude_arrivals(double h);
+    [[nodiscard]] double first_arrival(double h);
+    [[nodiscard]] Touch on_chord(const Touch& touch, double s) const;
+    [[nodiscard]] double closing_time(const Touch& touch, double h) const;
+    [[nodiscard]] bool is_released() const;
+    [[nodiscard]] IslandContact public_contact(const Touch& touch, double normal,
+                                               double tangential) const;
+    void try_to_sleep(double free_speed);
+    [[nodiscard]] bool rests(double h);
+    IslandOutcome advance_once(double until);
+    IslandOutcome advance_by_halves(double until);
+    [[nodiscard]] double free_speed() const;
+    bool fit_step(double h);
+
+    IslandOptions options_;
+    std::array<double, 2> gravity_{};
+    std::function<ContactCoefficients(std::uint32_t, std::uint32_t)> coefficients_;
+    std::vector<IslandBody> bodies_;  ///< in order of place; their state is in q_ and v_
+    std::vector<IslandWall> walls_;
+    struct Link {
+        int first = 0, second = 0;
+        double rest = 0, stiffness = 0, damping = 0;
+    };
+    std::vector<Link> links_;
+    double t_ = 0;
+    Eigen::VectorXd q_, v_;
+    bool asleep_ = false;
+    std::uint32_t open_steps_ = 0;
+    double slow_since_ = std::numeric_limits<double>::infinity();
+
+    ContactLaw law_;
+    LawProblem problem_;
+    std::vector<Touch> touches_, excluded_;
+    Eigen::VectorXd impulses_, v_next_;
+    double planned_ = 0;        ///< [s] length of the step in hand
+    double planned_until_ = 0;  ///< where it ends, or what ends it before
+    std::vector<Touch> warm_;
+    Eigen::VectorXd warm_impulses_;
+    double warm_step_ = 0;
+
+    std::vector<IslandContact> arrivals_;
+    IslandStatistics statistics_;
+    LawReport failure_;
+};
+
+}  // namespace ricochet::detail

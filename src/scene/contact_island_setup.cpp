@@ -1,0 +1,286 @@
+// What an island is made of, and where its members touch.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <tuple>
+
+#include "checks/require.hpp"
+#include "scene/contact_island.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+constexpr Refuse refuse{"ContactIsland"};
+constexpr Require expect{"ContactIsland"};
+
+bool finite(const std::array<double, 2>& x)
+{
+    return std::isfinite(x[0]) && std::isfinite(x[1]);
+}
+
+auto key(const IslandBody& b)
+{
+    return std::tuple(b.at[0], b.at[1], b.velocity[0], b.velocity[1], b.mass, b.radius, b.drag);
+}
+auto key(const IslandWall& w)
+{
+    return std::tuple(w.is_segment, w.point[0], w.point[1], w.normal[0], w.normal[1], w.end[0],
+                      w.end[1]);
+}
+
+void check_body(const IslandBody& b)
+{
+    if (!finite(b.at) || !finite(b.velocity)) {
+        refuse(fmt::format("position and velocity of body {} must be finite", b.id));
+    }
+    expect(b.mass > 0 && std::isfinite(b.mass), "mass must be positive and finite", b.mass);
+    expect(b.radius >= 0 && std::isfinite(b.radius), "radius must be finite, zero or positive",
+           b.radius);
+    expect(b.drag >= 0 && std::isfinite(b.drag), "drag must be finite, zero or positive", b.drag);
+}
+
+}  // namespace
+
+void ContactIsland::check(const IslandSetup& setup) const
+{
+    expect(options_.step > 0 && std::isfinite(options_.step), "step must be positive and finite",
+           options_.step);
+    expect(options_.tolerance > 0, "tolerance must be positive", options_.tolerance);
+    expect(options_.sleep_speed >= 0, "sleep_speed must not be negative", options_.sleep_speed);
+    if (!finite(setup.gravity)) refuse("gravity must be finite");
+    if (!setup.coefficients) refuse("coefficients of restitution and friction are not given");
+    for (const IslandBody& b : setup.bodies) check_body(b);
+    for (const IslandWall& w : setup.walls) {
+        const bool unit = std::abs(std::hypot(w.normal[0], w.normal[1]) - 1) < 1e-9;
+        if (!finite(w.point) || (w.is_segment ? !finite(w.end) : !unit)) {
+            refuse(
+                fmt::format("wall {} needs finite points, and a line a normal of length 1", w.id));
+        }
+    }
+    for (const IslandSpring& s : setup.springs) {
+        expect(s.rest >= 0 && std::isfinite(s.rest), "rest length must not be negative", s.rest);
+        expect(s.stiffness >= 0 && std::isfinite(s.stiffness), "stiffness must not be negative",
+               s.stiffness);
+        expect(s.damping >= 0 && std::isfinite(s.damping), "damping must not be negative",
+               s.damping);
+    }
+}
+
+/// Places by where members are: sums and pivots then do not depend on ids.
+void ContactIsland::sort_members(IslandSetup setup)
+{
+    bodies_ = std::move(setup.bodies);
+    walls_ = std::move(setup.walls);
+    std::ranges::stable_sort(bodies_, {}, [](const IslandBody& b) { return key(b); });
+    std::ranges::stable_sort(walls_, {}, [](const IslandWall& w) { return key(w); });
+    for (const IslandSpring& s : setup.springs) {
+        const auto [first, second] = std::minmax({place_of(s.first), place_of(s.second)});
+        if (first == second) refuse(fmt::format("a spring joins body {} to itself", s.first));
+        links_.push_back({first, second, s.rest, s.stiffness, s.damping});
+    }
+    std::ranges::sort(links_, {}, [](const Link& k) {
+        return std::tuple(k.first, k.second, k.rest, k.stiffness, k.damping);
+    });
+    const auto n = static_cast<Eigen::Index>(bodies_.size());
+    q_.resize(2 * n);
+    v_.resize(2 * n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        const IslandBody& b = bodies_[static_cast<std::size_t>(i)];
+        q_.segment<2>(2 * i) << b.at[0], b.at[1];
+        v_.segment<2>(2 * i) << b.velocity[0], b.velocity[1];
+    }
+    v_next_ = v_;
+}
+
+ContactIsland::ContactIsland(IslandSetup setup, const IslandOptions& options, double t)
+    : options_(options),
+      gravity_(setup.gravity),
+      coefficients_(setup.coefficients),
+      t_(t),
+      law_(options.tolerance)
+{
+    check(setup);
+    sort_members(std::move(setup));
+    project();
+}
+
+int ContactIsland::place_of(std::uint32_t id) const
+{
+    const auto found = std::ranges::find(bodies_, id, &IslandBody::id);
+    if (found == bodies_.end()) refuse(fmt::format("there is no body {}", id));
+    return static_cast<int>(found - bodies_.begin());
+}
+
+/// Of the coordinates, by which rounding is measured [m].
+double ContactIsland::size_of(int body) const
+{
+    return bodies_[static_cast<std::size_t>(body)].radius + std::abs(q_[2 * body]) +
+           std::abs(q_[2 * body + 1]);
+}
+
+std::string ContactIsland::name_of(const Touch& touch) const
+{
+    const std::uint32_t first = bodies_[static_cast<std::size_t>(touch.body)].id;
+    const auto other = static_cast<std::size_t>(touch.other);
+    return touch.wall ? fmt::format("body {} and wall {}", first, walls_[other].id)
+                      : fmt::format("bodies {} and {}", first, bodies_[other].id);
+}
+
+/// Onto their surfaces by the least way, weighed by mass. It is as if gravity had acted a hair
+/// longer or shorter: velocities are left as they are.
+void ContactIsland::project()
+{
+    const std::vector<double> close(bodies_.size(), 0.0);
+    problem_.inertia.clear();
+    problem_.couplings.clear();
+    for (const IslandBody& b : bodies_) problem_.inertia.push_back(b.mass);
+    const Eigen::VectorXd start = q_;
+    for (int round = 0; round < 8; ++round) {
+        find_touches(close);
+        double deepest = 0;
+        problem_.contacts.clear();
+        problem_.momentum.setZero(q_.size());
+        for (const Touch& touch : touches_) {
+            const double size = size_of(touch.body);
+            if (!(touch.gap >= -options_.largest_overlap * size)) {
+                refuse(fmt::format("{} overlap by {} m", name_of(touch), -touch.gap));
+            }
+            deepest = std::max(deepest, -touch.gap / size);
+            LawContact contact = law_contact(touch, 1);
+            contact.offset = {touch.gap, 0};
+            contact.friction = 0;
+            problem_.contacts.push_back(contact);
+        }
+        if (deepest <= 4e-16) break;
+        impulses_.resize(0);
+        Eigen::VectorXd way;
+        law_.solve(problem_, impulses_, way);
+        q_ += way;
+    }
+    statistics_.projected = (q_ - start).lpNorm<Eigen::Infinity>();
+}
+
+std::array<double, 2> ContactIsland::wall_displacement(int wall, double from, double to) const
+{
+    const WallMotion* motion = walls_[static_cast<std::size_t>(wall)].motion;
+    if (!motion || motion->still_until(from) >= to) return {0, 0};
+    const auto a = motion->displacement(from);
+    const auto b = motion->displacement(to);
+    return {b[0] - a[0], b[1] - a[1]};
+}
+
+double ContactIsland::wake_time() const
+{
+    double first = std::numeric_limits<double>::infinity();
+    for (const IslandWall& w : walls_) {
+        if (w.motion) first = std::min(first, w.motion->still_until(t_));
+    }
+    return first;
+}
+
+/// Gap and normal of a body at `at` from a wall displaced by `moved`; false in the middle of a
+/// segment, where there is no normal.
+bool ContactIsland::wall_touch(const Point& at, const Point& moved, Touch& touch) const
+{
+    const int body = touch.body;
+    const int wall = touch.other;
+    const IslandWall& w = walls_[static_cast<std::size_t>(wall)];
+    const double radius = bodies_[static_cast<std::size_t>(body)].radius;
+    const double x = at[0] - moved[0] - w.point[0];
+    const double y = at[1] - moved[1] - w.point[1];
+    if (!w.is_segment) {
+        touch.normal = w.normal;
+        touch.gap = x * w.normal[0] + y * w.normal[1] - radius;
+        return true;
+    }
+    const double along_x = w.end[0] - w.point[0];
+    const double along_y = w.end[1] - w.point[1];
+    const double square = along_x * along_x + along_y * along_y;
+    const double part = square > 0 ? std::clamp((x * along_x + y * along_y) / square, 0.0, 1.0) : 0;
+    const double dx = part < 1 ? x - part * along_x : at[0] - moved[0] - w.end[0];
+    const double dy = part < 1 ? y - part * along_y : at[1] - moved[1] - w.end[1];
+    const double distance = std::hypot(dx, dy);
+    if (!(distance > 0)) return false;
+    touch.normal = {dx / distance, dy / distance};
+    touch.gap = distance - radius;
+    touch.at_end = part <= 0 || part >= 1;
+    if (touch.at_end) touch.end = part <= 0 ? w.point : w.end;
+    return true;
+}
+
+void ContactIsland::pair_touches(const std::vector<double>& reach)
+{
+    std::vector<int> order(bodies_.size());
+    std::iota(order.begin(), order.end(), 0);
+    const auto left = [&](int i) {
+        return q_[2 * i] - bodies_[static_cast<std::size_t>(i)].radius -
+               reach[static_cast<std::size_t>(i)];
+    };
+    std::ranges::sort(order, {}, [&](int i) { return std::tuple(left(i), i); });
+    for (std::size_t a = 0; a < order.size(); ++a) {
+        const int i = order[a];
+        const auto bi = static_cast<std::size_t>(i);
+        const double right = q_[2 * i] + bodies_[bi].radius + reach[bi];
+        for (std::size_t b = a + 1; b < order.size() && left(order[b]) <= right; ++b) {
+            const auto bj = static_cast<std::size_t>(order[b]);
+            const auto [first, second] = std::minmax({i, order[b]});
+            const double x = q_[2 * first] - q_[2 * second];
+            const double y = q_[2 * first + 1] - q_[2 * second + 1];
+            const double distance = std::hypot(x, y);
+            const double radii = bodies_[bi].radius + bodies_[bj].radius;
+            // Points never meet.
+            if (!(distance - radii <= reach[bi] + reach[bj]) || radii == 0 || distance == 0)
+                continue;
+            touches_.push_back({.body = first,
+                                .other = second,
+                                .normal = {x / distance, y / distance},
+                                .gap = distance - radii});
+        }
+    }
+}
+
+void ContactIsland::wall_touches(int body, double reach)
+{
+    const std::size_t own = touches_.size();
+    for (int w = 0; w < static_cast<int>(walls_.size()); ++w) {
+        const IslandWall& wall = walls_[static_cast<std::size_t>(w)];
+        Point moved{};
+        double way = 0;
+        if (wall.motion) {
+            moved = wall.motion->displacement(t_);
+            const Point step = wall_displacement(w, t_, t_ + options_.step);
+            way = std::hypot(step[0], step[1]);
+        }
+        Touch touch{.body = body, .other = w, .wall = true};
+        if (!wall_touch({q_[2 * body], q_[2 * body + 1]}, moved, touch)) continue;
+        if (!(touch.gap <= reach + way)) continue;
+        // Where two segments end at one point, both have it.
+        const bool again = wall.is_segment && !wall.motion &&
+                           std::any_of(touches_.begin() + static_cast<std::ptrdiff_t>(own),
+                                       touches_.end(), [&](const Touch& c) {
+                                           return c.at_end && touch.at_end && c.end == touch.end;
+                                       });
+        if (!again) touches_.push_back(touch);
+    }
+}
+
+/// All that could close where each body goes no farther than its reach [m].
+void ContactIsland::find_touches(const std::vector<double>& reach)
+{
+    touches_.clear();
+    pair_touches(reach);
+    for (std::size_t i = 0; i < bodies_.size(); ++i) wall_touches(static_cast<int>(i), reach[i]);
+    std::ranges::sort(touches_, {},
+                      [](const Touch& c) { return std::tuple(c.wall, c.body, c.other); });
+    for (Touch& c : touches_) {
+        const auto other = static_cast<std::size_t>(c.other);
+        c.law = coefficients_(bodies_[static_cast<std::size_t>(c.body)].material,
+                              c.wall ? walls_[other].material : bodies_[other].material);
+    }
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,162 @@
+// The contact law solved for velocities: random problems against the law itself and, where the
+// solution is unique, against the dense solver.
+
+#include "scene/contact_law.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "ricochet/detail/contact_problem.hpp"
+
+namespace ricochet::detail {
+namespace {
+
+class RandomLaw {
+public:
+    explicit RandomLaw(unsigned seed) : random_(seed) {}
+
+    /// Bodies at random velocities, contacts between random ones or with walls, three to a body:
+    /// two more components than there are coordinates, so that impulses are not determined.
+    LawProblem draw(int bodies, double friction, bool springs)
+    {
+        LawProblem problem;
+        const double spread = uniform(0, 4);
+        for (int i = 0; i < bodies; ++i) {
+            problem.inertia.push_back(std::pow(10, uniform(-spread / 2, spread / 2)));
+        }
+        problem.momentum.resize(2 * bodies);
+        for (int i = 0; i < 2 * bodies; ++i) {
+            problem.momentum[i] = uniform(-1, 1) * problem.inertia[static_cast<std::size_t>(i / 2)];
+        }
+        for (int k = 0; k < 3 * bodies; ++k) {
+            const int a = static_cast<int>(uniform(0, bodies));
+            const int b = static_cast<int>(uniform(-1, bodies));
+            const double angle = uniform(0, 6.283);
+            problem.contacts.push_back({.first = a,
+                                        .second = a == b ? -1 : b,
+                                        .normal = {std::cos(angle), std::sin(angle)},
+                                        .friction = friction * uniform(0, 1)});
+        }
+        for (int i = 0; springs && i + 1 < bodies; ++i) {
+            problem.couplings.push_back({i, i + 1, uniform(0, 10), 0, uniform(0, 10)});
+        }
+        return problem;
+    }
+
+private:
+    double uniform(double low, double high)
+    {
+        return std::uniform_real_distribution<double>(low, high)(random_);
+    }
+    std::mt19937 random_;
+};
+
+struct Defect {
+    double law = 0, momentum = 0;
+};
+
+/// By how much p and v violate the law, in units of velocity, and the equation of momenta.
+Defect defect_of(const LawProblem& problem, const Eigen::VectorXd& p, const Eigen::VectorXd& v)
+{
+    Defect worst;
+    Eigen::VectorXd left = -problem.momentum;
+    for (Eigen::Index i = 0; i < v.size(); ++i) {
+        left[i] += problem.inertia[static_cast<std::size_t>(i / 2)] * v[i];
+    }
+    for (const LawCoupling& k : problem.couplings) {
+        const Eigen::Vector2d u = v.segment<2>(2 * k.first) - v.segment<2>(2 * k.second);
+        const Eigen::Vector2d f = Eigen::Matrix2d{{k.xx, k.xy}, {k.xy, k.yy}} * u;
+        left.segment<2>(2 * k.first) += f;
+        left.segment<2>(2 * k.second) -= f;
+    }
+    for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+        const LawContact& c = problem.contacts[k];
+        const Eigen::Vector2d n(c.normal[0], c.normal[1]);
+        const Eigen::Vector2d t(-n[1], n[0]);
+        Eigen::Vector2d u = v.segment<2>(2 * c.first);
+        double mass = problem.inertia[static_cast<std::size_t>(c.first)];
+        if (c.second >= 0) {
+            u -= v.segment<2>(2 * c.second);
+            const double other = problem.inertia[static_cast<std::size_t>(c.second)];
+            mass = mass * other / (mass + other);
+        }
+        const auto i = 2 * static_cast<Eigen::Index>(k);
+        left.segment<2>(2 * c.first) -= p[i] * n + p[i + 1] * t;
+        if (c.second >= 0) left.segment<2>(2 * c.second) += p[i] * n + p[i + 1] * t;
+        const double bound = c.friction * p[i];
+        EXPECT_GE(p[i], 0);
+        EXPECT_LE(std::abs(p[i + 1]), bound * (1 + 1e-15) + 1e-300);
+        const double normal = std::min(n.dot(u), p[i] / mass);
+        // Sliding against the friction, or none where it is below its bound.
+        const double room = (bound - std::copysign(1.0, -t.dot(u)) * p[i + 1]) / mass;
+        worst.law = std::max({worst.law, std::abs(normal), std::min(std::abs(t.dot(u)), room)});
+    }
+    worst.momentum = left.lpNorm<Eigen::Infinity>();
+    return worst;
+}
+
+TEST(ContactLaw, RandomProblemsAreSolvedOrReported)
+{
+    RandomLaw random(1);
+    ContactLaw law;
+    int solved = 0;
+    int problems = 0;
+    for (const int bodies : {1, 2, 5, 12, 20, 40}) {
+        // Those of 120 contacts jam in all directions, and half of them are reported as not solved.
+        for (int trial = 0; trial < (bodies == 40 ? 4 : 20); ++trial) {
+            const LawProblem problem = random.draw(bodies, 1, trial % 4 == 0);
+            Eigen::VectorXd p;
+            Eigen::VectorXd v;
+            const LawReport report = law.solve(problem, p, v);
+            EXPECT_EQ(report.converged, report.residual <= 1e-10);
+            problems += bodies < 40;
+            if (!report.converged) continue;
+            solved += bodies < 40;
+            const Defect defect = defect_of(problem, p, v);
+            // The residual is in units of sqrt(mass), of 10^4 at most from body to body.
+            EXPECT_LT(defect.law, 1e-8);
+            EXPECT_LT(defect.momentum, 1e-12 * (1 + p.norm() + problem.momentum.norm()));
+        }
+    }
+    EXPECT_GE(solved, problems - 2);
+}
+
+TEST(ContactLaw, WithoutFrictionVelocitiesAreThoseOfTheDenseSolver)
+{
+    // They are unique, impulses are not. Rounding times the factor 1e5 of the impulses.
+    RandomLaw random(2);
+    ContactLaw law;
+    for (const int bodies : {1, 3, 10, 16, 30}) {
+        const LawProblem problem = random.draw(bodies, 0, false);
+        Eigen::VectorXd p;
+        Eigen::VectorXd v;
+        const LawReport report = law.solve(problem, p, v);
+        ASSERT_TRUE(report.converged);
+        EXPECT_FALSE(report.dense);
+        const auto contacts = static_cast<Eigen::Index>(problem.contacts.size());
+        Eigen::MatrixXd h = Eigen::MatrixXd::Zero(2 * contacts, 2 * bodies);
+        for (Eigen::Index k = 0; k < contacts; ++k) {
+            const LawContact& c = problem.contacts[static_cast<std::size_t>(k)];
+            const Eigen::Matrix2d rows{{c.normal[0], c.normal[1]}, {-c.normal[1], c.normal[0]}};
+            h.block<2, 2>(2 * k, 2 * c.first) += rows;
+            if (c.second >= 0) h.block<2, 2>(2 * k, 2 * c.second) -= rows;
+        }
+        Eigen::VectorXd inverse(2 * bodies);
+        for (Eigen::Index i = 0; i < 2 * bodies; ++i) {
+            inverse[i] = 1 / problem.inertia[static_cast<std::size_t>(i / 2)];
+        }
+        const Eigen::MatrixXd w = h * inverse.asDiagonal() * h.transpose();
+        const Eigen::VectorXd free = inverse.cwiseProduct(problem.momentum);
+        const std::vector<double> friction(problem.contacts.size(), 0.0);
+        Eigen::VectorXd dense = Eigen::VectorXd::Zero(2 * contacts);
+        ContactSolver solver({.tolerance = 1e-12});
+        if (!solver.solve(w, h * free, friction, 2, dense).converged) continue;
+        const Eigen::VectorXd expected = free + inverse.cwiseProduct(h.transpose() * dense);
+        EXPECT_LT((v - expected).lpNorm<Eigen::Infinity>(), 1e-8);
+    }
+}
+
+}  // namespace
+}  // namespace ricochet::detail
