@@ -55,8 +55,13 @@ std::string data(const Tiles& tiles)
 
 std::string style(const Curve& curve, std::size_t which)
 {
-    constexpr std::array colours{"#1f5fa8", "#d1495b", "#2e8b57", "#e08e0b", "#7b4fa3", "#404040"};
-    const std::string_view colour = curve.published ? "#000000" : colours[which % colours.size()];
+    constexpr std::array colours{"#1f5fa8", "#d1495b", "#2e8b57", "#e08e0b", "#7b4fa3", "#404040",
+                                 "#00a3a3", "#b5651d", "#9aa02c", "#d67ab1", "#6c8ebf", "#888888"};
+    const std::string_view colour =
+        curve.published
+            ? "#000000"
+            : colours[(curve.colour < 0 ? which : static_cast<std::size_t>(curve.colour)) %
+                      colours.size()];
     switch (curve.style) {
         case Curve::Style::line: return fmt::format("lines linewidth 2 linecolor rgb '{}'", colour);
         case Curve::Style::dashed:
@@ -66,6 +71,13 @@ std::string style(const Curve& curve, std::size_t which)
         case Curve::Style::crosses:
             return fmt::format("points pointtype 2 pointsize 0.9 linewidth 1.5 linecolor rgb '{}'",
                                colour);
+        case Curve::Style::marked:
+            return fmt::format(
+                "linespoints linewidth 2.5 pointtype 7 pointsize 0.7 linecolor rgb '{}'", colour);
+        case Curve::Style::marked_dashed:
+            return fmt::format(
+                "linespoints linewidth 1.5 dashtype 2 pointtype 6 pointsize 0.7 linecolor rgb '{}'",
+                colour);
     }
     return "lines";
 }
@@ -228,8 +240,11 @@ void draw(const Exhibit& exhibit, const std::string& title, const std::filesyste
     const std::size_t count = exhibit.panels.size();
     const std::size_t across = count < 3 ? count : (count + 1) / 2;
     const std::size_t down = (count + across - 1) / across;
+    std::size_t curves = 0;
+    for (const Panel& panel : exhibit.panels) curves = std::max(curves, panel.curves.size());
+    const std::size_t key = curves > 6 ? 22 * (curves - 6) : 0;  // it grows by lines
     std::string out =
-        plot_head(file, static_cast<int>(620 * across), static_cast<int>(60 + 420 * down));
+        plot_head(file, static_cast<int>(620 * across), static_cast<int>(60 + (420 + key) * down));
     out += fmt::format(
         "set multiplot layout {},{} title {}\nset border 3 linecolor rgb '#404040'\n"
         "set tics nomirror out\nset format x '%g'\nset format y '%g'\nset key below samplen 2 "

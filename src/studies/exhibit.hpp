@@ -17,12 +17,13 @@ namespace ricochet::app {
 
 /// y over x, both as drawn.
 struct Curve {
-    enum class Style { line, dashed, points, crosses };
+    enum class Style { line, dashed, points, crosses, marked, marked_dashed };
 
     std::string name;
     std::vector<double> x{}, y{};
     Style style = Style::line;
     bool published = false;  ///< numbers of the paper
+    int colour = -1;         ///< its place in the palette; negative: that of the curve
 };
 
 /// Values on a grid, row by row.

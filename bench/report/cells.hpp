@@ -1,0 +1,171 @@
+// Cells of the report: one problem, solved by one peer at one setting.
+//
+// Each cell is run in a process of its own (main.cpp), so that a peer that crashes takes nothing
+// along. What a cell returns is scored by the program that asks (run.py).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "problems.hpp"
+
+namespace ricochet::report {
+
+/// What one run says of itself; a peer leaves out what it does not count.
+struct Answer {
+    bool finished = false;              ///< the run reached its end
+    std::vector<double> times{};        ///< [s] of events, in the order found
+    std::vector<std::size_t> guards{};  ///< of events
+    std::vector<std::vector<double>> samples{};
+    std::optional<std::uint64_t> steps{};
+    std::optional<std::uint64_t> flow_calls{};
+    std::optional<std::uint64_t> guard_calls{};
+    std::string note{};  ///< why it did not finish
+
+    void add(double t, std::size_t guard)
+    {
+        times.push_back(t);
+        guards.push_back(guard);
+    }
+};
+
+struct Cell {
+    std::string problem;                            ///< e.g. "impacts"
+    std::string peer;                               ///< e.g. "CVODE"
+    std::string how;                                ///< e.g. "Adams, root finding"
+    double value = 0;                               ///< the tolerance or the step; 0: none
+    std::function<std::function<Answer()>()> make;  ///< sets up what is run over and over
+
+    [[nodiscard]] std::string name() const;
+};
+
+struct Reference {
+    std::string problem;
+    std::string title;
+    double t_end = 0;
+    std::vector<Expected> events{};
+    std::vector<double> sample_times{};
+    std::vector<std::vector<double>> samples{};
+};
+
+/// All cells, problems, and versions of the peers that are built in.
+class Cells {
+public:
+    void add(Cell cell) { cells_.push_back(std::move(cell)); }
+    /// `make` is called where the reference is asked for, since some take a while.
+    void add_reference(std::function<Reference()> make) { references_.push_back(std::move(make)); }
+    void add_version(std::string peer, std::string version)
+    {
+        versions_.emplace_back(std::move(peer), std::move(version));
+    }
+
+    [[nodiscard]] const std::vector<Cell>& all() const { return cells_; }
+    [[nodiscard]] const std::vector<std::function<Reference()>>& references() const
+    {
+        return references_;
+    }
+    [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& versions() const
+    {
+        return versions_;
+    }
+
+private:
+    std::vector<Cell> cells_;
+    std::vector<std::function<Reference()>> references_;
+    std::vector<std::pair<std::string, std::string>> versions_;
+};
+
+inline constexpr double tolerances[] = {1e-4, 1e-6, 1e-8, 1e-10, 1e-12};
+
+/// Every problem once: `visit(name, title, make_task)`, where a call of `make_task` returns
+/// the task. Problems of several runs are given as vectors of tasks.
+template <class Visit>
+void for_each_problem(Visit visit)
+{
+    visit("ball", "Bouncing ball, 13 impacts", [] { return std::vector{ball()}; });
+    visit("impacts", "Impact oscillator, 200 impacts in 200 periods",
+          [] { return std::vector{impact_oscillator(1.2, 200)}; });
+    visit("henon-heiles", "Henon-Heiles, section", [] { return std::vector{henon_heiles()}; });
+    visit("arenstorf", "Arenstorf orbit, section", [] { return std::vector{arenstorf()}; });
+    visit("stick-slip", "Stick-slip on a belt, 100 periods",
+          [] { return std::vector{stick_slip()}; });
+    for (const int digits : {2, 4, 6, 8, 10, 12}) {
+        visit("near-tangent-1e-" + std::to_string(digits),
+              "Near-tangent pairs, depth 1e-" + std::to_string(digits), [digits] {
+                  std::vector<Task<NearTangentPairs>> tasks;
+                  for (std::size_t k = 0; k < tangent_phases; ++k) {
+                      tasks.push_back(near_tangent(std::pow(10.0, -digits), tangent_phase(k)));
+                  }
+                  return tasks;
+              });
+    }
+    for (const std::size_t n : {1U, 10U, 100U, 1000U}) {
+        visit("balls-" + std::to_string(n), std::to_string(n) + " balls in one state",
+              [n] { return std::vector{balls(n)}; });
+    }
+    for (const std::size_t n : {10U, 100U}) {
+        visit("thermostats-" + std::to_string(n), "Bank of " + std::to_string(n) + " thermostats",
+              [n] { return std::vector{thermostats(n)}; });
+    }
+    visit("guards-0", "Pendulum without guards", [] { return std::vector{pendulum(Unwatched{})}; });
+    for (const std::size_t n : {1U, 10U, 100U}) {
+        visit("guards-" + std::to_string(n), "Pendulum with " + std::to_string(n) + " idle guards",
+              [n] { return std::vector{pendulum(Watched{.guards_ = n})}; });
+    }
+}
+
+/// One answer of several runs: the guards of run k are counted from 1000 k.
+inline constexpr std::size_t guards_of_a_run = 1000;
+
+template <class S>
+[[nodiscard]] Reference reference_of(std::string name, std::string title,
+                                     const std::vector<Task<S>>& tasks)
+{
+    Reference out{.problem = std::move(name), .title = std::move(title), .t_end = tasks[0].t_end};
+    for (std::size_t k = 0; k < tasks.size(); ++k) {
+        for (const Expected& event : tasks[k].events) {
+            out.events.push_back({event.t, event.guard + guards_of_a_run * k});
+        }
+    }
+    return out;
+}
+
+/// Runs `solve(task, answer, offset)` for every task.
+template <class S, class Solve>
+[[nodiscard]] std::function<Answer()> over(std::vector<Task<S>> tasks, Solve solve)
+{
+    return [tasks = std::move(tasks), solve]() mutable {
+        Answer answer{.finished = true, .steps = 0, .flow_calls = 0, .guard_calls = 0};
+        for (std::size_t k = 0; k < tasks.size() && answer.finished; ++k) {
+            answer.finished = solve(tasks[k], answer, guards_of_a_run * k);
+        }
+        return answer;
+    };
+}
+
+void add_ours(Cells& cells);
+void add_taylor(Cells& cells);
+void add_odeint(Cells& cells);
+#ifdef RICOCHET_REPORT_CVODE
+void add_cvode(Cells& cells);
+#endif
+#ifdef RICOCHET_REPORT_ARKODE
+void add_arkode(Cells& cells);
+#endif
+#ifdef RICOCHET_REPORT_GSL
+void add_gsl(Cells& cells);
+#endif
+#ifdef RICOCHET_REPORT_ODE
+void add_ode(Cells& cells);
+#endif
+#ifdef RICOCHET_REPORT_BULLET
+void add_bullet(Cells& cells);
+#endif
+void add_set_valued(Cells& cells);
+
+}  // namespace ricochet::report

@@ -1,0 +1,90 @@
+// SUNDIALS CVODE with its own root finding, as its manual says: Adams with a fixed-point iteration,
+// since none of these problems is stiff; directions of the roots set; CVodeReInit after a reset.
+// Memory is set up once, outside of the time.
+#include <cvode/cvode.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+
+#include <memory>
+
+#include "sundials.hpp"
+
+namespace ricochet::report {
+
+namespace {
+
+template <class S>
+class Solver {
+public:
+    Solver(Task<S> task, double tolerance)
+        : task_(std::move(task)), system_(task_.system), state_(task_.x0.size())
+    {
+        memory_ = CVodeCreate(CV_ADAMS, state_.context);
+        iteration_ = SUNNonlinSol_FixedPoint(state_.x, 0, state_.context);
+        require(CVodeInit(memory_, flow_of<S>, 0, state_.x), "CVodeInit");
+        require(CVodeSStolerances(memory_, tolerance, tolerance), "CVodeSStolerances");
+        require(CVodeSetUserData(memory_, &system_), "CVodeSetUserData");
+        require(CVodeSetNonlinearSolver(memory_, iteration_), "CVodeSetNonlinearSolver");
+        require(CVodeSetMaxNumSteps(memory_, 1000000), "CVodeSetMaxNumSteps");
+        require(CVodeSetErrHandlerFn(
+                    memory_, [](int, const char*, const char*, char*, void*) {}, nullptr),
+                "CVodeSetErrHandlerFn");
+        const std::size_t guards = system_.guards();
+        if (guards > 0) {
+            require(CVodeRootInit(memory_, static_cast<int>(guards), guards_of<S>),
+                    "CVodeRootInit");
+            std::vector<int> directions(guards, Seen<S>::direction());
+            require(CVodeSetRootDirection(memory_, directions.data()), "CVodeSetRootDirection");
+            require(CVodeSetNoInactiveRootWarn(memory_), "CVodeSetNoInactiveRootWarn");
+        }
+    }
+    Solver(const Solver&) = delete;
+    Solver& operator=(const Solver&) = delete;
+    ~Solver()
+    {
+        CVodeFree(&memory_);
+        SUNNonlinSolFree(iteration_);
+    }
+
+    bool run(Answer& answer, std::size_t offset)
+    {
+        return drive(
+            system_, task_, state_.x, answer, offset, CV_ROOT_RETURN,
+            [&](double t_end, double* t) { return CVode(memory_, t_end, state_.x, t, CV_NORMAL); },
+            [&](int* flags) { CVodeGetRootInfo(memory_, flags); },
+            [&](double t) { require(CVodeReInit(memory_, t, state_.x), "CVodeReInit"); });
+    }
+
+private:
+    Task<S> task_;
+    Seen<S> system_;
+    State state_;
+    void* memory_ = nullptr;
+    SUNNonlinearSolver iteration_ = nullptr;
+};
+
+}  // namespace
+
+void add_cvode(Cells& cells)
+{
+    cells.add_version("CVODE", sundials_version());
+    for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
+        using S = decltype(make().front().system);
+        for (const double tolerance : tolerances) {
+            cells.add({name, "CVODE", "Adams, root finding", tolerance, [make, tolerance] {
+                           std::vector<std::shared_ptr<Solver<S>>> solvers;
+                           for (auto& task : make()) {
+                               solvers.push_back(std::make_shared<Solver<S>>(task, tolerance));
+                           }
+                           return [solvers] {
+                               Answer answer{.finished = true, .flow_calls = 0, .guard_calls = 0};
+                               for (std::size_t k = 0; k < solvers.size(); ++k) {
+                                   answer.finished &= solvers[k]->run(answer, guards_of_a_run * k);
+                               }
+                               return answer;
+                           };
+                       }});
+        }
+    });
+}
+
+}  // namespace ricochet::report

@@ -1,0 +1,60 @@
+// ricochet_report_draw: draws panels that are given as JSON on standard input, as every figure of
+// ricochet is drawn.
+//
+//     ricochet_report_draw <file.svg>
+//
+//     {"title": ..., "panels": [{"title": ..., "x": ..., "y": ..., "log_x": true, "log_y": true,
+//      "curves": [{"name": ..., "dashed": false, "x": [...], "y": [...]}]}]}
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <iostream>
+
+#include "studies/exhibit.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+Exhibit exhibit_of(const Json& given)
+{
+    Exhibit out;
+    for (const Json& panel : given.at("panels")) {
+        Panel& to = out.panels.emplace_back();
+        to.title = panel.at("title");
+        to.x_label = panel.at("x");
+        to.y_label = panel.at("y");
+        to.log_x = panel.value("log_x", true);
+        to.log_y = panel.value("log_y", true);
+        for (const Json& curve : panel.at("curves")) {
+            to.curves.push_back({.name = curve.at("name"),
+                                 .x = curve.at("x"),
+                                 .y = curve.at("y"),
+                                 .style = curve.value("dashed", false) ? Curve::Style::marked_dashed
+                                                                       : Curve::Style::marked,
+                                 .colour = curve.value("colour", -1)});
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
+}  // namespace ricochet::app
+
+int main(int argc, char** argv)
+{
+    try {
+        if (argc != 2) {
+            fmt::print(stderr, "usage: ricochet_report_draw <file.svg> < panels.json\n");
+            return 2;
+        }
+        const auto given = ricochet::app::Json::parse(std::cin);
+        ricochet::app::draw(ricochet::app::exhibit_of(given), given.at("title"), argv[1]);
+        return 0;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "ricochet_report_draw: {}\n", error.what());
+        return 1;
+    }
+}

@@ -1,0 +1,365 @@
+"""Writes the report: figures, a page of HTML that needs nothing but its figures, Markdown."""
+import html
+import json
+import math
+import re
+import shutil
+import statistics
+import subprocess
+
+from score import scored_as_wrong
+
+NOISY = 0.30
+AGREEMENT = 0.15
+BOUNDS = (1e-4, 1e-6, 1e-8, 1e-10)
+PALETTE = ["ricochet: dopri5", "ricochet: fehlberg78", "ricochet: Taylor", "odeint: step map",
+           "odeint: vector, dense output", "GSL: rk8pd, bisection", "CVODE: Adams, root finding",
+           "ARKODE: DP5, root finding", "SciPy: RK45", "SciPy: DOP853"]
+
+
+def minimum(row):
+    return min(row["samples"]) if row["samples"] else math.nan
+
+
+def median(row):
+    return statistics.median(row["samples"]) if row["samples"] else math.nan
+
+
+def p90(row):
+    ordered = sorted(row["samples"])
+    return ordered[round(0.9 * (len(ordered) - 1))] if ordered else math.nan
+
+
+def is_right(row):
+    return "failed" not in row and not scored_as_wrong(row)
+
+
+def series(rows):
+    """Rows by peer and way, in the order of the palette."""
+    out = {}
+    for row in rows:
+        out.setdefault(f"{row['peer']}: {row['how']}", []).append(row)
+    known = [name for name in PALETTE if name in out]
+    return {name: out[name] for name in known + [name for name in out if name not in PALETTE]}
+
+
+def number(x, unit=1.0):
+    if x is None or x != x:
+        return "-"
+    return f"{x / unit:.3g}"
+
+
+def duration(seconds):
+    if seconds != seconds:
+        return "-"
+    for unit, size in (("s", 1), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+# --- figures ---
+
+def curve(name, points):
+    points = [(x, y) for x, y in points if x == x and y == y and x > 0 and y > 0]
+    return {"name": name, "x": [x for x, _ in points], "y": [y for _, y in points],
+            "dashed": not name.startswith("ricochet"),
+            "colour": PALETTE.index(name) if name in PALETTE else 10 + sum(map(ord, name)) % 2}
+
+
+def panel(title, x, y, curves, **axes):
+    return {"title": title, "x": x, "y": y, "curves": [c for c in curves if c["x"]]} | axes
+
+
+def work_precision(title, rows, unit):
+    """Time against error, of right answers."""
+    curves = []
+    for name, cells in series(rows).items():
+        right = sorted((row for row in cells if is_right(row)), key=lambda row: -row["value"])
+        curves.append(curve(name, [(max(row["error"], 1e-17), minimum(row)) for row in right]))
+    return panel(title, unit, "shortest time of a run [s]", curves)
+
+
+def near_tangent(rows):
+    """Found crossings and time, over the depth, at one tolerance."""
+    found, times = [], []
+    for name, cells in series([row for row in rows if row["value"] == 1e-10]).items():
+        cells = sorted(((float(row["problem"].removeprefix("near-tangent-")), row)
+                        for row in cells if "failed" not in row), key=lambda pair: pair[0])
+        found.append(curve(name, [(depth, max(100 * row["share"], 1e-3)) for depth, row in cells]))
+        times.append(curve(name, [(depth, minimum(row)) for depth, row in cells
+                                  if not scored_as_wrong(row)]))
+    return [panel("Crossings found, tolerance 1e-10", "depth below the crest", "found [%]", found,
+                  log_y=False),
+            panel("Time of those that find all", "depth below the crest",
+                  "shortest time of 32 runs [s]", times)]
+
+
+def over_size(rows, prefix, title, bound, per_event):
+    """Shortest time over N of the cells whose error is within a bound."""
+    best = {}
+    for row in rows:
+        if not row["problem"].startswith(prefix) or not is_right(row) or row["error"] > bound:
+            continue
+        n = int(row["problem"].removeprefix(prefix))
+        seconds = minimum(row) / (per_event(row["problem"]) or 1)
+        per_peer = best.setdefault(f"{row['peer']}: {row['how']}", {})
+        per_peer[n] = min(per_peer.get(n, math.inf), seconds)
+    return panel(title, "N", "shortest time [s]",
+                 [curve(name, sorted(points.items())) for name, points in
+                  ((name, best[name]) for name in series(rows) if name in best)])
+
+
+def figures(report):
+    """Name of the file, caption and panels of every figure that has a curve."""
+    rows, problems = report["rows"], report["problems"]
+    by = {name: [row for row in rows if row["problem"] == name] for name in problems}
+    for row in rows:
+        events = problems[row["problem"]]["events"]
+        row["share"] = 1 - row.get("missed", events) / events if events else 1
+    out = []
+    for name, problem in problems.items():
+        if re.match(r"near-tangent|balls-|guards-", name) or not by[name]:
+            continue
+        unit = "relative error of the state" if not problem["events"] else "largest error [s]"
+        out.append((name, problem["title"] + ": time against error",
+                    [work_precision(problem["title"], by[name], unit)]))
+    tangent = [row for row in rows if row["problem"].startswith("near-tangent")]
+    if tangent:
+        out.append(("near-tangent", "Near-tangent pairs: found, and at what cost",
+                    near_tangent(tangent)))
+    balls = [row for row in rows if row["problem"].startswith("balls-")]
+    if balls:
+        out.append(("balls", "N balls in one state: time of an impact, errors within 1e-8 s",
+                    [over_size(balls, "balls-", "N balls in one state, per impact", 1e-8,
+                               lambda name: problems[name]["events"])]))
+    idle = [row for row in rows if row["problem"].startswith("guards-") and row["value"] == 1e-8]
+    if idle:
+        without = {f"{row['peer']}: {row['how']}": minimum(row) for row in idle
+                   if row["problem"] == "guards-0"}
+        curves = []
+        for name, cells in series(idle).items():
+            points = sorted((int(row["problem"].removeprefix("guards-")),
+                             minimum(row) / without.get(name, math.nan)) for row in cells
+                            if is_right(row))
+            curves.append(curve(name, points))
+        out.append(("guards", "Guards that never fire: time over that without guards",
+                    [panel("Idle guards, tolerance 1e-8", "guards", "time over none", curves)]))
+    return [figure for figure in out if any(p["curves"] for p in figure[2])]
+
+
+def draw(report, directory, root):
+    """Draws the figures; returns their names and captions, and why they are not there."""
+    program = root / "build/release/bin/ricochet_report_draw"
+    drawn = []
+    for name, caption, panels in figures(report):
+        file = directory / f"{name}.svg"
+        run = subprocess.run([program, file], input=json.dumps({"title": "", "panels": panels}),
+                             text=True, capture_output=True)
+        if run.returncode != 0:
+            return drawn, run.stderr.strip()
+        drawn.append((name, caption))
+    return drawn, ""
+
+
+# --- tables ---
+
+def fastest(rows, bound):
+    right = [row for row in rows if is_right(row) and row["error"] <= bound and row["samples"]]
+    return min(right, key=minimum, default=None)
+
+
+def at_equal_error(report):
+    """Per problem and bound: our fastest cell, and how many times as long each peer takes."""
+    out = []
+    for name, problem in report["problems"].items():
+        if name.startswith(("near-tangent", "guards-")):
+            continue
+        rows = [row for row in report["rows"] if row["problem"] == name]
+        for bound in BOUNDS:
+            ours = fastest([row for row in rows if row["peer"] == "ricochet"], bound)
+            if not ours:
+                continue
+            ratios = {}
+            for peer in sorted({row["peer"] for row in report["rows"]} - {"ricochet"}):
+                theirs = fastest([row for row in rows if row["peer"] == peer], bound)
+                ratios[peer] = minimum(theirs) / minimum(ours) if theirs else None
+            out.append((problem["title"], bound, ours, ratios))
+    return out
+
+
+def equal_error_table(report):
+    peers = sorted({row["peer"] for row in report["rows"]} - {"ricochet"})
+    header = ["problem", "error within", "ricochet", "by"] + peers
+    rows = []
+    for title, bound, ours, ratios in at_equal_error(report):
+        rows.append([title, f"{bound:g}", duration(minimum(ours)), ours["how"]] +
+                    [f"{ratios[peer]:.3g}" if ratios.get(peer) else "-" for peer in peers])
+    return header, rows
+
+
+def why(row):
+    """What is wrong with a row, or nothing."""
+    if "failed" in row:
+        return row["failed"]
+    if not row["finished"]:
+        return "did not reach the end" + (f": {row['note']}" if row["note"] else "")
+    return "wrong" if scored_as_wrong(row) else ""
+
+
+def cell_table(rows):
+    header = ["peer", "set as", "tolerance or step", "error", "missed", "invented", "steps",
+              "flow calls", "guard calls", "time min", "median", "p90", "remark", "again by"]
+    out = []
+    for row in rows:
+        known = "failed" not in row or "error" in row
+        out.append([row["peer"], row["how"], f"{row['value']:g}",
+                    number(row["error"]) if known else "-",
+                    str(row["missed"]) if known else "-", str(row["invented"]) if known else "-",
+                    *(str(row.get(c)) if row.get(c) is not None else "-"
+                      for c in ("steps", "flow_calls", "guard_calls")),
+                    duration(minimum(row)), duration(median(row)), duration(p90(row)), why(row),
+                    f"`{row['command']}`"])
+    return header, out
+
+
+def spread(samples):
+    ordered = sorted(samples)
+    return (ordered[round(0.9 * (len(ordered) - 1))] / ordered[0] - 1) if ordered else math.inf
+
+
+def agreement(report, older):
+    """Largest departure of the ratios of two reports: each time is taken over the geometric mean
+    of those of its problem that both have."""
+    def times(of):
+        return {row["name"]: minimum(row) for row in of["rows"] if row["samples"]}
+    new, old = times(report), times(older)
+    problem_of = {row["name"]: row["problem"] for row in report["rows"]}
+    worst = []
+    for problem in report["problems"]:
+        names = [name for name in new if name in old and problem_of[name] == problem]
+        if len(names) < 2:
+            continue
+        shift = statistics.fmean(math.log(new[name] / old[name]) for name in names)
+        worst += [(abs(math.expm1(math.log(new[name] / old[name]) - shift)), name)
+                  for name in names]
+    return sorted(worst, reverse=True)
+
+
+def remarks(report, older):
+    """Sentences about how far the report can be relied upon."""
+    out = []
+    noise = spread(report["yardstick"])
+    out.append(f"The yardstick, one rk4 step of the ball through odeint, took "
+               f"{duration(min(report['yardstick'], default=math.nan))} at best; a tenth of its "
+               f"samples were {100 * noise:.0f} % above that or more.")
+    if noise > NOISY:
+        out.append(f"That is more than {100 * NOISY:.0f} %: **the machine was too noisy**, and "
+                   "ratios of this report are not to be quoted.")
+    if older:
+        worst = agreement(report, older)
+        if worst:
+            apart = [pair for pair in worst if pair[0] > AGREEMENT]
+            out.append(f"Beside the other report on this commit, {len(worst) - len(apart)} of "
+                       f"{len(worst)} ratios agree within {100 * AGREEMENT:.0f} %; the largest "
+                       f"departure is {100 * worst[0][0]:.0f} % ({worst[0][1]}).")
+    for peer, reason in sorted(report["absent"].items()):
+        out.append(f"{peer} is not in this report: {reason}.")
+    return out
+
+
+# --- pages ---
+
+def heading(report):
+    machine = report["machine"]
+    peers = ", ".join(f"{peer} {version}" for peer, version in sorted(report["versions"].items()))
+    return (f"Commit {machine['commit']}, {machine['date']}; {machine['processor']}, "
+            f"{machine['cores']} cores; {machine['compiler']}. {peers}.")
+
+
+EXPLANATION = (
+    "A time is the processor time of one run, the shortest of up to 15 samples; the cells of a "
+    "problem are sampled in turns, each in a process of its own, all on one core. An answer is "
+    "scored first: events that are missed or invented, then the largest error of their times "
+    "against the reference. What misses or invents events is not timed, but for the near-tangent "
+    "pairs, where that is the question. Every peer solves the same problem, written once for all "
+    "that are driven from C++, and is used as its manual says.")
+
+
+def markdown_table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+def html_table(header, rows):
+    def cell(text):
+        if text.startswith("`") and text.endswith("`"):
+            return f"<td><code>{html.escape(text[1:-1])}</code></td>"
+        return f"<td>{html.escape(text)}</td>"
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
+    body = "".join("<tr>" + "".join(cell(text) for text in row) + "</tr>" for row in rows)
+    return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+            "</div>")
+
+
+STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 0 auto; padding: 0 1rem;
+       color: #222; background: #fff; overflow-wrap: break-word; }
+img { max-width: 100%; height: auto; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 0.8rem; white-space: nowrap; }
+th, td { padding: 0.15rem 0.6rem; border-bottom: 1px solid #ddd; text-align: left; }
+th { background: #f2f4f7; }
+summary { cursor: pointer; font-weight: 600; padding: 0.4rem 0; }
+"""
+
+
+def sections(report):
+    """Heading and rows of each problem's table."""
+    for name, problem in report["problems"].items():
+        rows = [row for row in report["rows"] if row["problem"] == name]
+        if rows:
+            yield problem["title"], cell_table(rows)
+
+
+def write(report, older, directory, root):
+    directory.mkdir(parents=True, exist_ok=True)
+    for old in directory.glob("*.svg"):
+        old.unlink()
+    drawn, undrawn = draw(report, directory, root)
+    said = remarks(report, older) + ([f"No figures: {undrawn}."] if undrawn else [])
+    table = equal_error_table(report)
+    lead = ("How many times as long as the fastest setting of ricochet the fastest setting of each "
+            "peer takes, both within the same error. A dash: no setting of the peer is that right.")
+
+    text = ["# Run time against error, beside the peers", heading(report), EXPLANATION, *said,
+            "## At equal error", lead, markdown_table(*table), "## Figures"]
+    text += [f"![{caption}]({name}.svg)" for name, caption in drawn]
+    text += ["## Every cell"]
+    for title, cells in sections(report):
+        text += [f"### {title}", markdown_table(*cells)]
+    (directory / "report.md").write_text("\n\n".join(text) + "\n")
+
+    def paragraph(sentence):
+        bold = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", html.escape(sentence))
+        return f"<p>{bold}</p>"
+    page = ['<!doctype html><html lang="en"><head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            "<title>ricochet: run time against error</title>", f"<style>{STYLE}</style></head>",
+            "<body><h1>Run time against error, beside the peers</h1>",
+            *map(paragraph, [heading(report), EXPLANATION, *said]),
+            "<h2>At equal error</h2>", paragraph(lead), html_table(*table), "<h2>Figures</h2>"]
+    for name, caption in drawn:
+        escaped = html.escape(caption)
+        page.append(f'<figure><img src="{name}.svg" alt="{escaped}">'
+                    f"<figcaption>{escaped}</figcaption></figure>")
+    page.append("<h2>Every cell</h2>")
+    for title, cells in sections(report):
+        page.append(f"<details><summary>{html.escape(title)}</summary>{html_table(*cells)}"
+                    "</details>")
+    page.append("</body></html>")
+    (directory / "index.html").write_text("\n".join(page) + "\n")
+    if (directory / "report.json").exists():
+        shutil.copy(directory / "report.json", directory / "report.before.json")
+    (directory / "report.json").write_text(json.dumps(report))
