@@ -36,7 +36,7 @@ for compiler in "$@"; do
 done
 last=${!#}
 consume "$last" "all components" -DCMAKE_PREFIX_PATH="$work/whole" \
-    -DRICOCHET_COMPONENTS="nonsmooth;sensitivity;faults;learn;hosts" -- nonsmooth sensitivity faults learn
+    -DRICOCHET_COMPONENTS="nonsmooth;sensitivity;scene;faults;learn;hosts" -- nonsmooth sensitivity scene faults learn
 consume "$last" "add_subdirectory" -DRICOCHET_SOURCE="$source" -- consumer
 
 if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_PATH="$work/core" \
@@ -45,7 +45,7 @@ if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_P
     exit 1
 fi
 grep -q learn "$work/log"
-for room in learn faults hosts nonsmooth sensitivity systems/sliding_mode.hpp; do
+for room in learn faults hosts nonsmooth scene sensitivity systems/sliding_mode.hpp; do
     [ -e "$work/whole/include/ricochet/$room" ]
     [ ! -e "$work/core/include/ricochet/$room" ]
 done

@@ -1,0 +1,32 @@
+// Scenes as JSON text.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "ricochet/scene/scene.hpp"
+#include "ricochet/scene/simulate.hpp"
+
+namespace ricochet {
+
+/// What is wrong with a scene's text, in one sentence that begins with its name and line:
+/// "bin.json:12: expected a number for "radius", found "big"".
+class SceneFileError : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+struct SceneFile {
+    Scene scene;
+    SceneOptions options;  ///< from "run"; t_end is NaN where it is not given
+};
+
+/// The scene that `text` describes (docs/scenes.md has the keys). `file` is what errors call it.
+/// @throws SceneFileError
+[[nodiscard]] SceneFile read_scene(std::string_view text, std::string_view file = "scene");
+
+/// The same from a file. @throws SceneFileError also where it cannot be read.
+[[nodiscard]] SceneFile load_scene(const std::string& path);
+
+}  // namespace ricochet

@@ -1,0 +1,156 @@
+// What is in a scene: discs and points, walls and terrain, springs, gravity and drag.
+//
+// A scene describes and checks; `simulate` (scene/simulate.hpp) runs it. The plane is vertical or
+// horizontal as gravity says. Discs do not turn: friction acts on their centres.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+namespace ricochet {
+
+/// (x, y)
+using Vector2 = std::array<double, 2>;
+
+/// Handles that a scene gives out, valid for that scene.
+struct MaterialId {
+    std::uint32_t index = 0;
+    friend bool operator==(MaterialId, MaterialId) = default;
+};
+struct BodyId {
+    std::uint32_t index = 0;
+    friend bool operator==(BodyId, BodyId) = default;
+};
+struct SurfaceId {
+    std::uint32_t index = 0;
+    friend bool operator==(SurfaceId, SurfaceId) = default;
+};
+
+/// Where two materials meet, the smaller of the two restitutions and of the two coefficients of
+/// friction hold. `MaterialId{}` is elastic and smooth.
+struct Material {
+    std::string name{};      ///< may be empty
+    double restitution = 1;  ///< Newton's coefficient, in [0, 1]
+    double friction = 0;     ///< Coulomb's coefficient
+};
+
+struct Disc {
+    std::string name{};  ///< may be empty: then it is called by its number
+    Vector2 at{};        ///< [m] centre
+    Vector2 velocity{};  ///< [m/s]
+    double radius = 1;   ///< [m], positive
+    double mass = 1;     ///< [kg], positive
+    double drag = 0;     ///< [kg/s] force -drag velocity, not negative
+    MaterialId material{};
+};
+
+/// A body without extension. Two points never meet.
+struct Point {
+    std::string name{};
+    Vector2 at{};        ///< [m]
+    Vector2 velocity{};  ///< [m/s]
+    double mass = 1;     ///< [kg], positive
+    double drag = 0;     ///< [kg/s]
+    MaterialId material{};
+};
+
+/// The half plane behind a line: bodies stay where (x - point) . normal is not negative.
+struct Wall {
+    std::string name{};
+    Vector2 point{};   ///< [m]
+    Vector2 normal{};  ///< of any length but zero; points to where bodies are
+    MaterialId material{};
+};
+
+/// A chain of segments, met from both sides.
+struct Terrain {
+    std::string name{};
+    std::vector<Vector2> points{};  ///< [m] two or more
+    bool closed = false;            ///< whether the last is joined to the first
+    MaterialId material{};
+};
+
+/// Between the centres of two bodies: pulls with stiffness (length - rest) + damping d(length)/dt.
+struct Spring {
+    std::array<BodyId, 2> between{};
+    double rest = 0;       ///< [m] length without force
+    double stiffness = 0;  ///< [N/m]
+    double damping = 0;    ///< [N s/m]
+};
+
+class Scene {
+public:
+    struct Settings {
+        Vector2 gravity{};          ///< [m/s^2]
+        double memory_limit = 4e9;  ///< [bytes] a scene that would need more in a run is refused
+    };
+
+    Scene() : Scene(Settings{}) {}
+    /// @throws std::invalid_argument where gravity is not finite.
+    explicit Scene(const Settings& settings);
+
+    /// Each is checked as it comes, and refused in one sentence that names it: a mass or radius
+    /// that is not positive, what is not finite, a name that is taken, an unknown handle, a
+    /// restitution above 1, a body that lies behind a wall or across terrain already there.
+    /// @throws std::invalid_argument
+    MaterialId material(const Material& material);
+    BodyId disc(const Disc& disc);
+    BodyId point(const Point& point);
+    SurfaceId wall(const Wall& wall);
+    SurfaceId terrain(const Terrain& terrain);
+    void spring(const Spring& spring);
+
+    /// Refuses `bodies` more bodies where they would need more memory than is allowed.
+    void require_room(double bodies) const;
+
+    /// What needs all parts: bodies that overlap at the start (which, and by how much), or lie
+    /// behind walls or across terrain that came after them. `simulate` and `explain` ask.
+    /// @throws std::invalid_argument
+    void check() const;
+
+    [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
+    /// A point is a disc of radius 0 here.
+    [[nodiscard]] std::span<const Disc> bodies() const noexcept { return bodies_; }
+    [[nodiscard]] std::span<const Material> materials() const noexcept { return materials_; }
+    [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }
+
+    /// Walls first, then terrain, each in the order in which it came.
+    struct Surface {
+        std::string name;
+        bool is_wall = true;
+        std::vector<Vector2> points;  ///< of a wall its one point; closed terrain repeats the first
+        Vector2 normal{};             ///< of a wall, of length 1
+        MaterialId material{};
+    };
+    [[nodiscard]] std::span<const Surface> surfaces() const noexcept { return surfaces_; }
+
+    /// As given, or "body 3" and "surface 3".
+    [[nodiscard]] std::string name_of(BodyId body) const;
+    [[nodiscard]] std::string name_of(SurfaceId surface) const;
+    /// The body of this name. @throws std::invalid_argument with the nearest name that is known.
+    [[nodiscard]] BodyId body(std::string_view name) const;
+
+    /// [bytes] What a run needs, without events and samples.
+    [[nodiscard]] double memory() const noexcept;
+
+private:
+    BodyId add(const Disc& body, std::string_view kind);
+    void take_name(const std::string& name, std::string_view kind);
+    void require_material(MaterialId material, std::string_view who) const;
+    void require_outside(const Disc& body, const Surface& surface) const;
+
+    Settings settings_;
+    std::vector<Material> materials_;
+    std::vector<Disc> bodies_;
+    std::vector<Surface> surfaces_;
+    std::vector<Spring> springs_;
+    std::unordered_map<std::string, std::uint32_t> names_;
+};
+
+}  // namespace ricochet

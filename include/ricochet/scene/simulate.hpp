@@ -1,0 +1,111 @@
+// A scene in motion: every body advances by a clock of its own, from impact to impact.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/scene/scene.hpp"
+
+namespace ricochet {
+
+/// What happens where several contacts of one cluster are struck at one instant.
+enum class ImpactLaw {
+    waves,     ///< those that approach fastest, ties together; again until none approaches
+    together,  ///< Newton's law for all contacts at once
+};
+
+struct SceneOptions {
+    double t_start = 0;                                       ///< [s]
+    double t_end = std::numeric_limits<double>::quiet_NaN();  ///< [s] above t_start
+    double rtol = 1e-8;  ///< of bodies with springs or drag, as in `Options`
+    double atol = 1e-10;
+    ImpactLaw impacts = ImpactLaw::waves;
+
+    /// [s] A change of the model, off at 0: an impact is elastic where one of its bodies had its
+    /// last one less than this ago (S. Luding and S. McNamara, How to handle the inelastic collapse
+    /// of a dissipative hard-sphere gas with the TC model, Granular Matter 1, 1998).
+    double elastic_within = 0;
+
+    bool record_events = true;           ///< off: events are counted, not kept
+    std::vector<double> sample_times{};  ///< [s] ascending; they change no bit of the motion
+    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();
+    const std::atomic<bool>* cancelled = nullptr;  ///< set from elsewhere, ends the run
+};
+
+/// The other one in an event.
+struct Partner {
+    bool is_surface = false;
+    std::uint32_t index = 0;  ///< of a body or of a surface
+    friend bool operator==(const Partner&, const Partner&) = default;
+};
+
+/// One contact that was struck, or one body that came to rest on a surface. Contacts of one
+/// cluster have the same `number` and time, and stand in the order of their waves.
+struct SceneEvent {
+    enum class Kind : std::uint8_t {
+        impact,
+        held,     ///< impacts on the surface have accumulated: it slides on it, or is at rest
+        stopped,  ///< friction has stopped what slid
+    };
+    double t = 0;  ///< [s]
+    std::uint64_t number = 0;
+    Kind kind = Kind::impact;
+    std::uint32_t body = 0;  ///< the one with the lower index
+    Partner other{};
+    Vector2 impulse{};                ///< [N s] on `body`; the other one has its opposite
+    std::array<Vector2, 2> before{};  ///< [m/s] velocities of body and other
+    std::array<Vector2, 2> after{};
+};
+
+struct BodyState {
+    Vector2 at{};         ///< [m]
+    Vector2 velocity{};   ///< [m/s]
+    bool asleep = false;  ///< at rest, and stays so until it is struck
+};
+
+struct SceneStatistics {
+    std::uint64_t impacts = 0;      ///< contacts struck
+    std::uint64_t events = 0;       ///< impacts of one cluster counted once
+    std::uint64_t waves = 0;        ///< of impacts of clusters
+    std::uint64_t collapses = 0;    ///< clusters whose restitution was spent
+    std::uint64_t predictions = 0;  ///< first contacts asked for, of pairs and surfaces
+    std::uint64_t stale = 0;        ///< predicted impacts that never came
+    std::uint64_t crossings = 0;    ///< from cell to cell
+    std::uint64_t steps = 0;        ///< of islands with springs or drag
+    std::uint64_t rejected = 0;
+    std::uint64_t flow_calls = 0;
+    std::uint64_t alone = 0;   ///< bodies that could meet none, and had no calendar
+    std::uint64_t groups = 0;  ///< of bodies that could meet
+};
+
+/// What a run returns. Nothing that was computed is lost, whatever the outcome.
+struct SceneRun {
+    Outcome outcome = Outcome::reached_end;
+    std::string message;  ///< empty at the end, else what ended the run, in a sentence
+    std::vector<std::uint32_t> involved;          ///< bodies that the message is about
+    double t = 0;                                 ///< [s] time reached, by all bodies
+    std::vector<BodyState> bodies;                ///< at that time
+    std::vector<SceneEvent> events;               ///< in the order of time
+    std::vector<double> sample_times;             ///< those reached
+    std::vector<std::vector<BodyState>> samples;  ///< a row for each
+    SceneStatistics statistics;
+};
+
+/// @throws std::invalid_argument where the scene or an option is not as it must be.
+[[nodiscard]] SceneRun simulate(const Scene& scene, const SceneOptions& options);
+
+/// How the scene would be run: islands, how each moves, which can meet and when first, what is
+/// skipped and why, memory. Nothing is simulated.
+/// @throws as `simulate`
+[[nodiscard]] std::string explain(const Scene& scene, const SceneOptions& options);
+
+/// Kinetic energy, and potential energy of gravity and springs [J].
+[[nodiscard]] double energy(const Scene& scene, const std::vector<BodyState>& bodies);
+
+}  // namespace ricochet

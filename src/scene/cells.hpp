@@ -1,0 +1,86 @@
+// A grid of cells over the whole plane, folded onto a torus: a body far away shares its bucket with
+// one that is near, which costs a question and decides nothing.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+class Cells {
+public:
+    Cells() = default;
+
+    /// Cells of at least `side`, about `per_cell` of `bodies` in each where they fill the box.
+    void size(double side, std::uint32_t buckets_x, std::uint32_t buckets_y)
+    {
+        side_ = side;
+        inverse_ = 1 / side;
+        mask_x_ = buckets_x - 1;
+        mask_y_ = buckets_y - 1;
+        width_ = buckets_x;
+        heads_.assign(static_cast<std::size_t>(buckets_x) * buckets_y, none);
+        fixed_.assign(heads_.size(), {});
+    }
+
+    struct Cell {
+        std::int64_t x = 0, y = 0;
+        friend bool operator==(const Cell&, const Cell&) = default;
+    };
+    [[nodiscard]] Cell cell_of(const Vector2& p) const noexcept
+    {
+        return {static_cast<std::int64_t>(std::floor(p[0] * inverse_)),
+                static_cast<std::int64_t>(std::floor(p[1] * inverse_))};
+    }
+    [[nodiscard]] std::uint32_t bucket_of(std::int64_t x, std::int64_t y) const noexcept
+    {
+        return (static_cast<std::uint32_t>(x) & mask_x_) +
+               width_ * (static_cast<std::uint32_t>(y) & mask_y_);
+    }
+    [[nodiscard]] double side() const noexcept { return side_; }
+
+    void insert(std::vector<Body>& bodies, std::uint32_t i, const Cell& cell)
+    {
+        const std::uint32_t bucket = bucket_of(cell.x, cell.y);
+        Body& body = bodies[i];
+        body.bucket = bucket;
+        body.previous = none;
+        body.next = heads_[bucket];
+        if (body.next != none) bodies[body.next].previous = i;
+        heads_[bucket] = i;
+    }
+    void remove(std::vector<Body>& bodies, std::uint32_t i)
+    {
+        Body& body = bodies[i];
+        (body.previous == none ? heads_[body.bucket] : bodies[body.previous].next) = body.next;
+        if (body.next != none) bodies[body.next].previous = body.previous;
+    }
+    [[nodiscard]] std::uint32_t head(std::uint32_t bucket) const noexcept { return heads_[bucket]; }
+
+    /// Faces that reach into a bucket.
+    void add_face(std::uint32_t bucket, std::uint32_t face)
+    {
+        auto& list = fixed_[bucket];
+        if (std::ranges::find(list, face) == list.end()) list.push_back(face);
+        any_fixed_ = true;
+    }
+    [[nodiscard]] const std::vector<std::uint32_t>& faces(std::uint32_t bucket) const noexcept
+    {
+        return fixed_[bucket];
+    }
+    [[nodiscard]] bool any_faces() const noexcept { return any_fixed_; }
+
+private:
+    double side_ = 1;
+    double inverse_ = 1;
+    std::uint32_t mask_x_ = 0, mask_y_ = 0, width_ = 1;
+    std::vector<std::uint32_t> heads_;
+    std::vector<std::vector<std::uint32_t>> fixed_;
+    bool any_fixed_ = false;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,212 @@
+#include "scene/groups.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "scene/islands.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+struct Interval {
+    double low = 0, high = 0;
+};
+
+/// Of x + v s + a s^2/2 for s in [0, until].
+Interval swept(double x, double v, double a, double until)
+{
+    if (a == 0 && v == 0) return {x, x};
+    const double end = x + until * (v + 0.5 * a * until);
+    Interval out{std::min(x, end), std::max(x, end)};
+    const double turn = a != 0 ? -v / a : never;
+    if (turn > 0 && turn < until) {
+        const double at = x + 0.5 * v * turn;
+        out.low = std::min(out.low, at);
+        out.high = std::max(out.high, at);
+    }
+    return out;
+}
+
+constexpr double infinite = never;
+
+/// Where gravity is across the walls that a body can meet, what happens on them leaves its motion
+/// along them alone: both are known.
+bool along_walls(const World& world, const Body& body, double until, Reach& reach)
+{
+    const Vector2 normal = world.wall_count > 0 ? world.faces[0].normal : Vector2{0, 1};
+    const Vector2 along = turned(normal);
+    if (normal[0] * normal[1] != 0) return false;  // boxes follow the axes
+    for (std::uint32_t f = 0; f < world.wall_count; ++f) {
+        const Face& wall = world.faces[f];
+        if (std::fabs(dot(wall.normal, along)) > 0) return false;
+        if (world.friction(body.material, wall.material) > 0 && dot(body.v, along) != 0) {
+            return false;
+        }
+    }
+    const double pull = dot(world.gravity, normal);
+    const double height = dot(body.p, normal);
+    const double rise = dot(body.v, normal);
+    Interval across = swept(height, rise, pull, until);
+    if (pull != 0) {
+        // No higher than its energy takes it, against gravity; as far as it falls along it.
+        const double top = height - rise * rise / (2 * pull);
+        (pull < 0 ? across.high : across.low) =
+            pull < 0 ? std::max(across.high, top) : std::min(across.low, top);
+    } else if (rise != 0) {
+        across = {-infinite, infinite};
+    }
+    for (std::uint32_t f = 0; f < world.wall_count; ++f) {
+        const Face& wall = world.faces[f];
+        const double at = dot(wall.at, normal);
+        if (dot(wall.normal, normal) > 0) {
+            across.low = std::max(across.low, at);
+        } else {
+            across.high = std::min(across.high, at);
+            // Struck from below, what moves against gravity may come back faster than it left.
+            if (pull > 0) across.low = -infinite;
+        }
+    }
+    const Interval sideways =
+        swept(dot(body.p, along), dot(body.v, along), dot(world.gravity, along), until);
+    for (std::size_t c = 0; c < 2; ++c) {
+        const bool across_axis = normal[c] != 0;
+        const double first = across_axis ? across.low * normal[c] : sideways.low * along[c];
+        const double second = across_axis ? across.high * normal[c] : sideways.high * along[c];
+        const double slack = body.radius + 1e-9 * (std::fabs(first) + std::fabs(second));
+        reach.low[c] = std::min(first, second) - slack;
+        reach.high[c] = std::max(first, second) + slack;
+    }
+    return true;
+}
+
+/// Around the start with the largest speed, behind no wall.
+void by_speed(const World& world, const Body& body, double fastest, Reach& reach)
+{
+    const double far = fastest * (world.options.t_end - world.options.t_start) * (1 + 1e-9);
+    for (std::size_t c = 0; c < 2; ++c) {
+        reach.low[c] = body.p[c] - far - body.radius;
+        reach.high[c] = body.p[c] + far + body.radius;
+    }
+    for (std::uint32_t f = 0; f < world.wall_count; ++f) {
+        const Face& wall = world.faces[f];
+        for (std::size_t c = 0; c < 2; ++c) {
+            if (wall.normal[c] == 1) reach.low[c] = std::max(reach.low[c], wall.at[c]);
+            if (wall.normal[c] == -1) reach.high[c] = std::min(reach.high[c], wall.at[c]);
+        }
+    }
+}
+
+/// Bodies that meet exchange speeds. With V^2 the sum of m v^2, impacts let V not grow, and gravity
+/// by |g| sqrt(mass of all) a second at most; no speed is above V / sqrt(m).
+void by_energy(const World& world, const std::vector<std::uint32_t>& group,
+               std::vector<Reach>& boxes)
+{
+    const double until = world.options.t_end - world.options.t_start;
+    double square = 0;
+    double mass = 0;
+    for (const std::uint32_t i : group) {
+        const Body& body = world.bodies[i];
+        square += dot(body.v, body.v) / body.inverse_mass;
+        mass += 1 / body.inverse_mass;
+    }
+    // What sleeps alone is not pulled by anything.
+    const bool asleep =
+        std::ranges::all_of(group, [&](std::uint32_t i) { return world.bodies[i].asleep; });
+    if (asleep) return;
+    const double v = std::sqrt(square) + norm(world.gravity) * std::sqrt(mass) * until;
+    for (const std::uint32_t i : group) {
+        const Body& body = world.bodies[i];
+        if (body.island == none) by_speed(world, body, v * std::sqrt(body.inverse_mass), boxes[i]);
+    }
+}
+
+/// Joins all that overlap along one axis; true if a part fell apart.
+class Divider {
+public:
+    Divider(const std::vector<Reach>& reaches, std::vector<std::uint32_t>& order)
+        : reaches_(reaches), order_(order)
+    {
+    }
+
+    /// Parts of [begin, end) that are apart along an axis, divided again along the other one.
+    void divide(std::size_t begin, std::size_t end, std::size_t axis, bool tried)
+    {
+        if (end - begin <= 1) return close(begin, end);
+        const auto first = order_.begin() + static_cast<std::ptrdiff_t>(begin);
+        const auto last = order_.begin() + static_cast<std::ptrdiff_t>(end);
+        std::sort(first, last, [&](std::uint32_t a, std::uint32_t b) {
+            return reaches_[a].low[axis] < reaches_[b].low[axis];
+        });
+        std::vector<std::size_t> cuts;
+        double top = reaches_[order_[begin]].high[axis];
+        for (std::size_t k = begin + 1; k < end; ++k) {
+            if (reaches_[order_[k]].low[axis] > top) cuts.push_back(k);
+            top = std::max(top, reaches_[order_[k]].high[axis]);
+        }
+        if (cuts.empty() && tried) return close(begin, end);
+        const bool whole = cuts.empty();
+        cuts.push_back(end);
+        std::size_t from = begin;
+        for (const std::size_t cut : cuts) {
+            divide(from, cut, 1 - axis, whole);
+            from = cut;
+        }
+    }
+
+    std::vector<std::vector<std::uint32_t>> parts;
+
+private:
+    void close(std::size_t begin, std::size_t end)
+    {
+        const auto first = order_.begin() + static_cast<std::ptrdiff_t>(begin);
+        const auto last = order_.begin() + static_cast<std::ptrdiff_t>(end);
+        parts.emplace_back(first, last);
+        std::ranges::sort(parts.back());
+    }
+
+    const std::vector<Reach>& reaches_;
+    std::vector<std::uint32_t>& order_;
+};
+
+/// Boxes of bodies that meet no other one: from closed forms where all walls are parallel, else
+/// from the largest speed.
+std::vector<Reach> reaches(const World& world)
+{
+    const double until = world.options.t_end - world.options.t_start;
+    std::vector<Reach> out(world.bodies.size());
+    const bool terrain = world.faces.size() > world.wall_count;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+        const Body& body = world.bodies[i];
+        if (body.island != none) {
+            out[i] = {{-infinite, -infinite}, {infinite, infinite}};
+        } else if (body.asleep) {
+            by_speed(world, body, 0, out[i]);
+        } else if (terrain || !along_walls(world, body, until, out[i])) {
+            by_speed(world, body, norm(body.v) + norm(world.gravity) * until, out[i]);
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
+std::vector<std::vector<std::uint32_t>> groups_of(const World& world)
+{
+    if (world.bodies.empty()) return {};
+    std::vector<Reach> boxes = reaches(world);
+    std::vector<std::uint32_t> order(world.bodies.size());
+    std::iota(order.begin(), order.end(), 0U);
+    for (std::size_t before = 0;;) {
+        Divider divider(boxes, order);
+        divider.divide(0, order.size(), 0, false);
+        if (divider.parts.size() == before) return std::move(divider.parts);
+        before = divider.parts.size();
+        for (const auto& part : divider.parts) {
+            if (part.size() > 1) by_energy(world, part, boxes);
+        }
+    }
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,243 @@
+#include "scene/impacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/gauss.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+/// Approaches that differ by less are equally fast.
+constexpr double tie = 1e-12;
+
+/// Waves for each contact after which a cluster is taken for one that collapses.
+constexpr std::size_t patience = 100;
+
+/// Sweeps alone, for few contacts; before the exact solution of more; where that is too large.
+constexpr std::size_t few = 4;
+constexpr std::size_t most_exact = 600;
+constexpr int few_sweeps = 30;
+constexpr int most_sweeps = 10'000;
+
+Vector2 velocity_of(const std::vector<Vector2>& v, const Contact& contact)
+{
+    return contact.surface ? v[contact.slot_a] : v[contact.slot_a] - v[contact.slot_b];
+}
+
+}  // namespace
+
+double Impacts::approach(const Cluster& cluster, const Contact& contact) const
+{
+    return -dot(velocity_of(cluster.after, contact), contact.normal);
+}
+
+double Impacts::noise(const Cluster& cluster, const Contact& contact) const
+{
+    const double other = contact.surface ? 0 : norm(cluster.after[contact.slot_b]);
+    return 8 * epsilon * (norm(cluster.after[contact.slot_a]) + other);
+}
+
+void Impacts::push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const
+{
+    Vector2& a = cluster.after[contact.slot_a];
+    a = a + world_.bodies[contact.a].inverse_mass * impulse;
+    if (contact.surface) return;
+    Vector2& b = cluster.after[contact.slot_b];
+    b = b - world_.bodies[contact.b].inverse_mass * impulse;
+}
+
+/// One contact alone, in closed form.
+void Impacts::strike(Cluster& cluster, Contact& contact) const
+{
+    const double u = approach(cluster, contact);
+    contact.impulse = (1 + contact.restitution) * u * contact.mass;
+    contact.tangential = 0;
+    if (contact.friction > 0) {
+        const Vector2 tangent = turned(contact.normal);
+        const double slip = dot(velocity_of(cluster.after, contact), tangent);
+        const double most = contact.friction * contact.impulse;
+        contact.tangential = std::clamp(-slip * contact.mass, -most, most);
+        push(cluster, contact, contact.impulse * contact.normal + contact.tangential * tangent);
+    } else {
+        push(cluster, contact, contact.impulse * contact.normal);
+    }
+}
+
+/// How an impulse at one contact moves another one along its normal.
+static double coupling(const World& world, const Contact& a, const Contact& b)
+{
+    double sum = 0;
+    const auto add = [&](std::uint32_t body, const Vector2& direction) {
+        if (b.a == body) sum += world.bodies[body].inverse_mass * dot(direction, b.normal);
+        if (!b.surface && b.b == body) {
+            sum -= world.bodies[body].inverse_mass * dot(direction, b.normal);
+        }
+    };
+    add(a.a, a.normal);
+    if (!a.surface) add(a.b, -1.0 * a.normal);
+    return sum;
+}
+
+/// Without friction, by an active set; false where that does not come to an end.
+bool Impacts::solve_exactly(Cluster& cluster) const
+{
+    const auto n = static_cast<Eigen::Index>(struck_.size());
+    Eigen::MatrixXd w(n, n);
+    Eigen::VectorXd q(n);
+    Eigen::VectorXd p(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        const Contact& a = cluster.contacts[struck_[static_cast<std::size_t>(i)]];
+        p[i] = a.impulse;
+        q[i] = -approach(cluster, a) - a.target;
+        for (Eigen::Index j = 0; j < n; ++j) {
+            w(i, j) = coupling(world_, a, cluster.contacts[struck_[static_cast<std::size_t>(j)]]);
+        }
+    }
+    if (!solve_together(w, q, p)) return false;
+    for (Eigen::Index i = 0; i < n; ++i) {
+        Contact& contact = cluster.contacts[struck_[static_cast<std::size_t>(i)]];
+        contact.impulse = p[i];
+        push(cluster, contact, p[i] * contact.normal);
+    }
+    return true;
+}
+
+/// All of `struck_` together: separation >= target, impulse >= 0, one of them equal.
+void Impacts::solve(Cluster& cluster) const
+{
+    double fastest = 0;
+    bool friction = false;
+    for (const std::uint32_t k : struck_) {
+        Contact& contact = cluster.contacts[k];
+        contact.impulse = contact.tangential = 0;
+        const double u = approach(cluster, contact);
+        fastest = std::max(fastest, std::fabs(u));
+        contact.target = contact.restitution * std::max(u, 0.0);
+        friction = friction || contact.friction > 0;
+    }
+    if (!friction && struck_.size() > few && struck_.size() <= most_exact) {
+        const std::vector<Vector2> start = cluster.after;
+        sweep(cluster, 0.5 * epsilon * fastest, few_sweeps);
+        cluster.after = start;
+        if (solve_exactly(cluster)) return;
+        cluster.after = start;
+        for (const std::uint32_t k : struck_) cluster.contacts[k].impulse = 0;
+    }
+    sweep(cluster, 0.5 * epsilon * fastest, most_sweeps);
+}
+
+/// One contact after another, until no velocity changes by more than `smallest`.
+void Impacts::sweep(Cluster& cluster, double smallest, int most) const
+{
+    for (int k = 0; k < most; ++k) {
+        double largest = 0;
+        for (const std::uint32_t c : struck_) {
+            Contact& contact = cluster.contacts[c];
+            const double wanted = approach(cluster, contact) + contact.target;
+            const double next = std::max(0.0, contact.impulse + wanted * contact.mass);
+            const double change = next - contact.impulse;
+            contact.impulse = next;
+            largest = std::max(largest, std::fabs(change) / contact.mass);
+            Vector2 impulse = change * contact.normal;
+            if (contact.friction > 0) {
+                const Vector2 tangent = turned(contact.normal);
+                const double slip = dot(velocity_of(cluster.after, contact), tangent);
+                const double most = contact.friction * contact.impulse;
+                const double held =
+                    std::clamp(contact.tangential - slip * contact.mass, -most, most);
+                impulse = impulse + (held - contact.tangential) * tangent;
+                contact.tangential = held;
+            }
+            push(cluster, contact, impulse);
+        }
+        if (largest <= smallest) return;
+    }
+}
+
+/// The contacts that approach fastest; false where none approaches.
+bool Impacts::wave(Cluster& cluster)
+{
+    struck_.clear();
+    double fastest = 0;
+    for (const Contact& contact : cluster.contacts) {
+        const double u = approach(cluster, contact);
+        if (u > noise(cluster, contact)) fastest = std::max(fastest, u);
+    }
+    if (fastest == 0) return false;
+    const bool together = world_.options.impacts == ImpactLaw::together;
+    for (std::uint32_t k = 0; k < cluster.contacts.size(); ++k) {
+        const double u = approach(cluster, cluster.contacts[k]);
+        if (together || u >= fastest * (1 - tie)) struck_.push_back(k);
+    }
+    ++world_.statistics.waves;
+    before_wave_ = cluster.after;
+    if (struck_.size() == 1) {
+        strike(cluster, cluster.contacts[struck_[0]]);
+    } else {
+        solve(cluster);
+    }
+    return true;
+}
+
+void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* events)
+{
+    for (const std::uint32_t k : struck_) {
+        const Contact& contact = cluster.contacts[k];
+        if (contact.impulse == 0) continue;
+        ++world_.statistics.impacts;
+        if (!events) continue;
+        Vector2 impulse = contact.impulse * contact.normal;
+        if (contact.tangential != 0) {
+            impulse = impulse + contact.tangential * turned(contact.normal);
+        }
+        SceneEvent event{.t = t, .body = contact.a, .impulse = impulse};
+        event.before[0] = before_wave_[contact.slot_a];
+        event.after[0] = cluster.after[contact.slot_a];
+        if (contact.surface) {
+            event.other = {true, world_.faces[contact.b].surface};
+        } else {
+            event.other = {false, contact.b};
+            event.before[1] = before_wave_[contact.slot_b];
+            event.after[1] = cluster.after[contact.slot_b];
+            if (contact.b < contact.a) {
+                std::swap(event.body, event.other.index);
+                std::swap(event.before[0], event.before[1]);
+                std::swap(event.after[0], event.after[1]);
+                event.impulse = -1.0 * event.impulse;
+            }
+        }
+        events->push_back(event);
+    }
+}
+
+void Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events)
+{
+    if (cluster.contacts.size() > 1) {
+        std::ranges::sort(cluster.contacts, {}, &Contact::at);
+    }
+    for (Contact& contact : cluster.contacts) {
+        double inverse = world_.bodies[contact.a].inverse_mass;
+        if (!contact.surface) inverse += world_.bodies[contact.b].inverse_mass;
+        contact.mass = 1 / inverse;
+    }
+    const std::size_t most = patience * cluster.contacts.size();
+    for (std::size_t waves = 0; !spend; ++waves) {
+        if (waves == most) spend = true;
+        if (!wave(cluster)) return;
+        emit(cluster, t, events);
+        if (cluster.contacts.size() == 1) return;
+    }
+    ++world_.statistics.collapses;
+    struck_.clear();
+    for (std::uint32_t k = 0; k < cluster.contacts.size(); ++k) {
+        cluster.contacts[k].restitution = 0;
+        struck_.push_back(k);
+    }
+    before_wave_ = cluster.after;
+    solve(cluster);
+    emit(cluster, t, events);
+}
+
+}  // namespace ricochet::detail

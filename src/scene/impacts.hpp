@@ -1,0 +1,67 @@
+// Impacts of one cluster: contacts that are struck at one instant, or touch one that is.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+struct Contact {
+    std::uint32_t a = 0;  ///< body that the normal pushes
+    std::uint32_t b = 0;  ///< body or face
+    bool surface = false;
+    std::uint32_t slot_a = 0, slot_b = 0;  ///< in the cluster
+    Vector2 normal{};
+    Vector2 at{};  ///< by which contacts are ordered, whatever the labels
+    double restitution = 1;
+    double friction = 0;
+    double impulse = 0;  ///< of the solve in hand, normal and tangential
+    double tangential = 0;
+    double target = 0;  ///< [m/s] separation that is asked for
+    double mass = 0;    ///< effective
+};
+
+struct Cluster {
+    std::vector<std::uint32_t> bodies;
+    std::vector<Vector2> before;  ///< velocities
+    std::vector<Vector2> after;
+    std::vector<Contact> contacts;
+
+    void clear()
+    {
+        bodies.clear();
+        before.clear();
+        after.clear();
+        contacts.clear();
+    }
+};
+
+/// Resolves the impacts of a cluster: `after` from `before`. What was struck is appended to
+/// `events`, in the order of the waves, if it is not null.
+class Impacts {
+public:
+    explicit Impacts(World& world) : world_(world) {}
+
+    /// Newton's law by waves, or for all at once. A cluster that does not come to an end has its
+    /// restitution spent, as `spend` has from the start.
+    void resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events);
+
+private:
+    [[nodiscard]] double approach(const Cluster& cluster, const Contact& contact) const;
+    [[nodiscard]] double noise(const Cluster& cluster, const Contact& contact) const;
+    void push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
+    void strike(Cluster& cluster, Contact& contact) const;
+    void solve(Cluster& cluster) const;
+    bool solve_exactly(Cluster& cluster) const;
+    void sweep(Cluster& cluster, double smallest, int most) const;
+    bool wave(Cluster& cluster);
+    void emit(const Cluster& cluster, double t, std::vector<SceneEvent>* events);
+
+    World& world_;
+    std::vector<std::uint32_t> struck_;  ///< contacts of the wave in hand
+    std::vector<Vector2> before_wave_;
+};
+
+}  // namespace ricochet::detail

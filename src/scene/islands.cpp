@@ -1,0 +1,292 @@
+#include "scene/islands.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "ricochet/detail/runge_kutta.hpp"
+#include "ricochet/detail/step_control.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+using Dopri5 = RungeKutta<Dopri5Tableau, std::vector<double>>;
+
+std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i)
+{
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+}  // namespace
+
+Islands::Islands(World& world)
+    : world_(world), place_(world.bodies.size(), 0), stages_(Dopri5::kept_stages)
+{
+    join(world);
+    for (std::uint32_t k = 0; k < islands_.size(); ++k) {
+        Island& island = islands_[k];
+        const std::size_t n = 4 * island.members.size();
+        island.x.resize(n);
+        island.remainder.assign(n, 0);
+        island.rate.resize(n);
+        island.x_end = island.remainder_end = island.rate_end = island.rate;
+        island.start = island.end = {world.options.t_start, 0};
+        for (std::size_t m = 0; m < island.members.size(); ++m) {
+            Body& body = world.bodies[island.members[m]];
+            body.island = k;
+            place_[island.members[m]] = static_cast<std::uint32_t>(m);
+            island.x[4 * m] = body.p[0];
+            island.x[4 * m + 1] = body.p[1];
+            island.x[4 * m + 2] = body.v[0];
+            island.x[4 * m + 3] = body.v[1];
+        }
+    }
+}
+
+void Islands::join(World& world)
+{
+    const auto count = static_cast<std::uint32_t>(world.bodies.size());
+    std::vector<std::uint32_t> parent(count);
+    std::iota(parent.begin(), parent.end(), 0U);
+    std::vector<char> driven(count, 0);
+    for (std::uint32_t i = 0; i < count; ++i) driven[i] = world.scene.bodies()[i].drag > 0;
+    for (const Spring& spring : world.scene.springs()) {
+        const auto [a, b] = spring.between;
+        driven[a.index] = driven[b.index] = 1;
+        const std::uint32_t first = root_of(parent, a.index);
+        const std::uint32_t second = root_of(parent, b.index);
+        parent[std::max(first, second)] = std::min(first, second);
+    }
+    std::vector<std::uint32_t> island_of(count, none);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        if (!driven[i]) continue;
+        std::uint32_t& island = island_of[root_of(parent, i)];
+        if (island == none) {
+            island = static_cast<std::uint32_t>(islands_.size());
+            islands_.emplace_back();
+        }
+        Island& of = islands_[island];
+        place_[i] = static_cast<std::uint32_t>(of.members.size());
+        of.members.push_back(i);
+        of.drag.push_back(world.scene.bodies()[i].drag);
+        of.inverse_mass.push_back(world.bodies[i].inverse_mass);
+    }
+    for (const Spring& spring : world.scene.springs()) {
+        const auto [a, b] = spring.between;
+        islands_[island_of[root_of(parent, a.index)]].links.push_back(
+            {place_[a.index], place_[b.index], spring.rest, spring.stiffness, spring.damping});
+    }
+}
+
+void Islands::flow(const Island& island, const State& x, State& rate) const
+{
+    ++world_.statistics.flow_calls;
+    const std::size_t n = island.members.size();
+    for (std::size_t m = 0; m < n; ++m) {
+        const double damping = island.drag[m] * island.inverse_mass[m];
+        rate[4 * m] = x[4 * m + 2];
+        rate[4 * m + 1] = x[4 * m + 3];
+        rate[4 * m + 2] = world_.gravity[0] - damping * x[4 * m + 2];
+        rate[4 * m + 3] = world_.gravity[1] - damping * x[4 * m + 3];
+    }
+    for (const Link& link : island.links) {
+        const std::size_t a = 4 * link.a;
+        const std::size_t b = 4 * link.b;
+        const Vector2 apart{x[b] - x[a], x[b + 1] - x[a + 1]};
+        const double length = norm(apart);
+        if (length == 0) continue;  // no direction, no force
+        const Vector2 along = (1 / length) * apart;
+        const double stretching = dot(along, {x[b + 2] - x[a + 2], x[b + 3] - x[a + 3]});
+        const double pull = link.stiffness * (length - link.rest) + link.damping * stretching;
+        for (std::size_t c = 0; c < 2; ++c) {
+            rate[a + 2 + c] += pull * island.inverse_mass[link.a] * along[c];
+            rate[b + 2 + c] -= pull * island.inverse_mass[link.b] * along[c];
+        }
+    }
+}
+
+void Islands::depart(const Island& island, double h, bool with_error) const
+{
+    const std::size_t n = island.x.size();
+    for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_}) state->resize(n);
+    for (State& stage : stages_) stage.resize(n);
+    State point(n);
+    const auto departure = [&](const auto& w, State& rate, double s) {
+        for (std::size_t i = 0; i < n; ++i) {
+            point[i] = island.x[i] + (s * island.rate[i] + (w[i] + island.remainder[i]));
+        }
+        flow(island, point, rate);
+        for (std::size_t i = 0; i < n; ++i) rate[i] -= island.rate[i];
+    };
+    if (with_error) {
+        Dopri5::depart<true>(departure, island.x, h, stages_.data(), w_, end_rate_, error_);
+    } else {
+        Dopri5::depart<false>(departure, island.x, h, stages_.data(), w_, end_rate_, error_);
+    }
+    seen_ = nullptr;
+}
+
+double Islands::error_of(const Island& island, double h) const
+{
+    double largest = 0;
+    for (std::size_t i = 0; i < island.x.size(); ++i) {
+        const double end = island.x[i] + (h * island.rate[i] + w_[i]);
+        const double scale = world_.options.atol +
+                             world_.options.rtol * std::max(std::fabs(island.x[i]), std::fabs(end));
+        largest = std::max(largest, std::fabs(error_[i]) / scale);
+        if (!std::isfinite(end + error_[i] + end_rate_[i])) return std::nan("");
+    }
+    return largest;
+}
+
+double Islands::first_step(const Island& island) const
+{
+    double size = 0;
+    double speed = 0;
+    for (std::size_t i = 0; i < island.x.size(); ++i) {
+        const double scale = world_.options.atol + world_.options.rtol * std::fabs(island.x[i]);
+        size = std::max(size, std::fabs(island.x[i]) / scale);
+        speed = std::max(speed, std::fabs(island.rate[i]) / scale);
+    }
+    const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : 1e-6;
+    State moved(island.x);
+    for (std::size_t i = 0; i < moved.size(); ++i) moved[i] += euler * island.rate[i];
+    State rate(moved.size());
+    flow(island, moved, rate);
+    double bend = 0;
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+        const double scale = world_.options.atol + world_.options.rtol * std::fabs(island.x[i]);
+        bend = std::max(bend, std::fabs(rate[i] - island.rate[i]) / scale);
+    }
+    const double fastest = std::max(speed, bend / euler);
+    const double h = fastest <= 1e-15 ? 1e-6 : std::pow(0.01 / fastest, 0.2);
+    const double first = std::min(100 * euler, h);
+    return std::isfinite(first) && first > 0 ? first : 1e-6;
+}
+
+bool Islands::attempt(std::uint32_t which)
+{
+    Island& island = islands_[which];
+    const Instant t_end{world_.options.t_end, 0};
+    for (;;) {
+        const double left = seconds(island.start, t_end);
+        const double least = 4 * epsilon * std::max(std::fabs(island.start.value), 1e-300);
+        island.h = island.next < left ? island.next : left;
+        if (island.h <= least && left > least) return false;
+        depart(island, island.h, true);
+        const double error = error_of(island, island.h);
+        const double factor = std::isfinite(error) ? ErrorRule{}.factor(error, 5) : 0.2;
+        if (ErrorRule::accepts(error)) {
+            // A step that the end of the run has cut short says little about the next one.
+            if (island.h < left || factor < 1) island.next = island.h * factor;
+            island.end = island.h == left ? t_end : island.start.after(island.h);
+            ++world_.statistics.steps;
+            return true;
+        }
+        ++world_.statistics.rejected;
+        island.next = island.h * std::min(factor, 1.0);
+    }
+}
+
+/// Quartics through the middle and the end of the step in hand.
+void Islands::record(Island& island)
+{
+    const double h = island.h;
+    for (std::size_t i = 0; i < island.x.size(); ++i) {
+        const TwoSum sum = two_sum(island.x[i], h * island.rate[i] + (w_[i] + island.remainder[i]));
+        island.x_end[i] = sum.value;
+        island.remainder_end[i] = sum.remainder;
+        island.rate_end[i] = island.rate[i] + end_rate_[i];
+    }
+    Dopri5::dense(0.5 * h, h, stages_.data(), end_rate_, middle_);
+    for (std::size_t m = 0; m < island.members.size(); ++m) {
+        const std::uint32_t i = island.members[m];
+        Body& body = world_.bodies[i];
+        ++body.version;
+        body.t = island.start;
+        body.quartic = true;
+        for (std::size_t c = 0; c < 2; ++c) {
+            const std::size_t k = 4 * m + c;
+            const double middle = middle_[k];
+            const double end = w_[k];
+            const double slope = h * end_rate_[k];
+            body.p[c] = island.x[k];
+            body.v[c] = island.rate[k];
+            body.a[c] = 2 * (16 * middle - 5 * end + slope) / (h * h);
+            world_.bends[i][0][c] = (-32 * middle + 14 * end - 3 * slope) / (h * h * h);
+            world_.bends[i][1][c] = (16 * middle - 8 * end + 2 * slope) / (h * h * h * h);
+        }
+    }
+}
+
+bool Islands::advance(std::uint32_t which)
+{
+    Island& island = islands_[which];
+    if (!island.begun) {
+        flow(island, island.x, island.rate);
+        island.next = first_step(island);
+        island.begun = true;
+    } else {
+        std::swap(island.x, island.x_end);
+        std::swap(island.remainder, island.remainder_end);
+        std::swap(island.rate, island.rate_end);
+        island.start = island.end;
+    }
+    if (!attempt(which)) return false;
+    record(island);
+    return true;
+}
+
+void Islands::look_at(const Island& island, const Instant& t) const
+{
+    if (seen_ == &island && seen_at_.value == t.value && seen_at_.remainder == t.remainder &&
+        seen_from_.value == island.start.value && seen_from_.remainder == island.start.remainder) {
+        return;
+    }
+    const double s = seconds(island.start, t);
+    depart(island, s, false);
+    for (std::size_t i = 0; i < island.x.size(); ++i) {
+        at_[i] = island.x[i] + (s * island.rate[i] + (w_[i] + island.remainder[i]));
+    }
+    seen_ = &island;
+    seen_at_ = t;
+    seen_from_ = island.start;
+}
+
+Vector2 Islands::position(std::uint32_t body, const Instant& t) const
+{
+    look_at(islands_[world_.bodies[body].island], t);
+    const std::size_t k = 4 * place_[body];
+    return {at_[k], at_[k + 1]};
+}
+
+Vector2 Islands::velocity(std::uint32_t body, const Instant& t) const
+{
+    look_at(islands_[world_.bodies[body].island], t);
+    const std::size_t k = 4 * place_[body];
+    return {at_[k + 2], at_[k + 3]};
+}
+
+bool Islands::restart(std::uint32_t which, const Instant& t,
+                      const std::vector<std::pair<std::uint32_t, Vector2>>& velocities)
+{
+    Island& island = islands_[which];
+    look_at(island, t);
+    seen_ = nullptr;
+    island.x = at_;
+    std::ranges::fill(island.remainder, 0.0);
+    for (const auto& [body, velocity] : velocities) {
+        const std::size_t k = 4 * place_[body];
+        island.x[k + 2] = velocity[0];
+        island.x[k + 3] = velocity[1];
+    }
+    island.start = t;
+    flow(island, island.x, island.rate);
+    if (!attempt(which)) return false;
+    record(island);
+    return true;
+}
+
+}  // namespace ricochet::detail

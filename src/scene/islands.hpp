@@ -1,0 +1,75 @@
+// Bodies joined by springs, or slowed by drag: each island advances by its own steps of dopri5.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+/// State of an island: x, y, x', y' of each member. Between two impacts an island's steps depend on
+/// its members alone.
+class Islands {
+public:
+    explicit Islands(World& world);
+
+    /// Whether there are any, and of how many members.
+    [[nodiscard]] std::size_t count() const noexcept { return islands_.size(); }
+    [[nodiscard]] const std::vector<std::uint32_t>& members(std::uint32_t island) const
+    {
+        return islands_[island].members;
+    }
+    [[nodiscard]] const Instant& end(std::uint32_t island) const { return islands_[island].end; }
+
+    /// On the method's own map: the step in hand, taken again with another length.
+    [[nodiscard]] Vector2 position(std::uint32_t body, const Instant& t) const;
+    [[nodiscard]] Vector2 velocity(std::uint32_t body, const Instant& t) const;
+
+    /// The next step of an island; its members get new records. False where no step is short
+    /// enough, or nothing finite comes out.
+    bool advance(std::uint32_t island);
+
+    /// An island goes on from t with changed velocities of some members: the step in hand is cut
+    /// there, and its length is kept for the next one.
+    bool restart(std::uint32_t island, const Instant& t,
+                 const std::vector<std::pair<std::uint32_t, Vector2>>& velocities);
+
+private:
+    using State = std::vector<double>;
+    struct Link {
+        std::uint32_t a = 0, b = 0;  ///< places in the island
+        double rest = 0, stiffness = 0, damping = 0;
+    };
+    struct Island {
+        std::vector<std::uint32_t> members;
+        std::vector<Link> links;
+        std::vector<double> drag, inverse_mass;
+        Instant start{}, end{};
+        double h = 0;     ///< of the step in hand
+        double next = 0;  ///< length that the error allows
+        bool begun = false;
+        State x, remainder, rate;              ///< at the start of the step in hand
+        State x_end, remainder_end, rate_end;  ///< at its end
+    };
+
+    void join(World& world);
+    void flow(const Island& island, const State& x, State& rate) const;
+    void depart(const Island& island, double h, bool with_error) const;
+    [[nodiscard]] double error_of(const Island& island, double h) const;
+    void look_at(const Island& island, const Instant& t) const;
+    [[nodiscard]] double first_step(const Island& island) const;
+    bool attempt(std::uint32_t which);
+    void record(Island& island);
+
+    World& world_;
+    std::vector<Island> islands_;
+    std::vector<std::uint32_t> place_;  ///< of a body in its island
+    mutable std::vector<State> stages_;
+    mutable State w_, end_rate_, error_, middle_, at_;
+    mutable const Island* seen_ = nullptr;  ///< whose state at `seen_at_` lies in `at_`
+    mutable Instant seen_at_{};
+    mutable Instant seen_from_{};
+};
+
+}  // namespace ricochet::detail

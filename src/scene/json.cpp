@@ -1,0 +1,399 @@
+#include "ricochet/scene/json.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <unordered_map>
+
+#include "files/read_file.hpp"
+#include "files/strict_json.hpp"
+#include "scene/json_lines.hpp"
+#include "scene/names.hpp"
+
+namespace ricochet {
+
+using namespace detail;
+
+namespace {
+
+using nlohmann::json;
+
+constexpr int deepest = 8;
+constexpr std::uintmax_t longest_file = 1ULL << 32;
+
+/// What is wrong with the value at a path.
+struct Trouble {
+    JsonPath path;
+    std::string what;
+};
+
+std::string shown(const json& value)
+{
+    std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+    return text.size() > 40 ? text.substr(0, 37) + "..." : text;
+}
+
+/// An object of the file: every key of it has to be asked for.
+class Part {
+public:
+    Part(const json& value, JsonPath path, std::string_view what)
+        : value_(value), path_(std::move(path)), what_(what)
+    {
+        if (!value.is_object()) {
+            fail(fmt::format("expected an object for {}, found {}", what, shown(value)));
+        }
+    }
+
+    [[noreturn]] void fail(std::string sentence) const
+    {
+        throw Trouble{path_, std::move(sentence)};
+    }
+    [[noreturn]] void fail_at(std::string_view key, std::string sentence) const
+    {
+        JsonPath path = path_;
+        path.emplace_back(std::string(key));
+        throw Trouble{std::move(path), std::move(sentence)};
+    }
+
+    /// Refuses keys of other names.
+    void only(std::initializer_list<std::string_view> known) const
+    {
+        for (const auto& item : value_.items()) {
+            if (std::ranges::find(known, item.key()) == known.end()) {
+                fail_at(item.key(), fmt::format("unknown key \"{}\" in {}{}", item.key(), what_,
+                                                nearest_name(item.key(), known)));
+            }
+        }
+    }
+
+    [[nodiscard]] bool has(std::string_view key) const { return value_.contains(std::string(key)); }
+    [[nodiscard]] const json& at(std::string_view key) const
+    {
+        const auto found = value_.find(std::string(key));
+        if (found == value_.end()) fail(fmt::format("expected \"{}\" in {}", key, what_));
+        return *found;
+    }
+    [[nodiscard]] JsonPath path_to(std::string_view key) const
+    {
+        JsonPath path = path_;
+        path.emplace_back(std::string(key));
+        return path;
+    }
+    [[nodiscard]] Part part(std::string_view key, std::string_view what) const
+    {
+        return {at(key), path_to(key), what};
+    }
+
+    [[nodiscard]] double number(std::string_view key) const
+    {
+        const json& value = at(key);
+        if (!value.is_number()) expected("a number", key, value);
+        return value.get<double>();
+    }
+    void number(std::string_view key, double& to) const
+    {
+        if (has(key)) to = number(key);
+    }
+    [[nodiscard]] Vector2 vector(std::string_view key) const
+    {
+        return vector_of(at(key), path_to(key), key);
+    }
+    void vector(std::string_view key, Vector2& to) const
+    {
+        if (has(key)) to = vector(key);
+    }
+    [[nodiscard]] static Vector2 vector_of(const json& value, JsonPath path, std::string_view key)
+    {
+        if (!value.is_array() || value.size() != 2 || !value[0].is_number() ||
+            !value[1].is_number()) {
+            throw Trouble{std::move(path), fmt::format("expected two numbers for \"{}\", found {}",
+                                                       key, shown(value))};
+        }
+        return {value[0].get<double>(), value[1].get<double>()};
+    }
+    void text(std::string_view key, std::string& to) const
+    {
+        if (!has(key)) return;
+        if (!at(key).is_string()) expected("a text", key, at(key));
+        to = at(key).get<std::string>();
+    }
+    void truth(std::string_view key, bool& to) const
+    {
+        if (!has(key)) return;
+        if (!at(key).is_boolean()) expected("true or false", key, at(key));
+        to = at(key).get<bool>();
+    }
+    /// Calls `function(value, path)` for each entry of a list, if there is one.
+    void each(std::string_view key,
+              const std::function<void(const json&, const JsonPath&)>& function) const
+    {
+        if (!has(key)) return;
+        const json& list = at(key);
+        if (!list.is_array()) expected("a list", key, list);
+        JsonPath path = path_to(key);
+        path.emplace_back(std::size_t{0});
+        for (std::size_t i = 0; i < list.size(); ++i) {
+            path.back() = i;
+            function(list[i], path);
+        }
+    }
+    [[noreturn]] void expected(std::string_view what, std::string_view key, const json& found) const
+    {
+        fail_at(key, fmt::format("expected {} for \"{}\", found {}", what, key, shown(found)));
+    }
+
+    /// Calls what the scene may refuse; a refusal is about this part.
+    template <class Call>
+    auto ask(const Call& call) const
+    {
+        try {
+            return call();
+        } catch (const std::invalid_argument& error) {
+            fail(error.what());
+        }
+    }
+
+private:
+    const json& value_;
+    JsonPath path_;
+    std::string_view what_;
+};
+
+class Reader {
+public:
+    SceneFile read(const json& whole)
+    {
+        const Part top(whole, {}, "a scene");
+        top.only({"gravity", "memory_limit", "materials", "bodies", "walls", "terrain", "springs",
+                  "run"});
+        Scene::Settings settings;
+        top.vector("gravity", settings.gravity);
+        top.number("memory_limit", settings.memory_limit);
+        SceneFile file{top.ask([&] { return Scene(settings); }), {}};
+        materials(top, file.scene);
+        top.each("walls", [&](const json& value, const JsonPath& path) {
+            wall({value, path, "a wall"}, file.scene);
+        });
+        top.each("terrain", [&](const json& value, const JsonPath& path) {
+            terrain({value, path, "terrain"}, file.scene);
+        });
+        top.each("bodies", [&](const json& value, const JsonPath& path) {
+            body({value, path, "a body"}, file.scene);
+        });
+        top.each("springs", [&](const json& value, const JsonPath& path) {
+            spring({value, path, "a spring"}, file.scene);
+        });
+        if (top.has("run")) run(top.part("run", "\"run\""), file.options);
+        return file;
+    }
+
+private:
+    void materials(const Part& top, Scene& scene)
+    {
+        if (!top.has("materials")) return;
+        static_cast<void>(top.part("materials", "\"materials\""));
+        for (const auto& item : top.at("materials").items()) {
+            JsonPath path = top.path_to("materials");
+            path.emplace_back(item.key());
+            const Part part(item.value(), path, "a material");
+            part.only({"restitution", "friction"});
+            Material material{.name = item.key()};
+            part.number("restitution", material.restitution);
+            part.number("friction", material.friction);
+            materials_.emplace(item.key(), part.ask([&] { return scene.material(material); }));
+        }
+    }
+
+    [[nodiscard]] MaterialId material_of(const Part& part) const
+    {
+        std::string name;
+        part.text("material", name);
+        if (!part.has("material")) return {};
+        const auto found = materials_.find(name);
+        if (found != materials_.end()) return found->second;
+        std::vector<std::string> known;
+        for (const auto& [key, id] : materials_) known.push_back(key);
+        part.fail_at("material",
+                     fmt::format("there is no material \"{}\"{}", name, nearest_name(name, known)));
+    }
+
+    static void wall_keys(const Part& part) { part.only({"name", "point", "normal", "material"}); }
+    void wall(const Part& part, Scene& scene) const
+    {
+        wall_keys(part);
+        Wall wall{.point = part.vector("point"), .normal = part.vector("normal")};
+        part.text("name", wall.name);
+        wall.material = material_of(part);
+        part.ask([&] { return scene.wall(wall); });
+    }
+
+    void terrain(const Part& part, Scene& scene) const
+    {
+        part.only({"name", "points", "closed", "material"});
+        Terrain terrain;
+        part.text("name", terrain.name);
+        part.truth("closed", terrain.closed);
+        static_cast<void>(part.at("points"));
+        part.each("points", [&](const json& value, const JsonPath& path) {
+            terrain.points.push_back(Part::vector_of(value, path, "points"));
+        });
+        terrain.material = material_of(part);
+        part.ask([&] { return scene.terrain(terrain); });
+    }
+
+    void body(const Part& part, Scene& scene) const
+    {
+        part.only(
+            {"name", "disc", "point", "at", "velocity", "drag", "material", "grid", "spacing"});
+        if (part.has("disc") == part.has("point")) {
+            part.fail(part.has("disc") ? "expected \"disc\" or \"point\" in a body, found both"
+                                       : "expected \"disc\" or \"point\" in a body, found neither");
+        }
+        Disc disc{.at = part.vector("at"), .radius = 0};
+        part.text("name", disc.name);
+        part.vector("velocity", disc.velocity);
+        part.number("drag", disc.drag);
+        disc.material = material_of(part);
+        const bool point = part.has("point");
+        const Part shape = part.part(point ? "point" : "disc", point ? "a point" : "a disc");
+        if (point) {
+            shape.only({"mass"});
+        } else {
+            shape.only({"radius", "mass"});
+            disc.radius = shape.number("radius");
+        }
+        shape.number("mass", disc.mass);
+        if (part.has("grid")) return grid(part, disc, point, scene);
+        if (part.has("spacing")) part.fail_at("spacing", "expected \"grid\" with \"spacing\"");
+        part.ask([&] { add(scene, disc, point); });
+    }
+
+    static void add(Scene& scene, const Disc& disc, bool point)
+    {
+        if (!point) {
+            scene.disc(disc);
+        } else {
+            scene.point({disc.name, disc.at, disc.velocity, disc.mass, disc.drag, disc.material});
+        }
+    }
+
+    /// Rows and columns of one body; a name is followed by its numbers.
+    static void grid(const Part& part, const Disc& first, bool point, Scene& scene)
+    {
+        const Vector2 count = part.vector("grid");
+        const Vector2 spacing = part.vector("spacing");
+        for (const double n : count) {
+            if (!(n >= 1) || n != std::floor(n)) {
+                part.fail_at("grid",
+                             fmt::format("expected two whole numbers for \"grid\", found {}",
+                                         shown(part.at("grid"))));
+            }
+        }
+        part.ask([&] { scene.require_room(count[0] * count[1]); });
+        for (double y = 0; y < count[1]; ++y) {
+            for (double x = 0; x < count[0]; ++x) {
+                Disc disc = first;
+                disc.at = {first.at[0] + x * spacing[0], first.at[1] + y * spacing[1]};
+                if (!disc.name.empty()) disc.name += fmt::format(" {} {}", x, y);
+                part.ask([&] { add(scene, disc, point); });
+            }
+        }
+    }
+
+    static void spring(const Part& part, Scene& scene)
+    {
+        part.only({"between", "rest", "stiffness", "damping"});
+        const json& ends = part.at("between");
+        if (!ends.is_array() || ends.size() != 2 || !ends[0].is_string() || !ends[1].is_string()) {
+            part.expected("two names of bodies", "between", ends);
+        }
+        part.ask([&] {
+            Spring spring{.between = {scene.body(ends[0].get<std::string>()),
+                                      scene.body(ends[1].get<std::string>())}};
+            part.number("rest", spring.rest);
+            part.number("stiffness", spring.stiffness);
+            part.number("damping", spring.damping);
+            scene.spring(spring);
+        });
+    }
+
+    static void run(const Part& part, SceneOptions& options)
+    {
+        part.only({"t_start", "t_end", "rtol", "atol", "impacts", "elastic_within", "sample_times",
+                   "max_events"});
+        part.number("t_start", options.t_start);
+        part.number("t_end", options.t_end);
+        part.number("rtol", options.rtol);
+        part.number("atol", options.atol);
+        part.number("elastic_within", options.elastic_within);
+        if (part.has("max_events")) {
+            const json& most = part.at("max_events");
+            if (!most.is_number_unsigned()) part.expected("a whole number", "max_events", most);
+            options.max_events = most.get<std::uint64_t>();
+        }
+        std::string law = "waves";
+        part.text("impacts", law);
+        if (law != "waves" && law != "together") {
+            part.expected("\"waves\" or \"together\"", "impacts", part.at("impacts"));
+        }
+        options.impacts = law == "waves" ? ImpactLaw::waves : ImpactLaw::together;
+        part.each("sample_times", [&](const json& value, const JsonPath&) {
+            if (!value.is_number()) part.expected("numbers", "sample_times", value);
+            options.sample_times.push_back(value.get<double>());
+        });
+    }
+
+    std::unordered_map<std::string, MaterialId> materials_;
+};
+
+/// The line that a parser means, which counts bytes or names a key.
+std::size_t line_of_trouble(std::string_view text, std::string_view message)
+{
+    try {
+        const json whole = json::parse(text);
+    } catch (const json::parse_error& error) {
+        return line_of_byte(text, error.byte > 0 ? error.byte - 1 : 0);
+    } catch (const json::exception&) {
+        return 1;
+    }
+    const std::size_t from = message.find('"');
+    const std::size_t to = message.rfind('"');
+    if (from == std::string_view::npos || to <= from) return 1;
+    const std::size_t line = line_of_repeated(text, message.substr(from + 1, to - from - 1));
+    return line > 0 ? line : 1;
+}
+
+}  // namespace
+
+SceneFile read_scene(std::string_view text, std::string_view file)
+{
+    json whole;
+    try {
+        whole = parse_strictly(text, deepest);
+    } catch (const JsonTooDeep& error) {
+        throw SceneFileError(
+            fmt::format("{}:{}: {}", file, line_of_depth(text, deepest), error.what()));
+    } catch (const JsonTrouble& error) {
+        throw SceneFileError(
+            fmt::format("{}:{}: {}", file, line_of_trouble(text, error.what()), error.what()));
+    }
+    try {
+        return Reader().read(whole);
+    } catch (const Trouble& trouble) {
+        throw SceneFileError(
+            fmt::format("{}:{}: {}", file, line_of(text, trouble.path), trouble.what));
+    }
+}
+
+SceneFile load_scene(const std::string& path)
+{
+    const auto refuse = [&](const std::string& why) {
+        throw SceneFileError(fmt::format("{}: {}", path, why));
+    };
+    return read_scene(read_file(path, refuse, longest_file), path);
+}
+
+}  // namespace ricochet

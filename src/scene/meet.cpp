@@ -1,0 +1,274 @@
+// First contacts.
+#include <algorithm>
+
+#include "scene/islands.hpp"
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+/// |path|^2 - reach^2.
+[[nodiscard]] Polynomial squared(const Path& path, const Squares& now)
+{
+    Polynomial c{};
+    for (int i = 0; i <= path.degree; ++i) {
+        for (int j = 0; j <= path.degree; ++j) {
+            c[static_cast<std::size_t>(i + j)] +=
+                dot(path.c[static_cast<std::size_t>(i)], path.c[static_cast<std::size_t>(j)]);
+        }
+    }
+    c[0] = now.at_once;
+    c[1] = 2 * now.rate;
+    return c;
+}
+
+/// How far the path can lead away from its start within `until`.
+[[nodiscard]] double reach_of(const Path& path) noexcept
+{
+    double sum = 0;
+    for (int k = path.degree; k > 0; --k) {
+        sum = (sum + norm(path.c[static_cast<std::size_t>(k)])) * path.until;
+    }
+    return sum;
+}
+
+[[nodiscard]] Path difference(const Path& a, const Path& b) noexcept
+{
+    Path out;
+    out.degree = std::max(a.degree, b.degree);
+    out.until = std::min(a.until, b.until);
+    for (std::size_t k = 0; k < out.c.size(); ++k) out.c[k] = a.c[k] - b.c[k];
+    while (out.degree > 0 && is_zero(out.c[static_cast<std::size_t>(out.degree)])) --out.degree;
+    return out;
+}
+
+/// The root of a gap on the steps' polynomials, moved to where the gap closes on the methods' own
+/// maps. `gap` returns the gap there and its rate.
+template <class Gap>
+[[nodiscard]] double on_map(double after, double until, const Gap& gap)
+{
+    for (int i = 0; i < 3; ++i) {
+        const auto [value, rate] = gap(after);
+        if (!(rate < 0)) break;
+        const double change = -value / rate;
+        after = std::clamp(after + change, 0.0, until);
+        if (std::fabs(change) <= 4 * epsilon * after) break;
+    }
+    return after;
+}
+
+struct GapAndRate {
+    double gap = 0;
+    double rate = 0;
+};
+
+}  // namespace
+
+Path World::path(std::uint32_t i, const Instant& t) const
+{
+    const Body& b = bodies[i];
+    const double s = seconds(b.t, t);
+    Path path;
+    if (!b.quartic) {
+        path.c[0] = place(b, s);
+        path.c[1] = speed(b, s);
+        path.c[2] = 0.5 * b.a;
+        path.degree = is_zero(b.a) ? 1 : 2;
+        return path;
+    }
+    const auto& [c3, c4] = bends[i];
+    const Vector2 c2 = 0.5 * b.a;
+    path.c[0] = b.p + s * (b.v + s * (c2 + s * (c3 + s * c4)));
+    path.c[1] = b.v + s * (2 * c2 + s * (3 * c3 + 4 * s * c4));
+    path.c[2] = c2 + s * (3 * c3 + 6 * s * c4);
+    path.c[3] = c3 + 4 * s * c4;
+    path.c[4] = c4;
+    path.degree = 4;
+    path.until = std::max(0.0, seconds(t, islands->end(b.island)));
+    return path;
+}
+
+Vector2 World::position(std::uint32_t i, const Instant& t) const
+{
+    const Body& b = bodies[i];
+    if (b.quartic) return islands->position(i, t);
+    return place(b, seconds(b.t, t));
+}
+
+Vector2 World::velocity(std::uint32_t i, const Instant& t) const
+{
+    const Body& b = bodies[i];
+    if (b.quartic) return islands->velocity(i, t);
+    return speed(b, seconds(b.t, t));
+}
+
+Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
+{
+    const Body& a = world.bodies[i];
+    const Body& b = world.bodies[j];
+    const Instant from = later(a.t, b.t);
+    const Path first = world.path(i, from);
+    const Path second = world.path(j, from);
+    const Path path = difference(first, second);
+    const double reach = a.radius + b.radius;
+    const double rounding =
+        World::rounding(first.c[0], reach) + World::rounding(second.c[0], reach);
+    Squares now = squares(path.c[0], path.c[1], reach, rounding);
+    Meeting meeting{.from = from};
+    const bool steps = std::isfinite(path.until);
+    if (steps && norm(path.c[0]) - reach > reach_of(path)) return meeting;
+    if (now.at_once <= now.tolerance) {
+        const double slowest = noise(first.c[1], second.c[1]);
+        if (std::fabs(now.rate) <= slowest * reach) {
+            now.rate = 0;
+            const double bend = dot(path.c[1], path.c[1]) + 2 * dot(path.c[0], path.c[2]);
+            if (bend < 0) return {.from = from, .after = 0, .presses = true};
+        }
+    }
+    const Polynomial gap = squared(path, now);
+    meeting.after = falls_within(gap, 2 * path.degree, path.until, now.tolerance);
+    if (steps && meeting.after > 0 && std::isfinite(meeting.after)) {
+        meeting.after = on_map(meeting.after, path.until, [&](double s) {
+            const Instant t = from.after(s);
+            const Vector2 apart = world.position(i, t) - world.position(j, t);
+            const double distance = norm(apart);
+            return GapAndRate{distance - reach,
+                              dot(apart, world.velocity(i, t) - world.velocity(j, t)) / distance};
+        });
+    }
+    return meeting;
+}
+
+/// Whether a body at p is on the side of a segment to which its normal points. A point on the line
+/// is where it comes from, and where its flight begins on the line it is where that leads.
+static bool is_above(const Face& face, const Body& body, const Vector2& p, const Vector2& v)
+{
+    const double height = dot(p - face.at, face.normal);
+    const double rounding = World::rounding(p, body.radius) + World::rounding(face.at, 0);
+    if (body.radius > 0 || std::fabs(height) > rounding) return height > 0;
+    const double rate = dot(v, face.normal);
+    if (rate == 0) return dot(body.a, face.normal) > 0;
+    return std::fabs(dot(body.p - face.at, face.normal)) > rounding ? rate < 0 : rate > 0;
+}
+
+FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, const Vector2& v)
+{
+    const double radius = body.radius;
+    if (face.kind == Face::Kind::wall) {
+        return {dot(p - face.at, face.normal) - radius, face.normal};
+    }
+    if (face.kind == Face::Kind::segment) {
+        const double along = -dot(p - face.at, turned(face.normal));
+        const double slack = 8 * epsilon * face.length;
+        if (along < -slack || along > face.length + slack) return {};
+        const Vector2 normal = is_above(face, body, p, v) ? face.normal : -1.0 * face.normal;
+        return {dot(p - face.at, normal) - radius, normal};
+    }
+    if (radius == 0) return {};
+    const Vector2 apart = p - face.at;
+    const double distance = norm(apart);
+    return {distance - radius, {apart[0] / distance, apart[1] / distance}};
+}
+
+/// Whether the foot of p on the line lies on the segment.
+static bool lies_on(const Face& face, const Vector2& p, double radius)
+{
+    const double along = -dot(p - face.at, turned(face.normal));
+    const double slack = radius == 0 ? World::rounding(p, 0) + World::rounding(face.at, 0) : 0;
+    return along >= -slack && along <= face.length + slack;
+}
+
+static bool lands_on(const Face& face, const Body& body, double after)
+{
+    return std::isfinite(after) && lies_on(face, place(body, after), body.radius);
+}
+
+/// A wall, or the inside of a segment.
+static Meeting meet_line(const World& world, std::uint32_t i, const Face& face)
+{
+    const Body& b = world.bodies[i];
+    const bool segment = face.kind == Face::Kind::segment;
+    const Path path = world.path(i, b.t);
+    const bool turn = segment && !is_above(face, b, path.c[0], path.c[1]);
+    const Vector2 normal = turn ? -1.0 * face.normal : face.normal;
+    const double gap = dot(path.c[0] - face.at, normal) - b.radius;
+    const double rounding = World::rounding(path.c[0], b.radius) + World::rounding(face.at, 0);
+    double rate = dot(path.c[1], normal);
+    const double bend = dot(path.c[2], normal);
+    Meeting meeting{.from = b.t};
+    if (gap <= rounding && std::fabs(rate) <= noise(path.c[1], {})) {
+        if (bend < 0) return {.from = b.t, .after = 0, .presses = true};
+        rate = 0;
+    }
+    if (path.degree <= 2) {
+        meeting.after = falls_after(gap, rate, 2 * bend, rounding);
+        if (segment && bend > 0 && !lands_on(face, b, meeting.after)) {
+            // Past its end, and back from behind.
+            const double behind = -(gap + 2 * b.radius);
+            const double square = rate * rate + 4 * bend * behind;
+            meeting.after =
+                rate < 0 && square > 0 ? (std::sqrt(square) - rate) / (2 * bend) : never;
+        }
+    } else {
+        if (gap > reach_of(path)) return meeting;
+        Polynomial c{gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};
+        meeting.after = falls_within(c, 4, path.until, rounding);
+        if (meeting.after > 0 && std::isfinite(meeting.after)) {
+            meeting.after = on_map(meeting.after, path.until, [&](double s) {
+                const Instant t = b.t.after(s);
+                return GapAndRate{dot(world.position(i, t) - face.at, normal) - b.radius,
+                                  dot(world.velocity(i, t), normal)};
+            });
+        }
+    }
+    if (segment && std::isfinite(meeting.after) && path.degree <= 2 &&
+        !lands_on(face, b, meeting.after)) {
+        meeting.after = never;
+    }
+    if (segment && std::isfinite(meeting.after) && path.degree > 2) {
+        const double s = meeting.after;
+        const Vector2 at =
+            path.c[0] + s * (path.c[1] + s * (path.c[2] + s * (path.c[3] + s * path.c[4])));
+        if (!lies_on(face, at, b.radius)) meeting.after = never;
+    }
+    return meeting;
+}
+
+Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
+{
+    const Face& face = world.faces[which];
+    const Body& b = world.bodies[i];
+    if (b.held == which) return {};
+    if (face.kind != Face::Kind::vertex) return meet_line(world, i, face);
+    if (b.radius == 0) return {};
+    const Path path = world.path(i, b.t);
+    Path apart = path;
+    apart.c[0] = path.c[0] - face.at;
+    const double rounding = World::rounding(path.c[0], b.radius) + World::rounding(face.at, 0);
+    Squares now = squares(apart.c[0], apart.c[1], b.radius, rounding);
+    const bool steps = std::isfinite(path.until);
+    Meeting meeting{.from = b.t};
+    if (steps && norm(apart.c[0]) - b.radius > reach_of(path)) return meeting;
+    if (now.at_once <= now.tolerance && std::fabs(now.rate) <= noise(path.c[1], {}) * b.radius) {
+        now.rate = 0;
+        if (dot(path.c[1], path.c[1]) + 2 * dot(apart.c[0], path.c[2]) < 0) {
+            return {.from = b.t, .after = 0, .presses = true};
+        }
+    }
+    meeting.after = path.degree == 1 ? straight(now, path.c[1])
+                                     : falls_within(squared(apart, now), 2 * path.degree,
+                                                    path.until, now.tolerance);
+    if (steps && meeting.after > 0 && std::isfinite(meeting.after)) {
+        meeting.after = on_map(meeting.after, path.until, [&](double s) {
+            const Instant t = b.t.after(s);
+            const Vector2 from_vertex = world.position(i, t) - face.at;
+            const double distance = norm(from_vertex);
+            return GapAndRate{distance - b.radius,
+                              dot(from_vertex, world.velocity(i, t)) / distance};
+        });
+    }
+    return meeting;
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,100 @@
+#include "scene/roots.hpp"
+
+#include <algorithm>
+
+namespace ricochet::detail {
+
+namespace {
+
+/// Where a polynomial changes its sign, ascending.
+struct Roots {
+    std::array<double, largest_degree> at{};
+    int count = 0;
+    void add(double s) { at[static_cast<std::size_t>(count++)] = s; }
+};
+
+/// The root between a and b, where the values have opposite signs.
+double root_between(const Polynomial& c, int degree, double a, double b)
+{
+    double fa = value_of(c, degree, a);
+    double s = 0.5 * (a + b);
+    for (int i = 0; i < 200; ++i) {
+        const double f = value_of(c, degree, s);
+        if (f == 0) return s;
+        ((f < 0) == (fa < 0) ? a : b) = s;
+        double rate = 0;
+        for (int k = degree; k > 0; --k) {
+            rate = rate * s + k * c[static_cast<std::size_t>(k)];
+        }
+        double next = s - f / rate;
+        if (!(next > a && next < b)) next = 0.5 * (a + b);
+        if (next == s || next <= a || next >= b) return next;
+        if (std::fabs(next - s) <= 2e-16 * std::fabs(next)) return next;
+        s = next;
+    }
+    return s;
+}
+
+/// All in (0, until], from those of the derivative, between which it is monotone.
+Roots roots_in(const Polynomial& c, int degree, double until)
+{
+    Roots roots;
+    while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;
+    if (degree == 0) return roots;
+    Roots turns;
+    if (degree > 1) {
+        Polynomial slope{};
+        for (int k = 1; k <= degree; ++k) {
+            slope[static_cast<std::size_t>(k - 1)] = k * c[static_cast<std::size_t>(k)];
+        }
+        turns = roots_in(slope, degree - 1, until);
+    }
+    double from = 0;
+    double f_from = c[0];
+    for (int k = 0; k <= turns.count; ++k) {
+        const double to = k < turns.count ? turns.at[static_cast<std::size_t>(k)] : until;
+        const double f_to = value_of(c, degree, to);
+        if ((f_from > 0 && f_to <= 0) || (f_from < 0 && f_to >= 0)) {
+            roots.add(f_to == 0 ? to : root_between(c, degree, from, to));
+        }
+        from = to;
+        f_from = f_to;
+    }
+    return roots;
+}
+
+/// All roots lie below it (Lagrange; Fujiwara).
+double bound_of_roots(const Polynomial& c, int degree)
+{
+    double bound = 0;
+    const double lead = std::fabs(c[static_cast<std::size_t>(degree)]);
+    for (int k = 0; k < degree; ++k) {
+        const double ratio = std::fabs(c[static_cast<std::size_t>(k)]) / lead;
+        if (ratio > 0) bound = std::max(bound, std::pow(ratio, 1.0 / (degree - k)));
+    }
+    return 2 * bound;
+}
+
+}  // namespace
+
+double falls_within(Polynomial c, int degree, double until, double tolerance) noexcept
+{
+    while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;
+    if (c[0] <= tolerance) {
+        // Closed now: what follows decides, and the root at zero is divided out.
+        int first = 1;
+        while (first <= degree && c[static_cast<std::size_t>(first)] == 0) ++first;
+        if (first > degree) return never;
+        if (c[static_cast<std::size_t>(first)] < 0) return 0;
+        for (int k = first; k <= degree; ++k) {
+            c[static_cast<std::size_t>(k - first)] = c[static_cast<std::size_t>(k)];
+        }
+        degree -= first;
+    }
+    if (degree == 0) return never;
+    const double end = std::isfinite(until) ? until : bound_of_roots(c, degree);
+    const Roots roots = roots_in(c, degree, end);
+    return roots.count > 0 ? roots.at[0] : never;
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,117 @@
+// One group of bodies, from event to event in the order of time.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scene/calendar.hpp"
+#include "scene/cells.hpp"
+#include "scene/impacts.hpp"
+#include "scene/islands.hpp"
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+/// Why a group could not go on.
+struct Failure {
+    Outcome outcome = Outcome::reached_end;
+    Instant t{};
+    std::vector<std::uint32_t> bodies{};
+    std::string message{};
+};
+
+/// What becomes of a group by `t_end`; the world's records are where its bodies are then.
+struct GroupResult {
+    std::optional<Failure> failure;
+    std::vector<SceneEvent> events;
+    std::uint64_t event_count = 0;
+};
+
+/// State of all bodies of a group at a sample time.
+using Samples = std::vector<std::vector<BodyState>>;
+
+class Runner {
+public:
+    Runner(World& world, std::vector<std::uint32_t> bodies, double t_end);
+
+    /// @param samples  a row for each of the options' sample times, whose bodies of this group are
+    ///                 filled in as far as the group comes
+    GroupResult run(Samples& samples);
+
+private:
+    struct Pending {
+        enum class Kind : std::uint8_t { nothing, pair, face, presses, presses_face, stop, edge };
+        Instant t = no_instant;
+        Instant crossing = no_instant;
+        std::uint32_t other = none;
+        std::uint32_t other_version = 0;
+        Kind kind = Kind::nothing;
+        std::int8_t across_x = 0, across_y = 0;
+        Cells::Cell cell{};
+    };
+
+    void place_all();
+    void place_faces();
+    void settle_at_start();
+    void predict(std::uint32_t i);
+    void consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other);
+    void consider_walls(std::uint32_t i);
+    void consider_bucket(std::uint32_t i, std::uint32_t bucket);
+    void consider_faces(std::uint32_t i);
+    void consider_own(std::uint32_t i);
+    void predict_crossing(std::uint32_t i);
+    void put_in_calendar(std::uint32_t i);
+    void move_to_cell(std::uint32_t i);
+    void cross(std::uint32_t i);
+    void step_island(std::uint32_t island);
+    void happen(std::uint32_t i);
+    void impact(std::uint32_t i);
+    void gather(std::uint32_t i, const Pending& seed);
+    void gather_faces(std::uint32_t slot, std::uint32_t sure);
+    void gather_pairs(std::uint32_t slot, std::uint32_t sure);
+    void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);
+    std::uint32_t slot_of(std::uint32_t body);
+    void apply();
+    bool collapses(std::uint32_t i);
+    void restart_island(std::uint32_t island);
+    void settle(std::uint32_t i, std::uint32_t was);
+    void halt(std::uint32_t i);
+    void leave_edge(std::uint32_t i);
+    [[nodiscard]] std::vector<std::uint32_t> touching_faces(std::uint32_t i) const;
+    void note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face, const Vector2& velocity);
+    void sample_until(const Instant& t, bool inclusive, Samples& samples);
+    void fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message);
+    [[nodiscard]] std::string called(std::uint32_t i) const
+    {
+        return world_.scene.name_of(BodyId{i});
+    }
+
+    World& world_;
+    std::vector<std::uint32_t> members_;
+    Instant t_end_;
+    Cells cells_;
+    bool celled_ = false;
+    Calendar calendar_;
+    std::vector<Pending> pending_;
+    std::vector<std::uint32_t> slots_;
+    std::vector<std::uint32_t> islands_;
+    Impacts impacts_;
+    Cluster cluster_;
+    std::vector<std::uint32_t> changed_;
+    std::vector<std::uint32_t> slots_of_islands_;
+    std::vector<std::pair<std::uint32_t, Vector2>> velocities_;
+    struct Series {
+        Instant since{};
+        Instant last{-never, 0};
+        std::uint32_t count = 0;
+    };
+    std::vector<Series> series_;  ///< of impacts of a body
+    Instant now_{};
+    std::uint32_t fruitless_ = 0;  ///< predicted impacts in a row that moved nothing
+    std::size_t next_sample_ = 0;
+    GroupResult result_;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,397 @@
+// What a group does at one instant: impacts, sliding and rest on surfaces.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "scene/runner.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+/// So many impacts of a body within the resolution of the time each, and its cluster collapses.
+constexpr std::uint32_t crowded = 64;
+
+/// Predicted impacts in a row that change nothing.
+constexpr std::uint32_t most_fruitless = 1000;
+
+}  // namespace
+
+std::uint32_t Runner::slot_of(std::uint32_t body)
+{
+    std::uint32_t& slot = slots_[body];
+    if (slot == none) {
+        slot = static_cast<std::uint32_t>(cluster_.bodies.size());
+        cluster_.bodies.push_back(body);
+        cluster_.before.push_back(world_.velocity(body, now_));
+    }
+    return slot;
+}
+
+void Runner::gather(std::uint32_t i, const Pending& seed)
+{
+    cluster_.clear();
+    slot_of(i);
+    for (std::uint32_t slot = 0; slot < cluster_.bodies.size(); ++slot) {
+        const bool first = slot == 0;
+        const bool pair = seed.kind == Pending::Kind::pair;
+        gather_faces(slot, first && !pair ? seed.other : none);
+        if (celled_) gather_pairs(slot, first && pair ? seed.other : none);
+    }
+    cluster_.after = cluster_.before;
+    for (const std::uint32_t body : cluster_.bodies) slots_[body] = none;
+}
+
+/// Contacts of a body of the cluster with faces; the face `sure` touches whatever its gap.
+void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
+{
+    const std::uint32_t i = cluster_.bodies[slot];
+    const Body& body = world_.bodies[i];
+    const Vector2 p = world_.position(i, now_);
+    const Vector2 v = cluster_.before[slot];
+    const auto look = [&](std::uint32_t f) {
+        const Face& face = world_.faces[f];
+        const FaceGap at = face_gap(face, body, p, v);
+        const double tolerance = World::rounding(p, body.radius) + World::rounding(face.at, 0) +
+                                 2 * resolution(now_) * std::fabs(dot(v, at.normal));
+        if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) return;
+        Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
+        contact.normal = at.normal;
+        contact.at = p - body.radius * at.normal;
+        contact.restitution = world_.restitution(body.material, face.material);
+        contact.friction = world_.friction(body.material, face.material);
+        cluster_.contacts.push_back(contact);
+    };
+    for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
+    if (celled_ && cells_.any_faces()) {
+        for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
+    }
+}
+
+void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
+{
+    const std::uint32_t i = cluster_.bodies[slot];
+    const Body& a = world_.bodies[i];
+    const Vector2 p = world_.position(i, now_);
+    const double slack = 1e-9 * (a.radius + std::fabs(p[0]) + std::fabs(p[1]));
+    const auto& cell = pending_[i].cell;
+    for (int x = -1; x <= 1; ++x) {
+        for (int y = -1; y <= 1; ++y) {
+            std::uint32_t j = cells_.head(cells_.bucket_of(cell.x + x, cell.y + y));
+            for (; j != none; j = world_.bodies[j].next) {
+                if (j == i) continue;
+                const Body& b = world_.bodies[j];
+                if (j != sure && !b.quartic) {
+                    const Vector2 near = p - place(b, seconds(b.t, now_));
+                    const double limit = a.radius + b.radius + slack;
+                    if (dot(near, near) > limit * limit) continue;
+                }
+                try_pair(slot, j, j == sure);
+            }
+        }
+    }
+}
+
+void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
+{
+    if (slots_[j] != none && slots_[j] < slot) return;  // seen from there
+    const std::uint32_t i = cluster_.bodies[slot];
+    const Body& a = world_.bodies[i];
+    const Body& b = world_.bodies[j];
+    const double reach = a.radius + b.radius;
+    if (reach == 0) return;
+    if (!sure && (a.quartic || b.quartic)) {
+        // On the polynomials first: the maps are expensive.
+        const Vector2 near = world_.path(i, now_).c[0] - world_.path(j, now_).c[0];
+        if (norm(near) > 1.001 * reach) return;
+    }
+    const Vector2 pa = world_.position(i, now_);
+    const Vector2 pb = world_.position(j, now_);
+    const Vector2 apart = pa - pb;
+    const double distance = norm(apart);
+    const Vector2 normal{apart[0] / distance, apart[1] / distance};
+    const Vector2 va = cluster_.before[slot];
+    const Vector2 vb = world_.velocity(j, now_);
+    const double tolerance = World::rounding(pa, reach) + World::rounding(pb, reach) +
+                             2 * resolution(now_) * std::fabs(dot(va - vb, normal));
+    if (!sure && !(distance - reach <= tolerance)) return;
+    Contact contact{.a = i, .b = j, .surface = false, .slot_a = slot};
+    contact.slot_b = slot_of(j);
+    contact.normal = normal;
+    contact.at = 0.5 * (pa + pb);
+    contact.restitution = world_.restitution(a.material, b.material);
+    contact.friction = world_.friction(a.material, b.material);
+    cluster_.contacts.push_back(contact);
+}
+
+/// Whether impacts of a body follow each other more closely than the time tells.
+bool Runner::collapses(std::uint32_t i)
+{
+    Series& series = series_[i];
+    if (series.count++ == 0) series.since = now_;
+    if (series.count <= crowded) return false;
+    series.count = 0;
+    return seconds(series.since, now_) <= crowded * resolution(now_);
+}
+
+void Runner::impact(std::uint32_t i)
+{
+    gather(i, pending_[i]);
+    const double within = world_.options.elastic_within;
+    if (within > 0) {
+        for (Contact& contact : cluster_.contacts) {
+            const auto recent = [&](std::uint32_t body) {
+                return series_[body].last.value > -never &&
+                       seconds(series_[body].last, now_) < within;
+            };
+            if (recent(contact.a) || (!contact.surface && recent(contact.b))) {
+                contact.restitution = 1;
+            }
+        }
+    }
+    bool spend = false;
+    if (within == 0) {
+        for (const std::uint32_t body : cluster_.bodies) spend = collapses(body) || spend;
+    }
+    std::vector<SceneEvent>* events = world_.options.record_events ? &result_.events : nullptr;
+    const std::size_t known = result_.events.size();
+    impacts_.resolve(cluster_, now_.value, spend, events);
+    for (std::size_t k = known; k < result_.events.size(); ++k) {
+        result_.events[k].number = result_.event_count;
+    }
+    apply();
+    if (changed_.empty()) {
+        ++world_.statistics.stale;
+        if (++fruitless_ > most_fruitless) {
+            return fail(Outcome::endless_cascade, {i},
+                        fmt::format("impacts of {} repeat without effect", called(i)));
+        }
+        return predict(i);
+    }
+    fruitless_ = 0;
+    ++result_.event_count;
+    if (result_.event_count >= world_.options.max_events) {
+        fail(Outcome::step_limit, {}, "max_events events have happened");
+    }
+}
+
+/// New records of those whose velocity has changed, and what they meet now.
+void Runner::apply()
+{
+    changed_.clear();
+    std::vector<std::uint32_t>& islands = slots_of_islands_;
+    islands.clear();
+    for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
+        if (cluster_.after[k] == cluster_.before[k]) continue;
+        const std::uint32_t i = cluster_.bodies[k];
+        changed_.push_back(i);
+        Body& body = world_.bodies[i];
+        series_[i].last = now_;
+        if (!is_finite(cluster_.after[k])) {
+            return fail(Outcome::non_finite, {i},
+                        fmt::format("the velocity of {} is not finite", called(i)));
+        }
+        if (body.island != none) {
+            if (std::ranges::find(islands, body.island) == islands.end()) {
+                islands.push_back(body.island);
+            }
+            continue;
+        }
+        body.p = place(body, seconds(body.t, now_));
+        body.v = cluster_.after[k];
+        body.a = world_.gravity;
+        body.t = now_;
+        ++body.version;
+        body.asleep = false;
+        const std::uint32_t held = std::exchange(body.held, none);
+        const bool on_surface = std::ranges::any_of(
+            cluster_.contacts, [&](const Contact& c) { return c.a == i && c.surface; });
+        if (on_surface) settle(i, held);
+    }
+    for (const std::uint32_t island : islands) restart_island(island);
+    if (result_.failure) return;
+    for (const std::uint32_t i : changed_) {
+        if (world_.bodies[i].island == none) predict(i);
+    }
+    for (const std::uint32_t island : islands) {
+        for (const std::uint32_t i : world_.islands->members(island)) predict(i);
+    }
+}
+
+void Runner::restart_island(std::uint32_t island)
+{
+    velocities_.clear();
+    for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
+        const std::uint32_t i = cluster_.bodies[k];
+        if (world_.bodies[i].island == island) velocities_.emplace_back(i, cluster_.after[k]);
+    }
+    Islands& islands = *world_.islands;
+    const bool taken = islands.restart(island, now_, velocities_);
+    if (!taken) {
+        return fail(Outcome::step_underflow, islands.members(island),
+                    fmt::format("the step of the island of {} fell below what the time resolves",
+                                called(islands.members(island)[0])));
+    }
+    const Instant& end = islands.end(island);
+    calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + island,
+                  before(end, t_end_) ? end : no_instant);
+}
+
+std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
+{
+    const Body& body = world_.bodies[i];
+    std::vector<std::uint32_t> faces;
+    const auto look = [&](std::uint32_t f) {
+        const Face& face = world_.faces[f];
+        if (face.kind == Face::Kind::vertex) return;
+        const double gap = face_gap(face, body, body.p, body.v).gap;
+        if (gap <= World::rounding(body.p, body.radius) + World::rounding(face.at, 0)) {
+            faces.push_back(f);
+        }
+    };
+    for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
+    if (celled_ && cells_.any_faces()) {
+        for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
+    }
+    return faces;
+}
+
+/// A body whose bounces on surfaces are shorter than the time resolves stays on them: at rest, or
+/// sliding on one of them. `was` is the face on which it slid before.
+void Runner::settle(std::uint32_t i, std::uint32_t was)
+{
+    Body& body = world_.bodies[i];
+    const Vector2 velocity = body.v;
+    std::vector<std::uint32_t> holding;
+    for (const std::uint32_t f : touching_faces(i)) {
+        const Vector2 n = world_.push_of(body, f);
+        const double pull = dot(world_.gravity, n);
+        const double leaves = dot(body.v, n);
+        if (!(pull < 0) || leaves < -8 * epsilon * norm(body.v)) continue;
+        if (2 * leaves <= resolution(body.t) * -pull || leaves <= 8 * epsilon * norm(body.v)) {
+            holding.push_back(f);
+        }
+    }
+    if (holding.empty()) return;
+    for (const std::uint32_t f : holding) {
+        const Vector2 n = world_.push_of(body, f);
+        body.v = body.v - dot(body.v, n) * n;
+    }
+    std::uint32_t chosen = none;
+    for (std::size_t k = 0; k < holding.size() && chosen == none; ++k) {
+        world_.slide(i, holding[k]);
+        const bool stays = std::ranges::all_of(holding, [&](std::uint32_t f) {
+            return dot(body.a, world_.push_of(body, f)) >= -8 * epsilon * norm(world_.gravity);
+        });
+        if (stays) chosen = holding[k];
+    }
+    if (chosen == none) {
+        // No single one carries it, so it lies in the corner of two.
+        body.v = body.a = {};
+        body.asleep = true;
+        body.held = chosen = holding[0];
+    }
+    if (chosen != was) note(SceneEvent::Kind::held, i, chosen, velocity);
+}
+
+/// When friction stops it, or its face ends.
+void Runner::consider_own(std::uint32_t i)
+{
+    const Body& body = world_.bodies[i];
+    if (body.held == none) return;
+    const Face& face = world_.faces[body.held];
+    Pending& pending = pending_[i];
+    const auto add = [&](double after, Pending::Kind kind) {
+        if (!(after < never)) return;
+        const Instant t = body.t.after(after);
+        if (!before(t, pending.t)) return;
+        pending.t = t;
+        pending.kind = kind;
+        pending.other = body.held;
+    };
+    const double slowing = dot(body.v, body.a);
+    if (slowing < 0 && world_.friction(body.material, face.material) > 0) {
+        add(-dot(body.v, body.v) / slowing, Pending::Kind::stop);
+    }
+    if (face.kind == Face::Kind::segment) {
+        const Vector2 along = -1.0 * turned(face.normal);
+        const double s = dot(body.p - face.at, along);
+        const double v = dot(body.v, along);
+        const double a = dot(body.a, along);
+        add(falls_after(s, v, a, 0), Pending::Kind::edge);
+        add(falls_after(face.length - s, -v, -a, 0), Pending::Kind::edge);
+    }
+}
+
+void Runner::halt(std::uint32_t i)
+{
+    Body& body = world_.bodies[i];
+    const double s = seconds(body.t, now_);
+    const Vector2 velocity = speed(body, s);
+    body.p = place(body, s);
+    body.v = {};
+    body.t = now_;
+    ++body.version;
+    const std::uint32_t face = body.held;
+    world_.slide(i, face);
+    if (body.asleep) {
+        note(SceneEvent::Kind::stopped, i, face, velocity);
+        ++result_.event_count;
+    }
+    predict(i);
+}
+
+void Runner::leave_edge(std::uint32_t i)
+{
+    Body& body = world_.bodies[i];
+    const double s = seconds(body.t, now_);
+    const Vector2 velocity = speed(body, s);
+    body.p = place(body, s);
+    body.v = velocity;
+    body.a = world_.gravity;
+    body.t = now_;
+    ++body.version;
+    body.held = none;
+    for (const std::uint32_t f : touching_faces(i)) {
+        const Face& face = world_.faces[f];
+        if (face.kind != Face::Kind::segment) continue;
+        // The face that goes on from here, in the direction of the motion.
+        const Vector2 along = -1.0 * turned(face.normal);
+        const double place_on = dot(body.p - face.at, along);
+        const bool ahead =
+            dot(body.v, along) > 0 ? place_on < 0.5 * face.length : place_on > 0.5 * face.length;
+        const Vector2 n = world_.push_of(body, f);
+        if (ahead && std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) &&
+            dot(world_.gravity, n) < 0) {
+            world_.slide(i, f);
+            break;
+        }
+    }
+    predict(i);
+}
+
+void Runner::settle_at_start()
+{
+    for (const std::uint32_t i : members_) {
+        Body& body = world_.bodies[i];
+        if (body.island != none || body.asleep || is_zero(world_.gravity)) continue;
+        const std::vector<std::uint32_t> faces = touching_faces(i);
+        if (!faces.empty()) settle(i, faces.size() == 1 ? faces[0] : none);
+    }
+}
+
+void Runner::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
+                  const Vector2& velocity)
+{
+    if (before(Instant{world_.options.t_start, 0}, now_) && world_.options.record_events) {
+        SceneEvent event{.t = now_.value, .number = result_.event_count, .kind = kind, .body = i};
+        event.other = {true, world_.faces[face].surface};
+        event.before[0] = velocity;
+        event.after[0] = world_.bodies[i].v;
+        result_.events.push_back(event);
+    }
+}
+
+}  // namespace ricochet::detail

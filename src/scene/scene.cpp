@@ -1,0 +1,260 @@
+#include "ricochet/scene/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "checks/require.hpp"
+#include "scene/names.hpp"
+#include "scene/vector2.hpp"
+
+namespace ricochet {
+
+using namespace detail;
+
+namespace {
+
+constexpr std::string_view who = "Scene";
+constexpr Refuse refuse{who};
+
+void require_vector(const Vector2& given, std::string_view what)
+{
+    for (const double component : given) require_finite(who, what, component);
+}
+
+/// What touches may overlap by the rounding of its coordinates.
+double rounding_of(const Vector2& at, double radius)
+{
+    return 8 * std::numeric_limits<double>::epsilon() *
+           (std::fabs(at[0]) + std::fabs(at[1]) + radius);
+}
+
+}  // namespace
+
+Scene::Scene(const Settings& settings) : settings_(settings)
+{
+    require_vector(settings.gravity, "gravity");
+    require_positive(who, "memory_limit", settings.memory_limit);
+    materials_.push_back({.name = "", .restitution = 1, .friction = 0});
+}
+
+double Scene::memory() const noexcept
+{
+    double segments = 0;
+    for (const Surface& surface : surfaces_) segments += static_cast<double>(surface.points.size());
+    return 512.0 * static_cast<double>(bodies_.size()) + 128 * segments +
+           256.0 * static_cast<double>(springs_.size());
+}
+
+void Scene::require_room(double bodies) const
+{
+    const double needed = memory() + 512 * bodies;
+    if (needed > settings_.memory_limit) {
+        refuse(fmt::format("{:g} bodies need about {:.3g} GB, and memory_limit allows {:.3g} GB",
+                           static_cast<double>(bodies_.size()) + bodies, needed * 1e-9,
+                           settings_.memory_limit * 1e-9));
+    }
+}
+
+void Scene::take_name(const std::string& name, std::string_view kind)
+{
+    if (name.empty()) return;
+    const auto kind_of = static_cast<std::uint32_t>(bodies_.size());
+    if (!names_.emplace(name, kind == "body" ? kind_of : ~0U).second) {
+        refuse(fmt::format("the name \"{}\" is given twice", name));
+    }
+}
+
+void Scene::require_material(MaterialId material, std::string_view of) const
+{
+    if (material.index >= materials_.size()) {
+        refuse(fmt::format("the material of {} is number {}, and there are {}", of, material.index,
+                           materials_.size()));
+    }
+}
+
+MaterialId Scene::material(const Material& material)
+{
+    const std::string label = fmt::format("material \"{}\": ", material.name);
+    require(material.restitution >= 0 && material.restitution <= 1, who, label + "restitution",
+            "lie in [0, 1]", material.restitution);
+    require_not_negative(who, label + "friction", material.friction);
+    take_name(material.name, "material");
+    materials_.push_back(material);
+    return {static_cast<std::uint32_t>(materials_.size() - 1)};
+}
+
+BodyId Scene::add(const Disc& body, std::string_view kind)
+{
+    const std::string label =
+        body.name.empty() ? fmt::format("{} {}", kind, bodies_.size()) : body.name;
+    const std::string prefix = label + ": ";
+    require_vector(body.at, prefix + "position");
+    require_vector(body.velocity, prefix + "velocity");
+    require_positive(who, prefix + "mass", body.mass);
+    require_not_negative(who, prefix + "drag", body.drag);
+    require_material(body.material, label);
+    if (static_cast<double>(bodies_.size()) + 1 > std::numeric_limits<std::uint32_t>::max() / 2.0) {
+        refuse("there are more bodies than handles");
+    }
+    require_room(1);
+    for (const Surface& surface : surfaces_) require_outside(body, surface);
+    take_name(body.name, "body");
+    bodies_.push_back(body);
+    return {static_cast<std::uint32_t>(bodies_.size() - 1)};
+}
+
+BodyId Scene::disc(const Disc& disc)
+{
+    require_positive(who, disc.name.empty() ? "radius" : disc.name + ": radius", disc.radius);
+    return add(disc, "body");
+}
+
+BodyId Scene::point(const Point& point)
+{
+    return add({.name = point.name,
+                .at = point.at,
+                .velocity = point.velocity,
+                .radius = 0,
+                .mass = point.mass,
+                .drag = point.drag,
+                .material = point.material},
+               "body");
+}
+
+SurfaceId Scene::wall(const Wall& wall)
+{
+    require_vector(wall.point, "point of a wall");
+    require_vector(wall.normal, "normal of a wall");
+    const double length = norm(wall.normal);
+    if (!(length > 0) || !std::isfinite(length)) refuse("the normal of a wall has no length");
+    require_material(wall.material, "a wall");
+    take_name(wall.name, "surface");
+    surfaces_.push_back({.name = wall.name,
+                         .is_wall = true,
+                         .points = {wall.point},
+                         .normal = {wall.normal[0] / length, wall.normal[1] / length},
+                         .material = wall.material});
+    return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
+}
+
+SurfaceId Scene::terrain(const Terrain& terrain)
+{
+    if (terrain.points.size() < 2) {
+        refuse(fmt::format("terrain needs at least 2 points, got {}", terrain.points.size()));
+    }
+    for (const Vector2& point : terrain.points) require_vector(point, "point of terrain");
+    require_material(terrain.material, "terrain");
+    std::vector<Vector2> points = terrain.points;
+    if (terrain.closed) points.push_back(points.front());
+    for (std::size_t i = 1; i < points.size(); ++i) {
+        if (points[i] == points[i - 1]) {
+            refuse(fmt::format("segment {} of terrain has no length", i - 1));
+        }
+    }
+    take_name(terrain.name, "surface");
+    surfaces_.push_back({.name = terrain.name,
+                         .is_wall = false,
+                         .points = std::move(points),
+                         .material = terrain.material});
+    return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
+}
+
+void Scene::spring(const Spring& spring)
+{
+    for (const BodyId end : spring.between) {
+        if (end.index >= bodies_.size()) {
+            refuse(fmt::format("a spring ends at body {}, and there are {}", end.index,
+                               bodies_.size()));
+        }
+    }
+    if (spring.between[0] == spring.between[1]) {
+        refuse(fmt::format("a spring joins {} to itself", name_of(spring.between[0])));
+    }
+    require_not_negative(who, "rest of a spring", spring.rest);
+    require_not_negative(who, "stiffness of a spring", spring.stiffness);
+    require_not_negative(who, "damping of a spring", spring.damping);
+    springs_.push_back(spring);
+}
+
+std::string Scene::name_of(BodyId body) const
+{
+    const std::string& name = bodies_[body.index].name;
+    return name.empty() ? fmt::format("body {}", body.index) : name;
+}
+
+std::string Scene::name_of(SurfaceId surface) const
+{
+    const std::string& name = surfaces_[surface.index].name;
+    return name.empty() ? fmt::format("surface {}", surface.index) : name;
+}
+
+BodyId Scene::body(std::string_view name) const
+{
+    const auto found = names_.find(std::string(name));
+    if (found != names_.end() && found->second != ~0U) return {found->second};
+    std::vector<std::string_view> known;
+    for (const Disc& body : bodies_) {
+        if (!body.name.empty()) known.push_back(body.name);
+    }
+    refuse(fmt::format("there is no body \"{}\"{}", name, nearest_name(name, known)));
+}
+
+void Scene::require_outside(const Disc& body, const Surface& surface) const
+{
+    const std::string label = body.name.empty() ? "a body" : body.name;
+    const double slack = rounding_of(body.at, body.radius);
+    if (surface.is_wall) {
+        const double gap = dot(body.at - surface.points[0], surface.normal) - body.radius;
+        if (gap < -slack - rounding_of(surface.points[0], 0)) {
+            refuse(fmt::format("{} at ({}, {}) lies behind {} by {:.3g}", label, body.at[0],
+                               body.at[1],
+                               surface.name.empty() ? "a wall" : "\"" + surface.name + "\"", -gap));
+        }
+        return;
+    }
+    for (std::size_t i = 1; i < surface.points.size(); ++i) {
+        const Vector2& a = surface.points[i - 1];
+        const double gap = norm(body.at - nearest_on(a, surface.points[i], body.at)) - body.radius;
+        if (gap < -slack - rounding_of(a, 0)) {
+            refuse(fmt::format("{} at ({}, {}) lies across segment {} of {} by {:.3g}", label,
+                               body.at[0], body.at[1], i - 1,
+                               surface.name.empty() ? "terrain" : "\"" + surface.name + "\"",
+                               -gap));
+        }
+    }
+}
+
+void Scene::check() const
+{
+    for (const Surface& surface : surfaces_) {
+        for (const Disc& body : bodies_) require_outside(body, surface);
+    }
+    // By the left edge: who begins before another one ends may overlap it.
+    std::vector<std::uint32_t> order(bodies_.size());
+    for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+    const auto left = [&](std::uint32_t i) { return bodies_[i].at[0] - bodies_[i].radius; };
+    std::ranges::sort(order, {}, left);
+    std::vector<std::uint32_t> open;
+    for (const std::uint32_t i : order) {
+        const Disc& a = bodies_[i];
+        std::erase_if(
+            open, [&](std::uint32_t j) { return bodies_[j].at[0] + bodies_[j].radius < left(i); });
+        for (const std::uint32_t j : open) {
+            const Disc& b = bodies_[j];
+            const double reach = a.radius + b.radius;
+            if (reach == 0 || std::fabs(a.at[1] - b.at[1]) > reach) continue;
+            const double overlap = reach - norm(a.at - b.at);
+            if (overlap > rounding_of(a.at, a.radius) + rounding_of(b.at, b.radius)) {
+                const auto [first, second] = std::minmax(i, j);
+                refuse(fmt::format("{} and {} overlap by {:.3g} at the start",
+                                   name_of(BodyId{first}), name_of(BodyId{second}), overlap));
+            }
+        }
+        open.push_back(i);
+    }
+}
+
+}  // namespace ricochet

@@ -1,0 +1,166 @@
+#include "ricochet/scene/simulate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "checks/require.hpp"
+#include "scene/groups.hpp"
+#include "scene/options.hpp"
+#include "scene/runner.hpp"
+
+namespace ricochet {
+
+using namespace detail;
+
+namespace detail {
+
+void validate(const SceneOptions& o)
+{
+    constexpr std::string_view who = "simulate";
+    require_finite(who, "t_start", o.t_start);
+    require_above(who, "t_end", o.t_end, "t_start", o.t_start);
+    require_positive(who, "rtol", o.rtol);
+    require_positive(who, "atol", o.atol);
+    require_not_negative(who, "elastic_within", o.elastic_within);
+    require(o.max_events > 0, who, "max_events", "be positive", 0);
+    double last = o.t_start;
+    for (const double t : o.sample_times) {
+        require_at_least(who, "a sample time", t, "the one before it,", last);
+        require(t <= o.t_end, who, "a sample time", "not lie after t_end", t);
+        last = t;
+    }
+}
+
+}  // namespace detail
+
+namespace {
+
+/// All groups until `t_end`; the first failure of any.
+std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
+{
+    std::optional<Failure> failure;
+    const auto groups = groups_of(world);
+    run.samples.assign(world.options.sample_times.size(),
+                       std::vector<BodyState>(world.bodies.size()));
+    for (const auto& group : groups) {
+        Runner runner(world, group, t_end);
+        GroupResult result = runner.run(run.samples);
+        world.statistics.groups += group.size() > 1;
+        world.statistics.alone += group.size() == 1;
+        for (SceneEvent& event : result.events) event.number += world.statistics.events;
+        world.statistics.events += result.event_count;
+        run.events.insert(run.events.end(), result.events.begin(), result.events.end());
+        if (result.failure && (!failure || before(result.failure->t, failure->t))) {
+            failure = std::move(result.failure);
+        }
+    }
+    return failure;
+}
+
+}  // namespace
+
+namespace {
+
+/// One pass over all groups; what failed in one group ends the others at that time, in a pass of
+/// their own.
+SceneRun run_until(const Scene& scene, const SceneOptions& options, double t_end, Failure* first)
+{
+    SceneRun run;
+    World world(scene, options);
+    const auto failure = run_groups(world, t_end, run);
+    if (failure && failure->t.value < t_end &&
+        world.statistics.groups + world.statistics.alone > 1 &&
+        failure->outcome != Outcome::cancelled) {
+        *first = *failure;
+        return run_until(scene, options, failure->t.value, first);
+    }
+    if (failure) *first = *failure;
+    const Instant end = failure ? failure->t : Instant{t_end, 0};
+    run.t = end.value;
+    run.bodies.resize(world.bodies.size());
+    for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
+        run.bodies[i] = {world.position(i, end), world.velocity(i, end), world.bodies[i].asleep};
+    }
+    run.statistics = world.statistics;
+    return run;
+}
+
+/// Events of all groups in the order of time; events of one group at one time keep their order.
+void sort_events(SceneRun& run)
+{
+    std::ranges::stable_sort(run.events, [](const SceneEvent& a, const SceneEvent& b) {
+        return a.t != b.t ? a.t < b.t : a.number < b.number;
+    });
+    std::uint64_t last = ~0ULL;
+    std::uint64_t number = ~0ULL;
+    for (SceneEvent& event : run.events) {
+        if (event.number != last) ++number;
+        last = event.number;
+        event.number = number;
+    }
+}
+
+}  // namespace
+
+SceneRun simulate(const Scene& scene, const SceneOptions& wanted)
+{
+    validate(wanted);
+    SceneOptions options = wanted;
+    // Their times tell which is the last.
+    options.record_events |= wanted.max_events != SceneOptions{}.max_events;
+    scene.check();
+    scene.require_room(0);
+    Failure failure;
+    SceneRun run = run_until(scene, options, options.t_end, &failure);
+    if (run.statistics.events > options.max_events) {
+        // Each group has counted for itself: the time of the last event that is wanted ends all.
+        std::vector<double> times;
+        std::uint64_t last = ~0ULL;
+        for (const SceneEvent& event : run.events) {
+            if (event.number != last) times.push_back(event.t);
+            last = event.number;
+        }
+        const auto nth = static_cast<std::ptrdiff_t>(options.max_events - 1);
+        std::ranges::nth_element(times, times.begin() + nth);
+        const double end = times[static_cast<std::size_t>(nth)];
+        failure = {Outcome::step_limit, {end, 0}, {}, "max_events events have happened"};
+        Failure later;
+        run = run_until(scene, options, end, &later);
+    }
+    run.outcome = failure.outcome;
+    run.message = failure.message;
+    run.involved = failure.bodies;
+    if (!wanted.record_events) run.events.clear();
+    sort_events(run);
+    std::size_t rows = 0;
+    for (const double t : options.sample_times) rows += t <= run.t;
+    run.samples.resize(rows);
+    run.sample_times.assign(options.sample_times.begin(),
+                            options.sample_times.begin() + static_cast<std::ptrdiff_t>(rows));
+    return run;
+}
+
+double energy(const Scene& scene, const std::vector<BodyState>& bodies)
+{
+    if (bodies.size() != scene.bodies().size()) {
+        Refuse{"energy"}(
+            fmt::format("{} states are given for {} bodies", bodies.size(), scene.bodies().size()));
+    }
+    double sum = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        const double mass = scene.bodies()[i].mass;
+        sum += mass * (0.5 * dot(bodies[i].velocity, bodies[i].velocity) -
+                       dot(scene.settings().gravity, bodies[i].at));
+    }
+    for (const Spring& spring : scene.springs()) {
+        const double length =
+            norm(bodies[spring.between[0].index].at - bodies[spring.between[1].index].at);
+        sum += 0.5 * spring.stiffness * (length - spring.rest) * (length - spring.rest);
+    }
+    return sum;
+}
+
+}  // namespace ricochet

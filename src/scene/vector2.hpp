@@ -1,0 +1,57 @@
+// Arithmetic in the plane.
+//
+// Every sum is written so that exchanging two bodies changes signs alone: the bits do not depend on
+// which of them is asked first.
+#pragma once
+
+#include <cmath>
+
+#include "ricochet/scene/scene.hpp"
+
+namespace ricochet::detail {
+
+[[nodiscard]] inline Vector2 operator+(const Vector2& a, const Vector2& b) noexcept
+{
+    return {a[0] + b[0], a[1] + b[1]};
+}
+[[nodiscard]] inline Vector2 operator-(const Vector2& a, const Vector2& b) noexcept
+{
+    return {a[0] - b[0], a[1] - b[1]};
+}
+[[nodiscard]] inline Vector2 operator*(double s, const Vector2& a) noexcept
+{
+    return {s * a[0], s * a[1]};
+}
+[[nodiscard]] inline double dot(const Vector2& a, const Vector2& b) noexcept
+{
+    return a[0] * b[0] + a[1] * b[1];
+}
+[[nodiscard]] inline double norm(const Vector2& a) noexcept
+{
+    return std::sqrt(dot(a, a));
+}
+[[nodiscard]] inline bool is_zero(const Vector2& a) noexcept
+{
+    return a[0] == 0 && a[1] == 0;
+}
+[[nodiscard]] inline bool is_finite(const Vector2& a) noexcept
+{
+    return std::isfinite(a[0]) && std::isfinite(a[1]);
+}
+/// Turned by a right angle, counterclockwise.
+[[nodiscard]] inline Vector2 turned(const Vector2& a) noexcept
+{
+    return {-a[1], a[0]};
+}
+
+/// The point of the segment from a to b that is nearest to p.
+[[nodiscard]] inline Vector2 nearest_on(const Vector2& a, const Vector2& b,
+                                        const Vector2& p) noexcept
+{
+    const Vector2 along = b - a;
+    const double length = dot(along, along);
+    const double part = length > 0 ? dot(p - a, along) / length : 0;
+    return part <= 0 ? a : part >= 1 ? b : a + part * along;
+}
+
+}  // namespace ricochet::detail

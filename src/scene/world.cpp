@@ -1,0 +1,127 @@
+#include "scene/world.hpp"
+
+#include "scene/islands.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+void add_faces(const Scene::Surface& surface, std::uint32_t index, std::vector<Face>& faces)
+{
+    if (surface.is_wall) {
+        faces.push_back({.kind = Face::Kind::wall,
+                         .at = surface.points[0],
+                         .normal = surface.normal,
+                         .surface = index,
+                         .material = surface.material.index});
+        return;
+    }
+    const auto& points = surface.points;
+    const bool closed = points.front() == points.back();
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        if (k + 1 < points.size()) {
+            const Vector2 along = points[k + 1] - points[k];
+            const double length = norm(along);
+            faces.push_back({.kind = Face::Kind::segment,
+                             .at = points[k],
+                             .normal = turned((1 / length) * along),
+                             .length = length,
+                             .surface = index,
+                             .material = surface.material.index});
+        }
+        if (k + 1 < points.size() || !closed) {
+            faces.push_back({.kind = Face::Kind::vertex,
+                             .at = points[k],
+                             .surface = index,
+                             .material = surface.material.index});
+        }
+    }
+}
+
+}  // namespace
+
+World::World(const Scene& from, const SceneOptions& with)
+    : scene(from), options(with), gravity(from.settings().gravity)
+{
+    const Instant start{with.t_start, 0};
+    bodies.reserve(from.bodies().size());
+    for (const Disc& disc : from.bodies()) {
+        Body body;
+        body.p = disc.at;
+        body.v = disc.velocity;
+        body.a = gravity;
+        body.t = start;
+        body.radius = disc.radius;
+        body.inverse_mass = 1 / disc.mass;
+        body.material = disc.material.index;
+        bodies.push_back(body);
+    }
+    for (const bool walls : {true, false}) {
+        std::uint32_t index = 0;
+        for (const Scene::Surface& surface : from.surfaces()) {
+            if (surface.is_wall == walls) add_faces(surface, index, faces);
+            ++index;
+        }
+        if (walls) wall_count = static_cast<std::uint32_t>(faces.size());
+    }
+    islands = std::make_unique<Islands>(*this);
+    if (islands->count() > 0) bends.resize(bodies.size());
+    put_to_sleep();
+}
+
+World::~World() = default;
+
+Vector2 World::push_of(const Body& body, std::uint32_t face) const
+{
+    const Face& on = faces[face];
+    if (on.kind == Face::Kind::wall) return on.normal;
+    const double height = dot(body.p - on.at, on.normal);
+    const bool above = body.radius == 0 ? dot(gravity, on.normal) < 0 : height > 0;
+    return above ? on.normal : -1.0 * on.normal;
+}
+
+/// A body on a face moves along it: pulled by gravity, slowed by friction.
+void World::slide(std::uint32_t i, std::uint32_t face)
+{
+    Body& body = bodies[i];
+    const Vector2 n = push_of(body, face);
+    const Vector2 along = turned(n);
+    const double pull = dot(gravity, along);
+    const double grip = friction(body.material, faces[face].material) * -dot(gravity, n);
+    const double speed = dot(body.v, along);
+    const double rounding = 4 * epsilon * norm(gravity);
+    body.held = face;
+    body.v = speed * along;
+    if (speed == 0 && std::fabs(pull) <= std::max(grip, rounding)) {
+        body.a = body.v = {};
+        body.asleep = true;
+        return;
+    }
+    body.asleep = false;
+    const double against = speed != 0 ? speed : pull;
+    double rate = std::fabs(pull) <= rounding ? 0 : pull;
+    if (grip > 0) rate -= std::copysign(grip, against);
+    body.a = rate * along;
+}
+
+/// What does not move and is not pulled, or lies on a wall that holds it.
+void World::put_to_sleep()
+{
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+        Body& body = bodies[i];
+        if (body.island != none || !is_zero(body.v)) continue;
+        if (is_zero(gravity)) body.asleep = true;
+        for (std::uint32_t f = 0; f < wall_count && !body.asleep; ++f) {
+            const Face& wall = faces[f];
+            const double gap = dot(body.p - wall.at, wall.normal) - body.radius;
+            if (gap > rounding(body.p, body.radius) + rounding(wall.at, 0)) continue;
+            if (!(dot(gravity, wall.normal) < 0)) continue;
+            slide(i, f);
+            if (body.asleep) break;
+            body.held = none;
+            body.a = gravity;
+        }
+    }
+}
+
+}  // namespace ricochet::detail

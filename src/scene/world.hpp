@@ -1,0 +1,217 @@
+// The bodies of a scene in motion.
+//
+// A body's record says where it was when its velocity last changed, and how it has moved since.
+// Nothing else advances it: when a pair meets is a function of two records alone, whatever was
+// asked before, so that calendars, cells, samples and labels do not change a bit.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "ricochet/detail/instant.hpp"
+#include "ricochet/scene/simulate.hpp"
+#include "scene/roots.hpp"
+#include "scene/vector2.hpp"
+
+namespace ricochet::detail {
+
+inline constexpr std::uint32_t none = ~0U;
+inline constexpr double epsilon = 2.220446049250313e-16;
+
+[[nodiscard]] inline bool before(const Instant& a, const Instant& b) noexcept
+{
+    return a.value < b.value || (a.value == b.value && a.remainder < b.remainder);
+}
+/// Seconds from `a` to `b`.
+[[nodiscard]] inline double seconds(const Instant& a, const Instant& b) noexcept
+{
+    return (b.value - a.value) + (b.remainder - a.remainder);
+}
+inline constexpr Instant no_instant{never, 0};
+
+/// Neither two events nor the ends of a flight closer than this are told apart.
+[[nodiscard]] inline double resolution(const Instant& t) noexcept
+{
+    return 4 * epsilon * std::fabs(t.value);
+}
+
+/// 128 bytes: the first half is what the neighbours ask for.
+struct alignas(64) Body {
+    Vector2 p{}, v{}, a{};  ///< at t: position, velocity, and half the second derivative's double
+    Instant t{};
+    double radius = 0;
+    double inverse_mass = 0;
+    std::uint32_t version = 0;                   ///< counts changes of the motion
+    std::uint32_t next = none, previous = none;  ///< in the cell
+    std::uint32_t bucket = none;
+    std::uint32_t material = 0;
+    std::uint32_t island = none;  ///< of those that advance by steps
+    std::uint32_t held = none;    ///< face on which it slides
+    bool asleep = false;
+    bool quartic = false;  ///< its step has terms of degree 3 and 4
+};
+
+/// What bodies meet that is no body: a wall, a segment or an end of segments.
+struct Face {
+    enum class Kind : std::uint8_t { wall, segment, vertex };
+    Kind kind = Kind::wall;
+    Vector2 at{};      ///< point of a wall, start of a segment, vertex
+    Vector2 normal{};  ///< of length 1
+    double length = 0;
+    std::uint32_t surface = 0;
+    std::uint32_t material = 0;
+};
+
+/// Position from an instant on: c[0] + c[1] s + ... within `until`.
+struct Path {
+    std::array<Vector2, 5> c{};
+    int degree = 0;
+    double until = never;
+};
+
+class Islands;
+
+struct World {
+    World(const Scene& scene, const SceneOptions& options);
+    ~World();
+    World(const World&) = delete;
+    World& operator=(const World&) = delete;
+
+    const Scene& scene;
+    const SceneOptions& options;
+    Vector2 gravity{};
+    std::vector<Body> bodies;
+    std::vector<std::array<Vector2, 2>>
+        bends;                ///< terms of degree 3 and 4, where there are islands
+    std::vector<Face> faces;  ///< walls first
+    std::uint32_t wall_count = 0;
+    std::unique_ptr<Islands> islands;
+    SceneStatistics statistics;
+
+    /// By its record; by the method's own map where it advances by steps.
+    [[nodiscard]] Vector2 position(std::uint32_t i, const Instant& t) const;
+    [[nodiscard]] Vector2 velocity(std::uint32_t i, const Instant& t) const;
+    [[nodiscard]] Path path(std::uint32_t i, const Instant& t) const;
+
+    [[nodiscard]] double restitution(std::uint32_t a, std::uint32_t b) const noexcept
+    {
+        return std::min(scene.materials()[a].restitution, scene.materials()[b].restitution);
+    }
+    [[nodiscard]] double friction(std::uint32_t a, std::uint32_t b) const noexcept
+    {
+        return std::min(scene.materials()[a].friction, scene.materials()[b].friction);
+    }
+
+    /// The direction in which a face pushes a body that slides on it.
+    [[nodiscard]] Vector2 push_of(const Body& body, std::uint32_t face) const;
+    /// A body on a face moves along it from now on: pulled by gravity, slowed by friction.
+    void slide(std::uint32_t i, std::uint32_t face);
+
+    /// What rounding makes of a gap at these coordinates [m].
+    [[nodiscard]] static double rounding(const Vector2& p, double radius) noexcept
+    {
+        return 8 * epsilon * (std::fabs(p[0]) + std::fabs(p[1]) + radius);
+    }
+
+private:
+    void put_to_sleep();
+};
+
+/// By the record, for bodies in closed form.
+[[nodiscard]] inline Vector2 place(const Body& b, double s) noexcept
+{
+    return {b.p[0] + s * (b.v[0] + 0.5 * s * b.a[0]), b.p[1] + s * (b.v[1] + 0.5 * s * b.a[1])};
+}
+[[nodiscard]] inline Vector2 speed(const Body& b, double s) noexcept
+{
+    return {b.v[0] + s * b.a[0], b.v[1] + s * b.a[1]};
+}
+
+/// A first contact, `after` seconds after `from`; infinite where there is none. `presses`: the two
+/// touch without approaching, and are pushed together.
+struct Meeting {
+    Instant from{};
+    double after = never;
+    bool presses = false;
+};
+[[nodiscard]] inline const Instant& later(const Instant& a, const Instant& b) noexcept
+{
+    return before(a, b) ? b : a;
+}
+
+/// Velocities below it are the rounding of others.
+[[nodiscard]] inline double noise(const Vector2& a, const Vector2& b) noexcept
+{
+    return 8 * epsilon * (norm(a) + norm(b));
+}
+
+struct Squares {
+    double at_once = 0;  ///< constant term of the squared distance minus the reach
+    double rate = 0;     ///< half its derivative
+    double tolerance = 0;
+};
+
+/// The squared gap of two bodies now: dp.dp - reach^2 in factors, which keeps its digits.
+[[nodiscard]] inline Squares squares(const Vector2& dp, const Vector2& dv, double reach,
+                                     double rounding)
+{
+    const double distance = norm(dp);
+    return {(distance - reach) * (distance + reach), dot(dp, dv), 2 * reach * rounding};
+}
+
+/// Two straight flights, or two of the same acceleration.
+[[nodiscard]] inline double straight(const Squares& now, const Vector2& dv) noexcept
+{
+    if (now.rate >= 0) return never;
+    if (now.at_once <= 0) return 0;
+    const double square = now.rate * now.rate - dot(dv, dv) * now.at_once;
+    if (square < 0) return never;
+    return now.at_once / (std::sqrt(square) - now.rate);
+}
+
+/// Bodies of which one at least moves by steps, or whose accelerations differ.
+[[nodiscard]] Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j);
+
+[[nodiscard]] inline Meeting meet(const World& world, std::uint32_t i, std::uint32_t j)
+{
+    const Body& a = world.bodies[i];
+    const Body& b = world.bodies[j];
+    const double reach = a.radius + b.radius;
+    if (reach == 0) return {};
+    if (a.quartic || b.quartic || a.a != b.a) return meet_curved(world, i, j);
+    const Instant& from = later(a.t, b.t);
+    const double sa = seconds(a.t, from);
+    const double sb = seconds(b.t, from);
+    const Vector2 va = speed(a, sa);
+    const Vector2 vb = speed(b, sb);
+    const Vector2 dv = va - vb;
+    const Vector2 pa = place(a, sa);
+    const Vector2 dp = pa - place(b, sb);
+    const double rate = dot(dp, dv);
+    if (rate >= 0) return {};
+    const double square = dot(dp, dp) - reach * reach;
+    if (square > 1e-6 * reach * reach) {
+        // Far from touching the sum of squares keeps its digits.
+        return {.from = from, .after = straight({square, rate, 0}, dv)};
+    }
+    const Squares now = squares(dp, dv, reach, 0);
+    if (now.at_once <= 4 * reach * World::rounding(pa, reach) && -rate <= noise(va, vb) * reach) {
+        return {};
+    }
+    return {.from = from, .after = straight(now, dv)};
+}
+[[nodiscard]] Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t face);
+
+/// Gap between a face and a body that its flight has led to p, and the direction in which the face
+/// pushes.
+struct FaceGap {
+    double gap = never;
+    Vector2 normal{};
+};
+[[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p,
+                               const Vector2& v);
+
+}  // namespace ricochet::detail

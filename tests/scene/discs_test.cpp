@@ -1,0 +1,267 @@
+// Discs in a box: against brute force, what is conserved, labels, reversal; bodies on their own.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/scene/simulate.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
+#include "scene/gas.hpp"
+
+namespace ricochet {
+namespace {
+
+using test::gas;
+
+/// All pairs and walls at every collision, in long double.
+class BruteForce {
+public:
+    explicit BruteForce(const Scene& scene)
+    {
+        for (const Disc& d : scene.bodies()) {
+            discs_.push_back({d.at[0], d.at[1], d.velocity[0], d.velocity[1], d.radius, d.mass});
+        }
+    }
+    long double next()
+    {
+        long double first = std::numeric_limits<long double>::infinity();
+        std::size_t a = 0;
+        std::size_t b = 0;
+        int wall = -1;
+        for (std::size_t i = 0; i < discs_.size(); ++i) {
+            const D& d = discs_[i];
+            const std::array<long double, 4> times{
+                d.v < 0 ? (d.r - d.y) / d.v : -1, d.u < 0 ? (d.r - d.x) / d.u : -1,
+                d.v > 0 ? (1 - d.r - d.y) / d.v : -1, d.u > 0 ? (1 - d.r - d.x) / d.u : -1};
+            for (int w = 0; w < 4; ++w) {
+                const long double t = times[static_cast<std::size_t>(w)];
+                if (t >= 0 && t < first) first = t, a = i, wall = w;
+            }
+            for (std::size_t j = 0; j < i; ++j) {
+                const long double t = meeting(d, discs_[j]);
+                if (t < first) first = t, a = i, b = j, wall = -1;
+            }
+        }
+        for (D& d : discs_) d.x += first * d.u, d.y += first * d.v;
+        if (wall >= 0) {
+            (wall % 2 == 0 ? discs_[a].v : discs_[a].u) *= -1;
+        } else {
+            strike(discs_[a], discs_[b]);
+        }
+        return t_ += first;
+    }
+
+private:
+    struct D {
+        long double x, y, u, v, r, m;
+    };
+    static long double meeting(const D& a, const D& b)
+    {
+        const long double x = a.x - b.x, y = a.y - b.y, u = a.u - b.u, v = a.v - b.v;
+        const long double rate = x * u + y * v, reach = a.r + b.r;
+        const long double square = rate * rate - (u * u + v * v) * (x * x + y * y - reach * reach);
+        if (rate >= 0 || square < 0) return std::numeric_limits<long double>::infinity();
+        return (x * x + y * y - reach * reach) / (std::sqrt(square) - rate);
+    }
+    static void strike(D& a, D& b)
+    {
+        const long double x = a.x - b.x, y = a.y - b.y, square = x * x + y * y;
+        const long double p =
+            2 * ((a.u - b.u) * x + (a.v - b.v) * y) / square / (1 / a.m + 1 / b.m);
+        a.u -= p * x / a.m, a.v -= p * y / a.m;
+        b.u += p * x / b.m, b.v += p * y / b.m;
+    }
+    std::vector<D> discs_;
+    long double t_ = 0;
+};
+
+TEST(Discs, TheFirstSixtyCollisionsAreThoseOfBruteForceInLongDouble)
+{
+    // An error grows by the ratio of a free path to a radius, some 5 times, at every collision of
+    // a disc: with ten discs 60 collisions are 12 a disc, and 1e-16 becomes 1e-16 5^12 = 2.4e-8;
+    // the first 20 are 4 a disc, 6e-14.
+    const Scene scene = gas({.count = 10, .fraction = 0.2, .spread = 0.3});
+    const SceneRun run = simulate(scene, {.t_end = 100, .max_events = 60});
+    ASSERT_EQ(run.outcome, Outcome::step_limit);
+    ASSERT_EQ(run.events.size(), 60u);
+    BruteForce exact(scene);
+    for (std::size_t k = 0; k < 60; ++k) {
+        EXPECT_NEAR(run.events[k].t, static_cast<double>(exact.next()), k < 20 ? 1e-12 : 1e-6) << k;
+    }
+}
+
+TEST(Discs, EnergyStaysAndNothingOverlaps)
+{
+    // Samples fall at any time: what overlaps there has overlapped at its last collision.
+    const Scene scene = gas({.count = 30, .spread = 0.4});
+    SceneOptions options{.t_end = 600, .record_events = false};
+    for (int k = 1; k <= 100; ++k) options.sample_times.push_back(6.0 * k);
+    const SceneRun run = simulate(scene, options);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_GT(run.statistics.impacts, 20'000u);
+    const double start = energy(scene, test::start_of(scene));
+    EXPECT_NEAR(energy(scene, run.bodies) / start, 1, 1e-12);
+    double largest = 0;
+    for (const auto& states : run.samples)
+        largest = std::max(largest, test::overlap(scene, states));
+    double radius = 0;
+    for (const Disc& disc : scene.bodies()) radius = std::max(radius, disc.radius);
+    EXPECT_LE(largest, 1e-13 * 2 * radius);
+}
+
+TEST(Discs, OtherLabelsGiveTheSameBits)
+{
+    for (const std::size_t count : {10, 60}) {
+        std::vector<std::size_t> order(count);
+        std::iota(order.begin(), order.end(), 0u);
+        std::shuffle(order.begin(), order.end(), std::mt19937(7));
+        const test::Gas wanted{.count = count, .gravity = {0.1, -1}, .spread = 0.2};
+        const SceneRun one = simulate(gas(wanted), {.t_end = 20});
+        const SceneRun two = simulate(gas(wanted, order), {.t_end = 20});
+        ASSERT_EQ(one.events.size(), two.events.size());
+        EXPECT_GT(one.events.size(), 20 * count);
+        for (std::size_t k = 0; k < one.events.size(); ++k) {
+            ASSERT_EQ(one.events[k].t, two.events[k].t) << k;
+        }
+        for (std::size_t k = 0; k < count; ++k) {
+            EXPECT_EQ(one.bodies[order[k]].at, two.bodies[k].at);
+            EXPECT_EQ(one.bodies[order[k]].velocity, two.bodies[k].velocity);
+        }
+    }
+}
+
+TEST(Discs, SamplesChangeNoBit)
+{
+    const Scene scene = gas({.count = 20, .gravity = {0, -2}});
+    const SceneRun plain = simulate(scene, {.t_end = 10});
+    SceneOptions options{.t_end = 10};
+    for (int k = 0; k < 1000; ++k) options.sample_times.push_back(0.01 * k);
+    const SceneRun sampled = simulate(scene, options);
+    ASSERT_EQ(sampled.samples.size(), 1000u);
+    for (std::size_t i = 0; i < plain.bodies.size(); ++i) {
+        EXPECT_EQ(plain.bodies[i].at, sampled.bodies[i].at);
+        EXPECT_EQ(plain.bodies[i].velocity, sampled.bodies[i].velocity);
+    }
+}
+
+TEST(Discs, ReversedVelocitiesLeadBack)
+{
+    // Four collisions a disc and back are eight: 1e-16 5^8 = 4e-11.
+    const std::size_t count = 100;
+    const Scene scene = gas({.count = count});
+    const SceneRun there = simulate(scene, {.t_end = 100, .max_events = 2 * count});
+    Scene turned;
+    for (const Scene::Surface& s : scene.surfaces()) {
+        turned.wall({.point = s.points[0], .normal = s.normal});
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        Disc disc = scene.bodies()[i];
+        disc.material = {};
+        disc.at = there.bodies[i].at;
+        disc.velocity = {-there.bodies[i].velocity[0], -there.bodies[i].velocity[1]};
+        turned.disc(disc);
+    }
+    const SceneRun back = simulate(turned, {.t_end = there.t});
+    for (std::size_t i = 0; i < count; ++i) {
+        for (std::size_t c = 0; c < 2; ++c) {
+            EXPECT_NEAR(back.bodies[i].at[c], scene.bodies()[i].at[c], 1e-10);
+        }
+    }
+}
+
+TEST(Discs, InelasticCollapseComesToAnEnd)
+{
+    // Three discs on a line, restitution 0.05: below 7 - 4 sqrt(3) = 0.0718 the outer ones shut the
+    // one between them in, and infinitely many collisions take a finite time.
+    Scene scene;
+    const MaterialId putty = scene.material({.restitution = 0.05});
+    for (const double x : {0.0, 2.0, 3.0}) {
+        scene.disc({.at = {x, 0}, .velocity = {1 - x / 1.5, 0}, .radius = 0.25, .material = putty});
+    }
+    const SceneRun run = simulate(scene, {.t_end = 10});
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+    for (const BodyState& body : run.bodies) {
+        EXPECT_NEAR(body.velocity[0], (1 - 1.0 / 3 - 1) / 3, 1e-14);
+    }
+}
+
+TEST(Discs, ADenseGasOfLittleRestitutionComesToAnEnd)
+{
+    // Taken one collision after another this gas stands still at a time near 1.
+    const Scene scene = gas({.count = 30, .fraction = 0.5, .restitution = 0.3});
+    const SceneRun run = simulate(scene, {.t_end = 1.5, .record_events = false});
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+    EXPECT_LT(energy(scene, run.bodies), 0.1 * energy(scene, test::start_of(scene)));
+    EXPECT_LE(test::overlap(scene, run.bodies), 1e-13);
+}
+
+TEST(Discs, RecentImpactsAreElasticWhereThatIsAskedFor)
+{
+    Scene scene;
+    const MaterialId putty = scene.material({.restitution = 0.05});
+    for (const double x : {0.0, 2.0, 3.0}) {
+        scene.disc({.at = {x, 0}, .velocity = {1 - x / 1.5, 0}, .radius = 0.25, .material = putty});
+    }
+    const SceneRun run = simulate(scene, {.t_end = 10, .elastic_within = 1e-4});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.statistics.collapses, 0u);
+    EXPECT_GT(run.events.size(), 3u);
+}
+
+TEST(Discs, BallsThatMeetNoneBounceAsEachDoesByItself)
+{
+    // Impact k of a drop from h: t0 (1 + 2 (e + ... + e^k)), t0 = sqrt(2 h / g). `integrate` finds
+    // the same to its own errors.
+    const double g = 9.81;
+    Scene scene({.gravity = {0, -g}});
+    const MaterialId steel = scene.material({.restitution = 0.9});
+    scene.wall({.normal = {0, 1}, .material = steel});
+    for (int i = 0; i < 20; ++i) {
+        scene.disc({.at = {i * 1.0, 1.25 + 0.1 * i}, .radius = 0.25, .material = steel});
+    }
+    const SceneRun run = simulate(scene, {.t_end = 6});
+    EXPECT_EQ(run.statistics.alone, 20u);
+    EXPECT_TRUE(std::ranges::is_sorted(run.events, {}, &SceneEvent::t));
+    for (std::uint32_t i = 0; i < 20; ++i) {
+        std::vector<double> times;
+        for (const SceneEvent& event : run.events) {
+            if (event.body == i) times.push_back(event.t);
+        }
+        const double t0 = std::sqrt(2 * (1 + 0.1 * i) / g);
+        double sum = t0;
+        double flight = 2 * t0;
+        const auto ball = integrate(BouncingBall({.gravity = g, .restitution = 0.9}),
+                                    {1 + 0.1 * i, 0.0}, {.t_end = 6});
+        ASSERT_EQ(times.size(), ball.events.size());
+        for (std::size_t k = 0; k < times.size(); ++k) {
+            EXPECT_NEAR(times[k], sum, 1e-14 * (1 + sum));
+            EXPECT_NEAR(times[k], ball.events[k].t, 1e-12);
+            sum += flight *= 0.9;
+        }
+    }
+}
+
+TEST(Discs, SleepersAreStruckAndHaveNoEventsBefore)
+{
+    // One after the other along a row of equal discs: the velocity is handed on.
+    Scene scene;
+    for (int i = 0; i < 100; ++i) scene.disc({.at = {3.0 * i, 0}});
+    scene.disc({.at = {-5, 0}, .velocity = {1, 0}});
+    const SceneRun run = simulate(scene, {.t_end = 49.5});
+    ASSERT_EQ(run.events.size(), 47u);
+    for (std::size_t k = 0; k < run.events.size(); ++k) {
+        EXPECT_DOUBLE_EQ(run.events[k].t, 3.0 + static_cast<double>(k));
+    }
+    EXPECT_EQ(run.statistics.events, 47u);
+    EXPECT_FALSE(run.bodies[46].asleep && run.bodies[46].velocity[0] != 0);
+    EXPECT_TRUE(run.bodies[60].asleep);
+}
+
+}  // namespace
+}  // namespace ricochet

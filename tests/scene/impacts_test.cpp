@@ -1,0 +1,180 @@
+// Impacts of several contacts at one instant: waves, all together, symmetry, labels.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "ricochet/scene/simulate.hpp"
+#include "scene/gas.hpp"
+
+namespace ricochet {
+namespace {
+
+/// Balls in contact on a line; the first comes at speed 1.
+Scene cradle(int balls, double restitution = 1)
+{
+    Scene scene;
+    const MaterialId steel = scene.material({.restitution = restitution});
+    scene.disc({.at = {-3, 0}, .velocity = {1, 0}, .radius = 0.5, .material = steel});
+    for (int i = 1; i < balls; ++i) {
+        scene.disc({.at = {1.0 * i, 0}, .radius = 0.5, .material = steel});
+    }
+    return scene;
+}
+
+TEST(Impacts, ACradleHandsTheVelocityToTheLastBall)
+{
+    for (int balls = 2; balls <= 9; ++balls) {
+        const SceneRun run = simulate(cradle(balls), {.t_end = 4});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        for (int i = 0; i < balls; ++i) {
+            const auto& body = run.bodies[static_cast<std::size_t>(i)];
+            EXPECT_NEAR(body.velocity[0], i == balls - 1 ? 1 : 0, 1e-14) << balls << " " << i;
+        }
+        EXPECT_EQ(run.statistics.events, 1u);
+        EXPECT_EQ(run.statistics.impacts, static_cast<std::uint64_t>(balls - 1));
+    }
+}
+
+TEST(Impacts, AllTogetherIsNewtonsLawForTheWholeCradle)
+{
+    const SceneRun run = simulate(cradle(5), {.t_end = 4, .impacts = ImpactLaw::together});
+    EXPECT_NEAR(run.bodies[0].velocity[0], -0.6, 1e-14);
+    for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(run.bodies[i].velocity[0], 0.4, 1e-14);
+}
+
+/// A disc strikes two that touch it at +-30 degrees at one time.
+Scene wedge(bool swapped)
+{
+    Scene scene;
+    const double x = std::cos(M_PI / 6);
+    const double y = std::sin(M_PI / 6);
+    scene.disc({.at = {-1, 0}, .velocity = {1, 0}, .radius = 0.5});
+    scene.disc({.at = {x, swapped ? -y : y}, .radius = 0.5});
+    scene.disc({.at = {x, swapped ? y : -y}, .radius = 0.5});
+    return scene;
+}
+
+TEST(Impacts, ASymmetricStrikeIsSymmetricWhateverTheLabels)
+{
+    // Impulses p along +-30 degrees: the striker keeps 1 - 2 p cos 30, and each contact separates
+    // as it approached: p - (1 - 2 p cos 30) cos 30 = cos 30, so p = 2 cos 30 / (1 + 2 cos^2 30) =
+    // 0.4 sqrt(3).
+    for (const ImpactLaw law : {ImpactLaw::waves, ImpactLaw::together}) {
+        const SceneRun one = simulate(wedge(false), {.t_end = 2, .impacts = law});
+        const SceneRun two = simulate(wedge(true), {.t_end = 2, .impacts = law});
+        EXPECT_NEAR(one.bodies[0].velocity[0], -0.2, 1e-14);
+        EXPECT_NEAR(one.bodies[0].velocity[1], 0, 1e-15);
+        EXPECT_NEAR(one.bodies[1].velocity[0], 0.6, 1e-14);
+        EXPECT_NEAR(one.bodies[1].velocity[1], 0.2 * std::sqrt(3.0), 1e-14);
+        EXPECT_NEAR(one.bodies[1].velocity[1], -one.bodies[2].velocity[1], 1e-15);
+        EXPECT_EQ(one.bodies[0].velocity, two.bodies[0].velocity);
+        EXPECT_EQ(one.bodies[1].velocity, two.bodies[2].velocity);
+    }
+}
+
+TEST(Impacts, ARackIsSymmetric)
+{
+    Scene scene;
+    const double root = std::sqrt(3.0);
+    for (int row = 0; row < 3; ++row) {
+        for (int k = 0; k <= row; ++k) {
+            scene.disc({.at = {row * root / 2, k - 0.5 * row}, .radius = 0.5});
+        }
+    }
+    scene.disc({.at = {-3, 0}, .velocity = {1, 0}, .radius = 0.5});
+    const SceneRun run = simulate(scene, {.t_end = 3});
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+    const auto& b = run.bodies;
+    for (const auto& [left, right] : {std::pair{1, 2}, std::pair{3, 5}}) {
+        const BodyState& l = b[static_cast<std::size_t>(left)];
+        const BodyState& r = b[static_cast<std::size_t>(right)];
+        EXPECT_NEAR(l.velocity[0], r.velocity[0], 1e-15);
+        EXPECT_NEAR(l.velocity[1], -r.velocity[1], 1e-15);
+    }
+    double momentum = 0;
+    double square = 0;
+    for (const BodyState& body : b) {
+        momentum += body.velocity[0];
+        square += body.velocity[0] * body.velocity[0] + body.velocity[1] * body.velocity[1];
+    }
+    EXPECT_NEAR(momentum, 1, 1e-14);
+    EXPECT_NEAR(square, 1, 1e-14);
+}
+
+TEST(Impacts, PackingsKeepMomentumAndEnergyUnderAnyLabels)
+{
+    std::mt19937 generator(3);
+    std::normal_distribution<double> normal;
+    for (int trial = 0; trial < 20; ++trial) {
+        std::vector<Disc> discs;
+        for (int k = 0; k < 25; ++k) {
+            discs.push_back({.at = {1.0 * (k % 5), 1.0 * (k / 5)},
+                             .velocity = {normal(generator), normal(generator)},
+                             .radius = 0.5,
+                             .mass = 0.5 + std::fabs(normal(generator))});
+        }
+        std::vector<std::size_t> order(discs.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::shuffle(order.begin(), order.end(), generator);
+        Scene one;
+        Scene two;
+        for (const Disc& disc : discs) one.disc(disc);
+        for (const std::size_t k : order) two.disc(discs[k]);
+        const SceneRun first = simulate(one, {.t_end = 1e-3});
+        const SceneRun second = simulate(two, {.t_end = 1e-3});
+        const double before = energy(one, test::start_of(one));
+        EXPECT_NEAR(energy(one, first.bodies) / before, 1, 1e-14);
+        for (std::size_t c = 0; c < 2; ++c) {
+            double momentum = 0;
+            double size = 0;
+            for (std::size_t k = 0; k < discs.size(); ++k) {
+                momentum += discs[k].mass * (first.bodies[k].velocity[c] - discs[k].velocity[c]);
+                size += discs[k].mass * std::fabs(discs[k].velocity[c]);
+            }
+            EXPECT_NEAR(momentum / size, 0, 1e-14);
+        }
+        for (std::size_t k = 0; k < order.size(); ++k) {
+            EXPECT_EQ(first.bodies[order[k]].velocity, second.bodies[k].velocity);
+        }
+    }
+}
+
+TEST(Impacts, ACornerTurnsAVelocityRound)
+{
+    Scene scene;
+    scene.wall({.normal = {0, 1}});
+    scene.wall({.normal = {1, 0}});
+    scene.disc({.at = {2, 2}, .velocity = {-1, -1}});
+    const SceneRun run = simulate(scene, {.t_end = 2});
+    EXPECT_EQ(run.statistics.events, 1u);
+    EXPECT_NEAR(run.bodies[0].at[0], 2, 1e-15);
+    EXPECT_EQ(run.bodies[0].velocity, (Vector2{1, 1}));
+}
+
+TEST(Impacts, TerrainIsMetOnItsSegmentsAndItsEnds)
+{
+    // A roof of two slopes of 45 degrees: a point straight down onto one goes off sideways; a disc
+    // onto the ridge goes straight up again.
+    Scene scene({.gravity = {0, -10}});
+    scene.terrain({.name = "roof", .points = {{-2, 0}, {0, 2}, {2, 0}}});
+    scene.point({.at = {1, 6}});
+    scene.disc({.at = {0, 7.5}, .radius = 0.5});
+    const SceneRun run = simulate(scene, {.t_end = 1.2});
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+    ASSERT_GE(run.events.size(), 2u);
+    for (std::size_t k = 0; k < 2; ++k) {
+        const SceneEvent& event = run.events[k];
+        const bool point = event.body == 0;
+        EXPECT_NEAR(event.t, 1, 1e-15);
+        EXPECT_NEAR(event.after[0][0], point ? 10 : 0, 1e-13);
+        EXPECT_NEAR(event.after[0][1], point ? 0 : 10, 1e-13);
+    }
+    EXPECT_NE(run.events[0].body, run.events[1].body);
+}
+
+}  // namespace
+}  // namespace ricochet
