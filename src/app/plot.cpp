@@ -82,57 +82,76 @@ bool jumps_in(const PlainRun& run, std::size_t i)
     return jump > 1e-6 * size;
 }
 
+/// What an axis shows: meaning, symbol and unit, the symbol only where the meaning does not say it
+/// already ("angle of the bird [rad]") and the unit only where there is one.
+std::string axis_label(const Component& component)
+{
+    std::string_view symbol = component.name;
+    while (symbol.ends_with('\'')) symbol.remove_suffix(1);
+    std::string out(component.meaning);
+    if (symbol.size() < 3 || component.meaning.find(symbol) == std::string_view::npos) {
+        out += fmt::format(" {}", component.name);
+    }
+    return component.unit == "1" ? out : fmt::format("{} [{}]", out, component.unit);
+}
+
+/// A title for gnuplot in as many lines as its width of about 110 letters asks for.
+std::string wrapped_title(std::string_view text)
+{
+    constexpr std::size_t width = 110;
+    std::string out;
+    while (text.size() > width) {
+        const std::size_t cut = text.rfind(", ", width);
+        if (cut == std::string_view::npos) break;
+        out += single_quoted(text.substr(0, cut + 1)) + ".\"\\n\".";
+        text.remove_prefix(cut + 2);
+    }
+    return out + single_quoted(text) + ".\"\\n\"";
+}
+
+/// The curve of component i, with its events.
+std::string curves(const Component& component, std::size_t i, std::string_view event,
+                   const PlainRun& run)
+{
+    const std::size_t column = i + 2;
+    std::vector<std::string> out{fmt::format("'flights' using 1:{} with lines linestyle 1 title {}",
+                                             column, single_quoted(component.meaning))};
+    if (!run.events.empty() && jumps_in(run, i)) {
+        out.push_back(fmt::format("'jumps' using 1:{} with lines linestyle 12 notitle", column));
+        out.push_back(
+            fmt::format("'jumps' using 1:{} with points linestyle 12 pointsize 0.7 "
+                        "title {}",
+                        column, single_quoted(fmt::format("{}: before and after", event))));
+    } else if (!run.events.empty()) {
+        out.push_back(fmt::format("'marks' using 1:{} with points linestyle 12 title {}", column,
+                                  single_quoted(event)));
+    }
+    return joined(out, ", \\\n     ");
+}
+
 std::string script(const SystemEntry& system, const RunSettings& settings, const PlainRun& run)
 {
     const std::size_t panels = system.state.size();
     const std::string_view event = system.guards.size() == 1 ? system.guards[0].event : "event";
 
     std::string out = fmt::format(
-        "set multiplot layout {},1 title {}.\"\\n\"\n"
-        "set grid linecolor rgb '#d8d8d8' linetype 1\n"
-        "set border 3 linecolor rgb '#404040'\n"
-        "set tics nomirror out\n"
+        "set multiplot layout {},1 title {}\n"
         "set lmargin 11\n"
         "set rmargin 3\n"
         "set tmargin 2.5\n"
         "set key outside top right horizontal Left reverse samplen 2.5\n"
         "set offsets graph 0, graph 0, graph 0.06, graph 0.06\n",
         panels,
-        single_quoted(title(system, settings) +
+        wrapped_title(title(system, settings) +
                       (run.outcome == Outcome::cancelled ? " (incomplete)" : "")));
     if (run.t != settings.options.t_start) {
         const auto [left, right] = std::minmax(settings.options.t_start, run.t);
         out += fmt::format("set xrange [{}:{}]\n", left, right);
     }
     for (std::size_t i = 0; i < panels; ++i) {
-        const Component& component = system.state[i];
-        const std::size_t column = i + 2;
         if (i + 1 == panels) out += "set xlabel 'time t [s]'\n";
-        out += fmt::format("set ylabel {}\n",
-                           single_quoted(fmt::format("{} {} [{}]", component.meaning,
-                                                     component.name, component.unit)));
-        std::vector<std::string> curves{
-            fmt::format("'flights' using 1:{} with lines linewidth 2 linecolor rgb '#1f5fa8' "
-                        "title {}",
-                        column, single_quoted(component.name))};
-        if (!run.events.empty()) {
-            if (jumps_in(run, i)) {
-                curves.push_back(
-                    fmt::format("'jumps' using 1:{} with lines linewidth 1.2 dashtype 2 "
-                                "linecolor rgb '#d1495b' notitle",
-                                column));
-                curves.push_back(fmt::format(
-                    "'jumps' using 1:{} with points pointtype 7 pointsize 0.7 linecolor rgb "
-                    "'#d1495b' title {}",
-                    column, single_quoted(fmt::format("{}: before and after", event))));
-            } else {
-                curves.push_back(
-                    fmt::format("'marks' using 1:{} with points pointtype 7 pointsize "
-                                "0.9 linecolor rgb '#d1495b' title {}",
-                                column, single_quoted(event)));
-            }
-        }
-        out += fmt::format("plot {}\n", joined(curves, ", \\\n     "));
+        out += fmt::format("set ylabel {}\nplot {}\n", single_quoted(axis_label(system.state[i])),
+                           curves(system.state[i], i, event, run));
     }
     return out + "unset multiplot\n";
 }
@@ -201,12 +220,29 @@ void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun
 std::string plot_head(const fs::path& file, int width, int height)
 {
     const bool svg = file.extension() == ".svg";
-    return "set encoding utf8\n" +
-           (svg ? fmt::format("set terminal svg noenhanced size {},{} font 'sans-serif,15' "
-                              "background rgb 'white'\n",
-                              width, height)
-                : fmt::format("set terminal pngcairo noenhanced size {},{} font 'Sans,13'\n", width,
-                              height)) +
+    std::string out = "set encoding utf8\n";
+    out += svg ? fmt::format(
+                     "set terminal svg noenhanced size {},{} font 'sans-serif,15' "
+                     "background rgb 'white'\n",
+                     width, height)
+               : fmt::format("set terminal pngcairo noenhanced size {},{} font 'Sans,13'\n", width,
+                             height);
+    // Colours of Okabe and Ito, which the colour-blind tell apart, each with a dash and a point of
+    // its own for print in grey; line style 12 marks events. The palette grows lighter throughout.
+    constexpr std::array colours{"#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#404040"};
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+        out += fmt::format(
+            "set style line {0} linecolor rgb '{1}' linewidth 2 dashtype {0} "
+            "pointtype {2} pointsize 0.8\n",
+            i + 1, colours[i], i + 4);
+    }
+    return out +
+           "set style line 12 linecolor rgb '#d55e00' linewidth 1.2 dashtype 2 pointtype 7 "
+           "pointsize 0.9\n"
+           "set grid linecolor rgb '#d8d8d8' linetype 1\n"
+           "set border 3 linecolor rgb '#404040'\n"
+           "set tics nomirror out\n"
+           "set palette defined (0 '#081d58', 1 '#225ea8', 2 '#41b6c4', 3 '#c7e9b4', 4 '#ffffd9')\n"
            "set output 'plot'\n";
 }
 

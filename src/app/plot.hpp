@@ -24,7 +24,8 @@ void plot(const SystemEntry& system, const RunSettings& settings,
 /// Names and contents of the files that a script reads.
 using PlotFiles = std::vector<std::pair<std::string, std::string>>;
 
-/// What a script for gnuplot begins with: terminal by the ending of `file`, size in pixels.
+/// The prelude of every script for gnuplot: terminal by the ending of `file`, size in pixels, and
+/// one style for lines, points, grid and palette. Curves use `linestyle` 1 to 6, events 12.
 [[nodiscard]] std::string plot_head(const std::filesystem::path& file, int width, int height);
 
 /// Runs gnuplot, as `plot` does, on a script of ours among `files`.

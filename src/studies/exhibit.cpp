@@ -55,29 +55,21 @@ std::string data(const Tiles& tiles)
 
 std::string style(const Curve& curve, std::size_t which)
 {
-    constexpr std::array colours{"#1f5fa8", "#d1495b", "#2e8b57", "#e08e0b", "#7b4fa3", "#404040",
-                                 "#00a3a3", "#b5651d", "#9aa02c", "#d67ab1", "#6c8ebf", "#888888"};
-    const std::string_view colour =
-        curve.published
-            ? "#000000"
-            : colours[(curve.colour < 0 ? which : static_cast<std::size_t>(curve.colour)) %
-                      colours.size()];
+    const std::size_t index = curve.colour < 0 ? which : static_cast<std::size_t>(curve.colour);
+    const std::string line = curve.published ? std::string("linecolor rgb '#000000'")
+                                             : fmt::format("linestyle {}", index % 6 + 1);
     switch (curve.style) {
-        case Curve::Style::line: return fmt::format("lines linewidth 2 linecolor rgb '{}'", colour);
-        case Curve::Style::dashed:
-            return fmt::format("lines linewidth 2 dashtype 2 linecolor rgb '{}'", colour);
-        case Curve::Style::points:
-            return fmt::format("points pointtype 7 pointsize 0.6 linecolor rgb '{}'", colour);
+        case Curve::Style::line: return fmt::format("lines {} dashtype 1 linewidth 2", line);
+        case Curve::Style::dashed: return fmt::format("lines {} dashtype 2 linewidth 2", line);
+        case Curve::Style::points: return fmt::format("points {} pointsize 0.6", line);
         case Curve::Style::crosses:
-            return fmt::format("points pointtype 2 pointsize 0.9 linewidth 1.5 linecolor rgb '{}'",
-                               colour);
+            return fmt::format("points {} pointtype 2 pointsize 0.9 linewidth 1.5", line);
         case Curve::Style::marked:
-            return fmt::format(
-                "linespoints linewidth 2.5 pointtype 7 pointsize 0.7 linecolor rgb '{}'", colour);
+            return fmt::format("linespoints {} dashtype 1 linewidth 2.5 pointtype {} pointsize 0.7",
+                               line, index + 4);
         case Curve::Style::marked_dashed:
-            return fmt::format(
-                "linespoints linewidth 1.5 dashtype 2 pointtype 6 pointsize 0.7 linecolor rgb '{}'",
-                colour);
+            return fmt::format("linespoints {} dashtype 2 linewidth 1.5 pointtype {} pointsize 0.7",
+                               line, index + 4);
     }
     return "lines";
 }
@@ -111,9 +103,7 @@ std::string script(const Panel& panel, std::size_t which, PlotFiles& files)
             parts.push_back(fmt::format("'{}' using 1:2:4 with labels notitle", file));
         }
     } else {
-        out +=
-            "set xtics autofreq\nset ytics autofreq\n"
-            "set grid linecolor rgb '#d8d8d8' linetype 1\n";
+        out += "set xtics autofreq\nset ytics autofreq\nset grid\n";
     }
     for (std::size_t i = 0; i < panel.curves.size(); ++i) {
         const Curve& curve = panel.curves[i];
@@ -246,8 +236,8 @@ void draw(const Exhibit& exhibit, const std::string& title, const std::filesyste
     std::string out =
         plot_head(file, static_cast<int>(620 * across), static_cast<int>(60 + (420 + key) * down));
     out += fmt::format(
-        "set multiplot layout {},{} title {}\nset border 3 linecolor rgb '#404040'\n"
-        "set tics nomirror out\nset format x '%g'\nset format y '%g'\nset key below samplen 2 "
+        "set multiplot layout {},{} title {}.\"\\n\"\nset format x '%g'\nset format y '%g'\nset "
+        "key below samplen 2 "
         "spacing 1.1\n"
         "set palette defined (0 '#f4f8fb', 0.5 '#7fb0d6', 1 '#1f5fa8')\nset datafile missing "
         "'NaN'\n"

@@ -244,21 +244,19 @@ void draw_rupture(const StrikeSlipFault& fault, const RuptureOptions& asked, con
     for (std::size_t i = 0; i < 3; ++i) {
         files.emplace_back(fmt::format("velocity{}", i), fault_map(fault, times[i]->velocity));
     }
-    std::string script = plot_head(file, 1500, 1250) +
-                         fmt::format(
-                             "set multiplot layout 3,3 title 'strike-slip fault, {0} x {0} "
-                             "elements: mean slip {1:.4g} m'\n"
-                             "set xlabel 'time [s]'\nset ylabel 'mean slip [m]'\nplot 'mean' using "
-                             "1:2 with lines linewidth 2 notitle\n"
-                             "set ylabel 'mean velocity [m/s]'\nplot 'mean' using 1:3 with lines "
-                             "linewidth 2 notitle\n"
-                             "set multiplot next\n"
-                             "set size ratio -1\nset yrange [{2}:0] \nset xrange [0:{2}]\nset "
-                             "xlabel 'along strike [km]'\n"
-                             "set ylabel 'depth [km]'\nset palette defined (0 '#081d58', 1 "
-                             "'#225ea8', 2 '#41b6c4', 3 "
-                             "'#c7e9b4', 4 '#ffffd9')\n",
-                             fault.elements(), r.mean_slip, fault.parameters().side / 1000);
+    std::string script =
+        plot_head(file, 1500, 1250) +
+        fmt::format(
+            "set multiplot layout 3,3 title 'strike-slip fault, {0} x {0} elements: mean slip "
+            "{1:.4g} m'.\"\\n\"\n"
+            "set xlabel 'time [s]'\nset ylabel 'mean slip [m]'\n"
+            "plot 'mean' using 1:2 with lines linestyle 1 notitle\n"
+            "set ylabel 'mean velocity [m/s]'\n"
+            "plot 'mean' using 1:3 with lines linestyle 1 notitle\n"
+            "set multiplot next\n"
+            "set size ratio -1\nset yrange [{2}:0] \nset xrange [0:{2}]\nunset grid\n"
+            "set xlabel 'along strike [km]'\nset ylabel 'depth [km]'\n",
+            fault.elements(), r.mean_slip, fault.parameters().side / 1000);
     script +=
         "set title 'slip [m]'\nplot 'slip' with image notitle\n"
         "set title 'largest velocity [m/s]'\nplot 'peak' with image notitle\n"

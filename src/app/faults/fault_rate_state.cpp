@@ -227,16 +227,15 @@ void draw_cycle(const StrikeSlipFault& fault, const RateStateRupture& r,
         plot_head(file, 1500, 850) +
         fmt::format(
             "set multiplot layout 2,3 title 'strike-slip fault with rate-and-state friction, {0} "
-            "x {0} elements'\n"
+            "x {0} elements'.\"\\n\"\n"
             "set xlabel 'time [years]'\nset logscale y\nset format y '1e%T'\n"
             "set ylabel 'fastest element [m/s]'\n"
-            "plot 'steps' using ($1/{1}):4 with lines linewidth 2 notitle\n"
+            "plot 'steps' using ($1/{1}):4 with lines linestyle 1 notitle\n"
             "unset logscale y\nset format y '%g'\nset ylabel 'mean slip [m]'\n"
-            "plot 'steps' using ($1/{1}):2 with lines linewidth 2 notitle\n"
+            "plot 'steps' using ($1/{1}):2 with lines linestyle 1 notitle\n"
             "set size ratio -1\nset yrange [{2}:0]\nset xrange [0:{2}]\n"
             "set xlabel 'along strike [km]'\nset ylabel 'depth [km]'\n"
-            "set palette defined (0 '#081d58', 1 '#225ea8', 2 '#41b6c4', 3 '#c7e9b4', 4 "
-            "'#ffffd9')\n"
+            "unset grid\n"
             "set title 'slip [m]'\nplot 'slip' with image notitle\n",
             fault.elements(), year, fault.parameters().side / 1000);
     const auto& pictures = r.rupture.snapshots;
