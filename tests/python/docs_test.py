@@ -1,4 +1,4 @@
-"""Every block of docs/python.md, every script of examples/python/, and the stubs."""
+"""Every block in Python of the pages, every script of examples/python/, and the stubs."""
 
 import ast
 import os
@@ -16,12 +16,13 @@ from ricochet import _ricochet
 SOURCE = Path(os.environ.get("RICOCHET_SOURCE", Path(__file__).parents[2]))
 
 
-def test_blocks_of_the_page_run():
+@pytest.mark.parametrize("page, least", [("README.md", 1), ("docs/python.md", 8), ("docs/python-more.md", 5)])
+def test_blocks_of_the_page_run(page, least):
     # One after the other, in one module, as a reader would; a comment `# -> text` after an expression or a
     # print says what it gives.
-    text = (SOURCE / "docs" / "python.md").read_text()
+    text = (SOURCE / page).read_text()
     blocks = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
-    assert len(blocks) >= 6
+    assert len(blocks) >= least
     names = {}
     for block in blocks:
         for missing in ("numba", "cffi", "matplotlib", "scipy"):
@@ -29,7 +30,7 @@ def test_blocks_of_the_page_run():
                 pytest.importorskip(missing)
         if "train_classifier(" in block and not find_spec("ricochet._learn"):
             continue  # a package without training
-        exec(compile(block, "docs/python.md", "exec"), names)
+        exec(compile(block, page, "exec"), names)
 
 
 @pytest.mark.parametrize("script", sorted((SOURCE / "examples" / "python").glob("*.py")),

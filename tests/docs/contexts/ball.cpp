@@ -1,0 +1,18 @@
+// A ball, and what a page may do with it.
+#include <ricochet/ricochet.hpp>
+#include <ricochet/systems/bouncing_ball.hpp>
+
+using namespace ricochet;
+using X = std::array<double, 2>;
+
+namespace {
+[[maybe_unused]] void observe(double, const X&) {}
+}
+
+int main()
+{
+    const BouncingBall ball;
+    const X x0{10, 0};
+    (void)x0;
+BLOCK
+}

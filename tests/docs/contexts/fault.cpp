@@ -1,0 +1,16 @@
+// needs: faults
+#include <ricochet/faults/fault_rate_state.hpp>
+
+using namespace ricochet;
+
+namespace {
+void use(double, double) {}
+}
+
+// Compiled and not run: it is years of motion.
+[[maybe_unused]] static void page()
+{
+BLOCK
+}
+
+int main() {}

@@ -1,0 +1,28 @@
+// needs: learn
+#include <ricochet/detail/random.hpp>
+#include <ricochet/detail/step_environment.hpp>
+#include <ricochet/faults/strike_slip_fault.hpp>
+#include <ricochet/learn/environment.hpp>
+#include <ricochet/learn/evolution.hpp>
+#include <ricochet/learn/tqc.hpp>
+#include <ricochet/nn/safetensors.hpp>
+
+using namespace ricochet;
+using namespace ricochet::learn;
+using namespace ricochet::detail;
+
+namespace {
+double work_and_error_of_runs_with(std::span<const double> x) { return x[0] * x[0]; }
+}
+
+// Compiled and not run: they are trainings.
+[[maybe_unused]] static void page()
+{
+    const std::vector<double> x0{1, 2};
+    double x = 0;
+    int steps = 0;
+BLOCK
+    (void)x, (void)steps;
+}
+
+int main() {}
