@@ -1,4 +1,4 @@
-// What a random system must do, by its closed form and the meanings of the library
+// Expected run of a random system, by its closed form and the meanings of the library
 // alone: polynomials in long double, their roots between their extrema by bisection,
 // and the rules for sets, resets and cascades.
 //
@@ -229,7 +229,7 @@ private:
         run_.events.insert(run_.events.end(), notes.begin(), notes.end());
     }
 
-    /// A set fires, and whoever is flipped by it.
+    /// A set fires, and the one that is flipped by it.
     void happen(Guards members, bool on_time)
     {
         if (++run_.sets > most_sets) return give_up();

@@ -239,7 +239,7 @@ private:
             test["friction"] = now.friction;
             test["rate"] = now.rate;
         } catch (const std::exception&) {
-            // What was changed is no number: it stays as it is.
+            // What was changed is not a number: it stays as it is.
         }
     }
 

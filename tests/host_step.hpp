@@ -76,7 +76,7 @@ private:
 
 static_assert(MethodStep<HostStep, HostState>);
 
-/// One look of a detector at a step with a watch whose side is set.
+/// One check of a detector at a step with a watch whose side is set.
 template <class Detector>
 [[nodiscard]] Finding look(const Detector& detector, const HostStep& step, Watch& watch,
                            Crossing crossing, std::uint64_t* guard_calls = nullptr)
@@ -85,12 +85,12 @@ template <class Detector>
     const HostSystem system{crossing};
     const GuardView<HostSystem, HostState> guard(system, calls, 0, 0, crossing, step.backward());
     watch.start = {.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]};
-    const Finding finding = look_at(detector, guard, step, watch);
+    const Finding finding = examine_step(detector, guard, step, watch);
     if (guard_calls) *guard_calls = calls;
     return finding;
 }
 
-/// One look of a detector at a step of a guard armed on `side`.
+/// One check of a detector at a step of a guard armed on `side`.
 template <class Detector>
 [[nodiscard]] Finding look(const Detector& detector, const HostStep& step, Side side,
                            Crossing crossing, std::uint64_t* guard_calls = nullptr)

@@ -1,4 +1,4 @@
-// What every locator must do, run for each of them by its own test file.
+// Cases for every locator, run for each of them by its own test file.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -149,7 +149,7 @@ struct Spiral {
     }
 };
 
-/// Motion that ends at its surface, where the flow is no number beyond.
+/// Motion that ends at its surface, where the flow is not a number beyond.
 struct Draining {
     using State = std::array<double, 1>;
     enum Kind { root, torricelli, logarithm };

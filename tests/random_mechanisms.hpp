@@ -18,7 +18,7 @@
 
 namespace ricochet::test {
 
-/// What was wrong with runs; and runs that ended by saying that they cannot go on.
+/// What was wrong with runs; and runs that ended by saying that they cannot continue.
 struct MechanismTally {
     std::uint64_t runs = 0, steps = 0, impacts = 0, reported = 0;
     std::string fault;   ///< the first

@@ -50,7 +50,7 @@ struct RandomSystem {
         double of_time = 0;
         double level = 0;
         GuardInfo info{};
-        std::uint32_t modes = ~0u;  ///< bit m: looked at in mode m
+        std::uint32_t modes = ~0u;  ///< bit m: examined in mode m
         Reset reset{};
     };
     struct Clock {

@@ -1,4 +1,4 @@
-// How well the potentials of rate-and-state friction satisfy what they must, against
+// Accuracy with which the potentials of rate-and-state friction satisfy what they must, against
 // formulas of their own in arithmetic of 113 bits.
 #pragma once
 
@@ -108,7 +108,7 @@ void compare_jet(const RateStateJet& jet, const Function& value, double v, doubl
     const Quad centre = at(0, 0), right = at(1, 0), left = at(-1, 0), up = at(0, 1),
                down = at(0, -1);
     const Quad s = abs(Quad(v));
-    // A derivative that cancels is judged by the part of it that the value has.
+    // A derivative that cancels is assessed by the part of it that the value has.
     const Quad unit = abs(centre) * Quad("1e-3");
     const auto scale = [&](const Quad& derivative, const Quad& per) {
         return std::max<Quad>(abs(derivative), unit / per);

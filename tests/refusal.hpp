@@ -1,4 +1,4 @@
-// What a wrong set-up is told.
+// Messages about a wrong set-up.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// Systems whose runs are saved, or cannot go on: of the tests, and of the measurements.
+// Systems whose runs are saved, or cannot continue: of the tests, and of the measurements.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// A light gate in a world of Bullet: the world goes on as it does, and its tick callback shows
+// A light gate in a world of Bullet: the world continues as it does, and its tick callback shows
 // every tick to a monitor, which records when a body passes the gate, finer than the ticks.
 #include <array>
 #include <cmath>

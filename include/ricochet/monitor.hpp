@@ -1,4 +1,4 @@
-// Events of a motion that somebody else integrates.
+// Events of a motion that a host integrates.
 //
 //     monitor.start(t, x, dxdt, h);
 //     while (t < t_end) {
@@ -58,7 +58,7 @@ concept HostStep = requires(const S& step, double s, std::span<double> x)
     step.interpolate(s, x);  // x(t0 + s)
 };
 
-/// A host that knows the derivative of its interpolant; else it is a difference over 1e-4 h, and
+/// A host that knows the derivative of its interpolant; otherwise it is a difference over 1e-4 h, and
 /// events near tangency are found less finely.
 template <class S>
 concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt)
@@ -78,6 +78,7 @@ concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, st
 /// interpolant of their own. Keeps views of its arguments.
 class HermiteStep {
 public:
+    /// Takes a step from t0 over h [s] from x0 to x1, with the rates at both ends; arrays of n doubles each.
     HermiteStep(const Instant& t0, double h, std::span<const double> x0, std::span<const double> x1,
                 std::span<const double> rate0, std::span<const double> rate1) noexcept
         : t0_(t0), h_(h), x0_(x0), x1_(x1), rate0_(rate0), rate1_(rate1)
@@ -112,7 +113,7 @@ public:
     }
 
 private:
-    /// From the tangent at the start, exact where the motion is straight.
+    /// Departure from the tangent at the start, exact where the motion is straight.
     [[nodiscard]] double departure(std::size_t i) const noexcept
     {
         return (x1_[i] - x0_[i]) - h_ * rate0_[i];
@@ -124,6 +125,7 @@ private:
     std::span<const double> x0_, x1_, rate0_, rate1_;
 };
 
+/// Options of a monitor.
 struct MonitorOptions {
     double event_tolerance = 0;  ///< as in `Options`
     double event_rtol = 0;
@@ -139,12 +141,29 @@ struct MonitorOptions {
 
 /// The events of a hybrid system in the steps of a host.
 ///
+/// A step is the path x(t0 + s), 0 <= s <= h, of the host from (t0, x0) to (t0 + h, x1). `examine` computes
+///
+///     F, s     = the earliest set of acting guards that leave their side within (0, h], located on
+///                `restep` where the host has it and else on `interpolate`, and its offset
+///     record the events of all other guards up to there
+///     F empty: `stands`; the next step begins at (t0 + h, x1)
+///     else:    x⁻ = x(t0 + s),  x⁺, q⁺ = r_F(q, t0 + s, x⁻);  `cut`, with these in `cut()`
+///
+/// and `resume`, called with the rate at x⁺, arms every guard there: on its sign, or on its surface on the sign of its
+/// rate. It returns `stands` if the next step begins at x⁺, and another `cut` at the same instant if x⁺ has
+/// carried guards across their surfaces. `rests` says that the state stays as it is up to the next time event, and
+/// `ended` that the run is over.
+///
+/// Required of the host: t0 and x0 are the end of the last step, or the instant and the state of the last cut, to the bit;
+/// t0 + h does not lie beyond `must_stop_at`; between `cut` and `resume` no step is shown. A call that violates this
+/// throws std::logic_error and changes nothing.
+///
 /// The system is one for `Simulation`; its flow is asked for where a guard starts on its surface
 /// without a rate, and where the host does not give the rate after an event.
 ///
 /// An exception from a function of the system or from a host's interpolant passes through
 /// unchanged. The monitor then waits for `start` or `restore`, and refuses all else: what it had
-/// found in the step in hand is half done.
+/// found in the current step is half done.
 ///
 /// After construction nothing is allocated for up to 8 guards and states of fixed size, but what is
 /// recorded, and what a reset of several guards at once merges.
@@ -154,7 +173,7 @@ class EventMonitor {
     static_assert(detail::check_declarations<System, X>());
 
 public:
-    /// What `cut` and `events` show states as: contiguous doubles.
+    /// Type of the states of `cut` and `events`: contiguous doubles.
     using State = detail::CoreState<X>;
 
     /// Keeps a reference to the system.
@@ -172,8 +191,8 @@ public:
     explicit EventMonitor(System&&, const X&, const MonitorOptions& = {}, const Detector& = {},
                           const Locator& = {}) = delete;
 
-    /// Arms all guards at a state that no event has led to: at the start, and after whatever a host
-    /// does to the state by itself. May be a cut at once: a guard that is about to be crossed.
+    /// Arms all guards at a state that no event has led to: at the start, and after a change that a host
+    /// makes to the state. May return a cut immediately: a guard that is about to be crossed.
     /// @param dxdt   the rate at x in offsets, n doubles
     /// @param scale  [s] length of the next step, roughly
     /// @throws std::invalid_argument naming a guard that is not finite, or behind a surface that
@@ -183,7 +202,7 @@ public:
     {
         return monitor_->start(t, taken(x), checked(dxdt, x.size()), mode, scale);
     }
-    /// With the rate of the system's flow.
+    /// Same, with the rate of the system's flow.
     Verdict start(const Instant& t, std::span<const double> x, double scale, Mode mode = 0)
     {
         return monitor_->start(t, taken(x), nullptr, mode, scale);
@@ -218,21 +237,21 @@ public:
     {
         return monitor_->resume(checked(dxdt, monitor_->x().size()), scale);
     }
-    /// With the rate of the system's flow.
+    /// Same, with the rate of the system's flow.
     [[nodiscard]] Verdict resume(double scale) { return monitor_->resume(nullptr, scale); }
-    /// After a cut, from a state of the host's own making in the place of `cut().after`.
+    /// After a cut, from a state of the host's own making in place of `cut().after`.
     [[nodiscard]] Verdict resume(std::span<const double> after, Mode mode,
                                  std::span<const double> dxdt, double scale)
     {
         return monitor_->resume(taken(after), mode, checked(dxdt, after.size()), scale);
     }
 
-    /// The state has been kept until t [s], at most `must_stop_at`. At a time event a cut.
+    /// Tells the monitor that the state has been kept until t [s], at most `must_stop_at`. Returns a cut at a time event.
     [[nodiscard]] Verdict hold(double t) { return monitor_->hold(t); }
 
     [[nodiscard]] const Cut<State>& cut() const noexcept { return monitor_->cut(); }
 
-    /// Where the next step begins.
+    /// Time [s] at which the next step begins.
     [[nodiscard]] Instant t() const noexcept { return monitor_->t(); }  ///< [s]
     [[nodiscard]] std::span<const double> x() const noexcept { return monitor_->x(); }
     [[nodiscard]] Mode mode() const noexcept { return monitor_->mode(); }
@@ -240,13 +259,13 @@ public:
     /// The next time event [s], beyond which no step goes; infinite where there is none.
     [[nodiscard]] double must_stop_at() const noexcept { return monitor_->must_stop_at(); }
 
-    /// Up to this time [s] no guard needs a look, by the bounds that the system declares or a gate
+    /// Time [s] up to which no guard needs a check, by the bounds that the system declares or a gate
     /// (`Planned`, `Certified`, ...): the host may go there in steps that it does not show, by
-    /// `skip_to`. Where nothing is known it is the time in hand.
+    /// `skip_to`. Without bounds it is the current time.
     [[nodiscard]] double quiet_until() const noexcept { return monitor_->quiet_until(); }
 
-    /// The host has gone on to t, at most `quiet_until` and before the next time event, in one step
-    /// or several; x and its rate are those there.
+    /// Tells the monitor that the host has continued to t, at most `quiet_until` and before the next time event,
+    /// in one step or several; x and its rate are those at t.
     /// @throws std::logic_error beyond that
     void skip_to(const Instant& t, std::span<const double> x, std::span<const double> dxdt)
     {
@@ -258,20 +277,20 @@ public:
     [[nodiscard]] Side side(std::size_t guard) const { return monitor_->side(guard); }
 
     [[nodiscard]] Outcome outcome() const noexcept { return monitor_->run().outcome; }
-    /// That ended the run, or `no_guard`.
+    /// The guard that ended the run, or `no_guard`.
     [[nodiscard]] std::size_t guard() const noexcept { return monitor_->run().guard; }
     [[nodiscard]] const Statistics& statistics() const noexcept
     {
         return monitor_->run().statistics;
     }
-    /// Since `clear_events`, in the order in which they happened.
+    /// Events since `clear_events`, in the order in which they happened.
     [[nodiscard]] std::span<const Event<State>> events() const noexcept
     {
         return monitor_->run().events;
     }
     void clear_events() noexcept { monitor_->clear_events(); }
 
-    /// All that the future depends on, between two steps.
+    /// State of the monitor between two steps: everything that its future depends on.
     [[nodiscard]] Snapshot save() const { return monitor_->save(); }
     /// @throws std::invalid_argument if the snapshot is of another system, or no state of one;
     /// then nothing has changed.

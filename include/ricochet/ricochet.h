@@ -43,7 +43,7 @@ extern "C" {
 
 /* --- results ----------------------------------------------------------------------------- */
 
-/** What a call came to. */
+/** Status of a call. */
 typedef enum rc_status {
     RC_OK = 0,
     RC_INVALID = 1,    /**< an argument, an option or the system is not as it has to be */
@@ -82,12 +82,12 @@ typedef enum rc_crossing {
     RC_EITHER = 2
 } rc_crossing;
 
-/** In the place of a guard: none. */
+/** Number of a guard that stands for none. */
 #define RC_NO_GUARD ((size_t)-1)
-/** In the place of a guard: the reset of a time event. */
+/** Number of a guard that stands for the reset of a time event. */
 #define RC_TIME_EVENT_RESET ((size_t)-2)
 
-/** What is said of a guard. All fields but the size may be zero. */
+/** Properties of a guard. All fields but the size may be zero. */
 typedef struct rc_guard_info {
     size_t size;         /**< sizeof(rc_guard_info) */
     const char* name;    /**< for messages, copied; null: none */
@@ -129,7 +129,7 @@ typedef int (*rc_reset_fn)(void* user, size_t which, rc_mode* mode, double t, do
  *  event belongs to them. */
 typedef int (*rc_reset_set_fn)(void* user, const size_t* fired, size_t count, int on_time,
                                rc_mode* mode, double t, double* x, size_t n);
-/** Whether guard `which` is looked at in this mode: 1 or 0 into `enabled`. */
+/** Whether guard `which` is examined in this mode: 1 or 0 into `enabled`. */
 typedef int (*rc_enabled_in_fn)(void* user, size_t which, rc_mode mode, int* enabled);
 /** Whether a crossing of guard `which` here is an event: 1 or 0 into `enabled`. */
 typedef int (*rc_enabled_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
@@ -162,7 +162,7 @@ typedef struct rc_callbacks {
     rc_guard_rates_fn guard_rates; /**< without rates they are differences along the flow */
     rc_guard_rate_fn guard_rate;
     rc_reset_fn reset;             /**< null: events change nothing */
-    rc_reset_set_fn reset_set;     /**< in the place of `reset` */
+    rc_reset_set_fn reset_set;     /**< in place of `reset` */
     rc_reset_fn rest;              /**< what becomes of the motion where events accumulate */
     rc_enabled_in_fn enabled_in;   /**< null: all guards in all modes */
     rc_enabled_fn enabled;         /**< null: every crossing is an event */
@@ -189,7 +189,7 @@ RC_API void rc_system_free(rc_system* system);
 
 /* --- options ----------------------------------------------------------------------------- */
 
-/** The method, by whose steps the motion goes on. */
+/** The method, by whose steps the motion continues. */
 typedef enum rc_method {
     RC_DOPRI5 = 0,     /**< order 5, error estimate, dense output */
     RC_FEHLBERG78 = 1, /**< order 8, error estimate: the cheapest for small errors */
@@ -200,14 +200,14 @@ typedef enum rc_method {
 
 /** How it is decided whether a step holds events. */
 typedef enum rc_detector {
-    RC_EXTREMUM = 0,  /**< ends and extremum inside, a look inside each step */
+    RC_EXTREMUM = 0,  /**< ends and extremum inside, a check inside each step */
     RC_ENDS = 1,      /**< ends of the step only */
     RC_BERNSTEIN = 2, /**< proves for guards that declare a degree */
     RC_PLANNED = 3,   /**< looks when declared bounds demand it; finds what RC_EXTREMUM finds */
     /* With a gate, `rc_options.gate`, that has been trained elsewhere: */
     RC_CALIBRATED = 4, /**< looks when a horizon gate says; may miss, as often as it was measured */
     RC_CALIBRATED_BOUNDS = 5, /**< as RC_PLANNED, with the levels of a level gate as bounds */
-    RC_FORESEEN = 6 /**< as RC_PLANNED, a horizon gate says when a look is likely to do */
+    RC_FORESEEN = 6 /**< as RC_PLANNED, a horizon gate says when a check is likely to do */
 } rc_detector;
 
 /** How an event is located in its step. */
@@ -245,7 +245,7 @@ typedef struct rc_options {
     uint64_t stall_steps; /**< 1000000 steps in a row advance the time by 1e-9 of the span, or the
                              run ends as RC_STALLED; 0: any number may stand still */
     const char* gate;     /**< path of the model of the detectors that ask one, else null */
-    const double* component_atol; /**< one for each component in the place of atol, copied; null */
+    const double* component_atol; /**< one for each component in place of atol, copied; null */
     size_t component_count;       /**< of them, 0 */
 } rc_options;
 
@@ -292,7 +292,7 @@ RC_API rc_status rc_simulation_free(rc_simulation* simulation);
 
 /* The three below return RC_CALLBACK where a callback failed. What has been computed is kept, time
  * and state are those of the last complete step or event, the outcome is RC_STOPPED_BY_CALLBACK,
- * and the next call goes on from there, with the same bits as if nothing had happened. A run that
+ * and the next call continues from there, with the same bits as if nothing had happened. A run that
  * has ended stays as it is. */
 
 /** Takes one step, with whatever events it holds. 0 into `goes_on` (which may be null) if the run
@@ -339,10 +339,10 @@ RC_API rc_mode rc_mode_now(rc_simulation* simulation);
 RC_API rc_outcome_code rc_outcome(rc_simulation* simulation);
 /** The name of an outcome, e.g. "reached_end"; "running"; "unknown" for a number that is none. */
 RC_API const char* rc_outcome_name(rc_outcome_code outcome);
-/** One sentence about it, with the remedy. */
+/** One sentence about an outcome, with the remedy. */
 RC_API const char* rc_outcome_text(rc_outcome_code outcome);
 
-/** What the run has counted. */
+/** Counts over a run. */
 typedef struct rc_statistics {
     size_t size;               /**< sizeof(rc_statistics), filled in by the caller */
     uint64_t steps;            /**< accepted, also those cut short by an event */
@@ -357,24 +357,24 @@ typedef struct rc_statistics {
     uint64_t checks_put_off; /**< steps whose check a plan or a gate saved */
     uint64_t outside_domain; /**< states outside the box of a gate: checked exactly */
     uint64_t bound_calls;
-    uint64_t rollbacks;      /**< stretches taken back to a step that was not closed */
+    uint64_t rollbacks;      /**< intervals taken back to a step that was not closed */
     uint64_t repeated_steps; /**< steps taken again for that */
     uint64_t events;
     uint64_t suppressed; /**< repeats of an event inside its own window */
     uint64_t disabled;   /**< crossings that `enabled` said were no events */
     /* Steps without an event, by what is known of them. */
     uint64_t proved;  /**< a bound or a polynomial excludes a root */
-    uint64_t checked; /**< the ends and the extremum inside were looked at */
+    uint64_t checked; /**< the ends and the extremum inside were examined */
     uint64_t gated;   /**< a calibrated gate skipped the check */
-    uint64_t assumed; /**< only the ends were looked at */
+    uint64_t assumed; /**< only the ends were examined */
     size_t guard;       /**< that ended the run, or RC_NO_GUARD */
     size_t other_guard; /**< of two conflicting resets the second, or RC_TIME_EVENT_RESET */
 } rc_statistics;
 
-/** Fills it in. RC_WRONG_SIZE, RC_BAD_HANDLE, RC_BUSY. */
+/** Fills in the counts. RC_WRONG_SIZE, RC_BAD_HANDLE, RC_BUSY. */
 RC_API rc_status rc_get_statistics(rc_simulation* simulation, rc_statistics* statistics);
 
-/** What happened. */
+/** Kind of an event. */
 typedef enum rc_event_kind {
     RC_CROSSING = 0,     /**< the guard changed sign */
     RC_TOUCH = 1,        /**< the guard reached its surface and turned back */
@@ -392,7 +392,7 @@ typedef struct rc_event {
     int32_t late;          /**< 1: found at a step after the one that held it */
     rc_mode mode_before;
     rc_mode mode_after;
-    const double* before;  /**< n doubles; null if not kept. Until the simulation goes on */
+    const double* before;  /**< n doubles; null if not kept. Until the simulation continues */
     const double* after;   /**< n doubles, the same as before where nothing is reset */
     double bracket_lo;     /**< [s] the guard is still on its side here, */
     double bracket_hi;     /**< [s] and has left it here */
@@ -407,7 +407,7 @@ RC_API rc_status rc_event_at(rc_simulation* simulation, size_t index, rc_event* 
 
 /** Number of samples taken so far, see `sample_times`; 0 for a handle that cannot be used. */
 RC_API size_t rc_sample_count(rc_simulation* simulation);
-/** The time [s] of sample `index` into `t` and its state, n doubles until the simulation goes on,
+/** The time [s] of sample `index` into `t` and its state, n doubles until the simulation continues,
  *  into `x`; either may be null. RC_INVALID if there is none. */
 RC_API rc_status rc_sample_at(rc_simulation* simulation, size_t index, double* t, const double** x);
 
@@ -441,10 +441,10 @@ RC_API rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t
  *      while (verdict == RC_STANDS && t < t_end) {
  *          step, to rc_monitor_must_stop_at(monitor) at most
  *          rc_monitor_examine(monitor, &step, &verdict);
- *          if (verdict == RC_STANDS) go on from the end of the step
+ *          if (verdict == RC_STANDS) continue from the end of the step
  *          while (verdict == RC_CUT) {
  *              rc_monitor_cut(monitor, &cut);
- *              go on from cut.t and cut.after
+ *              continue from cut.t and cut.after
  *              rc_monitor_resume(monitor, dxdt, n, h, &verdict);
  *          }
  *      }
@@ -474,11 +474,11 @@ typedef struct rc_monitor_options {
 /** Fills in the defaults; `size` is sizeof(rc_monitor_options). RC_WRONG_SIZE. */
 RC_API rc_status rc_monitor_options_default(rc_monitor_options* options, size_t size);
 
-/** What a host is to do next. */
+/** Decision of a monitor about a step. */
 typedef enum rc_verdict {
     RC_NO_VERDICT = -1, /**< the call has failed, see its status */
-    RC_STANDS = 0,      /**< the step stands: go on from its end */
-    RC_CUT = 1,   /**< it ends at a set of events: go on from `after` of rc_cut, and resume */
+    RC_STANDS = 0,      /**< the step stands: continue from its end */
+    RC_CUT = 1,   /**< it ends at a set of events: continue from `after` of rc_cut, and resume */
     RC_RESTS = 2, /**< the motion has come to rest: keep the state, and hold */
     RC_ENDED = 3  /**< the run is over, rc_monitor_outcome says why */
 } rc_verdict;
@@ -522,7 +522,7 @@ typedef struct rc_cut {
     rc_mode mode_after;
     int32_t on_time;       /**< 1: with a time event */
     int32_t accumulation;  /**< 1: `after` is what `rest` makes of the limit, `t` its time */
-    int32_t state_changed; /**< 0: the host need not start anew */
+    int32_t state_changed; /**< 0: the host need not start again */
     int32_t reserved;      /**< 0 */
 } rc_cut;
 
@@ -541,7 +541,7 @@ RC_API rc_status rc_monitor_free(rc_monitor* monitor);
  * copy them. Rates are as in rc_host_step; null for `dxdt`: the system's flow is asked. `scale` [s] is
  * roughly the length of the next step. After RC_INVALID and RC_OUT_OF_TURN nothing has changed,
  * and the right call may follow. After any other failure, such as RC_CALLBACK, what has been found
- * in the step in hand is half done, and the monitor waits for rc_monitor_start or
+ * in the current step is half done, and the monitor waits for rc_monitor_start or
  * rc_monitor_restore. */
 
 /** Arms all guards at a state that no event has led to: at the start, and after whatever a host
@@ -561,7 +561,7 @@ RC_API rc_status rc_monitor_examine(rc_monitor* monitor, const rc_host_step* ste
  *  motion that comes to rest. */
 RC_API rc_status rc_monitor_resume(rc_monitor* monitor, const double* dxdt, size_t n, double scale,
                                    rc_verdict* verdict);
-/** The same from a state of the host's own making in the place of `after`. */
+/** The same from a state of the host's own making in place of `after`. */
 RC_API rc_status rc_monitor_resume_at(rc_monitor* monitor, const double* x, const double* dxdt,
                                       size_t n, rc_mode mode, double scale, rc_verdict* verdict);
 
@@ -584,11 +584,11 @@ RC_API rc_mode rc_monitor_mode(rc_monitor* monitor);
 /** The next time event [s], beyond which no step goes; infinite where there is none; NaN before the
  *  start, and for a handle that cannot be used. */
 RC_API double rc_monitor_must_stop_at(rc_monitor* monitor);
-/** Up to this time [s] no guard needs a look, by the bounds that the system has or by a gate: the
+/** Up to this time [s] no guard needs a check, by the bounds that the system has or by a gate: the
  *  host may go there in steps that it does not show, by rc_monitor_skip_to. Where nothing is known
- *  it is the time in hand; NaN before the start, and for a handle that cannot be used. */
+ *  it is the current time; NaN before the start, and for a handle that cannot be used. */
 RC_API double rc_monitor_quiet_until(rc_monitor* monitor);
-/** The host has gone on to t, at most rc_monitor_quiet_until and before the next time event, in one
+/** The host has continued to t, at most rc_monitor_quiet_until and before the next time event, in one
  *  step or several; x and its rate, which must be given, are those there. RC_OUT_OF_TURN beyond. */
 RC_API rc_status rc_monitor_skip_to(rc_monitor* monitor, double t, const double* x,
                                     const double* dxdt, size_t n);
@@ -609,9 +609,9 @@ RC_API rc_status rc_monitor_side(rc_monitor* monitor, size_t which, rc_side* sid
 RC_API rc_outcome_code rc_monitor_outcome(rc_monitor* monitor);
 /** The guard that ended the run, or RC_NO_GUARD. */
 RC_API size_t rc_monitor_guard(rc_monitor* monitor);
-/** As rc_callback_failure, of this monitor; null: of this thread. */
+/** Describes the last failure of a callback like rc_callback_failure, of this monitor; null: of this thread. */
 RC_API rc_status rc_monitor_callback_failure(rc_monitor* monitor, rc_callback_error* error);
-/** As rc_get_statistics; calls of the flow are the host's, and not counted. */
+/** Fills in the counts like rc_get_statistics; calls of the flow are the host's, and not counted. */
 RC_API rc_status rc_monitor_statistics(rc_monitor* monitor, rc_statistics* statistics);
 
 /** Number of events recorded since rc_monitor_clear_events; 0 for a handle that cannot be used. */
@@ -621,11 +621,11 @@ RC_API rc_status rc_monitor_event_at(rc_monitor* monitor, size_t index, rc_event
 /** Forgets the events recorded so far. */
 RC_API rc_status rc_monitor_clear_events(rc_monitor* monitor);
 
-/** As rc_save, between two steps: all that the future of the monitor depends on; the host saves
- *  what its own depends on. RC_OUT_OF_TURN before the start, before a cut was resumed, and after
+/** Saves the monitor like rc_save, between two steps: all that its future depends on; the host saves its
+ *  own state. RC_OUT_OF_TURN before the start, before a cut was resumed, and after
  *  the end. */
 RC_API rc_status rc_monitor_save(rc_monitor* monitor, void* bytes, size_t* size);
-/** As rc_restore, of the same or of another monitor of the same system with the same options. */
+/** Restores a saved state like rc_restore, of the same or of another monitor of the same system with the same options. */
 RC_API rc_status rc_monitor_restore(rc_monitor* monitor, const void* bytes, size_t size);
 
 #ifdef __cplusplus

@@ -96,7 +96,7 @@ template <class System, std::size_t n>
     }
 }
 
-/// A door with the constants of the flow and the step in hand.
+/// A door with the constants of the flow and the current step.
 template <class System, class X>
 struct StepperDoor<System, X, Taylor> : Door<System, X> {
     static constexpr std::size_t n = fixed_size<X>();
@@ -221,7 +221,7 @@ class KernelOf<System, X, Taylor> {
         return *static_cast<D*>(static_cast<Door<System, X>*>(door));
     }
 
-    /// The coefficients of the step from the start in hand, if they are not those already.
+    /// The coefficients of the step from the current start, if they are not those already.
     [[gnu::always_inline]] static TaylorStep<n, m>& expand(void* door, const State& state,
                                                            int order)
     {

@@ -1,4 +1,4 @@
-"""Compiled functions in the place of Python's."""
+"""Compiled functions in place of Python's."""
 
 import sys
 

@@ -11,8 +11,8 @@ from ._run import set_mode, source_of, state_from
 class Verdict(IntEnum):
     """What a host is to do next."""
 
-    STANDS = 0  #: the step stands: go on from its end
-    CUT = 1     #: the step ends at a set of events: go on from ``cut.after``, and ``resume``
+    STANDS = 0  #: the step stands: continue from its end
+    CUT = 1     #: the step ends at a set of events: continue from ``cut.after``, and ``resume``
     RESTS = 2   #: the motion has come to rest: keep the state until ``must_stop_at``, then ``hold``
     ENDED = 3   #: the run is over; ``run.outcome`` says why
 
@@ -33,7 +33,7 @@ class Cut(NamedTuple):
     fired_names: list
     on_time: bool        #: with a time event
     accumulation: bool   #: ``after`` is what ``rest`` makes of the limit of infinitely many events
-    state_changed: bool  #: False: the host need not start anew
+    state_changed: bool  #: False: the host need not start again
 
 
 _OPTIONS = ("event_tolerance", "event_rtol", "event_window", "look_inside", "record_events",
@@ -129,7 +129,7 @@ class Monitor(_ricochet.Monitor):
         return _VERDICTS[self._hold(t)]
 
     def skip_to(self, t, x, rate):
-        """The host has gone on to ``t``, at most ``quiet_until``, in steps that it has not shown."""
+        """The host has continued to ``t``, at most ``quiet_until``, in steps that it has not shown."""
         self._skip_to(t, x, rate)
 
     @property

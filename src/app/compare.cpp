@@ -214,7 +214,7 @@ void add_verdict(const std::vector<Method>& methods, bool fixed_step,
     if (const Method* verified = find(methods, DetectorKind::verified, fixed_step)) {
         const bool same = verified->accuracy.found == extremum.accuracy.found;
         sentences.push_back(fmt::format(
-            "{}: verified put off {} checks and takes {} a step beyond extremum ({}), with {} "
+            "{}: verified deferred {} checks and takes {} a step beyond extremum ({}), with {} "
             "events.",
             verified->stepping, verified->statistics.checks_put_off, extra(*verified, extremum),
             duration(per_step(extremum)), same ? "the same" : "other"));
@@ -272,7 +272,7 @@ std::string cost_table(const SystemEntry& system, const std::vector<double>& exa
     std::string out =
         row("", "largest", "missed", "spurious", "late", "steps", "flow", "guard", "asked",
             "checks", "time", "spread") +
-        row("", "error [s]", "", "", "", "", "calls", "calls", "", "put off", "per run", "");
+        row("", "error [s]", "", "", "", "", "calls", "calls", "", "deferred", "per run", "");
     for (const Method& method : methods) {
         const Statistics& s = method.statistics;
         const Accuracy& a = method.accuracy;
@@ -302,7 +302,7 @@ std::string to_text(const SystemEntry& system, const std::vector<double>& exact,
                            options.rtol, options.atol);
     }
     if (!system.line.empty()) {
-        out += fmt::format("line: the boundary itself, {}, is asked in the place of a network.\n",
+        out += fmt::format("line: the boundary itself, {}, is asked in place of a network.\n",
                            system.line);
     }
     if (!system.published.empty()) {

@@ -188,8 +188,8 @@ void Claims::keeps(std::string_view option, const fs::path& file, bool resume)
     }
     if (!resume && there) {
         throw BadInput(
-            fmt::format("'{}' keeps an earlier training or proof: --resume goes on from it; to "
-                        "begin anew, remove it",
+            fmt::format("'{}' keeps an earlier training or proof: --resume continues from it; to "
+                        "start again, remove it",
                         file.string()));
     }
 }

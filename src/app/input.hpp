@@ -1,4 +1,4 @@
-// What the user typed, read strictly: one sentence names what was given and what
+// Strict reading of what the user typed: one sentence names what was given and what
 // was expected.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What ends a command early and keeps what it has computed: Ctrl-C, a request to terminate, a
+// Requests that end a command early and keep what it has computed: Ctrl-C, a request to terminate, a
 // terminal that goes away, memory that runs short.
 #pragma once
 
@@ -19,7 +19,7 @@ enum class Cause : int {
     memory = -1,
 };
 
-/// While it lives, the first interrupt sets a flag that runs look at after every step; a second one
+/// While it lives, the first interrupt sets a flag that runs examine after every step; a second one
 /// ends the program.
 class Interrupts {
 public:

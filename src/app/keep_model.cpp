@@ -78,7 +78,7 @@ void say_what_is_kept(const fs::path& checkpoint, const std::string& trouble)
     std::error_code error;
     if (!trouble.empty()) say("ricochet: {}\n", printable(trouble));
     if (fs::exists(checkpoint, error)) {
-        say("ricochet: interrupted; the same command with --resume goes on from '{}'\n",
+        say("ricochet: interrupted; the same command with --resume continues from '{}'\n",
             checkpoint.string());
     } else {
         say("ricochet: interrupted; nothing is kept\n");

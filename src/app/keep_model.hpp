@@ -20,7 +20,7 @@ void keep_model(const Model& model, const std::filesystem::path& file,
 void claim_training(const std::filesystem::path& out, std::filesystem::path& checkpoint,
                     bool resume);
 
-/// Of what was interrupted: where it goes on from, on standard error.
+/// Of what was interrupted: where it continues from, on standard error.
 /// @param trouble  why its last checkpoint could not be written; empty: it was
 void say_what_is_kept(const std::filesystem::path& checkpoint, const std::string& trouble);
 

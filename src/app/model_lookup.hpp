@@ -1,4 +1,4 @@
-// Where models are, and which one suits a run.
+// Search for the model that suits a run.
 #pragma once
 
 #include <filesystem>
@@ -22,11 +22,11 @@ struct FoundModel {
 
 /// The file that the user named: a path, or a name in one of the directories, with
 /// or without its extension.
-/// @throws BadInput saying where it was looked for.
+/// @throws BadInput saying where it was searched for.
 [[nodiscard]] std::filesystem::path find_model(const std::string& given);
 
 /// The file of a model that comes with the library, in one of the directories.
-/// @throws BadInput saying where it was looked for.
+/// @throws BadInput saying where it was searched for.
 [[nodiscard]] std::filesystem::path find_model(const OwnModel& own);
 
 /// The model that the user named, see `find_model`.

@@ -1,4 +1,4 @@
-// What there is to know of networks that choose steps.
+// Advice on networks that choose steps.
 #pragma once
 
 #include <string_view>

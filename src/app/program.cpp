@@ -226,9 +226,9 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
         "  ricochet simulate spring-slider --set ratio=0.4 --plot stick-slip.svg\n\n"
         "Why a step is taken to hold no event:\n"
         "  proved    a bound, or the polynomial of the step (bernstein), excludes it\n"
-        "  checked   the ends and the turning points of the guard were looked at (extremum)\n"
+        "  checked   the guard was evaluated at the ends and the turning points (extremum)\n"
         "  gated     a calibrated network skipped the check, within its miss rate\n"
-        "  assumed   only the ends were looked at (ends), or a network was believed\n"
+        "  assumed   the guard was evaluated at the ends only (ends), or a network predicted no event\n"
         "A late event was found at a step after the one that held it.");
     command.callback([&status, request, handler] { status = handler(*request); });
 }

@@ -1,4 +1,4 @@
-// What `ricochet` and its further programs, `ricochet-<name>`, have in common.
+// Parts that `ricochet` and its further programs, `ricochet-<name>`, share.
 //
 // Exit status: 0 fine; 1 a run or training that ended otherwise than hoped (its
 // result is printed all the same) or a file that could not be written in the end;

@@ -34,7 +34,7 @@ struct Range {
 
 struct Parameter {
     std::string_view name;
-    double initial;         ///< what it is when nobody sets it
+    double initial;         ///< default value
     std::string_view unit;  ///< "1" where it has none
     Range range;
     std::string_view meaning;

@@ -275,7 +275,7 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
                     s.events == 1 ? "" : "s", s.steps, s.rejected, s.flow_calls, s.guard_calls);
     if (s.network_calls > 0) {
         out += fmt::format(
-            ",\n{} predictions: {} checks put off, {} false alarms, {} missed events ({} late)",
+            ",\n{} predictions: {} checks deferred, {} false alarms, {} missed events ({} late)",
             s.network_calls, s.checks_put_off, s.false_alarms, s.missed_events, s.late_events);
     }
     if (s.outside_domain > 0) {

@@ -10,7 +10,7 @@ namespace ricochet::app {
 
 /// While it lives, a thread looks every few milliseconds at what the program holds, and raises
 /// `Cause::memory` when more would not leave enough to report what there is. After some seconds it
-/// says once on standard error that the run goes on, and how it is ended.
+/// says once on standard error that the run continues, and how it is ended.
 class RunWatch {
 public:
     /// @param share  of the memory that is available now which a run may take: reports are made

@@ -1,4 +1,4 @@
-// What reports say of differential inclusions.
+// Reports on differential inclusions.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// How a run is to be done: the choices that the command line offers, by name.
+// Settings of a run: the choices that the command line offers, by name.
 #pragma once
 
 #include <cstddef>

@@ -1,12 +1,12 @@
 // The events of a motion, computed here or by a host: which set comes first in a step, what its
-// resets make of the state, and on which side every guard goes on.
+// resets make of the state, and on which side every guard is armed afterwards.
 //
-//     find      the first set of events in the step in hand, and the state x⁻ there
-//     apply     the resets of its members: x⁻ becomes x⁺, the mode may change
-//     settle    every guard anew with the flow at x⁺; guards that a reset has carried across their
+//     find      the first set of events in the current step, and the state x⁻ there
+//     apply     the resets of the fired guards: x⁻ becomes x⁺, the mode may change
+//     settle    arm every guard with the flow at x⁺; guards that a reset has carried across their
 //               surfaces are the next set, at the same instant
 //
-// `Loop` adds a method that takes the steps, `MonitorLoop` is shown those of a host.
+// `Loop` adds a method that takes the steps; `MonitorLoop` is shown the steps of a host.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +36,7 @@
 
 namespace ricochet::detail {
 
-/// False, as the compiler knows.
+/// Stands for `false` as a constant of the compiler.
 struct Never {
     constexpr explicit Never(bool) noexcept {}
     constexpr operator bool() const noexcept { return false; }
@@ -47,7 +47,7 @@ class EventEngine {
 protected:
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
-    /// Places the step in hand at the start. Keeps a reference to `setup`.
+    /// Places the current step at the start. Keeps a reference to `setup`.
     /// @param options  valid ones
     EventEngine(const RunSetup<X>& setup, const X& x0, const Options& options)
         : setup_(setup),
@@ -84,14 +84,14 @@ protected:
 
     void refuse_bad_guards();
 
-    /// Leaves the guards that fire at the start as members.
+    /// Puts the guards that fire at the start into the fired set.
     void arm_at_start();
 
-    /// Whether a guard that was not a member is on its other side at a set by no more than rounding.
+    /// Whether a guard outside the fired set is on its other side at the set by no more than rounding.
     [[nodiscard]] bool is_flipped_by_rounding(std::size_t i, Side before);
 
-    /// What rounding of the time and of the state, 8 units in the last place of each
-    /// component, may make of guard i at the start of the step.
+    /// Change of guard i at the start of the step that rounding of the time and of the state, 8 units in
+    /// the last place of each component, may cause.
     [[nodiscard]] double rounding_of(std::size_t i);
     [[nodiscard]] double rounding_of(std::size_t i, double t, const X& x);
 
@@ -108,20 +108,20 @@ protected:
 
     // --- time events ---
 
-    /// One that is not ahead would be lost, with all that follow it.
+    /// A time event that is not ahead would be lost, with all time events that follow it.
     void find_time_event(bool at_start = false);
 
-    /// At the start of the step. What it causes is settled by `settle`.
+    /// Applies a time event at the start of the step; `settle` deals with its consequences.
     void apply_time_event();
 
     // --- finding ---
 
-    /// Looks at the step as the detector does of every step. False: it holds no event.
+    /// Examines the step as the detector does every step. False: it holds no event.
     /// @param cleared  whether a network has predicted that it holds none
     [[nodiscard]] bool deserves_search(bool& cleared);
 
-    /// Whether any guard deserves a search. Detectors that ask for it see the guards inside
-    /// the step, too; a second time where the first leaves doubts.
+    /// Whether any guard needs a search. For detectors that ask for it, guards are evaluated inside
+    /// the step, too, and a second time where the first leaves doubts.
     [[nodiscard]] bool any_suspicious()
     {
         if (on_series_ || !bank_.looks() || !options_.look_inside) return bank_.suspicious(step_.h());
@@ -129,7 +129,7 @@ protected:
         return is_suspicious(error_controlled_ && hardly_moves());
     }
 
-    /// The same after a look inside, if there is one; `moves` hardly: at several places more.
+    /// Same after an evaluation inside the step, if there is one; at several more places where the state hardly `moves`.
     [[nodiscard]] bool is_suspicious(bool hardly_moves);
 
     /// On series no rates are needed until a search asks for them.
@@ -159,8 +159,8 @@ protected:
         bank_.pass_on();
     }
 
-    /// Finds the first set that cuts the step short, and what its resets make of the state. False:
-    /// the step stands, with what it holds besides recorded.
+    /// Finds the first set that cuts the step short, and the state after its resets. False:
+    /// the step stands, and its other events are recorded.
     [[nodiscard]] bool find(bool cleared);
 
     void count_refined() noexcept
@@ -179,13 +179,13 @@ protected:
     /// Whether guard i counts at the start of the step; it is about to fire there.
     [[nodiscard]] bool counts_here(std::size_t i);
 
-    /// Members whose crossing is no event go on without one: those that `enabled`
-    /// rules out, and repeats of an event inside its own window.
+    /// Removes guards from the fired set whose crossing is no event: those that `enabled`
+    /// rejects, and repeats of an event inside its own window.
     void dismiss_members();
 
-    /// The guard has just had its event in the same direction. If it has not turned back
-    /// since, this is the same crossing, seen again because the reset moved the state by a
-    /// rounding; else it is a new event, and events accumulate.
+    /// Whether a crossing repeats the last event of the guard in the same direction. If the guard has not turned
+    /// back since, it is the same crossing, found again because the reset moved the state by a
+    /// rounding; otherwise it is a new event, and events accumulate.
     [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
     {
         const GuardRecord& record = bank_[i];
@@ -198,16 +198,15 @@ protected:
         return resets_any_ && bank_[i].info.resets && bank_[i].turned;
     }
 
-    /// Computes what the resets of the members make of the state before.
+    /// Applies the resets of the fired guards to the state before.
     void transform(bool on_time)
     {
         const double t = on_time ? time_event_ : time_of_set();
-        resets_.apply(system_, bank_, search_.members().span(), on_time, step_.mode(), t,
+        resets_.apply(system_, bank_, search_.fired().span(), on_time, step_.mode(), t,
                       search_.before());
     }
 
-    /// Whether the event leaves everything as it was, and no host wants to know, so that the step
-    /// can stand.
+    /// Whether the event changes nothing, and no host asks for such cuts, so that the step can stand.
     [[nodiscard]] bool changes_nothing();
 
     /// Whether this event of the guard, not yet counted, ends the run.
@@ -229,30 +228,30 @@ protected:
         add_evidence(finders_.detector.put_off, steps);
     }
 
-    /// Samples all guards at the start of the step in hand, every one of which is looked at.
+    /// Samples all guards at the start of the current step, every one of which is examined.
     void watch_all()
     {
         if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
         watching_ = newly_armed_ = true;
-        planner_->look_back(run_.statistics);
+        planner_->review(run_.statistics);
     }
 
-    /// After the guards have been armed.
+    /// Plans the deadlines of guards that have just been armed.
     void begin_plan()
     {
         newly_armed_ = watching_ = false;
         planner_->begin(step_, bank_);
     }
 
-    /// Whether one of the guards in doubt deserves a search in the step in hand.
+    /// Whether one of the guards in doubt needs a search in the current step.
     [[nodiscard]] bool judges_suspicious();
 
     // --- applying ---
 
-    /// The set that was found cuts the step short: applies it.
+    /// Applies the set that was found, which cuts the step short.
     void cut_short();
 
-    /// The members fire: the step is placed at `search_.before()` made `resets_.after()`. Unless
+    /// Fires the set: places the step at the state after the resets, and records the events. Unless
     /// the run has ended, `settle` is due.
     /// @param located  inside the current step, else at its start
     /// @param on_time  with a time event
@@ -264,24 +263,24 @@ protected:
         set_remainder_ = at.remainder;
     }
 
-    /// How far from its surface a guard that has just fired may be. A guard with declared
-    /// bounds may be expensive, and is not asked for what its location says as well.
+    /// Distance from its surface that a guard that has just fired may have. A guard with declared
+    /// bounds may be expensive, and the distance is then taken from its location.
     void find_band(std::size_t i, double t);
 
-    /// |g| where the guard has fired, at the state before.
-    [[nodiscard]] double residue_of(std::size_t i, double t)
+    /// Value |g| at the state before, where the guard has fired.
+    [[nodiscard]] double tolerance_of(std::size_t i, double t)
     {
         return std::fabs(bank_.view(i, mode_before_, calls()).value(t, search_.before()));
     }
 
     [[nodiscard]] double time_of_set() const noexcept { return set_time_; }
 
-    [[nodiscard]] std::size_t first_member()
+    [[nodiscard]] std::size_t first_fired()
     {
-        return search_.members().empty() ? no_guard : search_.members()[0];
+        return search_.fired().empty() ? no_guard : search_.fired()[0];
     }
 
-    /// Whether the resets have left something to go on from; else the run has ended.
+    /// Whether the resets have left a state to continue from; else the run has ended.
     [[nodiscard]] bool goes_on();
 
     [[nodiscard]] bool fits_dimension(const X& before, const X& after, bool same_mode) const
@@ -291,20 +290,20 @@ protected:
 
     // --- settling ---
 
-    /// What is left to do once the flow at the start of the step is known.
+    /// Work that is due once the flow at the start of the step is known.
     enum class Pending : std::uint8_t {
         nothing,
-        settle,     ///< members have fired: their accumulations, then all guards
-        arm,        ///< a member has come to rest: all guards
-        arm_stuck,  ///< one that its reset did not turn back has
+        settle,     ///< guards have fired: their accumulations, then all guards
+        arm,        ///< a fired guard has come to rest: all guards
+        arm_stuck,  ///< same, a guard that its reset did not turn back
         hold,       ///< the whole system has
     };
 
     /// Arms the guards with the flow at x⁺. True: another set has been applied at the same
-    /// instant, or a member has come to rest, and `settle` is due again.
+    /// instant, or a fired guard has come to rest, and `settle` is due again.
     [[nodiscard]] bool settle();
 
-    /// Settles all that happens at one instant, where the flow is there to be evaluated.
+    /// Settles everything that happens at one instant, and evaluates the flow there.
     void settle_all()
     {
         level_ = 0;
@@ -312,19 +311,18 @@ protected:
         }
     }
 
-    /// The guards that were carried across their surfaces fire in turn.
+    /// Fires the guards that were carried across their surfaces.
     [[nodiscard]] bool apply_next_set();
 
-    /// Whether the events of a member accumulate here. It comes to rest, or the run
-    /// ends.
-    [[nodiscard]] bool rest_members();
+    /// Whether the events of a fired guard accumulate here, so that it comes to rest or the run ends.
+    [[nodiscard]] bool rest_fired();
 
-    /// Notes how guard i leaves its surface after its reset. True if it is not going to rise
+    /// Keeps the rate at which guard i leaves its surface after its reset. True if the guard will not rise
     /// above its rounding any more.
     [[nodiscard]] bool fades(std::size_t i);
 
-    /// Whether the reset has put guard i so far from its surface, on the side it came from, that
-    /// it need not rise: not a residue of the location.
+    /// Whether the reset has put guard i farther from its surface, on the side it came from, than an error of
+    /// location explains, so that it need not rise.
     [[nodiscard]] bool is_away(std::size_t i, double rounding);
 
     /// The rate [1/s] of guard i at the start of the step; where it is a difference quotient,
@@ -338,21 +336,21 @@ protected:
     /// The limit of the events of guard i is `ahead` [s] from here, give or take `error`.
     void come_to_rest(std::size_t i, double ahead, double error);
 
-    /// Whether guard i stays where it is while the state stands still: its surface does not
-    /// move. Looked at from a thousandth of the time that is left to all of it.
+    /// Whether guard i stays where it is while the state stands still, because its surface does not
+    /// move; tested from a thousandth of the remaining time to all of it.
     [[nodiscard]] bool stays_on_surface(std::size_t i);
 
     void enable_guards();
 
-    /// Arms every guard at the start of a flight. The members have fired and count as
-    /// being on their surface up to the residue of their location. Those that the
-    /// resets have carried across their surface become the new members.
+    /// Arms every guard at the start of a flight. Guards that have fired count as
+    /// being on their surface up to the error of their location. Guards that the
+    /// resets have carried across their surface become the new fired set.
     void arm_all();
 
     /// False: the run has ended.
     [[nodiscard]] bool arm_one(std::size_t i, double widest);
 
-    /// The side that a crossing which counts leaves; `else_side` where both do.
+    /// Side from which a departure counts; `else_side` where both do.
     [[nodiscard]] static constexpr Side side_left_by(Crossing crossing, Side else_side) noexcept
     {
         return crossing == Crossing::falling  ? Side::above
@@ -360,35 +358,35 @@ protected:
                                               : else_side;
     }
 
-    /// The side that a guard on its surface is about to be on.
+    /// Side that a guard on its surface is about to enter.
     [[nodiscard]] Side heading(std::size_t i);
 
-    /// The rest rule has not stopped the setup into the surface.
+    /// Whether the rest rule has failed to stop a motion into the surface.
     [[nodiscard]] bool still_stuck(std::size_t i) const noexcept
     {
         return bank_[i].info.unilateral && bank_[i].enabled && bank_[i].side == Side::below;
     }
 
-    /// A unilateral guard on its surface that its reset does not turn back.
-    [[nodiscard]] std::size_t stuck_member();
+    /// Whether a unilateral guard is on its surface and its reset does not turn it back.
+    [[nodiscard]] std::size_t stuck_guard();
 
     // --- recording ---
 
     void note_crossings(double s);
 
-    /// All that other guards do up to the set of the members: crossings before it, which
-    /// leave a guard on its other side, and crossings with it.
+    /// Records the crossings of other guards before the fired set, after which a guard is on its
+    /// other side, and the crossings with it.
     void note_crossings_to_set();
 
     [[nodiscard]] bool counts_at_set(std::size_t i);
-    /// Whether a recorded guard has not yet left its side at the set by no more than what
-    /// rounding makes of its value there.
+    /// Whether a recorded guard has not left its side at the set, by no more than the rounding of its value
+    /// there.
     [[nodiscard]] bool is_rounding_at_set(std::size_t i, const GuardSample& at);
 
     [[nodiscard]] bool is_member(std::size_t i) noexcept
     {
-        auto& members = search_.members();
-        return std::find(members.begin(), members.end(), i) != members.end();
+        auto& fired = search_.fired();
+        return std::find(fired.begin(), fired.end(), i) != fired.end();
     }
 
     void record(Event<X>&& event)
@@ -402,18 +400,18 @@ protected:
 
     void record_time_event(double t);
 
-    /// A member of the set, found inside the step or flipped at its start.
+    /// Records a fired guard, found inside the step or carried across at its start.
     void record_crossing(std::size_t i, double t, bool located);
 
-    /// A notification of a guard that a reset has carried across its surface.
+    /// Records a guard without effect that a reset has carried across its surface.
     void record_jump(std::size_t i, Side before);
 
-    /// What happened in the step up to offset s without consequence.
+    /// Records the events up to offset s that change nothing.
     void record_notes(double s);
 
     // --- saving ---
 
-    /// All that the future of the guards depends on.
+    /// State of the guards that their future depends on.
     template <class Visitor>
     void visit_guards(Visitor&& visit)
     {
@@ -422,8 +420,8 @@ protected:
 
     static constexpr int most_levels = 100;  ///< of sets at one instant
     static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
-    /// Of the last flight of a guard: over so long the rounding of its small excursions is
-    /// magnified less by a difference quotient than over the usual 1e-5 of a step.
+    /// Fraction of the last flight of a guard over which a difference quotient is taken: over this length the rounding
+    /// of its small excursions is magnified less than over the usual 1e-5 of a step.
     static constexpr double low_part = 0.05;
 
     const RunSetup<X>& setup_;
@@ -453,14 +451,14 @@ protected:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
-    bool asked_ = false;        ///< a network, about the step in hand
+    bool asked_ = false;        ///< a network, about the current step
     bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
-    /// [s] of the set in hand. Time and remainder lie apart: copied at once, right after they have
+    /// [s] of the current set. Time and remainder lie apart: copied at once, right after they have
     /// been written one by one, they would have the processor wait.
     double set_time_ = 0;
     Mode mode_before_ = 0;
-    bool located_ = false;  ///< the set in hand lies inside the step, else at its start
+    bool located_ = false;  ///< the current set lies inside the step, else at its start
     bool on_time_ = false;  ///< and happens with a time event
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;

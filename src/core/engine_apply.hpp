@@ -1,4 +1,4 @@
-// What a set of events makes of the state.
+// Application of a set of events to the state.
 #pragma once
 
 #include "core/engine.hpp"
@@ -13,7 +13,7 @@ inline void EventEngine<X, single>::cut_short()
     for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
     note_crossings_to_set();
     mode_before_ = step_.mode();
-    for (const std::size_t i : search_.members()) find_band(i, t);
+    for (const std::size_t i : search_.fired()) find_band(i, t);
     ++run_.statistics.steps;
     count_refined();
     record_notes(s);
@@ -29,14 +29,14 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
     on_time_ = on_time;
     mode_before_ = step_.mode();
     if (on_time) record_time_event(t);
-    for (const std::size_t i : search_.members()) record_crossing(i, t, located);
+    for (const std::size_t i : search_.fired()) record_crossing(i, t, located);
     if (!goes_on()) {
         step_.restart(at, search_.before(), step_.mode());
         return;
     }
     step_.restart(at, resets_.after(), resets_.mode());
     if (on_time) step_.hold(t);
-    if (stops_) return end(Outcome::stopped_by_event, first_member());
+    if (stops_) return end(Outcome::stopped_by_event, first_fired());
     pending_ = Pending::settle;
 }
 
@@ -55,7 +55,7 @@ inline void EventEngine<X, single>::find_band(std::size_t i, double t)
     record.estimated = system_->bounded && !record.info.boolean && std::isfinite(residue) &&
                        search_.at() == where.root && !search_.late();
     record.band =
-        record.estimated ? std::max(residue, bank_.touch(i, step_.h())) : residue_of(i, t);
+        record.estimated ? std::max(residue, bank_.touch(i, step_.h())) : tolerance_of(i, t);
 }
 
 template <class X, bool single>
@@ -66,11 +66,11 @@ inline bool EventEngine<X, single>::goes_on()
         run_.other_guard = resets_.conflict().second;
         end(Outcome::conflicting_resets, resets_.conflict().first);
     } else if (modes > 0 && resets_.mode() >= modes) {
-        end(Outcome::unknown_mode, first_member());
+        end(Outcome::unknown_mode, first_fired());
     } else if (!fits_dimension(search_.before(), resets_.after(), resets_.mode() == step_.mode())) {
-        end(Outcome::wrong_dimension, first_member());
+        end(Outcome::wrong_dimension, first_fired());
     } else if (!all_finite(resets_.after()) || resets_.after().size() == 0) {
-        end(Outcome::non_finite, first_member());
+        end(Outcome::non_finite, first_fired());
     }
     return !ended_;
 }
@@ -94,7 +94,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::apply_time_event()
 {
     for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
-    search_.members().clear();
+    search_.fired().clear();
     assign(search_.before(), step_.x0());
     transform(true);
     resting_ =

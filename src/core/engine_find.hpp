@@ -1,4 +1,4 @@
-// Which set of events comes first in the step in hand.
+// Search for the first set of events in the current step.
 #pragma once
 
 #include "core/engine.hpp"
@@ -10,7 +10,7 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
 {
     cleared = false;
     if (predicts_) {
-        meter_.look_back(run_.statistics);
+        meter_.review(run_.statistics);
         asked_ = meter_.asks();
         if (asked_) cleared = ask_network();
         if (cleared && !finders_.detector.checks_every_step) {
@@ -102,7 +102,7 @@ inline bool EventEngine<X, single>::find(bool cleared)
         if (predicts_ && (cleared || search_.late())) ++run_.statistics.missed_events;
         if (search_.late()) ++run_.statistics.late_events;
         dismiss_members();
-        if (search_.members().empty()) continue;
+        if (search_.fired().empty()) continue;
         on_time_ = time_event_due_ && search_.at() == step_.h();
         place_set(step_.instant(search_.at(), search_.at_remainder()));
         transform(on_time_);
@@ -132,10 +132,10 @@ inline bool EventEngine<X, single>::counts_here(std::size_t i)
 template <class X, bool single>
 inline void EventEngine<X, single>::dismiss_members()
 {
-    auto& members = search_.members();
+    auto& fired = search_.fired();
     std::size_t kept = 0;
-    for (std::size_t k = 0; k < members.size(); ++k) {
-        const std::size_t i = members[k];
+    for (std::size_t k = 0; k < fired.size(); ++k) {
+        const std::size_t i = fired[k];
         const double t = step_.time(search_.at());
         if (!system_.enabled_at(i, step_.mode(), t, search_.before())) {
             ++run_.statistics.disabled;
@@ -143,12 +143,12 @@ inline void EventEngine<X, single>::dismiss_members()
             ++run_.statistics.suppressed;
         } else {
             bank_[i].again = repeats(i, t) && turned_back(i);
-            members[kept++] = i;
+            fired[kept++] = i;
             continue;
         }
         search_.pass(step_, bank_, i, calls());
     }
-    members.shrink(kept);
+    fired.shrink(kept);
 }
 
 template <class X, bool single>
@@ -156,7 +156,7 @@ inline bool EventEngine<X, single>::changes_nothing()
 {
     if (cuts_at_all_) return false;
     if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
-    for (const std::size_t i : search_.members()) {
+    for (const std::size_t i : search_.fired()) {
         if (bank_[i].info.unilateral || ends_run(i)) return false;
     }
     return same_state(resets_.after(), search_.before());
@@ -174,7 +174,7 @@ inline bool EventEngine<X, single>::ends_run(std::size_t i) const noexcept
 template <class X, bool single>
 inline void EventEngine<X, single>::go_on_past_members()
 {
-    for (const std::size_t i : search_.members()) {
+    for (const std::size_t i : search_.fired()) {
         search_.note(i, bank_[i].side);
         search_.pass(step_, bank_, i, calls());
     }

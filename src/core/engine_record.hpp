@@ -1,4 +1,4 @@
-// What is kept of events.
+// Record of events.
 #pragma once
 
 #include "core/engine.hpp"
@@ -30,7 +30,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
             may_cross && (search_.crosses_with_set(step_, bank_, i, at, resolution_) ||
                           is_rounding_at_set(i, at));
         GuardSample last = at;
-        // On the side that it comes from, until it crosses. The time of the set is a double.
+        // The guard is on the side that it comes from until it crosses. The time of the set is a double.
         if (with_set) {
             constexpr double epsilon = std::numeric_limits<double>::epsilon();
             const double ulp = epsilon * std::fabs(step_.time(at.s));
@@ -40,7 +40,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         if (!record.acting) {
             search_.note_crossings(step_, bank_, i, last, resolution_, calls());
         }
-        // One that acts and has left its side, but was located behind the set, has so by rounding
+        // An acting guard that has left its side, but was located behind the set, has left it by rounding
         // of its value: its own event is still to come.
         const bool to_come = record.acting && counts(record.side, record.info.crossing);
         if (!to_come && has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
@@ -106,7 +106,7 @@ inline void EventEngine<X, single>::record_time_event(double t)
 template <class X, bool single>
 inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, bool located)
 {
-    stops_ = (stops_ && i != first_member()) || ends_run(i);
+    stops_ = (stops_ && i != first_fired()) || ends_run(i);
     // At the start of a step the guard has been armed on the side that it has been carried to.
     const Side side = bank_[i].side;
     count_event(i, t, located ? side : opposite(side));

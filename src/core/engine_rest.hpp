@@ -1,4 +1,4 @@
-// Accumulating events, and what becomes of the motion there.
+// Accumulating events, and the motion after them.
 #pragma once
 
 #include "core/engine.hpp"
@@ -6,10 +6,10 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline bool EventEngine<X, single>::rest_members()
+inline bool EventEngine<X, single>::rest_fired()
 {
     bool rested = false;
-    for (const std::size_t i : search_.members()) {
+    for (const std::size_t i : search_.fired()) {
         ShrinkingIntervals& intervals = bank_[i].intervals;
         const bool again = std::exchange(bank_[i].again, false);
         const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
@@ -47,7 +47,7 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
                 part = std::max(part, low_part * record.intervals.interval());
                 rate = departure(i, 1e5 * part);
             }
-            // A difference of a unit in the last place does not tell which way it goes.
+            // A difference of a unit in the last place does not determine the direction.
             lost = std::fabs(rate) * part <= rounding / 8;
             if (lost) rate = 0;
         }
@@ -78,7 +78,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     const Mode mode = step_.mode();
     ahead = std::min(ahead, step_.until(options_.t_end));
     if (timed_) ahead = std::min(ahead, step_.until(time_event_));
-    // What else moves stands still while the time goes ahead to the limit: a floor that moves
+    // The rest of the state stands still while the time jumps to the limit: a floor that moves
     // would leave other bodies, or pass them.
     if (bank_.size() > 1 &&
         ahead > 4 * std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value)) {
@@ -107,7 +107,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
         return end(Outcome::non_finite, i);
     }
     step_.restart(ahead, 0, after, mode_after);
-    for (const std::size_t k : search_.members()) {
+    for (const std::size_t k : search_.fired()) {
         bank_[k].rated_over = stale;
     }
     bank_[i].intervals = {};

@@ -1,4 +1,4 @@
-// On which side every guard goes on, and which of them fire at once.
+// Side on which every guard is armed after a set, and the guards that fire at the same instant.
 #pragma once
 
 #include "core/engine.hpp"
@@ -12,7 +12,7 @@ inline bool EventEngine<X, single>::settle()
         case Pending::nothing: break;
         case Pending::hold: return false;
         case Pending::settle:
-            if (guarded_ && !resting_ && !rest_members()) arm_all();
+            if (guarded_ && !resting_ && !rest_fired()) arm_all();
             if (on_time_ && !ended_) find_time_event();
             break;
         case Pending::arm_stuck:
@@ -23,14 +23,14 @@ inline bool EventEngine<X, single>::settle()
     }
     if (ended_) return false;
     if (pending_ != Pending::nothing) return true;
-    return !resting_ && !search_.members().empty() && apply_next_set();
+    return !resting_ && !search_.fired().empty() && apply_next_set();
 }
 
 template <class X, bool single>
 inline bool EventEngine<X, single>::apply_next_set()
 {
     if (level_++ == most_levels) {
-        end(Outcome::endless_cascade, search_.members()[0]);
+        end(Outcome::endless_cascade, search_.fired()[0]);
         return false;
     }
     search_.begin(step_.x0());
@@ -38,7 +38,7 @@ inline bool EventEngine<X, single>::apply_next_set()
     search_.stay_at_start();
     place_set(step_.instant(0, 0));
     transform(false);
-    stuck_ = stuck_member();
+    stuck_ = stuck_guard();
     if (stuck_ == no_guard) {
         apply(false, false);
         return !ended_;
@@ -49,17 +49,17 @@ inline bool EventEngine<X, single>::apply_next_set()
     }
     come_to_rest(stuck_, 0, 0);
     if (ended_) return false;
-    search_.members().clear();
-    search_.members().push_back(stuck_);
+    search_.fired().clear();
+    search_.fired().push_back(stuck_);
     pending_ = resting_ ? Pending::hold : Pending::arm_stuck;
     return true;
 }
 
 template <class X, bool single>
-inline std::size_t EventEngine<X, single>::stuck_member()
+inline std::size_t EventEngine<X, single>::stuck_guard()
 {
     if (resets_.mode() != step_.mode() || !same_state(resets_.after(), step_.x0())) return no_guard;
-    for (const std::size_t i : search_.members()) {
+    for (const std::size_t i : search_.fired()) {
         if (bank_[i].info.unilateral) return i;
     }
     return no_guard;
@@ -91,7 +91,7 @@ inline void EventEngine<X, single>::arm_at_start()
             bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
         }
         if (record.info.unilateral && record.side == Side::below) {
-            search_.members().push_back(i);
+            search_.fired().push_back(i);
         }
     }
 }
@@ -114,11 +114,11 @@ inline void EventEngine<X, single>::arm_all()
 {
     double widest = 0;
     for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].fired = false;
-    for (const std::size_t i : search_.members()) {
+    for (const std::size_t i : search_.fired()) {
         bank_[i].fired = true;
         widest = std::max(widest, bank_[i].band);
     }
-    search_.members().clear();
+    search_.fired().clear();
     if (system_->moded) enable_guards();
     bank_.await_none();
     newly_armed_ = true;
@@ -146,7 +146,7 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     }
     const Side before = record.side != Side::plateau ? record.side : record.awaited;
     if (record.fired && record.estimated && std::fabs(g) > record.band) {
-        record.band = residue_of(i, step_.time(0));
+        record.band = tolerance_of(i, step_.time(0));
     }
     record.estimated = false;
     const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
@@ -174,7 +174,7 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
                                               : flipped;
     if (fires && counts_here(i)) {
         if (record.acting) {
-            search_.members().push_back(i);
+            search_.fired().push_back(i);
         } else {
             record_jump(i, before);
         }
@@ -192,7 +192,7 @@ inline bool EventEngine<X, single>::is_flipped_by_rounding(std::size_t i, Side b
     const double g = bank_.g0(i);
     if (record.fired || record.newly_enabled || record.info.boolean) return false;
     if (before == Side::plateau || side_of(g) != opposite(before)) return false;
-    // Else another's reset has carried it across: what rounding leaves need not be asked.
+    // Otherwise the reset of another guard has carried it across, by more than rounding.
     const double moves = std::fabs(bank_.rate0(i)) * (std::fabs(step_.time(0)) + h_next_);
     if (!(std::fabs(g) <= 0x1p-20 * std::max(bank_.scale(i, h_next_), moves))) return false;
     return std::fabs(g) <= rounding_of(i);
@@ -209,8 +209,8 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
         if (bank_[i].fired && bank_[i].turned && bank_[i].intervals.is_low()) {
             rate = bank_[i].departure;
             if (rate == 0) {
-                // Too slow to be told: its reset has sent it back, and it has its next event
-                // on the way down again.
+                // The guard is too slow for its rate to be known: its reset has sent it back, and its next
+                // event is on its way down.
                 const Side back = bank_[i].last_side;
                 bank_.set_rate0(i, sign_of(back) * std::numeric_limits<double>::min());
                 return back;
@@ -220,8 +220,8 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     }
     if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
     if (rate != 0 && bank_[i].fired) return side_of(rate);
-    // The second derivative has the sign of the rate a little later. A rate that it
-    // undoes within rounding of the time is none; nor is one that is all rounding.
+    // The second derivative has the sign that the rate has a little later. A rate that it
+    // cancels within rounding of the time counts as zero, as does a rate that is all rounding.
     const double delta = 1e-6 * h_next_;
     X& later = resets_.after();
     X& rate_later = resets_.scratch();

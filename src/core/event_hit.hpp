@@ -1,4 +1,4 @@
-// What a search for events works with: how finely it looks, and what it finds.
+// Resolution of a search for events, and the hits that it finds.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace ricochet::detail {
 
-/// How finely events are told apart, at a time.
+/// Resolution of events at a given time.
 class EventResolution {
 public:
     explicit EventResolution(const Options& options) noexcept
@@ -30,7 +30,7 @@ public:
         return absolute_ + relative_ * std::fabs(t);
     }
 
-    /// Whether events are located to neighbouring doubles, wherever they are.
+    /// Whether events are located to neighbouring doubles at any time.
     [[nodiscard]] bool is_finest() const noexcept { return absolute_ == 0 && relative_ == 0; }
 
     /// Events no further apart [s] cannot be told apart.
@@ -54,16 +54,16 @@ struct Note {
     Location where;
 };
 
-/// Drops the notes beyond the offset s, and sorts the others by time.
+/// Drops the recorded crossings beyond the offset s, and sorts the others by time.
 void sort_notes_until(double s, std::vector<Note>& notes);
 
-/// How a guard changes its sign at a place that a locator found.
+/// Change of sign of a guard at a place that a locator found.
 [[nodiscard]] inline EventKind kind_of(const Location& where) noexcept
 {
     return where.jump ? EventKind::jump : EventKind::crossing;
 }
 
-/// A guard that acts, found to leave its side inside a step.
+/// An acting guard that leaves its side inside a step.
 struct Hit {
     std::size_t guard = 0;
     Side side = Side::plateau;  ///< that it leaves

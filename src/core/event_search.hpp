@@ -1,10 +1,10 @@
-// Which events does a step hold, and which of them comes first?
+// Search for the events of a step, and for the first set among them.
 //
-// Guards that act, by a reset or by ending the run, cut the step short at the first
-// set of events. Its members are found without regard to the order in which the
-// guards were written: every candidate is located by itself, the earliest first, and
-// whichever else has left its side by the end of the window is located too. Guards
-// that only notify are located on the step's polynomial, one at a time, up to there.
+// Acting guards, which have a reset or end the run, cut the step short at the first
+// set of events. The set does not depend on the order in which the guards are
+// declared: every candidate is located by itself, the earliest first, and
+// every other guard that has left its side by the end of the window is located too. Guards
+// that are only recorded are located on the step's polynomial, one at a time, up to there.
 #pragma once
 
 #include <algorithm>
@@ -44,7 +44,7 @@ public:
           space_(like),
           before_(like),
           hits_(guards),
-          members_(guards),
+          fired_(guards),
           finest_(resolution.is_finest()),
           evidence_(finders.detector.evidence)
     {
@@ -59,16 +59,16 @@ public:
         refined_ = unresolved_ = false;
     }
 
-    /// A state of the dimension of `like` to work with, when no search is going on.
+    /// A state of the dimension of `like` to work with, when no search is continuing.
     [[nodiscard]] X& space(const X& like)
     {
         fit(like);
         return space_.x;
     }
 
-    [[nodiscard]] GuardList<std::size_t, single>& members() noexcept { return members_; }
+    [[nodiscard]] GuardList<std::size_t, single>& fired() noexcept { return fired_; }
     [[nodiscard]] std::vector<Note>& notes() noexcept { return notes_; }
-    /// Crossings of guard i that are noted, but not yet recorded.
+    /// Crossings of guard i that are found, but not yet recorded.
     [[nodiscard]] std::uint64_t noted(std::size_t i) const noexcept
     {
         return static_cast<std::uint64_t>(std::count_if(
@@ -77,19 +77,19 @@ public:
     }
     [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
 
-    /// Whether a guard was resolved by dividing the step; and whether that was not enough.
+    /// Whether a guard was resolved by dividing the step, and whether that was not enough.
     [[nodiscard]] bool refined() const noexcept { return refined_; }
     [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
 
     /// Whether the set was only found at a step after the one that held it.
     [[nodiscard]] bool late() const noexcept { return late_; }
 
-    /// Where the set happens [s], as offset + remainder, and the state there.
+    /// Offset [s] of the set, as offset + remainder, and the state there.
     [[nodiscard]] double at() const noexcept { return at_; }
     [[nodiscard]] double at_remainder() const noexcept { return at_remainder_; }
     [[nodiscard]] X& before() noexcept { return before_; }
 
-    /// The set that fires next is at the start of the step.
+    /// Places the next set at the start of the step.
     void stay_at_start() noexcept { at_ = at_remainder_ = 0; }
     [[nodiscard]] const Location& where(std::size_t guard) noexcept
     {
@@ -106,7 +106,7 @@ public:
                                 std::uint64_t& calls)
     {
         hits_.clear();
-        members_.clear();
+        fired_.clear();
         evidence_ = finders_->detector.evidence;
         late_ = false;
         std::size_t suspects = 0;
@@ -131,7 +131,7 @@ public:
         return true;
     }
 
-    /// Adds the crossings and touches of a notifying guard, up to the sample `end`.
+    /// Adds the crossings and touches of a recorded guard, up to the sample `end`.
     void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
                         const EventResolution& resolution, std::uint64_t& calls)
     {
@@ -167,8 +167,8 @@ public:
                 record.next = side_of(end.value);
                 return;
             }
-            // Zero by rounding at many offsets side by side, and rates that contradict it, as of
-            // a flow that jumps there: the search goes on behind it.
+            // The guard is zero by rounding at many neighbouring offsets, and its rates contradict it, as with
+            // a flow that jumps there: the search continues behind it.
             if (creeping > 8) {
                 const double behind = where.root + reach;
                 reach *= 2;
@@ -188,13 +188,13 @@ public:
         }
     }
 
-    /// Notes a located crossing of a guard that acts, but did not change anything.
+    /// Adds a located crossing of an acting guard that did not change anything.
     void note(std::size_t i, Side side)
     {
         notes_.push_back({.guard = i, .kind = kind_of(where(i)), .side = side, .where = where(i)});
     }
 
-    /// A guard that has crossed without consequence goes on from there.
+    /// Continues the search behind a crossing that changes nothing.
     void pass(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
@@ -244,13 +244,13 @@ public:
         // The rounding of a step of length s moves an event by a few ulp(s).
         const double rounding = 64 * std::numeric_limits<double>::epsilon() * sample.s;
         const double reach = std::max(resolution.blur(step.time(sample.s)), rounding);
-        // A guard that acts must be located in the set; one that only notifies may be as far
+        // A guard that acts must be located in the set; one that is only recorded may be as far
         // from its surface as the rounding of its largest values.
         const double band = bank[i].acting ? 0 : bank.touch(i, step.h());
         return std::fabs(sample.value) <= std::max(std::fabs(sample.rate) * reach, band);
     }
 
-    /// Notes a crossing that happens with the set.
+    /// Adds a crossing that happens with the set.
     void note_at_set(Bank& bank, std::size_t i, Side side, double slope)
     {
         notes_.push_back({.guard = i,
@@ -260,13 +260,13 @@ public:
         bank.arm(i, opposite(side));
     }
 
-    /// Drops what was noted beyond the offset s, and sorts the rest by time.
+    /// Drops the crossings beyond the offset s, and sorts the rest by time.
     void keep_notes_until(double s)
     {
         if (!notes_.empty()) sort_notes_until(s, notes_);
     }
 
-    /// The state at a note on the step's polynomial.
+    /// State at a crossing on the step's polynomial.
     [[nodiscard]] const X& state_at(const CurrentStep& step, const Note& note)
     {
         step.interpolate(note.where.root, space_.x);
@@ -286,8 +286,8 @@ private:
         }
     }
 
-    /// Both ends of the stretch are on the surface: so is all of a plateau between, of
-    /// which the middle and a place that no symmetry singles out are looked at.
+    /// Whether an interval with both ends on the surface is a plateau; its middle and a place that no symmetry singles
+    /// out are evaluated.
     [[nodiscard]] static bool is_plateau(Probe& probe, const Watch& watch)
     {
         const double width = watch.end.s - watch.start.s;
@@ -297,8 +297,8 @@ private:
                probe.value(watch.start.s + 0.381966 * width).value == 0;
     }
 
-    /// What the guard does next in the stretch. A touch is noted, and a clear stretch
-    /// decides on which side the guard is at its end.
+    /// Next event of the guard in the interval. A touch is added, and a clear interval
+    /// determines on which side the guard is at its end.
     [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i)
     {
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
@@ -319,7 +319,7 @@ private:
                                                                  const GuardSample& lo,
                                                                  const GuardSample& hi);
 
-    /// The detector's answers on the parts of a stretch, up to the first that is not clear.
+    /// Finding of the detector on the parts of an interval, up to the first that is not clear.
     [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank, std::size_t i)
     {
         parts_.resolve(probe, i, watch, bank[i].info.touch, bank.looked_everywhere());
@@ -346,7 +346,7 @@ private:
         return finders_->examine(probe, watch);
     }
 
-    /// What rounding leaves of a guard that decays within the step is that of the part.
+    /// The rounding of a guard that decays within the step is that of the part.
     static void judge_by_its_own_size(Watch& watch, const Bank& bank, std::size_t i) noexcept
     {
         const double width = watch.end.s - watch.start.s;
@@ -357,8 +357,8 @@ private:
         watch.touch = bank.touch_of(i, look.size());
     }
 
-    /// Nothing more can be said of the stretch: what is left after an event at the end
-    /// of a step is that event's residue, and a plateau waits.
+    /// Finding where nothing more can be decided: a remainder after an event at the end
+    /// of a step belongs to the error of that event, and a plateau waits.
     [[nodiscard]] static bool is_over(Probe& probe, const Watch& watch, GuardRecord& record)
     {
         const double h = probe.step().h();
@@ -374,7 +374,7 @@ private:
     }
 
     /// Whether a guard that has left its side by `node` does nothing else in what is left of
-    /// the stretch, which then is a bracket as good as any part of it.
+    /// the interval, which then is a bracket as good as any part of it.
     [[nodiscard]] bool stays_beyond(const Watch& whole, GuardSample node) const noexcept
     {
         const DetectorTable<X>& detector = finders_->detector;
@@ -414,7 +414,7 @@ private:
                                           bank.unresolved(i, probe.step().h()));
         if (!bank[i].info.boolean)
             return finders_->locate(probe, finding.lo, finding.hi, tolerance);
-        // A guard of which only the sign means anything jumps by its nature.
+        // A boolean guard always jumps.
         Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
         where.jump = false;
         return where;
@@ -429,7 +429,7 @@ private:
         bank.go_on_from(i, side, away(side, s));
     }
 
-    /// On the surface and heading for `side`, by next to nothing.
+    /// Whether the guard is on the surface, within rounding, and heads for `side`.
     [[nodiscard]] static GuardSample away(Side side, double s) noexcept
     {
         const double least = sign_of(side) * std::numeric_limits<double>::min();
@@ -447,7 +447,7 @@ private:
         bank.go_on_from(i, side, start);
     }
 
-    /// Adds a hit of a guard that acts, and notes its touches before it.
+    /// Adds a hit of an acting guard, and its touches before it.
     void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
@@ -467,7 +467,7 @@ private:
         }
     }
 
-    /// Where a cubic through the ends of the stretch would have its root.
+    /// Root of the cubic through the ends of the interval.
     [[nodiscard]] static double guess(const Finding& finding) noexcept
     {
         if (!std::isfinite(finding.lo.rate) || !std::isfinite(finding.hi.rate)) {
@@ -490,7 +490,7 @@ private:
         hit.located = true;
     }
 
-    /// The first set where guard i is the only one that deserves a look. What nearly
+    /// First set where guard i is the only one that needs a check. The code that nearly
     /// every event needs is inlined here: handing samples from one function to another
     /// through memory takes as long as the location itself.
     [[gnu::flatten]] bool find_only(const CurrentStep& step, Bank& bank, std::size_t i,
@@ -547,14 +547,14 @@ private:
         hit.guard = i;
         hit.side = side;
         hit.where = where;
-        members_.push_back(i);
+        fired_.push_back(i);
     }
 
     /// The first set among several candidates.
     [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank,
                                   const EventResolution& resolution, std::uint64_t& calls);
 
-    /// Locates the only member of the set, and keeps the state at its root.
+    /// Locates the only guard of the set, and keeps the state at its root.
     void locate_alone(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
                       std::uint64_t& calls);
 
@@ -574,7 +574,7 @@ private:
     ProbeSpace<X> space_;
     X before_;
     GuardList<Hit, single> hits_;
-    GuardList<std::size_t, single> members_;
+    GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
     bool finest_;
     ResolvedParts parts_;

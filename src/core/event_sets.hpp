@@ -16,7 +16,7 @@ inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Bank& ba
     }
     if (hits_.empty()) return false;
     close_set(step, bank, resolution, calls);
-    if (members_.size() == 1) locate_alone(step, bank, resolution, calls);
+    if (fired_.size() == 1) locate_alone(step, bank, resolution, calls);
     return true;
 }
 
@@ -26,7 +26,7 @@ inline void EventSearch<X, single>::locate_alone(const CurrentStep& step, Bank& 
                                                  std::uint64_t& calls)
 {
     Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
-        return candidate.guard == members_[0];
+        return candidate.guard == fired_[0];
     });
     const auto guard = bank.view(hit.guard, step.mode(), calls);
     Probe probe(guard, step, space_);
@@ -69,7 +69,7 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
         limit = window_end(step, resolution);
     }
     for (Hit& hit : hits_) {
-        if (hit.located && hit.where.root <= limit) members_.push_back(hit.guard);
+        if (hit.located && hit.where.root <= limit) fired_.push_back(hit.guard);
     }
 }
 
@@ -89,11 +89,11 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step,
                                                  const EventResolution& resolution,
                                                  bool time_event_due)
 {
-    if (members_.size() > 1) {
+    if (fired_.size() > 1) {
         at_ = 0;
         for (const Hit& hit : hits_) {
             if (hit.located &&
-                std::find(members_.begin(), members_.end(), hit.guard) != members_.end()) {
+                std::find(fired_.begin(), fired_.end(), hit.guard) != fired_.end()) {
                 at_ = std::max(at_, hit.where.root);
             }
         }

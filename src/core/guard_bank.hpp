@@ -37,7 +37,7 @@ public:
         if (rules.keeps_sizes()) sizes_.resize(size());
     }
 
-    /// What happened before is of no account; events go on to be counted.
+    /// Forgets the past of the guards, except for the numbers of their events.
     void forget() noexcept
     {
         for (GuardRecord& record : records_) {
@@ -63,27 +63,27 @@ public:
             sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
             for (std::size_t i = 0; i < size(); ++i) {
                 rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until somebody asks
-                records_[i].asleep = false;
+                records_[i].deferred = false;
             }
         } else {
             sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
         }
         if (rules_.keeps_sizes()) {
             for (std::size_t i = 0; i < size(); ++i) {
-                // Beside a pole that it has just passed, a guard has no size of its own.
+                // The value beside a pole is no measure of the size of a guard.
                 if (records_[i].fired && records_[i].jumped) continue;
                 sizes_[i] = std::fmax(std::fabs(g0_[i]), sizes_[i]);
             }
         }
     }
 
-    /// All guards take part in the steps from here on. `sampled`: their values are known.
+    /// Wakes all guards for the next steps. `sampled`: their values are known.
     void wake_all(const Step<X>& step, double scale, std::uint64_t& calls, bool sampled)
     {
         if (!sampled) sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
         sample_rates(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, rate0_);
         for (std::size_t i = 0; i < size(); ++i) {
-            records_[i].asleep = false;
+            records_[i].deferred = false;
             arm(i, records_[i].side);
         }
     }
@@ -129,8 +129,7 @@ public:
         run.g0 = g0_[0];
         run.rate0 = rate0_[0];
     }
-    /// What a quiet run has left: the guard at the start of the step in hand, at its end and
-    /// inside.
+    /// Takes over from a quiet run: the guard at the start of the current step, at its end and inside.
     void take_back(const QuietRun& run) noexcept
     {
         if (size() == 0) return;
@@ -144,7 +143,7 @@ public:
         looked_ = Looked::inside;
     }
 
-    /// A smooth phase starts at time t, with guards on their surfaces or not.
+    /// Starts a smooth phase at time t, with guards on their surfaces or not.
     void begin_phase(double t) noexcept { armed_at_ = t; }
 
     /// As `take_back`, of a run on series: the guard has not been cleared.
@@ -165,7 +164,7 @@ public:
         this->see(step.guard_series(), step.time(0) == armed_at_);
     }
 
-    /// What is left to look at of guard i in the step, of which `end` is the end.
+    /// Part of the step that has not been examined for guard i; `end` is the sample at its end.
     [[nodiscard]] Watch watch(std::size_t i, const Step<X>& step, const GuardSample& end) const
     {
         const GuardRecord& record = records_[i];
@@ -186,15 +185,15 @@ public:
         return {.s = h, .value = g1_[i], .rate = known(rate1_[i])};
     }
 
-    /// Half the width of the band around the surface that counts as being on it where the
-    /// rate is zero, as far as the rounding of the guard's values in the step goes. What the
-    /// rounding of the state adds to that is asked for where it matters (`StepProbe::rounding`).
+    /// Event tolerance: |g| up to which a guard with a rate of zero counts as being on its surface, from the
+    /// rounding of its values in the step. The rounding of the state is added where it
+    /// matters (`StepProbe::rounding`).
     [[nodiscard]] double touch(std::size_t i, double h) const noexcept
     {
         return touch_of(i, rules_.remembers ? sizes_[i] : scale(i, h));
     }
 
-    /// As `touch`, in a stretch in which |g| reaches `largest`.
+    /// Same tolerance as `touch`, for an interval in which |g| reaches `largest`.
     [[nodiscard]] double touch_of(std::size_t i, double largest) const noexcept
     {
         constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
@@ -213,12 +212,12 @@ public:
     void arm(std::size_t i, Side side) noexcept
     {
         records_[i].side = side;
-        sign_[i] = records_[i].enabled && !records_[i].asleep ? sign_of(side) : 0;
+        sign_[i] = records_[i].enabled && !records_[i].deferred ? sign_of(side) : 0;
         as_screened_ = false;
     }
 
-    /// The width [s] below which a bracket in a step of length h is a matter of the guard's
-    /// rounding, where it is not narrowed further; else 0.
+    /// Width [s] below which a bracket in a step of length h is dominated by the guard's
+    /// rounding, for guards whose brackets are not narrowed further; else 0.
     [[nodiscard]] double unresolved(std::size_t i, double h) const noexcept
     {
         if (!rules_.coarse) return 0;
@@ -228,17 +227,17 @@ public:
         return width <= 1e-10 * h ? width : 1e-10 * h;
     }
 
-    /// Guard i is not looked at until it is woken.
+    /// Puts guard i to sleep: it is not examined until it is woken.
     void put_to_sleep(std::size_t i) noexcept
     {
-        records_[i].asleep = true;
+        records_[i].deferred = true;
         sign_[i] = 0;
     }
 
-    /// Guard i takes part in the step, with its samples at both ends.
+    /// Wakes guard i in the current step, with its samples at both ends.
     void wake(std::size_t i, const GuardSample& start, const GuardSample& end) noexcept
     {
-        records_[i].asleep = false;
+        records_[i].deferred = false;
         forget_screening();
         g0_[i] = start.value;
         rate0_[i] = start.rate;
@@ -247,17 +246,17 @@ public:
         arm(i, records_[i].side);
     }
 
-    /// Nothing inside the step has been looked at. What a search changes belongs to `suspects`;
-    /// all other guards are at its end what they were at its start.
+    /// Begins the search of a step. A search changes the guards of `suspects` only;
+    /// all other guards are at the end of the step as they were at its start.
     void begin_search(double h) noexcept
     {
-        // A guard that wakes or leaves its plateau is another than the one that was screened.
+        // A guard that wakes or leaves its plateau has to be screened again.
         if (rules_.puts_off || waiting_) forget_screening();
         if (!screened_) screen(h);
         for (const std::size_t i : suspects_) records_[i].next = records_[i].side;
     }
 
-    /// The guard goes on from `start` inside the step, on `side`.
+    /// Continues the guard from `start` inside the step, on `side`.
     void go_on_from(std::size_t i, Side side, const GuardSample& start) noexcept
     {
         arm(i, side);
@@ -267,7 +266,7 @@ public:
         rate0_[i] = start.rate;
     }
 
-    /// The end of a clear step becomes the start of the next.
+    /// Makes the end of a clear step the start of the next.
     void pass_on() noexcept
     {
         if (rules_.remembers) {
@@ -286,10 +285,10 @@ public:
         for (std::size_t i = 0; i < size(); ++i) leave_plateau(i, g0_[i]);
     }
 
-    /// A guard on a plateau takes the side that it is on at the end of the step.
+    /// Arms a guard on a plateau on its side at the end of the step.
     void leave_plateau(std::size_t i) noexcept { leave_plateau(i, g1_[i]); }
 
-    /// As `pass_on`, after events inside the step.
+    /// Same as `pass_on`, after events inside the step.
     void pass_on_after_events() noexcept
     {
         for (const std::size_t i : suspects_) {
@@ -332,7 +331,7 @@ public:
             visit(record.turned);
             visit(record.departs);
             visit(record.awaited);
-            if (rules_.puts_off) visit(record.asleep);
+            if (rules_.puts_off) visit(record.deferred);
             record.intervals.visit(visit);
         }
         visit(waiting_);
@@ -340,7 +339,7 @@ public:
         heed_enabled();
     }
 
-    /// Guard i is on a plateau; if it leaves that away from `side`, it has its event.
+    /// Puts guard i on a plateau; leaving it away from `side` is its event.
     void await(std::size_t i, Side side) noexcept
     {
         records_[i].awaited = side;
@@ -389,7 +388,7 @@ private:
     using Guards::waiting_;
     using typename Guards::Looked;
 
-    /// What belongs to the end of a step belongs to the start of the next.
+    /// Exchanges the samples at the end of a step with those at its start.
     void hand_over(Doubles& from, Doubles& to) const noexcept
     {
         if (size() > 4 && !rules_.puts_off) {
@@ -401,7 +400,7 @@ private:
 
     void leave_plateau(std::size_t i, double g) noexcept
     {
-        if (sign_[i] == 0 && records_[i].enabled && !records_[i].asleep) arm(i, side_of(g));
+        if (sign_[i] == 0 && records_[i].enabled && !records_[i].deferred) arm(i, side_of(g));
     }
 
     [[nodiscard]] double known(double rate) const noexcept

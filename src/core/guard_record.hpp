@@ -1,4 +1,4 @@
-// What is known of the guards of a system, one record for each.
+// Records of the guards of a system, one for each.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ public:
 template <class T, bool single>
 using PerGuard = std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, 8>>;
 
-/// As many elements as there are guards, at most.
+/// List of at most as many elements as there are guards.
 template <class T, bool single>
 class GuardList {
 public:
@@ -56,7 +56,7 @@ private:
     std::size_t size_ = 0;
 };
 
-/// What is known of a guard beside its values.
+/// State of a guard beside its values.
 struct GuardRecord {
     GuardInfo info;
     bool enabled = true;
@@ -64,19 +64,19 @@ struct GuardRecord {
     bool fired = false;
     bool turned = false;   ///< its last reset has sent it back from the surface
     double departure = 0;  ///< [1/s] its rate after the last reset
-    /// [s] scale of that rate; NaN where it is not that of the state in hand.
+    /// [s] scale of that rate; NaN where it is not that of the current state.
     double rated_over = std::numeric_limits<double>::quiet_NaN();
     bool again = false;            ///< it is back inside the window of its last event
     Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
-    bool acting = false;           ///< resets, or may end the run; else a notification
-    bool asleep = false;           ///< its check is deferred: nothing in the bank is of this step
+    bool acting = false;           ///< has a reset or may end the run; else events are only recorded
+    bool deferred = false;           ///< its check is deferred: nothing in the bank is of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     bool jumped = false;        ///< its last event was a jump
-    bool departs = false;       ///< the smooth phase in hand started at its event, or enabled it
-    double band = 0;            ///< |g| where it fired: it counts as being on its surface
-    bool estimated = false;     ///< the band is what location left, not a value of the guard
-    double from = 0;            ///< [s] offset in the step up to which it has been looked at
+    bool departs = false;       ///< the smooth current phase started at its event, or enabled it
+    double band = 0;            ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
+    bool estimated = false;     ///< the tolerance is the error of location, not a value of the guard
+    double from = 0;            ///< [s] offset in the step up to which it has been examined
     std::uint64_t events = 0;
     double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
     Side last_side = Side::plateau;                          ///< the side it left then
@@ -88,15 +88,14 @@ struct GuardRecord {
     return side == Side::above ? 1 : side == Side::below ? -1 : 0;
 }
 
-/// Whether checks are deferred. Without what it plans by, a detector is the exact one that it is
-/// made around.
+/// Whether checks are deferred. Without bounds or a gate, a detector is the exact one that it wraps.
 template <class X>
 [[nodiscard]] bool puts_off(const DetectorTable<X>& detector, const SystemTable<X>& system)
 {
     return detector.puts_off && system.guarded && (!detector.needs_bounds || system.bounded);
 }
 
-/// What a detector asks of all guards, of a system with bounds or without.
+/// Requirements of a detector on all guards, of a system with bounds or without.
 struct BankRules {
     Screening screening = Screening::ends;
     bool uses_rates = false;
@@ -108,7 +107,7 @@ struct BankRules {
     /// Whether brackets are not narrowed below the rounding of the sizes that smooth phases
     /// started with: those of guards with declared bounds, which may be expensive.
     bool coarse = false;
-    /// Whether guards can be looked at inside a step.
+    /// Whether guards can be examined inside a step.
     bool looks = false;
     bool (*suspects)(double, double, double, double, double, double) = nullptr;
 

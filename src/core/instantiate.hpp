@@ -37,7 +37,7 @@ template <class X>
            setup.system->guard_count(setup.door) == 1;
 }
 
-/// A loop with its setup, which goes on after exceptions from the system.
+/// A loop with its setup, which continues after exceptions from the system.
 template <class X>
 struct KeptSetup {
     RunSetup<X> kept;
@@ -139,7 +139,7 @@ const StepKernel<X>& kernel_by_name(MethodName name) noexcept
     return named_kernels<X>()[static_cast<std::size_t>(name)].step;
 }
 
-/// What takes the quiet runs of a set-up: its own kernel, or that of a method of ours.
+/// Kernel of the quiet runs of a set-up: its own, or that of a method of ours.
 template <class X>
 QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
 {

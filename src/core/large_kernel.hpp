@@ -1,6 +1,6 @@
 // Whole steps of states that do not fit the registers.
 //
-// What bounds such a step is the traffic to and from memory: each stage is one pass over its
+// Such a step is bound by the traffic to and from memory: each stage is one pass over its
 // operands, in which the rate of the stage before becomes one of departures, too, and everything
 // that is computed at the end of a step is computed in one pass. The end and what rounding leaves
 // out of it lie in arrays of their own, which the acceptance of a step only exchanges.

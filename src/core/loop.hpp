@@ -1,10 +1,10 @@
 // A run in progress: smooth steps, events, resets, until the end or a reason to stop.
 //
 //     step from (t, x)              the method, as a departure from the tangent
-//     guards at its end             screened, all at once
+//     guards at its end             screened together
 //     find                          the first set of events in the step
 //     apply                         x⁻ becomes x⁺, the mode may change
-//     settle                        every guard anew; guards that a reset carried across fire
+//     settle                        arm every guard; guards that a reset carried across fire
 //
 // Steps are half-open, (t, t + h]. Between the first step and the last nothing is allocated for
 // states of fixed size, unless something is recorded.
@@ -31,7 +31,7 @@
 
 namespace ricochet::detail {
 
-/// What takes the quiet runs of a set-up; null: every step is one of the loop.
+/// Kernel of the quiet runs of a set-up; null: every step is one of the loop.
 template <class X>
 [[nodiscard]] QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept;
 
@@ -87,18 +87,17 @@ public:
         return showing_sample_ ? sample_mode_ : step_.mode();
     }
     [[nodiscard]] bool ended() const noexcept override { return ended_; }
-    /// What has been computed so far; its time and state are brought up to date by
-    /// `finish`.
+    /// Result so far; its time and state are brought up to date by `finish`.
     [[nodiscard]] const Run<X>& run() const noexcept override { return run_; }
 
-    /// Of a `Metered` detector: what asking its network has cost and saved so far.
+    /// Cost and savings of the network of a `Metered` detector so far.
     [[nodiscard]] MeterReading meter() const override
     {
         return puts_off_ ? planner_->meter().reading() : meter_.reading();
     }
 
     /// Takes one step, with whatever events it holds. False: the run has ended. A detector
-    /// that puts off checks does not look ahead here, since every step is final.
+    /// that defers checks does not look ahead here, since every step is final.
     bool step() override
     {
         show_all();
@@ -106,17 +105,17 @@ public:
         return !ended_;
     }
 
-    /// Goes on to the next sample time, or to the end of the next step that holds events;
+    /// Advances to the next sample time, or to the end of the next step that holds events;
     /// `t`, `x` and `mode` are those there, after the events. False: the run has ended, and
-    /// nothing has happened in it that was not shown.
+    /// everything that has happened in it was shown.
     bool advance() override;
 
-    /// One step that may end in the middle of a stretch of tentative steps if it looks ahead.
+    /// One step that may end in the middle of an interval of tentative steps if it looks ahead.
     void advance_once(bool look_ahead) override { advance_one({.look_ahead = look_ahead}); }
 
     void run_to_end() override;
 
-    /// `advance` shows only what happens from here on.
+    /// Makes `advance` show only samples and events from here on.
     void show_all() noexcept override
     {
         shown_samples_ = run_.trajectory.t.size();
@@ -124,15 +123,14 @@ public:
         showing_sample_ = false;
     }
 
-    /// Goes on to the end and hands over all that was computed.
+    /// Advances to the end and returns the result.
     [[nodiscard]] Run<X> take() override
     {
         run_to_end();
         return finish();
     }
 
-    /// Hands over what has been computed so far; before the end its outcome is `cancelled`. The
-    /// simulation is over.
+    /// Returns the result so far; before the end its outcome is `cancelled`. The simulation is over.
     [[nodiscard]] Run<X> finish() override;
 
     /// Brings the time, the state and the counts of `run` up to date, and its last samples where
@@ -148,8 +146,8 @@ public:
         }
     }
 
-    /// All that the future depends on. A simulation of the same system with the same
-    /// options, stepping, detector and locator that restores it goes on with the same
+    /// State that the future of the run depends on. A simulation of the same system with the same
+    /// options, stepping, detector and locator that restores it continues with the same
     /// bits; only its end, its sample times and what it records may be others. What was
     /// recorded is not part of it.
     [[nodiscard]] Snapshot save() override;
@@ -159,7 +157,7 @@ public:
     void restore(const Snapshot& snapshot) override;
 
 protected:
-    /// What an exception from the system leads back to is kept from here on.
+    /// Keeps the start of every step from here on, so that a run continues after exceptions.
     void keep_resumable()
     {
         mark_ = std::make_unique<Mark>(bank_);
@@ -206,12 +204,12 @@ private:
 
     [[nodiscard]] std::vector<RunProperty> properties() const;
 
-    /// Of a snapshot that has been read.
+    /// Takes over the values of a snapshot that has been read.
     void refuse_bad_place() const;
 
     // --- steps ---
 
-    /// What a detector that puts off checks may do.
+    /// Freedom of a detector that defers checks.
     struct Advance {
         bool look_ahead = true;       ///< take steps that are closed only later
         bool to_next_sample = false;  ///< but none beyond one with a sample time
@@ -245,7 +243,7 @@ private:
         bool resting = false, watching = false;
     };
 
-    /// After an exception has left the deadlines of guards half renewed.
+    /// Renews the deadlines of guards after an exception has left them half renewed.
     void plan_anew()
     {
         if (!replans_) return;
@@ -255,7 +253,7 @@ private:
     }
 
     void mark_step() noexcept;
-    /// Before events change what the next step depends on.
+    /// Keeps the state of the guards before events change it.
     void mark_everything()
     {
         if (mark_ && !mark_->everything) copy_to_mark();
@@ -263,7 +261,7 @@ private:
     [[gnu::noinline]] void copy_to_mark();
     void go_back_to_mark();
 
-    /// Before a step that ends at a time event, or that is recorded by further evaluations.
+    /// Keeps the state before a step that ends at a time event, or is recorded by further evaluations.
     void mark_what_lasts()
     {
         if (mark_ && (time_event_due_ || options_.record_steps || holds_sample())) {
@@ -280,13 +278,13 @@ private:
                bank_.is_steady();
     }
 
-    /// Goes on until a step deserves a look, and deals with it. False: there is none. An exception
-    /// leads back to where the run or, after it, the step in hand has started.
+    /// Takes steps until one needs a check, and deals with it. False: there is none. An exception
+    /// leads back to the start of the quiet run or of the current step after it.
     bool run_quietly();
     [[gnu::noinline]] void end_quiet_run_resumably(const QuietRun& quiet);
     [[gnu::always_inline]] void end_quiet_run(const QuietRun& quiet);
 
-    /// Whether the run may go on after as many steps; decides when it is asked next.
+    /// Whether the limits of the options allow further steps; determines when it is asked next.
     [[gnu::noinline]] bool may_take_more_steps();
 
     /// Whether time has hardly advanced since the last review.
@@ -296,7 +294,7 @@ private:
         return std::fabs(step_.until(reviewed_)) < 1e-9 * span;
     }
 
-    /// A failure of a step, or what lies behind it.
+    /// Deals with a step that failed: an event before the failure, or the end of the run.
     void end_step(Outcome outcome) noexcept
     {
         end(step_.flow_fits() ? outcome : Outcome::wrong_dimension);
@@ -304,7 +302,7 @@ private:
 
     void reach_end();
 
-    /// The step stands, with a time event at its end if one is due.
+    /// Accepts the step, with a time event at its end if one is due.
     void pass()
     {
         if (timed_ && time_event_due_) {
@@ -322,24 +320,24 @@ private:
 
     [[nodiscard]] bool is_tentative() const noexcept { return puts_off_ && planner_->in_stretch(); }
 
-    /// One step with a look at its end, where planning does not pay.
+    /// One step with a check of its end, where planning does not pay.
     void advance_with_check(double remaining);
 
     void advance_by_plan(double remaining, const Advance& how);
 
     void remember_step(double proposed, std::uint64_t rejected);
 
-    /// Whether the next step, too, may be taken before the stretch is closed.
+    /// Whether the next step, too, may be taken before the interval is closed.
     [[nodiscard]] bool may_go_on(double ends, const Advance& how);
 
-    /// The step in hand is the last of its stretch: closes it, or goes back to the first step
+    /// The current step is the last of its interval: closes it, or goes back to the first step
     /// that could not be closed.
     void close_stretch();
 
-    /// The exact detector looks at the step in hand, for the guards in doubt.
+    /// The exact detector examines the current step, for the guards in doubt.
     void judge();
 
-    /// Takes back the whole stretch, without having looked, and goes on carefully.
+    /// Rolls the whole interval back without a check, and continues step by step.
     void take_back()
     {
         careful_steps_ = planner_->steps().size() + 1;
@@ -361,13 +359,13 @@ private:
     /// False: the run has ended.
     [[nodiscard]] bool take_step(double remaining);
 
-    /// The next step is no longer than its method knows to be right.
+    /// Limits the next step to the length that its method allows.
     [[gnu::noinline]] void limit_to_reach();
 
-    /// Shorter only where the setup ends within the step, at the surface of a guard.
+    /// Shortens a step only where the domain of the flow ends within it, at the surface of a guard.
     [[nodiscard]] bool take_fixed_step(double h, bool failed = false);
 
-    /// `proposed`: what the step would have been if nothing had cut it short.
+    /// @param proposed  length of the step if nothing had cut it short
     [[nodiscard]] bool take_controlled_step(double h, double proposed)
     {
         const double error = step_.attempt(h, options_.rtol, options_.atol);
@@ -397,8 +395,8 @@ private:
         return ahead <= h ? 0.9 * ahead : 0.1 * h;
     }
 
-    /// The flow ends here, as it cannot be evaluated a step of h further on, and a guard reaches
-    /// its surface no later: its event happens at the start of the step.
+    /// Places an event at the start of the step where the flow cannot be evaluated a step of h further on,
+    /// and a guard reaches its surface no later.
     [[nodiscard]] bool happen_where_flow_ends(double h);
 
     [[nodiscard]] double smallest_step() const noexcept
@@ -407,7 +405,7 @@ private:
         return std::max(options_.h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
     }
 
-    /// A mode-less system at rest stays as it is, until a time event or the end.
+    /// Keeps a system without modes at rest until a time event or the end.
     void hold(double remaining);
 
     // --- events ---
@@ -416,10 +414,10 @@ private:
     /// ended.
     [[nodiscard]] bool handle_events();
 
-    /// The step may hold events: finds out, and deals with them.
+    /// Searches a step that may hold events, and deals with them.
     [[gnu::noinline]] bool search(bool cleared);
 
-    /// A guard is no number at the end of the step: takes it again, shorter, until all are.
+    /// A guard is not a number at the end of the step: takes it again, shorter, until all are.
     /// False: there is no such step, and the run has ended.
     [[nodiscard]] bool return_to_domain();
 
@@ -428,8 +426,8 @@ private:
     [[nodiscard]] double shorten_into_domain(bool beyond);
 
     /// The step after an event at `t` is at most twice the flight before it, or the first
-    /// step: no further than what is known of the setup reaches, wherever the end lies. Events
-    /// that follow at once shorten it by no more than error control would at each of them.
+    /// step, wherever the end lies. Events that follow immediately shorten it by no more than error control would
+    /// at each of them.
     void limit_next_step(double t) noexcept;
 
     // --- output ---
@@ -481,8 +479,8 @@ private:
     bool showing_sample_ = false;
     Mode sample_mode_ = 0;
     StepStart<X> place_;
-    std::unique_ptr<Mark> mark_;  ///< null: the run does not go on after an exception
-    bool replans_ = false;        ///< all deadlines of guards are to be found anew
+    std::unique_ptr<Mark> mark_;  ///< null: the run does not continue after an exception
+    bool replans_ = false;        ///< all deadlines of guards are to be found again
 };
 
 }  // namespace ricochet::detail

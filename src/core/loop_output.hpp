@@ -1,4 +1,4 @@
-// What is kept of a run besides its events.
+// Output of a run besides its events.
 #pragma once
 
 #include "core/loop.hpp"

@@ -25,7 +25,7 @@ inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& ho
     const std::uint64_t rejected = run_.statistics.rejected;
     if (!take_step(remaining)) {
         if (is_tentative()) {
-            // The failure may lie beyond an event: without looking ahead it will be seen.
+            // The failure may lie beyond an event, which is found without looking ahead.
             ended_ = false;
             run_.outcome = Outcome::reached_end;
             take_back();
@@ -105,7 +105,7 @@ template <class X, bool single>
 inline void Loop<X, single>::take_back_to(std::size_t k)
 {
     const auto& tentative = planner_->steps()[k];
-    // The step in hand has not been accepted.
+    // The current step has not been accepted.
     const std::size_t taken = planner_->steps().size() - 1 - k;
     ++run_.statistics.rollbacks;
     run_.statistics.repeated_steps += taken;

@@ -1,8 +1,8 @@
-// What an exception from the functions of a system leads back to: the start of the step in hand.
+// Return to the start of the current step after an exception from a function of the system.
 //
-// A step changes nothing that the next depends on before it stands, but for its own length, what
-// it has recorded and, where it may hold events or ends at a time event, nearly everything. So the
-// first two are noted at every step and the rest only where a search begins.
+// Before a step stands it changes only its own length and what it has recorded; where it may hold events,
+// or ends at a time event, it changes nearly everything. Therefore the first two are kept at every step,
+// and the rest only where a search begins.
 #pragma once
 
 #include "core/loop.hpp"
@@ -103,7 +103,7 @@ void Loop<X, single>::go_back_to_mark()
         mark.next_sample = first.samples;
     }
     if (mark.planned) {
-        // Deadlines may be half renewed: they are found anew where the step starts.
+        // Deadlines may be half renewed: they are found again where the step starts.
         planner_->steps().clear();
         replans_ = true;
     }
@@ -126,7 +126,7 @@ void Loop<X, single>::go_back_to_mark()
     ended_ = false;
     pending_ = Engine::Pending::nothing;
     if (guarded_) {
-        search_.members().clear();
+        search_.fired().clear();
         search_.begin(step_.x0());
     }
 }

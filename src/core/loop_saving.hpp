@@ -1,4 +1,4 @@
-// What a run is saved by.
+// Saving and restoring of a run.
 #pragma once
 
 #include "core/loop.hpp"

@@ -1,4 +1,4 @@
-// What a run refuses, and what it is known by.
+// Validation of a run, and the properties that identify it.
 #pragma once
 
 #include "core/loop.hpp"

@@ -28,7 +28,7 @@ template <class X, bool single>
 inline void Loop<X, single>::run_to_end()
 {
     while (!ended_) {
-        // Where one event follows the other a quiet run would be over at its first step.
+        // Where events follow each other closely a quiet run would end at its first step.
         const std::uint64_t events = run_.statistics.events;
         const bool calm = calm_steps_ > 1 || setup_.quiet_on_series;
         if (calm && may_run_quietly() && run_quietly()) continue;
@@ -144,7 +144,7 @@ template <class X, bool single>
 void Loop<X, single>::limit_to_reach()
 {
     if (!error_controlled_) return;
-    // No shorter than is sensible: what cannot be taken at that length is refused by its error.
+    // The length has a lower limit: a step that cannot be taken at that length is rejected by its error.
     const double reach = std::max(step_.reach(options_.rtol, options_.atol), smallest_step());
     h_next_ = std::min(h_next_, reach);
 }
@@ -236,8 +236,8 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
     }
     for (std::size_t k = 0; k < bank_.size(); ++k) bank_[k].band = 0;
     bank_[i].band = std::fabs(bank_.g0(i));
-    search_.members().clear();
-    search_.members().push_back(i);
+    search_.fired().clear();
+    search_.fired().push_back(i);
     this->settle_all();
     return true;
 }

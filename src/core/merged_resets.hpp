@@ -1,7 +1,7 @@
 // The resets of guards that fired together, applied to one state.
 //
-// A reset of a single guard changes the state in place. Of several, each reads the state
-// before, and what it changed is merged: two that give one component, or the mode, two
+// The reset of a single guard changes the state in place. Several resets all read the state
+// before, and their changes are merged: two that give one component, or the mode, two
 // values are in conflict, unless the system takes the whole set.
 #pragma once
 
@@ -22,40 +22,40 @@ class MergedResets {
 public:
     explicit MergedResets(const X& like) : after_(like), single_(like) {}
 
-    /// Computes what the resets of `members`, all from the state `before`, make of it; with
-    /// that of a time event if the set happens on time. `bank` says which of them reset.
+    /// Applies the resets of the guards in `fired`, which all read the state `before`, and the reset of a time
+    /// event if the set happens on time. `bank` knows which guards have a reset.
     template <class Bank>
-    void apply(const SystemAt<X>& system, const Bank& bank, std::span<const std::size_t> members,
+    void apply(const SystemAt<X>& system, const Bank& bank, std::span<const std::size_t> fired,
                bool on_time, Mode mode, double t, const X& before)
     {
         assign(after_, before);
         mode_ = mode;
         conflict_ = {no_guard, no_guard};
-        if (members.size() > 1 || on_time) {
+        if (fired.size() > 1 || on_time) {
             mode_writer_ = resizer_ = no_guard;
             writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
         }
         if (system->reset_set) {
             std::size_t resetting = 0;
-            for (const std::size_t i : members) resetting += bank[i].info.resets;
+            for (const std::size_t i : fired) resetting += bank[i].info.resets;
             if (resetting > 0) {
-                mode_ = system->reset_set(system.door(), members, on_time, mode, t, after_);
+                mode_ = system->reset_set(system.door(), fired, on_time, mode, t, after_);
                 return;
             }
         } else if (system->reset) {
-            if (members.size() == 1 && !on_time) {
-                const std::size_t i = members[0];
+            if (fired.size() == 1 && !on_time) {
+                const std::size_t i = fired[0];
                 if (bank[i].info.resets) mode_ = system->reset(system.door(), i, mode, t, after_);
                 return;
             }
-            for (const std::size_t i : members) {
+            for (const std::size_t i : fired) {
                 if (!bank[i].info.resets) continue;
                 assign(single_, before);
                 merge(i, system->reset(system.door(), i, mode, t, single_), mode, before);
             }
         }
         if (!on_time || !system->timed()) return;
-        if (members.empty()) {
+        if (fired.empty()) {
             mode_ = system->time_reset(system.door(), mode, t, after_);
         } else {
             assign(single_, before);
@@ -69,15 +69,14 @@ public:
     [[nodiscard]] X& scratch() noexcept { return single_; }
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
 
-    /// Two guards that disagree, or a guard and `time_event_reset`; `no_guard` where there are
-    /// none.
+    /// Two guards whose resets disagree, or a guard and `time_event_reset`; `no_guard` without a conflict.
     [[nodiscard]] const std::pair<std::size_t, std::size_t>& conflict() const noexcept
     {
         return conflict_;
     }
 
 private:
-    /// Adds to `after_` what one reset has made of the state before, in `single_`.
+    /// Merges the result of one reset, in `single_`, into `after_`.
     void merge(std::size_t writer, Mode mode_after, Mode mode, const X& before)
     {
         const auto claim = [&](std::size_t& owner, bool same) {
@@ -98,8 +97,8 @@ private:
         });
     }
 
-    /// One reset that gives the state another dimension writes all of it: in conflict with
-    /// any other that writes, unless they agree.
+    /// Merges a reset that changes the dimension of the state. It writes all components, and is in conflict with
+    /// any other reset that writes, unless they agree.
     void merge_resized(std::size_t writer, const X& before)
     {
         if (same_state(single_, before)) return;

@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// As `Meter`; without one, the network is always asked and planning always done.
+/// Interface of `Meter`; without one, the network is always asked and planning always done.
 class Metering {
 public:
     explicit Metering(const MeterOptions* options, std::size_t planned_guards = 0)
@@ -22,9 +22,9 @@ public:
     {
         if (meter_) meter_->note_cleared();
     }
-    void look_back(const Statistics& counts)
+    void review(const Statistics& counts)
     {
-        if (meter_) meter_->look_back(counts);
+        if (meter_) meter_->review(counts);
     }
     [[nodiscard]] MeterReading reading() const { return meter_->reading(); }
 

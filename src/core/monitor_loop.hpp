@@ -12,7 +12,7 @@
 
 namespace ricochet::detail {
 
-/// @throws std::logic_error: what a host did, and what was expected.
+/// @throws std::logic_error naming the call of the host and the expected one.
 [[noreturn]] void throw_out_of_turn(std::string_view call, std::string_view expected);
 /// @throws std::logic_error: a step that does not begin where the last one ended.
 [[noreturn]] void throw_gap(double expected, double found);
@@ -20,9 +20,9 @@ namespace ricochet::detail {
 [[noreturn]] void throw_state_moved(std::size_t component, double expected, double found);
 /// @throws std::logic_error: the step goes beyond a time event.
 [[noreturn]] void throw_beyond_time_event(double event, double end);
-/// @throws std::logic_error: guards have to be looked at before.
+/// @throws std::logic_error: guards have to be examined before.
 [[noreturn]] void throw_not_quiet(double until, double found);
-/// @throws std::invalid_argument: a length, time or scale that is none.
+/// @throws std::invalid_argument for a length, time or scale that is not a positive or finite number.
 [[noreturn]] void throw_no_length(std::string_view what, double found);
 
 /// @throws std::invalid_argument
@@ -70,7 +70,7 @@ public:
         run_.guard = run_.other_guard = no_guard;
         this->pending_ = Pending::nothing;
         this->level_ = 0;
-        search_.members().clear();
+        search_.fired().clear();
         step_.restart(t, x, mode);
         place_rate(dxdt);
         h_next_ = scale;
@@ -87,7 +87,7 @@ public:
         require_turn("examine");
         require_next(step);
         time_event_due_ = timed_ && ends_at_time_event(step);
-        return or_start_anew([&] { return look_at(step); });
+        return or_start_anew([&] { return check_at(step); });
     }
 
     Verdict resume(const double* dxdt, double scale) override
@@ -224,7 +224,7 @@ private:
     using Engine::time_event_due_;
     using Engine::timed_;
 
-    // --- what a host may not do ---
+    // --- calls out of turn ---
 
     void require_turn(std::string_view call) const
     {
@@ -280,10 +280,10 @@ private:
         return backward_ ? t > end : t < end;
     }
 
-    // --- looking ---
+    // --- checks ---
 
     /// An exception from a function of the system, or from a host's interpolant, leaves guards half
-    /// looked at or half armed: then no call but `start` and `restore` goes on.
+    /// examined or half armed: then no call but `start` and `restore` continues.
     template <class Function>
     Verdict or_start_anew(const Function& function)
     {
@@ -297,7 +297,7 @@ private:
         }
     }
 
-    [[nodiscard]] Verdict look_at(const HostStepTable& step)
+    [[nodiscard]] Verdict check_at(const HostStepTable& step)
     {
         step_.show(step);
         if (std::exchange(departs_, false)) step_.align_start();
@@ -339,7 +339,7 @@ private:
         return false;
     }
 
-    /// A stretch is a single step: a host does not go back.
+    /// Plans with intervals of a single step, since a host does not go back.
     [[nodiscard]] bool holds_set_by_plan()
     {
         if (newly_armed_) this->begin_plan();
@@ -375,7 +375,7 @@ private:
         if (!step_.flow_fits()) throw_flow_does_not_fit(step_.x0().size());
     }
 
-    /// Arms the guards; a set that follows at once is a cut of its own.
+    /// Arms the guards; a set that follows at the same instant is another cut.
     Verdict go_on()
     {
         departs_ = true;
@@ -403,7 +403,7 @@ private:
         cut_.mode_after = step_.mode();
         cut_.on_time = !cut_.accumulation && this->on_time_;
         cut_.state_changed = !same_state(cut_.before, cut_.after);
-        cut_.fired.assign(search_.members().begin(), search_.members().end());
+        cut_.fired.assign(search_.fired().begin(), search_.fired().end());
         std::sort(cut_.fired.begin(), cut_.fired.end());
         return Verdict::cut;
     }

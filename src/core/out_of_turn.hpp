@@ -1,11 +1,11 @@
-// What a host may not do now.
+// Refusal of calls of a host that are out of turn.
 #pragma once
 
 #include <stdexcept>
 
 namespace ricochet::detail {
 
-/// A call to a monitor that is not the one it expects; nothing has changed.
+/// Error for a call that the monitor does not expect now; nothing has changed.
 class OutOfTurn : public std::logic_error {
 public:
     using std::logic_error::logic_error;

@@ -1,4 +1,4 @@
-// Whether the bounds that a plan relies on are true.
+// Tests of the bounds that a plan relies on.
 #pragma once
 
 #include "core/planner.hpp"
@@ -6,7 +6,7 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline void Planner<X, single>::check_change(std::size_t i, const Look& from, const Look& to,
+inline void Planner<X, single>::check_change(std::size_t i, const Check& from, const Check& to,
                                              const Bank& bank)
 {
     if (!bounded_ || !detector_->checks_bounds || !from.exact || !to.exact) return;
@@ -15,7 +15,7 @@ inline void Planner<X, single>::check_change(std::size_t i, const Look& from, co
 }
 
 template <class X, bool single>
-inline void Planner<X, single>::check_covered(std::size_t i, const Look& from, const Look& to,
+inline void Planner<X, single>::check_covered(std::size_t i, const Check& from, const Check& to,
                                               const Bank& bank)
 {
     if (!bounded_) return;
@@ -24,7 +24,7 @@ inline void Planner<X, single>::check_covered(std::size_t i, const Look& from, c
 }
 
 template <class X, bool single>
-inline void Planner<X, single>::blame_change(std::size_t i, const Look& from, const Look& to,
+inline void Planner<X, single>::blame_change(std::size_t i, const Check& from, const Check& to,
                                              const Bank& bank)
 {
     const double tau = to.time - from.time;
@@ -36,7 +36,7 @@ inline void Planner<X, single>::blame_change(std::size_t i, const Look& from, co
 }
 
 template <class X, bool single>
-inline void Planner<X, single>::blame(std::size_t i, const Look& from, const Look& to,
+inline void Planner<X, single>::blame(std::size_t i, const Check& from, const Check& to,
                                       double allowed)
 {
     wrong_ = {.guard = i,
@@ -55,8 +55,8 @@ inline void Planner<X, single>::watch_sleeper(std::size_t i, double t, const X& 
                                               const Bank& bank, Statistics& counts)
 {
     if (wrong_ || !bank[i].enabled || never_sleeps(bank[i])) return;
-    const Look from = last_look(i);
-    Look now{.time = clock(t), .t = t, .x = &x};
+    const Check from = last_check(i);
+    Check now{.time = clock(t), .t = t, .x = &x};
     if (!(now.time > from.time)) return;
     now.value = value_at(i, now.time, t, x, mode, bank, counts);
     now.bound = bound(i, now, mode, bank[i].side);
@@ -71,35 +71,35 @@ inline void Planner<X, single>::watch_sleeper(std::size_t i, double t, const X& 
 }
 
 template <class X, bool single>
-inline void Planner<X, single>::check_bound(std::size_t i, const Look& look, Mode mode,
+inline void Planner<X, single>::check_bound(std::size_t i, const Check& check, Mode mode,
                                             const Bank& bank)
 {
     if (!bounded_) return;
     void* const door = system_.door();
     if (system_->lower_bound && bank[i].side == Side::above) {
-        check_against(system_->lower_bound(door, i, mode, look.t, *look.x), i, look, bank);
+        check_against(system_->lower_bound(door, i, mode, check.t, *check.x), i, check, bank);
     }
     if (system_->upper_bound && bank[i].side == Side::below) {
-        check_against(system_->upper_bound(door, i, mode, look.t, *look.x), i, look, bank);
+        check_against(system_->upper_bound(door, i, mode, check.t, *check.x), i, check, bank);
     }
 }
 
 template <class X, bool single>
-inline void Planner<X, single>::check_against(double bound, std::size_t i, const Look& look,
+inline void Planner<X, single>::check_against(double bound, std::size_t i, const Check& check,
                                               const Bank& bank)
 {
     const double sign = sign_of(bank[i].side);
     if (wrong_) return;
-    const double reach = band(bank, i, look.value, 0);
-    if (!(sign * bound > std::max(sign * look.value, 0.0) + reach)) return;
+    const double reach = band(bank, i, check.value, 0);
+    if (!(sign * bound > std::max(sign * check.value, 0.0) + reach)) return;
     wrong_ = {.guard = i,
               .lower_bound = sign > 0,
               .upper_bound = sign < 0,
-              .t = look.t,
-              .x = *look.x,
-              .value = look.value,
-              .since = look.t,
-              .value_then = look.value,
+              .t = check.t,
+              .x = *check.x,
+              .value = check.value,
+              .since = check.t,
+              .value_then = check.value,
               .allowed = bound};
 }
 

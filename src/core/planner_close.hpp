@@ -1,4 +1,4 @@
-// How a stretch of steps without a look is closed.
+// Closing of an interval of steps without a check.
 #pragma once
 
 #include "core/planner.hpp"
@@ -9,31 +9,31 @@ template <class X, bool single>
 inline std::size_t Planner<X, single>::close_one(std::size_t i, const Step<X>& step, Bank& bank,
                                                  Statistics& counts, double h_next)
 {
-    LastLook& known = looks_[i];
+    LastCheck& known = checks_[i];
     if (never_sleeps(bank[i]) || known.unclear) return steps_.size() - 1;
-    Look from = last_look(i);
-    Look end;
+    Check from = last_check(i);
+    Check end;
     if (bound_at(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
         detector_->sure(self_, end.bound, band(bank, i, end.value, end.value)) >= h_next) {
         if (detector_->checks_bounds && ++lower_bounds_used_ % 8 == 0) {
-            (void)look_at(i, steps_.size(), step, bank, counts);
+            (void)check_at(i, steps_.size(), step, bank, counts);
         }
-        note(i, known, end, step.mode(), bank);
+        plan_after(i, known, end, step.mode(), bank);
         return none;
     }
-    end = look_at(i, steps_.size(), step, bank, counts);
+    end = check_at(i, steps_.size(), step, bank, counts);
     const std::size_t failed = narrow(i, from, known.first, steps_.size(), end, step, bank, counts);
     const bool moved = from.time != known.time || failed == none;
     const double rate = known.rate;
     if (failed != none) remember(known, place(failed + 1, step).time, failing_value_);
-    if (moved) note(i, known, failed == none ? end : from, step.mode(), bank);
+    if (moved) plan_after(i, known, failed == none ? end : from, step.mode(), bank);
     if (!moved) known.rate = rate;
     return failed;
 }
 
 template <class X, bool single>
-inline std::size_t Planner<X, single>::narrow(std::size_t i, Look& from, std::size_t lo,
-                                              std::size_t hi, const Look& end, const Step<X>& step,
+inline std::size_t Planner<X, single>::narrow(std::size_t i, Check& from, std::size_t lo,
+                                              std::size_t hi, const Check& end, const Step<X>& step,
                                               const Bank& bank, Statistics& counts)
 {
     if (closes(bank, i, from, end)) {
@@ -44,11 +44,11 @@ inline std::size_t Planner<X, single>::narrow(std::size_t i, Look& from, std::si
     if (hi - lo == 1) {
         failing_value_ = end.value;
         if (from.exact && from.time == place(lo, step).time) return lo;
-        if (Look start; bound_at(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
+        if (Check start; bound_at(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
             from = end;
             return none;
         }
-        const Look start = look_at(i, lo, step, bank, counts);
+        const Check start = check_at(i, lo, step, bank, counts);
         check_covered(i, from, start, bank);
         from = start;
         if (!closes(bank, i, start, end)) return lo;
@@ -57,7 +57,7 @@ inline std::size_t Planner<X, single>::narrow(std::size_t i, Look& from, std::si
         return none;
     }
     const std::size_t middle = lo + (hi - lo) / 2;
-    const Look half = look_at(i, middle, step, bank, counts);
+    const Check half = check_at(i, middle, step, bank, counts);
     const std::size_t failed = narrow(i, from, lo, middle, half, step, bank, counts);
     return failed != none ? failed : narrow(i, from, middle, hi, end, step, bank, counts);
 }

@@ -51,7 +51,7 @@ public:
         return behind_[i];
     }
 
-    /// Some guards may have been enabled or disabled.
+    /// Updates which guards are enabled.
     void heed_enabled() noexcept
     {
         selective_ = false;
@@ -101,7 +101,7 @@ protected:
         }
     }
 
-    /// Rates of all guards at once from the system.
+    /// Rates of all guards from the system in one call.
     void rates_together(Mode mode, double t, const X& x, const X& dxdt, Doubles& rates)
     {
         if (!backward_) return system_->rates(system_.door(), mode, t, x, dxdt, all(rates));
@@ -109,7 +109,7 @@ protected:
         for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
     }
 
-    /// Rates of all guards at once by the central difference along the flow.
+    /// Rates of all guards by the central difference along the flow, in two calls.
     void difference(Mode mode, double t, const X& x, const X& dxdt, double scale, Doubles& rates)
     {
         const double delta = 1e-5 * scale;

@@ -1,4 +1,4 @@
-// Which guards of a system deserve a search in a step, by what is known of them at its ends and
+// Screening: the guards of a system that need a search in a step, by their values at its ends and
 // inside.
 //
 // What every step needs of every guard lies in plain arrays, so that a hundred guards
@@ -44,7 +44,7 @@ protected:
 public:
     using Guards::size;
 
-    /// The guards are power series over the step in hand; or none are known.
+    /// Sets the power series of the guards over the current step, or none.
     /// `starts`: a smooth phase starts with the step.
     void see(const SeriesTerms& series, bool starts) noexcept
     {
@@ -73,7 +73,7 @@ public:
         marked_ = false;
     }
 
-    /// And once more, at the part `CubicLook::further` of the step where the state is `x`.
+    /// Evaluates them a second time, at the part `CubicLook::further` of the step where the state is `x`.
     void sample_further(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
         const double s = CubicLook::further * step.h();
@@ -81,7 +81,7 @@ public:
         looked_ = Looked::further;
     }
 
-    /// And once more, at the part `u` of the step, one of `CubicLook::places`.
+    /// Evaluates them once more, at the part `u` of the step, one of `CubicLook::places`.
     void sample_place(const Step<X>& step, double u, const X& x, std::uint64_t& calls)
     {
         sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
@@ -96,7 +96,7 @@ public:
 
     [[nodiscard]] bool looked_everywhere() const noexcept { return looked_ == Looked::everywhere; }
 
-    /// Whether any guard deserves a second evaluation inside the step, or a search.
+    /// Whether any guard needs a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
     {
         if (looked() && !waiting_ && !bands_) {
@@ -111,8 +111,8 @@ public:
         return suspicious(h);
     }
 
-    /// Whether a second evaluation inside the step can change what is thought of a guard: not
-    /// where the first met the cubic to nine digits, which is no coincidence.
+    /// Whether a second evaluation inside the step can change the decision on a guard: not
+    /// where the first agreed with the cubic to nine digits, which is no coincidence.
     [[nodiscard]] bool needs_second_look(double h) const noexcept
     {
         for (std::size_t i = 0; i < size(); ++i) {
@@ -123,7 +123,7 @@ public:
         return false;
     }
 
-    /// Whether any guard deserves a search.
+    /// Whether any guard needs a search.
     [[nodiscard]] bool suspicious(double h) noexcept
     {
         if (waiting_ && leaves_plateau()) return true;
@@ -131,7 +131,7 @@ public:
         return !suspects_.empty();
     }
 
-    /// The guards that deserve a search, in ascending order, as `begin_search` found them.
+    /// Guards that need a search, in ascending order, as `begin_search` found them.
     [[nodiscard]] std::span<const std::size_t> suspects() const noexcept
     {
         return suspects_.span();
@@ -144,7 +144,7 @@ public:
         return !(look.lowest(sign_[i]) > CubicLook::most * deviation(look, i));
     }
 
-    /// Whether guard i is in the step what the cubic through its ends says, as far as it has
+    /// Whether guard i agrees in the step with the cubic through its ends, as far as it has
     /// been evaluated.
     [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
     {
@@ -157,7 +157,7 @@ public:
     /// Whether the guards have been evaluated inside the step.
     [[nodiscard]] bool looked() const noexcept { return looked_ != Looked::not_at_all; }
 
-    /// Of one of the `suspects`: it is one still, after what the search has found so far.
+    /// Whether one of the `suspects` still is one, after the findings of the search so far.
     [[nodiscard]] bool still_suspicious(std::size_t i, double h) const noexcept
     {
         return as_screened_ || suspicious(i, h);
@@ -167,7 +167,7 @@ public:
     {
         if (sign_[i] == 0) return false;
         if (has_series(i)) return !is_clear_of_series(i, h);
-        const double band = sign_[i] * records_[i].info.touch;  // worth a look if it is reached
+        const double band = sign_[i] * records_[i].info.touch;  // worth a check if it is reached
         const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
             return screen.suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
         });
@@ -182,17 +182,17 @@ public:
             return no_guard;
         }
         for (std::size_t i = 0; i < size(); ++i) {
-            const bool idle = !records_[i].enabled || records_[i].asleep;
+            const bool idle = !records_[i].enabled || records_[i].deferred;
             if (!idle && !std::isfinite(g1_[i])) return i;
         }
         return no_guard;
     }
 
-    /// Whether guard i, on a plateau, has its event in the step, or is no number at its end.
+    /// Whether guard i, on a plateau, has its event in the step, or is not a number at its end.
     [[nodiscard]] bool leaves_plateau(std::size_t i) const noexcept
     {
         const GuardRecord& record = records_[i];
-        if (record.side != Side::plateau || !record.enabled || record.asleep) return false;
+        if (record.side != Side::plateau || !record.enabled || record.deferred) return false;
         if (!std::isfinite(g1_[i])) return true;
         return record.awaited != Side::plateau && side_of(g1_[i]) == opposite(record.awaited) &&
                counts(record.awaited, record.info.crossing);
@@ -203,7 +203,7 @@ protected:
     using Guards::rules_;
     using Guards::sample_values;
 
-    /// Where in the step in hand the guards have been evaluated.
+    /// Places in the current step at which the guards have been evaluated.
     enum class Looked : std::uint8_t { not_at_all, inside, further, everywhere };
 
     [[gnu::noinline]] bool leaves_plateau() const noexcept
@@ -231,7 +231,7 @@ protected:
         return use(OwnScreen{rules_.suspects});
     }
 
-    /// Guards that are screened together: where one of them is suspected, each is looked at.
+    /// Number of guards that are screened together: where one of them is suspected, each is examined.
     static constexpr std::size_t block = 16;
     [[nodiscard]] bool are_few() const noexcept { return size() < block; }
 
@@ -273,7 +273,7 @@ protected:
         return {g0_[i], rate0_[i], g1_[i], rate1_[i], h};
     }
 
-    /// Whether the ends of the step tell of guard i that it deserves a search.
+    /// Whether guard i needs a search by its values at the ends of the step.
     template <class Screen>
     [[nodiscard, gnu::always_inline]] auto shows(const Screen& screen, double h) const noexcept
     {
@@ -300,7 +300,7 @@ protected:
         };
     }
 
-    /// Whether guard i deserves a second evaluation inside the step, or a search.
+    /// Whether guard i needs a second evaluation inside the step, or a search.
     template <class Screen>
     [[nodiscard, gnu::always_inline]] auto in_doubt(const Screen& screen, double h) const noexcept
     {
@@ -315,7 +315,7 @@ protected:
         };
     }
 
-    /// The step in hand is another, or what is known of its guards.
+    /// Forgets the screening, after a change of the step or of its guards.
     void forget_screening() noexcept { screened_ = marked_ = false; }
 
     /// Finds the guards in doubt.
@@ -346,7 +346,7 @@ protected:
             return;
         }
         if (looked()) {
-            // One that deserves a search is in doubt, or deviates elsewhere.
+            // A guard that needs a search is in doubt, or deviates elsewhere.
             if (!marked_) mark(h);
             if (looked_ == Looked::inside)
                 return screen_marked(h, [](std::size_t) { return false; });
@@ -374,7 +374,7 @@ protected:
         });
     }
 
-    /// Looks at each guard that is marked, or for which `condition` holds.
+    /// Visits each guard that is marked, or for which `condition` holds.
     template <class Condition>
     [[gnu::always_inline]] void screen_marked(double h, const Condition& condition) noexcept
     {
@@ -399,7 +399,7 @@ protected:
         return std::fabs(g) <= std::numeric_limits<double>::max();
     }
 
-    /// The largest deviation of guard i from the cubic through its ends that was seen.
+    /// Largest deviation of guard i from the cubic through its ends that was found.
     [[nodiscard]] double deviation(const CubicLook& look, std::size_t i) const noexcept
     {
         const double e = look.deviation(CubicLook::inside, inside_[i]);
@@ -424,15 +424,15 @@ protected:
     SeriesTerms series_;
     bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
-    bool bands_ = false;        ///< whether any guard declares one
-    bool screened_ = false;     ///< whether `suspects_` is of the step in hand
+    bool bands_ = false;        ///< whether any guard declares a touch
+    bool screened_ = false;     ///< whether `suspects_` is of the current step
     bool as_screened_ = false;  ///< and no guard has changed since
     // A value does not lie beside its rate: both are written one by one, see `HostStepTable`.
     Doubles sign_{}, g0_{}, g1_{}, rate0_{}, rate1_{};
     Looked looked_ = Looked::not_at_all;
-    bool marked_ = false;  ///< whether `marks_` is of the step in hand
+    bool marked_ = false;  ///< whether `marks_` is of the current step
     Doubles inside_{}, further_{};
-    Doubles worst_{};  ///< of further looks
+    Doubles worst_{};  ///< of further evaluations
     GuardList<std::size_t, single> suspects_;
     GuardList<std::size_t, single> marks_;  ///< guards in doubt
 };

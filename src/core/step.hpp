@@ -1,8 +1,8 @@
 // The step in progress.
 //
-// The steps that advance leave their stages in the state of the step, where the dense output finds
-// them; steps that are repeated to inner times leave them elsewhere, so that asking never disturbs
-// what is being asked about.
+// Steps that advance keep their stages in the state of the step, where the dense output reads
+// them; steps that are repeated to inner times keep theirs elsewhere, so that an evaluation inside the step never
+// changes the step.
 #pragma once
 
 #include <algorithm>
@@ -47,7 +47,7 @@ public:
     }
 
     [[nodiscard]] const StepState<X>& state() const noexcept { return state_; }
-    /// For a quiet run, which goes on from here and leaves the step in hand.
+    /// State of the step for a quiet run, which continues from here and leaves its current step.
     [[nodiscard]] StepState<X>& lend() noexcept { return state_; }
     [[nodiscard]] double time(double s) const noexcept { return state_.time(s); }
     [[nodiscard]] const Instant& start() const noexcept { return state_.start; }
@@ -61,7 +61,7 @@ public:
         return remainder == 0 ? at : at.after(state_.in_time(remainder));
     }
 
-    /// @param each  absolute tolerances of the components, in the place of one for all; or none
+    /// @param each  absolute tolerances of the components, in place of one for all; or none
     /// @param other  of components that a reset adds
     void measure_with(std::vector<double> each, double other)
     {
@@ -82,7 +82,7 @@ public:
     [[nodiscard]] const X& rate0() const noexcept { return state_.rate0; }
     [[nodiscard]] const X& rate1() const noexcept { return state_.rate1; }
     [[nodiscard]] int order() const noexcept { return kernel_->order; }
-    /// Of the error estimate; 0: there is none.
+    /// Order of the error estimate; 0: there is none.
     [[nodiscard]] int error_order() const noexcept { return kernel_->error_order; }
 
     /// x(t0 + s) on the dense output: the method's own where it has one, else the
@@ -100,7 +100,7 @@ public:
         }
     }
 
-    /// As `interpolate`, without further evaluations of the flow: on the cubic through both
+    /// Interpolates without further evaluations of the flow: on the cubic through both
     /// ends where the method has no dense output of its own.
     void peek(double s, X& x) const
     {
@@ -122,8 +122,8 @@ public:
         }
     }
 
-    /// As `peek` at the part `Part::u` of the step, of which the dense output has its weights
-    /// from the compiler.
+    /// Same as `peek` at the part `Part::u` of the step, for which the weights of the dense output are
+    /// constants.
     template <class Part>
     [[gnu::always_inline]] void peek(X& x) const
     {
@@ -232,7 +232,7 @@ public:
 
     [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
 
-    /// The step in hand is one that a host has taken from the state in hand.
+    /// Makes a step that a host has taken from the current state the current one.
     void show(const HostStepTable& host) noexcept
     {
         StepState<X>& of = state_;
@@ -268,7 +268,7 @@ public:
         straight_ = std::nextafter(t, std::numeric_limits<double>::infinity()) - t;
     }
 
-    /// As `accept`, of a step that a host has taken.
+    /// Accepts a step that a host has taken.
     void accept_shown() noexcept
     {
         StepState<X>& of = state_;
@@ -284,7 +284,7 @@ public:
         for_components([&](auto i) { state_.rate0[i] = dxdt[static_cast<std::size_t>(i)]; });
     }
 
-    /// Takes a step of length h, without a look at its error. False if the end of the step or the
+    /// Takes a step of length h, without a check of its error. False if the end of the step or the
     /// flow there is not finite.
     bool attempt(double h) { return kernel_->take(system_.door(), state_, h); }
 
@@ -338,7 +338,7 @@ public:
         }
     }
 
-    /// As `accept`, where the end is the time `t` by decree.
+    /// Accepts the step and sets its end to the time `t`.
     void accept_at(double t) noexcept
     {
         accept();
@@ -354,7 +354,7 @@ public:
         arrive();
     }
 
-    /// The same to an instant.
+    /// Same, to an instant.
     void restart(const Instant& at, const X& x, Mode mode)
     {
         state_.start = at;
@@ -371,10 +371,10 @@ public:
         assign(state_.rate0, at.rate);
     }
 
-    /// Only time goes on, to t.
+    /// Advances the time alone, to t.
     void hold(double t) noexcept { state_.start = {t, 0}; }
 
-    /// Evaluates the flow at the start anew.
+    /// Evaluates the flow at the start again.
     void refresh() { flow(0, state_.x0, state_.rate0); }
 
     [[nodiscard]] StepStart<X> place() const
@@ -382,7 +382,7 @@ public:
         return {state_.start, state_.mode, state_.x0, state_.remainder, state_.rate0};
     }
 
-    /// As `place`, into what is there already.
+    /// Places the step like `place`, in memory that is there already.
     void store(StepStart<X>& at) const
     {
         at.t = state_.start;
@@ -392,7 +392,7 @@ public:
         assign(at.rate, state_.rate0);
     }
 
-    /// Whether the flow has given its rate the dimension of the state, always.
+    /// Whether every call of the flow has given its rate the dimension of the state.
     [[nodiscard]] bool flow_fits() const noexcept { return state_.flow_fits; }
     [[nodiscard]] std::uint64_t flow_calls() const noexcept { return state_.flow_calls; }
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
@@ -441,7 +441,7 @@ private:
         host.restep(host.host, s, x.data(), state_.x0.size());
     }
 
-    /// Over a ten-thousandth of the step the rounding and the bend of a difference are alike.
+    /// Over a ten-thousandth of the step the errors of rounding and of curvature of a difference are alike.
     void rate_on_host(double s, X& dxdt) const
     {
         const HostStepTable& host = *state_.host;

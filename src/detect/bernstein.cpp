@@ -64,7 +64,7 @@ struct QuarticCheck {
     return size * (basis.rounding + basis.norm * 2 * clock / width);
 }
 
-/// The stretch begins at an event, or on the surface and heads for its side.
+/// The interval begins at an event, or on the surface and heads for its side.
 [[nodiscard]] bool starts_on_surface(const Watch& watch, double band) noexcept
 {
     const double sign = sign_of(watch.side);
@@ -123,10 +123,10 @@ bool stays_on_side(const BernsteinTask& task, const Watch& watch, const double* 
 
 namespace {
 
-/// The search of one stretch.
+/// The search of one interval.
 class Search {
 public:
-    /// @param values the samples at the nodes of the whole stretch
+    /// @param values the samples at the nodes of the whole interval
     Search(const BernsteinTask& task, Watch& watch, const double* values, const GuardCurve& curve)
         : task_(task),
           watch_(watch),
@@ -159,7 +159,7 @@ public:
     }
 
 private:
-    /// The guard on a part of the stretch, as a polynomial.
+    /// The guard on a part of the interval, as a polynomial.
     struct Fit {
         double from = 0;  ///< [s] offset
         double to = 0;    ///< [s] offset
@@ -233,7 +233,7 @@ private:
         return fit.finite && fit.misfit <= scales_.band / 2;
     }
 
-    /// Walks along a part of the stretch, in halves where it takes more than one
+    /// Walks along a part of the interval, in halves where it takes more than one
     /// polynomial.
     void scan(const Fit& fit, int halvings)
     {
@@ -263,7 +263,7 @@ private:
 
     // --- pieces of a fit ---
 
-    /// Whether the polynomial of the whole stretch has no root and no touch in a piece.
+    /// Whether the polynomial of the whole interval has no root and no touch in a piece.
     [[nodiscard]] bool excludes(Piece& piece, int halvings)
     {
         const double* c = piece.c.data();
@@ -313,7 +313,7 @@ private:
         return least(c, degree_, 1) > margin || least(c, degree_, -1) > margin;
     }
 
-    /// All coefficients but the first are, and the first is where the stretch starts.
+    /// All coefficients but the first are, and the first is where the interval starts.
     [[nodiscard]] bool leaves_surface(const Fit& fit, const Piece& piece) const noexcept
     {
         if (piece.from > 0 || fit.from > watch_.start.s) return false;
@@ -447,7 +447,7 @@ private:
     Coefficients last_{};  ///< of the last fit, with its width and error
     double last_width_ = 1;
     double last_error_ = 0;
-    Evidence evidence_ = Evidence::checked;  ///< of a clear stretch
+    Evidence evidence_ = Evidence::checked;  ///< of a clear interval
 };
 
 }  // namespace

@@ -7,7 +7,7 @@ namespace ricochet {
 
 namespace {
 
-/// The guard times the sign of its armed side on a stretch, as a cubic over u in
+/// The guard times the sign of its armed side on an interval, as a cubic over u in
 /// [0, 1] through the values and rates at both ends.
 struct GuardCubic {
     double v0, r0, v1, r1;  ///< values and rates per unit of u
@@ -77,7 +77,7 @@ Finding clear_if(bool known) noexcept
 
 /// Whether a guard that is across its surface, or on it, and falls at this rate will turn
 /// at once: within the rounding of a rate. One that is not yet there may be overlooked
-/// at the end of a step, and is looked at from the start of the next.
+/// at the end of a step, and is examined from the start of the next.
 [[nodiscard]] bool turns_now(double value, double rate, double curvature) noexcept
 {
     return value <= 0 && (rate == 0 || (rate < 0 && -rate <= 1e-9 * curvature));
@@ -110,8 +110,8 @@ Finding clear_if(bool known) noexcept
 }
 
 /// Where to look for the turn of the guard times `sign`, which falls at `lo` and rises at
-/// `hi`, as a fraction of the stretch: the minimum of the cubic. Where that does not
-/// converge soon there is a kink or a flat place, and the stretch is halved.
+/// `hi`, as a fraction of the interval: the minimum of the cubic. Where that does not
+/// converge soon there is a kink or a flat place, and the interval is halved.
 [[nodiscard]] double turn(double sign, const GuardSample& lo, const GuardSample& hi,
                                  int i) noexcept
 {
@@ -240,7 +240,7 @@ Finding Extremum::examine(GuardPath& path, Watch& watch) const
 
     const GuardCubic cubic(sign, watch.start, watch.end);
     const bool on_surface = is_on_surface(path, watch, watch.end);
-    // A stretch that ends inside the step ends at an event, which others have looked at.
+    // An interval that ends inside the step ends at an event, which others have examined.
     const bool whole = watch.end.s == path.h();
     const bool returns = on_surface && whole && turns_back(path, watch, cubic);
     const bool left = has_left(side, watch.end.value) && !returns;

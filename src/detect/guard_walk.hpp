@@ -1,9 +1,9 @@
-// What a guard does between the ends of a stretch, told from samples in order of time.
+// Behaviour of a guard between the ends of an interval, from samples in order of time.
 //
 // Between two samples in a row the guard is monotone, or away from its surface. A touch
 // is a minimum inside the band around the surface, on the way down and up again; a
 // minimum below the band is two crossings. Near a minimum that lies at an end of the
-// stretch, the rate there decides on which side of the end it lies: it is the same
+// interval, the rate there decides on which side of the end it lies: it is the same
 // number in both of the steps that meet there.
 #pragma once
 
@@ -21,8 +21,8 @@ public:
         double noise = 0;  ///< differences of g that mean nothing
     };
 
-    /// @param at_start the guard on the polynomial at the start of the stretch, which may
-    ///        lie across the surface where the stretch begins at an event
+    /// @param at_start the guard on the polynomial at the start of the interval, which may
+    ///        lie across the surface where the interval begins at an event
     GuardWalk(const Watch& watch, Crossing crossing, double at_start, const Scales& scales) noexcept
         : watch_(&watch),
           crossing_(crossing),
@@ -48,7 +48,7 @@ public:
     [[nodiscard]] const Finding& finding() const noexcept { return finding_; }
     [[nodiscard]] Side side() const noexcept { return side_; }
 
-    /// The next sample, inside the stretch.
+    /// The next sample, inside the interval.
     void pass(const GuardSample& at) noexcept
     {
         const double value = sign_ * at.value;
@@ -66,14 +66,14 @@ public:
         }
     }
 
-    /// No further samples before the end of the stretch: the crossing is where it is.
+    /// No further samples before the end of the interval: the crossing is where it is.
     void close() noexcept
     {
         decided_ = true;
         finding_ = Finding::leaving(side_, from_, low_);
     }
 
-    /// The end of the stretch. @param heading where a guard that is on its surface there
+    /// The end of the interval. @param heading where a guard that is on its surface there
     /// goes: 1, to its side; -1, across; 0, not known
     void end(const GuardSample& at, int heading) noexcept
     {

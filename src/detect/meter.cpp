@@ -116,7 +116,7 @@ double Meter::allowance(Way way) const noexcept
     return known ? share : std::max(share, 0.0) + first_excess * piece;
 }
 
-/// Once it is known what a piece of trial costs in vain, there must be as much to spend.
+/// Once it is known the cost of a useless piece of trial, the budget must cover it.
 bool Meter::may_try(Way way) const noexcept
 {
     const Account& account = of(way);
@@ -142,7 +142,7 @@ void Meter::consider(const Statistics& counts)
                        .asked = now.asked - then_.asked};
     next_check_ = counts.guard_calls + asked_ + 4;
     if (counts.steps < next_steps_) {
-        // A trial that has become too dear ends here.
+        // A trial that has become too expensive ends here.
         const double excess = cost_of(piece) - of(best_).mean() * std::max(piece.steps, 0.0);
         if (excess <= allowance(way_) && asked_ < most_asked_) return;
     }

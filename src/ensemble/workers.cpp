@@ -6,7 +6,7 @@ namespace ricochet::detail {
 
 namespace {
 
-// A task follows another within a fraction of a millisecond; falling asleep and
+// A task follows another within a fraction of a millisecond; waiting and
 // being woken takes a good part of that.
 constexpr int spins = 4000;
 

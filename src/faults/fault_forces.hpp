@@ -1,4 +1,4 @@
-// The right-hand side of a fault, without units.
+// The right-hand side of a fault, nondimensional.
 #pragma once
 
 #include <cmath>
@@ -33,7 +33,7 @@ public:
         out = start * fault_.weight() - kd_ - 2 * p.damping * hv_;
     }
 
-    /// b(0), without units.
+    /// b(0), nondimensional.
     [[nodiscard]] double first_strength(Eigen::Index i) const
     {
         const auto& p = fault_.parameters();

@@ -20,7 +20,7 @@ using detail::RuptureRecord;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Without units but for xi.
+/// Nondimensional but for xi.
 struct Motion {
     VectorXd u;             ///< d - v_pl t
     VectorXd v;             ///< velocity
@@ -38,7 +38,7 @@ struct StageRates {
     VectorXd u, v, xi;
 };
 
-/// N of each element, without units.
+/// N of each element, nondimensional.
 VectorXd normal_forces(const StrikeSlipFault& fault, const FaultFriction& friction)
 {
     if (friction.normal_stress == 0) return fault.weight();
@@ -142,7 +142,7 @@ private:
 
     /// A step from `now_` to `next_`. Of order 1 under error control it is two halves, whose
     /// difference from the whole is the estimate; one of order 4 that leaves elements creeping is
-    /// taken anew with order 2.
+    /// taken again with order 2.
     bool attempt(double h)
     {
         residual_ = 0;

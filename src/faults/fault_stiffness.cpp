@@ -352,7 +352,7 @@ FaultStiffness FaultStiffness::dense(int elements, Eigen::MatrixXd matrix)
             elements, rows, matrix.rows(), matrix.cols()));
     }
     if (!matrix.allFinite())
-        throw std::invalid_argument("the kernel has entries that are no numbers");
+        throw std::invalid_argument("the kernel has entries that are not numbers");
     const double asymmetry = (matrix - matrix.transpose()).cwiseAbs().maxCoeff();
     const double largest = matrix.cwiseAbs().maxCoeff();
     if (asymmetry > 1e-9 * largest) {

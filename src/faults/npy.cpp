@@ -120,7 +120,7 @@ Eigen::MatrixXd read_npy_square(const std::filesystem::path& file)
     const char* data = bytes.data() + header.data;
     Eigen::MatrixXd out =
         header.single ? matrix<float>(data, header.side) : matrix<double>(data, header.side);
-    if (!out.allFinite()) refuse(file, "has entries that are no numbers, or infinite");
+    if (!out.allFinite()) refuse(file, "has entries that are not numbers, or infinite");
     if (!header.fortran) out.transposeInPlace();
     return out;
 }

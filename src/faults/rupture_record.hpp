@@ -1,4 +1,4 @@
-// What is kept of a rupture while it runs.
+// Record of a rupture while it runs.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace ricochet::detail {
 /// What `RuptureOptions::polynomial_bound` stands for.
 [[nodiscard]] double polynomial_bound(const StrikeSlipFault& fault, const RuptureOptions& options);
 
-/// Fields without units.
+/// Fields nondimensional.
 struct FaultFields {
     Eigen::VectorXd slip;      ///< d
     Eigen::VectorXd velocity;  ///< v
@@ -36,7 +36,7 @@ public:
         out_.mean_velocities = {0.0};
     }
 
-    /// A step from t over h, both without units. `mean_at(theta)` is the mean motion at t +
+    /// A step from t over h, both nondimensional. `mean_at(theta)` is the mean motion at t +
     /// theta h, `fields_at(theta, fields)` the motion.
     template <class MeanAt, class FieldsAt>
     void add(double t, double h, MeanAt&& mean_at, FieldsAt&& fields_at)
@@ -78,7 +78,7 @@ public:
         }
     }
 
-    /// @param rest_time  without units; NaN: something moves
+    /// @param rest_time  nondimensional; NaN: something moves
     /// @param located    whether that is more exact than the ends of steps
     void finish(double t, double rest_time, bool located, const FaultFields& fields)
     {
@@ -99,7 +99,7 @@ public:
         }
     }
 
-    /// The largest mean velocity so far, without units.
+    /// The largest mean velocity so far, nondimensional.
     [[nodiscard]] double peak() const noexcept { return peak_; }
 
 private:

@@ -130,7 +130,7 @@ public:
 
     /// Opens whatever may hold something at a squared distance of at most `best`, nearer
     /// things first. `bound(four)` gives lower bounds for four boxes; `open(first, last)`
-    /// looks at the places of a block, and lowers `best`. Finite `best` only.
+    /// examines the places of a block, and lowers `best`. Finite `best` only.
     template <class Bound, class Open>
     void search(double& best, const Bound& bound, const Open& open) const
     {

@@ -7,7 +7,7 @@
 
 namespace ricochet::geometry::detail {
 
-/// Segments in one look; columns are a multiple of it long.
+/// Segments in one check; columns are a multiple of it long.
 inline constexpr std::size_t segments_per_look = 64;
 
 struct SegmentColumns {
@@ -19,7 +19,7 @@ struct SegmentColumns {
     std::size_t count;
 };
 
-/// The first look that holds the least, and the least; `squared` is as given if none is less.
+/// The first check that holds the least, and the least; `squared` is as given if none is less.
 struct LeastLook {
     double squared;
     std::size_t look;

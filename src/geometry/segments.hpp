@@ -60,7 +60,7 @@ struct NearestPair {
 
 /// Segments of positive length that do not change.
 ///
-/// `nearest` searches the tree, `nearest_brute` looks at every segment; both return the
+/// `nearest` searches the tree, `nearest_brute` examines every segment; both return the
 /// same bits, also which segment it is: of several at the same distance, the first.
 class Segments {
 public:

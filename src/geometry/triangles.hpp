@@ -40,7 +40,7 @@ struct Ball {
     double radius;
 };
 
-/// The triangles of a mesh. `nearest` searches trees, `nearest_brute` looks at everything; both
+/// The triangles of a mesh. `nearest` searches trees, `nearest_brute` examines everything; both
 /// return the same bits, of several at the same distance the first.
 class Triangles {
 public:
@@ -57,7 +57,7 @@ public:
     [[nodiscard]] NearestOnTriangle nearest_brute(const Eigen::Vector3d& p) const noexcept;
 
     /// The nearest faces of this mesh and of `body`, displaced by `pose`, nearer than
-    /// 1e100; `hint` holds faces that may be near. A pose that is no number gives NaN.
+    /// 1e100; `hint` holds faces that may be near. A pose that is not a number gives NaN.
     [[nodiscard]] NearestFaces nearest(const Triangles& body, const Pose& pose,
                                        const NearestFaces& hint = {}) const noexcept;
     [[nodiscard]] NearestFaces nearest_brute(const Triangles& body,

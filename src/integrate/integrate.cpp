@@ -35,7 +35,7 @@ void throw_start_empty()
 void throw_no_reset(std::size_t which, std::string_view name)
 {
     throw std::invalid_argument(fmt::format(
-        "integrate: {} is unilateral and needs a reset: nothing says how the motion goes on there",
+        "integrate: {} is unilateral and needs a reset: it defines how the motion continues there",
         guard_called(which, name)));
 }
 

@@ -79,13 +79,13 @@ std::string_view describe(Outcome outcome) noexcept
                    "earlier, let events that accumulate come to rest, or raise stall_steps";
         case Outcome::stopped_by_callback:
             return "a function of the system reported an error; all that was computed before is "
-                   "kept, and the run goes on from the last completed step when it is asked to";
+                   "kept, and the next call continues from the last completed step";
         case Outcome::at_rest: return "every element came to rest for good";
         case Outcome::not_handed_over:
             return "events alone do not lead on from here; allow set-valued steps";
         case Outcome::released: return "every reaction is at a bound, as was asked for";
         case Outcome::law_violated:
-            return "a step ended with a reaction that contradicts its law; look at reaction_set, "
+            return "a step ended with a reaction that contradicts its law; check reaction_set, "
                    "or take shorter steps";
         case Outcome::running: return "the run has not ended";
     }

@@ -110,7 +110,7 @@ bool Statement::proved_by_guard(Box& box) const
     return guard - slack - rounding > margin_;
 }
 
-/// Whether a box is one of those that are looked at closely, whoever examines it.
+/// Whether a box is one of those that are examined closely, whichever thread examines it.
 bool one_in_64(const Point& centre, std::size_t n) noexcept
 {
     std::uint64_t hash = 0;
@@ -121,7 +121,7 @@ bool one_in_64(const Point& centre, std::size_t n) noexcept
     return hash >> 58U == 0;
 }
 
-/// The guard itself is not asked for, which may be a thousand times as dear; one box in 64 compares
+/// The guard itself is not asked for, which may be a thousand times as expensive; one box in 64 compares
 /// it with the bound.
 bool Statement::proved_by_least(Box& box) const
 {

@@ -178,7 +178,7 @@ private:
         return {.highest = highest, .spread = highest - low, .closest = o_.closest};
     }
 
-    /// Descends from cheap thresholds to dear ones.
+    /// Descends from cheap thresholds to expensive ones.
     /// @returns nothing if even the cheapest is above the limit, or the logits do not tell the
     ///          states within the margin from the others
     std::optional<Begun> search(double margin, const Attempt& attempt)
@@ -408,7 +408,7 @@ std::string_view describe(CertifyOutcome outcome) noexcept
         case CertifyOutcome::proved: return "proved over the whole domain";
         case CertifyOutcome::partly_proved:
             return "proved over the domain but for the boxes that the record lists, where the "
-                   "exact guard is asked; a smaller edge or a lower threshold leaves fewer";
+                   "exact guard is evaluated; a smaller edge or a lower threshold leaves fewer";
         case CertifyOutcome::refuted:
             return "a state clears although its guard is within the margin; lower the threshold, "
                    "or "

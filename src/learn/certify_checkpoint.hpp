@@ -40,7 +40,7 @@ struct Progressed {
 
 /// Writes to a neighbouring file and renames it. Of a level that was begun the finished parts are
 /// kept.
-/// @param key  what a proof that goes on must agree in
+/// @param key  what a proof that continues must agree in
 /// @throws std::runtime_error naming the file
 void save(const Progressed& all, const std::string& key, const std::filesystem::path& file);
 

@@ -492,7 +492,7 @@ std::string_view describe(TrainingOutcome outcome) noexcept
     switch (outcome) {
         case TrainingOutcome::finished: return "no event was missed";
         case TrainingOutcome::stopped:
-            return "stopped early, no event was missed; resume from the checkpoint to go on";
+            return "stopped early, no event was missed; resume from the checkpoint to continue";
         case TrainingOutcome::misses_remain:
             return "events are still missed; train longer, widen the network, or look for states "
                    "labelled both ways";

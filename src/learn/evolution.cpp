@@ -410,7 +410,7 @@ std::string_view describe(EvolutionOutcome outcome) noexcept
             return "reached the time allowed; resume with more if the score still falls";
         case EvolutionOutcome::target: return "reached the target";
         case EvolutionOutcome::converged: return "the spread is too small to change anything";
-        case EvolutionOutcome::stopped: return "stopped; resume to go on";
+        case EvolutionOutcome::stopped: return "stopped; resume to continue";
         case EvolutionOutcome::none_allowed:
             return "no vector had a score below infinity; start nearer, or with less spread";
     }

@@ -484,7 +484,7 @@ private:
             const double steps = cleared / unit;
             double looks = 1 / steps;
             if (horizon() && validation_.event[i] <= cleared) {
-                looks *= 1 + std::log2(steps);  // the stretch is halved until the event is found
+                looks *= 1 + std::log2(steps);  // the interval is halved until the event is found
             }
             sum += validation_.weight[i] * looks;
             states += validation_.weight[i];

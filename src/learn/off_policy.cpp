@@ -28,7 +28,7 @@ struct State {
     Random::State actions{};  ///< of the uniform ones
     Random::State episode_seeds{};
     std::uint64_t episode_seed = 0;
-    std::vector<double> episode_actions;  ///< of the episode that goes on, one after the other
+    std::vector<double> episode_actions;  ///< of the episode that continues, one after the other
     std::vector<double> observation;
     double episode_return = 0;
     double returns = 0;  ///< summed since the last report
@@ -113,7 +113,7 @@ public:
     }
 
 private:
-    /// Acts, keeps what came of it, and learns. Something if it cannot go on.
+    /// Acts, keeps what came of it, and learns. Something if it cannot continue.
     std::optional<PolicyOutcome> step()
     {
         choose_action();
@@ -393,7 +393,7 @@ std::string_view describe(PolicyOutcome outcome) noexcept
         case PolicyOutcome::finished: return "took all steps";
         case PolicyOutcome::max_seconds:
             return "reached the time allowed; resume with more if the return still rises";
-        case PolicyOutcome::stopped: return "stopped; resume to go on";
+        case PolicyOutcome::stopped: return "stopped; resume to continue";
         case PolicyOutcome::non_finite:
             return "the environment gave a number that is not finite; the policy learnt until then "
                    "is kept";

@@ -28,7 +28,7 @@ struct Learner {
     std::string name;  ///< for messages, e.g. "train_tqc"
     /// An action for this observation, with noise.
     std::function<void(std::span<const double> observation, std::span<double> action)> explore;
-    /// One update; losses are looked at after it if `losses`.
+    /// One update; losses are examined after it if `losses`.
     std::function<void(const ReplayBuffer&, bool losses)> update;
     std::function<LearnerLosses()> losses;
     std::function<bool()> finite;

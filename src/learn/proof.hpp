@@ -145,7 +145,7 @@ private:
     Begun& begun_;
     Tally total_;  ///< of the frontier and of the first `settled_` parts
     std::size_t settled_ = 0;
-    std::size_t next_ = 0;  ///< part that nobody has claimed
+    std::size_t next_ = 0;  ///< next part that is not claimed
     unsigned running_ = 0;
     std::uint64_t boxes_ = 0;  ///< for the progress; parts that are not finished included
     Stop stop_ = Stop::none;

@@ -27,12 +27,12 @@ std::string describe(const std::vector<Rival>& rivals)
                           [](const Rival& a, const Rival& b) { return a.seconds < b.seconds; });
     if (&fastest == &network) {
         return fmt::format(
-            "the network is the fastest of {} ways to look: {:.2f} of the time of "
+            "the network is the fastest of {} ways to check: {:.2f} of the time of "
             "every step, {}",
             rivals.size(), share(network), lost(network, exact));
     }
     return fmt::format(
-        "the network is not the fastest of {} ways to look: it takes {:.2f} of the time of every "
+        "the network is not the fastest of {} ways to check: it takes {:.2f} of the time of every "
         "step ({}), looking at {} takes {:.2f} ({})",
         rivals.size(), share(network), lost(network, exact), fastest.name, share(fastest),
         lost(fastest, exact));

@@ -300,7 +300,7 @@ private:
     {
         const double x = (attempt.length - options_.h_min) / (options_.h_max - options_.h_min);
         if (!attempt.solved) return -x;
-        const double cheap = 1 - (attempt.work_per_solve - 1) / (options_.dear - 1);
+        const double cheap = 1 - (attempt.work_per_solve - 1) / (options_.expensive - 1);
         return x * std::clamp(cheap, 0.0, 1.0) * std::exp(-options_.alpha * attempt.error);
     }
 
@@ -348,7 +348,7 @@ StepWorldOptions checked(StepWorldOptions o, double longest)
     constexpr ricochet::detail::Require require{"StepWorldOptions"};
     if (o.h_max == 0) o.h_max = longest;
     require(o.alpha >= 0 && std::isfinite(o.alpha), "alpha must be zero or positive", o.alpha);
-    require(o.dear > 1, "dear must be above 1", o.dear);
+    require(o.expensive > 1, "expensive must be above 1", o.expensive);
     require(o.lambda >= 0 && std::isfinite(o.lambda), "lambda must be zero or positive", o.lambda);
     require(o.work_unit > 0, "work_unit must be positive", o.work_unit);
     require(o.h_min > 0, "h_min must be positive", o.h_min);

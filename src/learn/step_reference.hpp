@@ -18,7 +18,7 @@ namespace ricochet::learn::detail {
 
 inline constexpr std::size_t fault_samples = 600;
 
-/// Velocities of a reference at even times, without units, one column per time.
+/// Velocities of a reference at even times, nondimensional, one column per time.
 struct FaultReference {
     Eigen::MatrixXd velocity;
     double of_all = 0;     ///< sum of its squares

@@ -10,9 +10,9 @@ std::string ClassifierTrial::describe() const
     const std::string cost =
         pays()
             ? fmt::format(
-                  "the network takes {:.2f} of the time of looking at the end of every step", ratio)
+                  "the network takes {:.2f} of the time of a check of every step", ratio)
             : fmt::format(
-                  "looking at the end of every step is faster: the network takes {:.2f} "
+                  "a check of the end of every step is faster: the network takes {:.2f} "
                   "times as long",
                   ratio);
     const std::string verdict = learn::describe(rivals);

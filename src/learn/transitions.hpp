@@ -1,4 +1,4 @@
-// What a learner is taught from: transitions, kept and drawn.
+// Transitions that a learner is taught from, kept and drawn.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Does the guard change sign without a zero? Poles and jumps do.
+// Changes of sign without a zero: poles and jumps of a guard.
 #pragma once
 
 #include <algorithm>
@@ -53,7 +53,7 @@ inline constexpr double jump_part = 1e-3;
     return false;
 }
 
-/// Where the guard jumps. On a pole itself it is not finite, and no state to go on from: the
+/// Where the guard jumps. On a pole itself it is not finite, and no state to continue from: the
 /// bracket then reaches a few doubles beyond it, at most to `end`.
 [[nodiscard, gnu::noinline]] inline Location jump_at(GuardPath& path, const GuardSample& lo, GuardSample hi,
                                               double end)

@@ -202,7 +202,7 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi,
         const double width = hi.s - lo.s;
         const double finest = path.finest(hi.s);
         if (width <= std::max(tolerance, finest)) break;
-        // A root at an end is looked for beside it.
+        // A root at an end is searched for beside it.
         const double beside = std::max(finest, reach / 4);
         if (s >= hi.s && slow == 0) s = hi.s - beside;
         if (s <= lo.s && slow == 0) s = lo.s + beside;

@@ -1,4 +1,4 @@
-// How the kernels of each instruction set are reached.
+// Table of the kernels of each instruction set.
 #pragma once
 
 #include "ricochet/nn/mlp.hpp"

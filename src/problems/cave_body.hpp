@@ -75,7 +75,7 @@ public:
 
     /// These meshes; refinements and sizes are not used. The body begins where it is.
     /// @throws std::invalid_argument also for a mesh that is empty, open or has a
-    /// coordinate that is no number, naming the face, and for a body that is not inside of the
+    /// coordinate that is not a number, naming the face, and for a body that is not inside of the
     /// cave.
     CaveBody(const Parameters& parameters, const geometry::Mesh& cave, const geometry::Mesh& body);
 

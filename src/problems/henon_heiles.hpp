@@ -13,7 +13,7 @@ namespace ricochet {
 /// A star in the meridian plane of a galaxy with a potential of third degree.
 ///
 /// State (vx, vy, x, y), dimensionless; passages through the plane x = 0 with x rising
-/// are looked for, and nothing happens there.
+/// are searched for, and nothing happens there.
 ///
 ///     flow    vx' = -x - 2 x y,  vy' = -y - x² + y²,  x' = vx,  y' = vy
 ///     guard   x, rising

@@ -1,4 +1,4 @@
-// The smallest eigenvalue of a matrix that depends on parameters: a dear guard without geometry.
+// The smallest eigenvalue of a matrix that depends on parameters: an expensive guard without geometry.
 #pragma once
 
 #include <array>
@@ -78,7 +78,7 @@ public:
         return eigenvalue({x[0], x[1], x[2], x[3]}) - p_.level;
     }
 
-    /// u K' u with the eigenvector u: as dear as the guard.
+    /// u K' u with the eigenvector u: as expensive as the guard.
     template <class X, class D>
     [[nodiscard]] double guard_rate(double /*t*/, const X& x, const D& dxdt) const noexcept
     {

@@ -13,7 +13,7 @@ namespace ricochet {
 
 /// y = cos(t + phase) and the level 1 - depth.
 ///
-/// State (y, y'); passages through the level are looked for, and nothing happens there.
+/// State (y, y'); passages through the level are searched for, and nothing happens there.
 ///
 ///     flow    y'' = -y
 ///     guard   y - (1 - depth), either direction

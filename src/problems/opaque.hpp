@@ -116,7 +116,7 @@ public:
         info.degree = 0;
         return info;
     }
-    /// Whether the state is inside. A guard that is no number is not.
+    /// Whether the state is inside. A guard that is not a number is not.
     template <class X>
     [[nodiscard]] bool guard(double t, const X& x) const noexcept
     {

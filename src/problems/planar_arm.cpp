@@ -190,7 +190,7 @@ void ArmScene::place(const std::vector<std::vector<Point2>>& obstacles)
         box.add(std::array{-p_.reach, -p_.reach});
         box.add(std::array{p_.reach, p_.reach});
         box.widen(1e-9 * p_.reach);
-        // Distances to the edges, whichever side: 1-Lipschitz, and what the guard looks at.
+        // Distances to the edges, whichever side: 1-Lipschitz, and what the guard examines.
         place->table.emplace(box, p_.grid, 1e-14 * p_.reach, [&](const auto& at) {
             return place->edges.nearest({at[0], at[1]}).distance;
         });
@@ -227,7 +227,7 @@ ArmScene::Contact ArmScene::contact(Search search, const double* angles) const n
     const auto joints = ends(angles, n_, link_);
     Contact best{.distance = infinity, .link = 0, .point = {}, .normal = {}};
     NearestPair nearest;
-    // The link that was nearest goes first, and bounds what the others look at.
+    // The link that was nearest goes first, and bounds what the others examine.
     const std::uint32_t first = last->answer.contact.link < n_ ? last->answer.contact.link : 0;
     for (std::uint32_t k = 0; k < n_; ++k) {
         const std::uint32_t link = k == 0 ? first : k <= first ? k - 1 : k;

@@ -1,4 +1,4 @@
-// What the two files of the paper on potentials have in common.
+// Parts that the two files of the paper on potentials share.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What the two files of the paper on step control have in common.
+// Parts that the two files of the paper on step control share.
 #pragma once
 
 #include <vector>

@@ -17,7 +17,7 @@ namespace ricochet::app {
 /// @throws BadInput or ModelError.
 int compare_step_control(const CompareRequest& request);
 
-/// `compare rate-and-state`: the tables of the published study beside ours, computed anew in about
+/// `compare rate-and-state`: the tables of the published study beside ours, computed again in about
 /// a minute.
 int compare_rate_and_state(const CompareRequest& request);
 

@@ -114,7 +114,7 @@ constexpr std::array<ModelData, 19> all{{
     {"diode-circuit-step", by_evolution, nullptr},
     {"diode-circuit-tqc", by_reward, nullptr},
     {"eigenvalue-certified",
-     "regression on random states drawn anew for each batch, a quarter of them where the network "
+     "regression on new random states for each batch, a quarter of them where the network "
      "is worst",
      nullptr},
     {"fault-step", by_evolution, nullptr},

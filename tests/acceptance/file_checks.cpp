@@ -1,4 +1,4 @@
-// Saved runs, potential files and runs that cannot go on: nothing is taken for what it is not.
+// Saved runs, potential files and runs that cannot continue: nothing is taken for what it is not.
 #include <fmt/format.h>
 
 #include <array>

@@ -1,4 +1,4 @@
-// What skipping the checks of dear guards must show.
+// What skipping the checks of expensive guards must show.
 #include <vector>
 
 #include "certificates.hpp"

@@ -1,4 +1,4 @@
-// What the library must show, by topic, as checks that can be run.
+// Acceptance checks by topic.
 #pragma once
 
 #include <array>
@@ -65,7 +65,7 @@ struct Check {
 /// Events where guards accumulate, decay, or move faster than the state.
 [[nodiscard]] std::vector<Check> resolution_checks();
 
-/// Saved runs, potential files, runs that cannot go on.
+/// Saved runs, potential files, runs that cannot continue.
 [[nodiscard]] std::vector<Check> file_checks();
 
 /// The fault and the rules for its steps.
@@ -146,7 +146,7 @@ struct Check {
 [[nodiscard]] Measured time_idle_guard();
 [[nodiscard]] Measured time_hundred_idle_guards();
 
-/// Scenes with dear guards: the planner against a check at every step.
+/// Scenes with expensive guards: the planner against a check at every step.
 [[nodiscard]] Measured time_cavern();
 [[nodiscard]] Measured time_cavern_dopri5();
 [[nodiscard]] Measured compare_many_events();

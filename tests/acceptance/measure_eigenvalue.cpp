@@ -1,4 +1,4 @@
-// A dear guard without geometry: what bounds of its value save beside those of its rate.
+// An expensive guard without geometry: what bounds of its value save beside those of its rate.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What trained gates save, and what they miss.
+// Savings and misses of trained gates.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 namespace ricochet::bench {
 
 /// A boolean black box on an arm of 4 joints among 8 obstacles, in calls of the guard: a horizon
-/// gate, trained here, against a look at every step and against `EveryK`, over at least
+/// gate, trained here, against a check of every step and against `EveryK`, over at least
 /// `events` fresh events each.
 [[nodiscard]] Measured gate_black_box_4(std::size_t events = 30'000);
 

@@ -1,4 +1,4 @@
-// Networks attached to scenes with dear guards: whatever they say, the same events; and with the
+// Networks attached to scenes with expensive guards: whatever they say, the same events; and with the
 // meter on, the same time.
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-// What is done to every scene with a dear guard: networks of any weights are attached, and the
+// What is done to every scene with an expensive guard: networks of any weights are attached, and the
 // events and times compared with those of runs without.
 #pragma once
 
@@ -119,7 +119,7 @@ struct MeteredRow {
 };
 
 /// Two rows: what knows nothing, and what looks too far ahead. The tenth of the samples that was
-/// disturbed least counts. A look at every step is timed in turns with the others unless it takes
+/// disturbed least counts. A check of every step is timed in turns with the others unless it takes
 /// so long that this tells nothing.
 template <class Stepping, class System>
 void time_metered(std::vector<MeteredRow>& rows, const std::string& name, const System& of,

@@ -41,7 +41,7 @@ auto row(const Event<X>& event)
 
 // --- saving ---
 
-/// A run that is saved after so many of its steps, restored elsewhere and gone on with.
+/// A run that is saved after so many of its steps, restored elsewhere and continued with.
 struct Interruptible {
     std::string name;
     std::uint64_t steps = 0;

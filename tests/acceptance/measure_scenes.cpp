@@ -1,4 +1,4 @@
-// Scenes with dear guards: a check at every step against the planner of bounds.
+// Scenes with expensive guards: a check at every step against the planner of bounds.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -128,12 +128,12 @@ struct Mesh {
 
 /// Gains of the policies of all seeds on one fault.
 struct Gains {
-    double over_classical = 0;  ///< the best rule that looks at errors
+    double over_classical = 0;  ///< the best rule that examines errors
     double over_heuristic = 0;
     double over_constant = 0;
     double over_best = 0;      ///< constant steps or a rule
     double final_slip = 0;     ///< over the best of all, at 1e-3
-    double solves_to_end = 0;  ///< over constant steps that go on when all is at rest
+    double solves_to_end = 0;  ///< over constant steps that continue when all is at rest
     std::string line;
 };
 

@@ -24,7 +24,7 @@ namespace ricochet::bench {
 
 namespace {
 
-/// Without guards, with the ends looked at, with the extremum looked for.
+/// Without guards, with the ends examined, with the extremum searched for.
 struct Trio {
     Timing none, ends, extremum;
 

@@ -57,7 +57,7 @@ TEST_F(App, CompareSaysWhatTheNetworkCostsAndWritesTheTimes)
     const Result result = run({"compare", "bouncing-ball", "--csv", "table.csv"});
     EXPECT_EQ(result.status, 0) << result.err;
     EXPECT_NE(result.out.find("the network costs"), std::string::npos);
-    EXPECT_NE(result.out.find("verified put off 0 checks"), std::string::npos);
+    EXPECT_NE(result.out.find("verified deferred 0 checks"), std::string::npos);
     EXPECT_NE(result.out.find("with the same events"), std::string::npos);
     EXPECT_NE(result.out.find("u/(g h²) + v/(g h) <= 1/2"), std::string::npos);
     // The title, then the two tables.

@@ -190,7 +190,7 @@ TEST_F(Robust, ACheckpointIsLeftAloneWithoutResume)
         write("m.safetensors.checkpoint", "an earlier training");
         expect_refused(words, {"m.safetensors.checkpoint", "--resume", "remove"});
         EXPECT_EQ(content(work() / "m.safetensors.checkpoint"), "an earlier training");
-        // And what is no checkpoint is not gone on from.
+        // And what is no checkpoint is not continued from.
         Words resumed = words;
         resumed.emplace_back("--resume");
         expect_refused(resumed, {"m.safetensors.checkpoint"});

@@ -389,7 +389,7 @@ static void ends_runs_of_callbacks_that_misbehave(void)
     rc_system_free(system);
 }
 
-/* A callback that goes on with the run that called it. */
+/* A callback that continues with the run that called it. */
 static rc_simulation* inner;
 static int goes_on_with_it(void* user, rc_mode mode, double t, const double* x, double* dxdt,
                            size_t n)

@@ -1,4 +1,4 @@
-/* Whichever call of a callback fails, the run goes on afterwards with the bits of one in which
+/* Whichever call of a callback fails, the run continues afterwards with the bits of one in which
  * none has failed. */
 #include <math.h>
 
@@ -23,7 +23,7 @@ enum {
 struct world {
     size_t calls;      /* so far */
     size_t fails_at;   /* the call that fails, once; 0: none */
-    int moves;         /* after that, another simulation goes on from a snapshot */
+    int moves;         /* after that, another simulation continues from a snapshot */
     int moded;         /* impacts of the first ball change the mode */
     size_t seen[calls_of];
 };

@@ -1,5 +1,5 @@
 /* The structs of the first release, 0.1, as they were: a program that was compiled with them
- * goes on working with every later library of the same soname. Not to be changed. */
+ * continues working with every later library of the same soname. Not to be changed. */
 #ifndef RICOCHET_TESTS_C_FIRST_RELEASE_H
 #define RICOCHET_TESTS_C_FIRST_RELEASE_H
 

@@ -253,7 +253,7 @@ public:
     using X = typename System::X;
     static constexpr std::size_t n = X().size();
 
-    /// @param moves  every verdict is followed by a snapshot, and another monitor goes on
+    /// @param moves  every verdict is followed by a snapshot, and another monitor continues
     OfC(System& system, bool moves) : system_(Callbacks<System>::make(system)), moves_(moves)
     {
         CHECK_STATUS(RC_OK, rc_monitor_new(system_, nullptr, &monitor_));

@@ -1,4 +1,4 @@
-/* What a host must not do: a defined error each, and a monitor that goes on as if it had not. */
+/* What a host must not do: a defined error each, and a monitor that continues as if it had not. */
 #include "rk4_host.h"
 
 static const double start[2] = {10, 0};

@@ -13,7 +13,7 @@ struct host {
     rc_mode mode;
     double t;
     double x[most_components], rate[most_components];  /* where it is */
-    double x1[most_components], rate1[most_components]; /* the end of the step in hand */
+    double x1[most_components], rate1[most_components]; /* the end of the current step */
     double h;
     int restep_error; /* that its restep returns; 0: none */
 };

@@ -24,7 +24,7 @@ static void set(int* flag)
     pthread_mutex_unlock(&lock);
 }
 
-/* Waits in its callback until it may go on. */
+/* Waits in its callback until it may continue. */
 static int waiting_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
 {
     if (t > 1) {
@@ -75,7 +75,7 @@ static void refuses_a_second_thread(void)
 
 static const double start_of_fall[2] = {10, 0};
 
-/* Waits in its callback until it may go on. */
+/* Waits in its callback until it may continue. */
 static int waiting_step(void* user, double s, double* x, size_t n)
 {
     (void)user, (void)n;

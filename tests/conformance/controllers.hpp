@@ -1,4 +1,4 @@
-// What every step controller must do.
+// Conformance suite of step controllers.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What every convex set must do.
+// Conformance suite of convex sets.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What every detector must do with a step.
+// Conformance suite of detectors, on one step.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -26,9 +26,9 @@ struct DetectorCase {
     std::function<bool(double sign, const GuardSample&, const GuardSample&, double touch)>
         leaves_plainly;
     Evidence unsuspected{};        ///< of a step that is not suspected
-    Evidence claims{};             ///< of a guard that no degree is known of, once looked at
+    Evidence claims{};             ///< of a guard that no degree is known of, once examined
     bool sees_pairs = false;       ///< two crossings in one step, and touches
-    std::uint64_t most_calls = 1;  ///< of the guard in one look
+    std::uint64_t most_calls = 1;  ///< of the guard in one check
 };
 
 inline void PrintTo(const DetectorCase& detector, std::ostream* out)
@@ -392,7 +392,7 @@ TEST_P(DetectorSuite, TheDirectionOfTimeChangesNothing)
 TEST_P(DetectorSuite, NotANumberIsNoEvidence)
 {
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    // At the end: the step is looked at, and never taken for one that only leaves.
+    // At the end: the step is examined, and never taken for one that only leaves.
     EXPECT_TRUE(GetParam().suspects(1, 1, -1, nan, -1, 1));
     const GuardSample start{.s = 0, .value = 1, .rate = -1};
     EXPECT_FALSE(GetParam().leaves_plainly(1, start, {.s = 1, .value = nan, .rate = -1}, 0));

@@ -1,4 +1,4 @@
-// What every gate, a detector with a network to ask, must do in a run.
+// Conformance suite of gates, detectors that ask a network, in a run.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@
 
 namespace ricochet::test {
 
-/// A point that goes to and fro between two walls at -1 and 1, at unit speed.
+/// A point that goes back and forth between two walls at -1 and 1, at unit speed.
 struct Shuttle {
     using State = std::array<double, 2>;
     static constexpr std::string_view name = "shuttle";
@@ -126,7 +126,7 @@ struct GateCase {
     bool saves = true;                     ///< exact calls, with a network that tells the truth
     bool plans = false;                    ///< by bounds on top of what the network clears
     bool refuses_other_weights = false;    ///< since its proof is of these
-    Evidence put_off = Evidence::checked;  ///< of the steps that it does not look at
+    Evidence put_off = Evidence::checked;  ///< of the steps that it does not examine
 };
 
 inline void PrintTo(const GateCase& gate, std::ostream* out)
@@ -190,7 +190,7 @@ protected:
         return model;
     }
 
-    /// Random weights of all sizes, constants, and weights that are no numbers.
+    /// Random weights of all sizes, constants, and weights that are not numbers.
     [[nodiscard]] static std::vector<Model> hostile()
     {
         std::mt19937_64 random(5);

@@ -1,4 +1,4 @@
-// What every pair of potentials of friction must do.
+// Conformance suite of pairs of potentials of friction.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -326,7 +326,7 @@ TEST_P(PotentialSuite, AnotherUnitOfLengthChangesNoBit)
     }
 }
 
-/// Whether a call is refused, or answers that it is no number.
+/// Whether a call is refused, or answers that it is not a number.
 template <class Call>
 [[nodiscard]] bool refuses(const Call& call)
 {

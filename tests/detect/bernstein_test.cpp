@@ -68,7 +68,7 @@ struct Timed {
     }
 };
 
-/// From 0 to 1 by steps of `step`, looked at by Bernstein.
+/// From 0 to 1 by steps of `step`, examined by Bernstein.
 Run<Timed::State> run_timed(const Timed& system, double step)
 {
     return integrate(system, {0.0}, {.t_end = 1, .step = step}, FixedStep<Rk4>{}, Bernstein{});
@@ -116,7 +116,7 @@ TEST(Bernstein, ThreeRootsInOneStepAreFoundInOrder)
 
 TEST(Bernstein, ARootThatAResetMovesBackIsNotFoundTwice)
 {
-    // Each of the events puts off the later ones by the slip, which is less than the
+    // Each of the events defers the later ones by the slip, which is less than the
     // window of 1e-12 s.
     for (const bool squared : {false, true}) {
         const test::ThreeRoots system{.squared = squared, .slip = 1e-14};
@@ -672,7 +672,7 @@ TEST(Bernstein, StatesSizedAtRunTimeGiveTheSameEvents)
     EXPECT_EQ(times(eigen), times(fixed));
 }
 
-// --- one look at a step ---
+// --- one check of a step ---
 
 TEST(Bernstein, TheBracketOfAnOnlyRootIsTheWholeStep)
 {

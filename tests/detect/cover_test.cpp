@@ -68,7 +68,7 @@ TEST(Cover, TwoSpeedsBoundThePathBetweenThem)
 
 TEST(Cover, NoMotionWithinTheBoundsEscapesThem)
 {
-    // Motions on a line with accelerations drawn anew for every piece, within A: integrated
+    // Motions on a line with accelerations drawn again for every piece, within A: integrated
     // exactly, so that only the rounding of sums is left, for which the margin is 1e-9.
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> uniform(-1, 1);
@@ -109,7 +109,7 @@ TEST(Cover, NoMotionWithinTheBoundsEscapesThem)
 
 TEST(Cover, TheForecastIsWhereTwoValuesJustCloseTheStretch)
 {
-    // A guard that goes on with its slope and bends by A, at constant speed: closed at the
+    // A guard that continues with its slope and bends by A, at constant speed: closed at the
     // forecast up to rounding, not beyond it.
     for (const double slope : {-0.9, -0.5, 0.0, 0.5}) {
         const double a = 0.25;

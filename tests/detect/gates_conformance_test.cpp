@@ -41,7 +41,7 @@ std::vector<GateCase> keeping_gates()
     const MeterOptions counted{
         .decision = MeterOptions::Decision::counted, .guard = 1e-6, .network = 1e-7, .step = 1e-7};
     std::vector<GateCase> gates{
-        // Without a bound to cover a stretch it saves nothing: every step is checked.
+        // Without a bound to cover an interval it saves nothing: every step is checked.
         keeping(any_gate("Verified", true_prediction(), verified), Evidence::checked),
         keeping(any_gate("Foreseen", true_horizons(), foreseen), Evidence::proved),
         keeping(any_gate("Certified", certified_levels(), certified), Evidence::proved),

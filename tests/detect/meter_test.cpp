@@ -28,7 +28,7 @@ using X = std::array<double, 2>;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double inf = std::numeric_limits<double>::infinity();
 
-/// A point that goes to and fro between two walls at -1 and 1.
+/// A point that goes back and forth between two walls at -1 and 1.
 struct Shuttle {
     using State = X;
     static constexpr std::string_view name = "shuttle";
@@ -176,7 +176,7 @@ TEST(Metered, AskingIsStoppedWhereItDoesNotPay)
 
 TEST(Metered, AHostileNetworkIsFoundOutByTheStepsItTakesBack)
 {
-    // Twenty steps further than any stretch can be closed, at a guard and a network for nothing.
+    // Twenty steps further than any interval can be closed, at a guard and a network at no cost.
     const Foreseen bold(horizon_gate(0.25), unchecked);
     Shuttle loose{.loose = 4};
     const auto planned = integrate(loose, at_centre, fifty_seconds, Fixed{}, Planned(unchecked));
@@ -224,7 +224,7 @@ void expect_same_events_while_ways_change(const Shuttle& system, const Options& 
     EXPECT_EQ(checked.run.statistics.network_calls, 0U);
     EXPECT_EQ(checked.run.statistics.checks_put_off, 0U);
     EXPECT_GE(checked.run.statistics.guard_calls, exact.statistics.steps);
-    // Looks for nothing, and all the time for trials: no way is left for long.
+    // Looks at no cost, and all the time for trials: no way is left for long.
     MeterOptions restless = counted(0, 0);
     restless.trials = 1;
     for (const std::uint64_t piece : {1U, 7U, 50U}) {
@@ -238,7 +238,7 @@ void expect_same_events_while_ways_change(const Shuttle& system, const Options& 
 
 TEST(Metered, EventsStayTheSameWhereEveryStepIsCheckedForAWhile)
 {
-    // A bound four times too large makes stretches be taken back.
+    // A bound four times too large makes intervals be taken back.
     expect_same_events_while_ways_change<Fixed>(Shuttle{.loose = 4}, fifty_seconds);
     expect_same_events_while_ways_change<ErrorControlled<Dopri5>>(
         Shuttle{.loose = 4}, {.t_end = 50, .rtol = 1e-9, .atol = 1e-9, .h_max = 0.02});
@@ -257,7 +257,7 @@ TEST(Metered, PlanningIsLeftWhereItCostsMoreThanItSaves)
             calls += meter.checks() ? 1 : planned;
             checked += meter.checks() ? 1 : 0;
             counts.guard_calls = static_cast<std::uint64_t>(calls);
-            meter.look_back(counts);
+            meter.review(counts);
         }
         EXPECT_EQ(meter.reading().checks, planned > 1);
         // Of the first 8 pieces half are planned in any case, and trials are few.

@@ -151,7 +151,7 @@ TEST(Network, OneModelServesEveryBallUnderErrorControl)
 
 TEST(Network, AStepOutsideItsRangeIsNeverCleared)
 {
-    // Trained for 0.01 s only: the last step, 0.004 s, is looked at.
+    // Trained for 0.01 s only: the last step, 0.004 s, is examined.
     const Network network(linear_model(0, 0, -1));  // never "event"
     const auto run = integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 0.104, .step = 0.01},
                                FixedStep<Rk4>{}, network);
@@ -214,7 +214,7 @@ TEST(Network, AModelForOneStepIsRefusedUnderErrorControl)
 
 TEST(Network, OutsideItsDomainNothingIsCleared)
 {
-    // The model knows heights up to some 12 m; a ball from 1000 m is looked at until
+    // The model knows heights up to some 12 m; a ball from 1000 m is examined until
     // it has come down that far, and by then it is too fast.
     const auto run = integrate(BouncingBall(), {1000.0, 0.0}, {.t_end = 14, .step = 0.01},
                                FixedStep<Rk4>{}, Network(paper_model()));

@@ -421,7 +421,7 @@ struct Far {
 
 TEST(Planned, AGuardThatIsNeverApproachedIsHardlyCalled)
 {
-    // On a circle of radius 1 the speed is 2 and the distance at least 4: every look covers
+    // On a circle of radius 1 the speed is 2 and the distance at least 4: every check covers
     // 4 / (1.01 * 2) s or more, 100 s need 51 of them, and one is made at the start.
     const double t_end = 100;
     for (const bool two_ended : {false, true}) {
@@ -437,7 +437,7 @@ TEST(Planned, AGuardThatIsNeverApproachedIsHardlyCalled)
 
 TEST(Planned, LookingAheadSavesLooks)
 {
-    // Away from a wall at the full speed two values cover any stretch; one covers a distance
+    // Away from a wall at the full speed two values cover any interval; one covers a distance
     // as long as that behind it, which takes log2(1000) looks from 0.01 to 10.
     struct Leaving {
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0, 0, 0}; }
@@ -697,7 +697,7 @@ TEST(Planned, AGuardThatIsNotANumberEndsTheRunWhereItDid)
     };
     const auto run = expect_planned_same<Fixed>(FastHole{{room}}, start, options);
     EXPECT_EQ(run.outcome, Outcome::non_finite);
-    // A guard with a bound is promised to be a number; its hole is met where it is looked at.
+    // A guard with a bound is promised to be a number; its hole is met where it is examined.
     const auto planned = integrate(Hole{room}, start, options, Fixed{}, Planned{});
     EXPECT_EQ(planned.outcome, Outcome::non_finite);
     EXPECT_GE(planned.t, run.t);
@@ -801,7 +801,7 @@ TEST(Planned, ARunThatIsCutShortEndsWhereItDid)
     }
     expect_planned_same<Fixed>(room, start, {.t_end = 5, .step = 0.01, .stop_at_event = true});
 
-    // Cancelled within a stretch: whatever is returned is final.
+    // Cancelled within an interval: whatever is returned is final.
     std::atomic<bool> cancelled = false;
     Options options{.t_end = 5, .step = 0.01};
     options.cancelled = &cancelled;
@@ -845,9 +845,9 @@ TEST(Planned, StatesSizedAtRunTimeHaveTheEventsOfTheExactDetector)
 
 TEST(Planned, AnEventTakesFiveExactCallsToLocateOnAverage)
 {
-    // A guard with a rate of its own: after the looks at the ends of the step that holds the
+    // A guard with a rate of its own: after the examines the ends of the step that holds the
     // event there is one at each sample of Newton's method, two that close the bracket and
-    // one that arms the guard anew.
+    // one that arms the guard again.
     Room room;
     room.gravity = 0;
     struct Rated : Room {
@@ -880,7 +880,7 @@ TEST(Planned, RefusesPlansThatAreNone)
 TEST(EveryK, FindsWhatLastsLongerThanKSteps)
 {
     // A ball that bounces on the floor of a wide room is beyond it until it is reflected: no
-    // two crossings lie between two looks, and the events are those of every step.
+    // two crossings lie between two checks, and the events are those of every step.
     Room room;
     room.radius = 1e3;
     room.discs = {{0, -1e3, 1e3}};

@@ -1,4 +1,4 @@
-// What must hold in every physics engine that moves a body in steps of a fixed length.
+// Cases for every physics engine that moves a body in steps of a fixed length.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What must hold in every host: its motion, the library's events.
+// Cases for every host: its motion, the library's events.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -61,7 +61,7 @@ TEST(WrongUse, AStepShownTwiceIsRefused)
     started.host().step(1);
     EXPECT_EQ(started.monitor.examine(started.host()), Verdict::stands);
     EXPECT_THROW((void)started.monitor.examine(started.host()), std::logic_error);
-    // Nothing has changed: the run goes on.
+    // Nothing has changed: the run continues.
     started.host().step(1);
     EXPECT_EQ(started.monitor.examine(started.host()), Verdict::stands);
 }

@@ -204,7 +204,7 @@ TEST(Filippov, SlidingAlongOneSurfaceGoesOnAcrossTheOther)
 
 TEST(Filippov, SlidingEndsAtAnotherSurfaceBeyondWhichNothingHoldsIt)
 {
-    // Beyond x = 0 both fields lead up: the motion goes on into the first quadrant.
+    // Beyond x = 0 both fields lead up: the motion continues into the first quadrant.
     const Two system({{{{1, 1, 0}, {2, 1, 0}, {1, -1, 0}, {2, 3, 0}}}});
     const auto run = run_from(system, {-1.0, 0.0, 0.0}, 2);
     ASSERT_EQ(run.events.size(), 1u);
@@ -468,7 +468,7 @@ struct SuperTwisting {
 TEST(Filippov, SlidingOfSecondOrderNeedsItsRateAsASecondSurface)
 {
     const auto one = run_from(Filippov<SuperTwisting<1>>(), {1.0, 0.5}, 20);
-    EXPECT_NE(one.outcome, Outcome::reached_end);  // says that it cannot go on
+    EXPECT_NE(one.outcome, Outcome::reached_end);  // says that it cannot continue
     EXPECT_LT(one.t, 2);
     const auto two = run_from(Filippov<SuperTwisting<2>>(), {1.0, 0.5}, 20);
     EXPECT_EQ(two.outcome, Outcome::reached_end);

@@ -1,4 +1,4 @@
-// Exceptions from the functions of a system, and the runs that go on after them.
+// Exceptions from the functions of a system, and the runs that continue after them.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Runs that cannot go on: states of a wrong dimension, time that stands still.
+// Runs that cannot continue: states of a wrong dimension, time that stands still.
 
 #include "ricochet/integrate/outcome.hpp"
 

@@ -25,7 +25,7 @@ namespace {
 using Fixed = FixedStep<Rk4>;
 constexpr double inf = std::numeric_limits<double>::infinity();
 
-/// A point that goes to and fro between two walls at -1 and 1; only whether it is between them
+/// A point that goes back and forth between two walls at -1 and 1; only whether it is between them
 /// is known.
 struct Shuttle {
     using State = std::array<double, 2>;
@@ -288,7 +288,7 @@ TEST(Calibrated, FindsTheEventsOfTheExactDetectorInFewerCalls)
 
 TEST(Calibrated, ComesBackToAnEventThatTheGateDidNotSeeComing)
 {
-    // Clears 0.32 s always. Beyond a wall the point stays there, so that the look sees it.
+    // Clears 0.32 s always. Beyond a wall the point stays there, so that the check sees it.
     Model bold = true_horizons({0.32});
     bold.levels[0].threshold = 1e9;
     const Options options{.t_end = 50, .step = 0.01};
@@ -319,7 +319,7 @@ TEST(Calibrated, LooksAtEveryStepOutsideOfItsBoxAndCountsThem)
 
 TEST(CalibratedBounds, LooksLessThanThePlannerAlone)
 {
-    // Without looking ahead; with it the planner closes half a flight by two looks.
+    // Without looking ahead; with it the planner closes half a flight by two checks.
     const PlannerOptions planning{.two_ended = false};
     const Options options{.t_end = 50, .step = 0.01};
     const Measured::State start{0, 1};

@@ -139,7 +139,7 @@ TEST(StepWorld, ThePublishedReturnTelescopes)
 TEST(StepWorld, ThePublishedReturnIsLargestForTheSmallestSteps)
 {
     StepWorldOptions options = published_step_world();
-    options.dear = 1e9;  // solves cost nothing
+    options.expensive = 1e9;  // solves cost nothing
     const StepWorld world = step_world(StrikeSlipFault({.elements = 1}), 30, options);
     const double coarse = constant(world, 0.3).undiscounted;
     const double fine = constant(world, 0.003).undiscounted;
@@ -240,7 +240,7 @@ TEST(StepWorld, RefusesOptionsThatCannotBe)
     };
     for (const double bad : {-1.0, nan}) {
         refused({.alpha = bad});
-        refused({.dear = bad});
+        refused({.expensive = bad});
         refused({.lambda = bad});
         refused({.work_unit = bad});
         refused({.h_min = bad});

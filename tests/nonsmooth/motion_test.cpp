@@ -699,7 +699,7 @@ TEST(Start, IsRefusedWhereNoReactionOfAConeOpposesIt)
         1e-8);
 }
 
-// f escapes to infinity at t = 1 and is no number beyond.
+// f escapes to infinity at t = 1 and is not a number beyond.
 struct Escaping {
     static constexpr int state_size = 1;
     static constexpr int reaction_size = 1;

@@ -1,4 +1,4 @@
-// Trees against a look at everything.
+// Trees against a check of everything.
 #include <gtest/gtest.h>
 
 #include <cmath>

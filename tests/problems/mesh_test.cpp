@@ -1,4 +1,4 @@
-// Meshes: reading and refusing them, distances from trees against a look at everything, and
+// Meshes: reading and refusing them, distances from trees against a check of everything, and
 // the scene that is made of two.
 #include <gtest/gtest.h>
 
@@ -91,7 +91,7 @@ TEST(Mesh, BadOnesAreRefusedByFace)
     EXPECT_NE(text("OFF\n3 1 0\n0 0 0\n").find("ends among the vertices"), std::string::npos);
     EXPECT_NE(text("OFF\n").find("numbers of vertices"), std::string::npos);
     EXPECT_NE(text("OFF\n1 1 0\n0 0 0\n3 0 0\n").find("all its vertices"), std::string::npos);
-    // A coordinate that is no number is read, and refused by the face that has it.
+    // A coordinate that is not a number is read, and refused by the face that has it.
     EXPECT_NE(sentence(read_mesh("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n")).find("face 0"),
               std::string::npos);
 }

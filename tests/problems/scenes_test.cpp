@@ -1,4 +1,4 @@
-// Scenes with dear guards: what they promise, along real runs.
+// Scenes with expensive guards: what they promise, along real runs.
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -128,7 +128,7 @@ def test_time_events_and_modes_by_name():
     cut = monitor.cut
     assert cut.t == pytest.approx(0.75, abs=1e-15) and cut.fired_names == ["top"]
     assert (cut.mode_before, cut.mode_after) == ("up", "down") and not cut.state_changed
-    # The host may go on from a state and a mode of its own.
+    # The host may continue from a state and a mode of its own.
     assert monitor.resume(0.1, after=[0.5], mode="up") is Verdict.STANDS
     assert monitor.mode == "up" and monitor.x == [0.5]
     assert monitor.events["kind"].tolist() == [Kind.TIME, Kind.CROSSING]

@@ -40,7 +40,7 @@ def test_scipys_own_tests_pass(theirs, name):
 
 
 def test_all_roots_of_a_cubic_within_one_step_are_found():
-    # SciPy looks at the signs at the ends of a step: of three roots within it finds one.
+    # SciPy examines the signs at the ends of a step: of three roots within it finds one.
     def cubic(t, y):
         return (t - 1) * (t - 1.2) * (t - 1.3)
 

@@ -50,7 +50,7 @@ def test_a_classifier_spares_calls_of_the_guard(trained):
     assert trained.trial.network_calls < trained.trial.exact_calls / 2
     # The honest line says which is faster, as it was measured.
     faster = trained.trial.network_seconds < trained.trial.exact_seconds
-    assert ("looking at the end of every step is faster" in trained.verdict) is not faster
+    assert ("a check of the end of every step is faster" in trained.verdict) is not faster
     network = trained.network
     assert network.system == "pendulum" and network.parameters == pendulum.parameters
     assert network.step_range == (0.01, 0.01)

@@ -24,7 +24,7 @@ public:
         double epsilon = 1e-8;  ///< positive
     };
 
-    /// What a checkpoint must hold to continue.
+    /// State that a checkpoint must hold to continue.
     struct State {
         std::uint64_t steps = 0;
         std::vector<double> first;   ///< m

@@ -18,7 +18,7 @@
 
 namespace ricochet {
 
-/// What defines a law that is affine in the slip rate, for theta in [theta_min, theta_max].
+/// Definition of a law that is affine in the slip rate, for theta in [theta_min, theta_max].
 struct AffineLaw {
     std::function<double(double)> direct;        ///< A(V), of which only the integral may diverge
     std::function<double(double)> direct_slope;  ///< dA/dV

@@ -25,7 +25,7 @@ namespace ricochet {
 
 namespace detail {
 
-/// What a system declares beside its functions.
+/// Declarations of a system beside its functions.
 struct InclusionTraits {
     Confines confines = Confines::reaction;
     bool affine = false;
@@ -289,7 +289,7 @@ public:
                       Reaction& r, Reaction& lower, Reaction& upper) const override
     {
         if constexpr (branching) {
-            // On copies: what is written here could be what is read.
+            // Works on copies, since the output may overlap the input.
             const State at = by_components(w.data());
             State motion;
             Reaction acting;
@@ -411,7 +411,7 @@ private:
                     rate = terms.observed(0, copied(free));
                 }
             } else {
-                // Not free[k]: what is indexed at run time is kept in memory.
+                // Avoids free[k]: an array that is indexed at run time is kept in memory.
                 for_each_component(free, [&](auto i) { set_where(i == k, free[i], rate); });
             }
             if constexpr (moves) rate -= rate_of_offset(t)[0];

@@ -10,5 +10,5 @@
 #if ((defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || defined(__FAST_MATH__)) && \
     !defined(RICOCHET_ALLOW_FINITE_MATH)
 #error \
-    "ricochet: compiled with -ffast-math or -ffinite-math-only, under which NaN and infinity are not seen and runs go on with them; leave the flag out here, or define RICOCHET_ALLOW_FINITE_MATH if you know what you lose"
+    "ricochet: compiled with -ffast-math or -ffinite-math-only, under which NaN and infinity are not recognised and runs continue with them; leave the flag out here, or define RICOCHET_ALLOW_FINITE_MATH if you know what you lose"
 #endif

@@ -14,7 +14,7 @@ public:
     static constexpr bool uses_rates = Exact::uses_rates;
     static constexpr Screening screening = screening_of<Exact>;
     static constexpr bool looks_inside = LooksInside<Exact>;
-    static constexpr Evidence evidence = Exact::evidence;  ///< of a step it has looked at
+    static constexpr Evidence evidence = Exact::evidence;  ///< of a step it has examined
 
     explicit Around(const Exact& exact) : exact_(exact) {}
 

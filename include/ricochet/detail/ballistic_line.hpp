@@ -46,7 +46,7 @@ struct BallisticLine {
         return Ends::suspects(sign, g0, rate0, g1, rate1, h);
     }
 
-    /// A prediction may have been late, so that every event is looked at with care.
+    /// A prediction may have been late, so that every event is examined with care.
     [[nodiscard]] static bool leaves_plainly(double, const GuardSample&, const GuardSample&,
                                              double) noexcept
     {

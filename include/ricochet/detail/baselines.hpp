@@ -19,7 +19,7 @@ enum class Baseline {
     backward_euler,  ///< plain Newton in (V, state)
 };
 
-/// What stands for the state.
+/// Variable that stands for the state.
 enum class StateForm {
     theta,      ///< theta' = 1 - V theta / D_RS
     potential,  ///< xi' = dD*/dd at d = -dDdag/dxi, f = dDdag/dV

@@ -39,7 +39,7 @@ concept Branching = Inclusion<System> &&
 namespace detail {
 
 /// The hybrid system. Digit i to base 3 of a mode is the branch of reaction i: 0 lower (y > 0),
-/// 1 inside (held), 2 upper. Three more modes say that the motion cannot go on by itself:
+/// 1 inside (held), 2 upper. Three more modes say that the motion cannot continue by itself:
 /// `several`, where changes coincide and rates do not tell what follows, `no_flow`, where
 /// the held reactions are not determined by y' = 0, and `empty`, where a lower bound lies above
 /// the upper one. There nothing moves.
@@ -143,7 +143,7 @@ public:
         Inclusion::Flow::apply(flow_, matrices_.inclusion(), terms_, mode, t, x, dxdt);
     }
 
-    /// What acts in a mode at (t, w).
+    /// Reactions and rates in a mode at (t, w).
     [[nodiscard]] Reaction reaction(Mode mode, double t, const Vector& w) const
     {
         return motion(mode, t, w).reaction;
@@ -153,7 +153,7 @@ public:
     /// reactions that are not held. Writes the rate of the motion and the reactions, too.
     void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const;
 
-    /// What rounding of the terms may make of the held reactions.
+    /// Change of the held reactions that rounding of the terms may cause.
     [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
     {
         const double free = (rate - terms_.lever.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
@@ -283,7 +283,7 @@ private:
         return matrices_.inclusion().bound(t, w, i, side);
     }
 
-    /// What a motion does in a mode.
+    /// Motion in a mode: rate, reactions and bounds.
     struct Motion {
         Vector rate;
         Reaction reaction, lower, upper;
@@ -305,7 +305,7 @@ private:
                 std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
     }
 
-    /// As `motion`, but for the rate: a mode that holds nothing asks for the bounds alone.
+    /// Same as `motion` without the rate: a mode that holds nothing asks for the bounds alone.
     [[nodiscard]] Motion bounded_motion(Mode mode, double t, const Vector& w) const
     {
         if (holds(mode)) return motion(mode, t, w);
@@ -450,7 +450,7 @@ private:
         return checked(mode_of(next));
     }
 
-    /// Of the terms of a rate or a reaction: 64 units in the last place.
+    /// Rounding of the terms of a rate or a reaction: 64 units in the last place.
     static constexpr double negligible = 64 * std::numeric_limits<double>::epsilon();
 
     Matrices matrices_;

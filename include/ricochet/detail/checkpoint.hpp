@@ -23,7 +23,7 @@ struct Score {
     friend bool operator==(const Score&, const Score&) = default;
 };
 
-/// Everything a training needs to go on to the same bits.
+/// Everything a training needs to continue to the same bits.
 struct Checkpoint {
     std::uint64_t fingerprint = 0;  ///< of the data set and the options
     std::uint64_t iteration = 0;    ///< iterations done
@@ -54,7 +54,7 @@ struct GateCheckpoint {
     std::vector<std::vector<double>> best_thresholds;
 };
 
-/// As of a `Checkpoint`.
+/// Saves and loads the checkpoint of a gate, like a `Checkpoint`.
 void save_checkpoint(const GateCheckpoint& checkpoint, const std::filesystem::path& file);
 [[nodiscard]] GateCheckpoint load_gate_checkpoint(const std::filesystem::path& file);
 

@@ -22,7 +22,7 @@ struct RICOCHET_ALIGNED StateWithReaction {
 
 }  // namespace detail
 
-/// Where a set-valued motion is: the reaction belongs to the state.
+/// State of a set-valued motion; the reaction belongs to it.
 template <Inclusion System>
 using SetValuedState = detail::StateWithReaction<state_size<System>, reaction_size<System>>;
 
@@ -39,7 +39,7 @@ enum class Scheme {
     theta,  ///< A (w_{n+1} - w_n) / h = theta f_{n+1} + (1 - theta) f_n + G reaction
 };
 
-/// What stands for the reaction in a stage that averages f over its ends.
+/// Treatment of the reaction in a stage that averages f over its ends.
 enum class FirstStage {
     averaged,  ///< averaged like f: order 2 also where the reaction varies
     at_end,    ///< that of the stage's end, as in the source's code: order 1 there
@@ -104,7 +104,7 @@ public:
     ///     (w_{n+1} - 4 w_g + 3 w_n + h A^-1 (f_n + G reaction_n)) / 2.
     void embedded_error(const State& from, double h, const State& to, Vector& error) const;
 
-    /// Where the pair of reaction and y is on its graph: for a set of reactions the sign of
+    /// Branch of the pair of reaction and y on its graph: for a set of reactions the sign of
     /// y tells, and where that is zero up to rounding the place of the reaction in the
     /// set; for a set of states the place of y. Boxes only.
     void branches_of(const State& state, Branches& branches);

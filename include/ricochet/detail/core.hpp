@@ -55,13 +55,13 @@ public:
     virtual bool advance() = 0;
     /// Forgets what `advance` has not shown yet.
     virtual void show_all() noexcept = 0;
-    /// One step, which may be one of a stretch that is closed later if it looks ahead.
+    /// One step, which may be one of an interval that is closed later if it looks ahead.
     virtual void advance_once(bool look_ahead) = 0;
     /// The fastest way to the end, which `step` and `advance` do not take.
     virtual void run_to_end() = 0;
     [[nodiscard]] virtual Run<X> take() = 0;
     [[nodiscard]] virtual Run<X> finish() = 0;
-    /// What has been computed so far, with its time, state and counts up to date.
+    /// Result so far, with its time, state and counts up to date.
     virtual const Run<X>& bring_up_to_date() = 0;
     /// Lets a run that was cancelled be continued.
     virtual void go_on() noexcept = 0;

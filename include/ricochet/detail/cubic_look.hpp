@@ -1,11 +1,11 @@
 // Internal: what it declares may change without notice.
 //
-// Does a cubic through the ends of a stretch tell what a guard does inside?
+// Does a cubic through the ends of an interval tell what a guard does inside?
 //
 // Error control resolves the state, not the guard: where the state stands still or moves
 // slowly, steps grow without regard to a guard that depends on time. One evaluation at an
-// offset that is no simple fraction of the stretch is compared with the cubic through the
-// values and rates at its ends. A stretch where they disagree is divided until they agree
+// offset that is no simple fraction of the interval is compared with the cubic through the
+// values and rates at its ends. An interval where they disagree is divided until they agree
 // (detail/resolved_parts.hpp).
 #pragma once
 
@@ -17,13 +17,13 @@
 
 namespace ricochet::detail {
 
-/// The guard at the ends of a stretch, as a cubic over u in [0, 1].
+/// The guard at the ends of an interval, as a cubic over u in [0, 1].
 struct CubicLook {
-    /// Where a stretch is looked at: the golden section, which no period of a guard with
+    /// Part of an interval at which the guard is evaluated: the golden section, which no period of a guard with
     /// a simple ratio to the step hides behind, and a second place for cases of doubt.
     static constexpr double inside = 0.381966;
     static constexpr double further = 0.723607;
-    /// Where a step is looked at besides `inside` if the state stands still in it, so that
+    /// Further parts of a step at which the guard is evaluated if the state stands still in it, so that
     /// nothing has limited its length: no more than an eighth of it goes unseen.
     static constexpr std::array<double, 8> places = {0.0902, 0.2016,  0.3069, 0.4934,
                                                      0.6123, further, 0.8278, 0.9271};

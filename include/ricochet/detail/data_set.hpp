@@ -11,7 +11,7 @@
 
 namespace ricochet::learn {
 
-/// What one feature is.
+/// Description of one feature.
 struct Column {
     std::string name;
     std::string unit;  ///< "1" where it has none

@@ -5,7 +5,7 @@
 // A system is asked what it can do by concepts, and a member that answers to none of
 // them would be passed over in silence: a guard that is not const, a reset that returns
 // no mode, a function that counts its guards but is not told which. Here every such
-// member is looked at once per system, templates and overloads too, and is refused with
+// member is examined once per system, templates and overloads too, and is refused with
 // a sentence. So is a member that cannot be called at all, because it is private or its own
 // requires-clause does not hold, and one whose name is a slip away from a known one. A
 // system that means all its names as they are says so:
@@ -25,7 +25,7 @@
 
 namespace ricochet::detail {
 
-/// What became of a function that a system may declare.
+/// Result of examining a function that a system may declare.
 enum class Declaration : std::uint8_t {
     absent,
     fits,
@@ -38,7 +38,7 @@ enum class Declaration : std::uint8_t {
 
 // --- arguments to try with ---
 
-/// Becomes whatever is asked for.
+/// Converts to any type.
 struct Anything {
     template <class T>
     operator T() const;
@@ -51,7 +51,7 @@ struct Only {
     operator U() const;
 };
 
-/// Every name that is looked for. Together with these a class that has the name itself
+/// Every name that is searched for. Together with these a class that has the name itself
 /// has it twice, and a pointer to it is ambiguous.
 struct Names {
     int flow, guard, guards, guard_rate, guard_rates, guard_info, guard_count, reset, rest, enabled;
@@ -90,7 +90,7 @@ concept SpeltWell = requires
 #undef RICOCHET_VALUE
 };
 
-// What can be asked of one name: whether a class has a member of it, how it can be
+// Tests of one name: whether a class has a member of it, how it can be
 // called, whether it has an address, whether it is a number or another value.
 #define RICOCHET_NAME(name)                                                                   \
     struct Name_##name {                                                                      \
@@ -159,7 +159,7 @@ concept CallableSomehow =
     CallableAround<Name, System, X&, X&> || CallableAround<Name, System, X&> || CallableAround<Name, System> ||
     CallableWithTime<Name, System, X&, X&> || CallableWithTime<Name, System, X&>;
 
-/// Of a function that fits no form, why.
+/// Reason why a function fits no form.
 template <class Name, class System, class X>
 [[nodiscard]] constexpr Declaration unfit() noexcept
 {
@@ -188,7 +188,7 @@ template <class Name, class System, class X>
     }
 }
 
-/// Takes a Mode, and only that, in the place of a number of a guard.
+/// Takes a Mode, and only that, in place of a number of a guard.
 template <class Name, class System, class... Rest>
 concept TakesOnlyMode = Name::template takes<const System, Only<Mode>, Rest...> &&
     !Name::template takes<const System, Only<std::size_t>, Rest...>;

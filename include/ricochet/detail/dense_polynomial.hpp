@@ -19,7 +19,7 @@
 
 namespace ricochet {
 
-/// Which nodes a step's polynomial has besides its start.
+/// Nodes of a step's polynomial besides its start.
 enum class DenseNodes {
     end,         ///< cubic: the end with its slope
     middle_end,  ///< quartic: the middle without its slope, the end with it
@@ -141,7 +141,7 @@ struct DenseParts {
     const X* rate0 = nullptr;
     std::array<const X*, 3> w{};      ///< departures at the nodes
     std::array<const X*, 3> slope{};  ///< their slopes per second; null where not used
-    SeriesTerms series{};             ///< in the place of nodes
+    SeriesTerms series{};             ///< in place of nodes
 
     [[nodiscard]] int degree() const noexcept
     {

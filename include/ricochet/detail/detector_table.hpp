@@ -19,7 +19,7 @@ struct MeterOptions;
 
 namespace ricochet::detail {
 
-/// What a gate says of a state, see `gates::Gate::Answer`.
+/// Answer of a gate about a state, see `gates::Gate::Answer`.
 struct GateAnswer {
     double cleared = 0;
     bool outside = false;
@@ -51,7 +51,7 @@ struct DetectorTable {
     // --- deferred checks ---
     bool puts_off = false;
     bool needs_bounds = false;
-    Evidence put_off = Evidence::assumed;  ///< of a step without a look
+    Evidence put_off = Evidence::assumed;  ///< of a step without a check
     std::size_t longest = 1;
     bool checks_bounds = false;
     double margin = 0;

@@ -55,7 +55,7 @@ template <class X>
     }
 }
 
-/// What the functions of the table take: the system, and room for states of its own type.
+/// Argument of the functions of the table: the system, and memory for states of its own type.
 template <class System, class UserState>
 class Door {
 public:

@@ -6,7 +6,7 @@
 //
 //     M v + N f(V, xi) = F,    xi = xi^ + g xi'(V, xi),    M = A / g = 1/g + H + g K
 //
-// without units but for V = v times the unit of velocity. The states are eliminated element by
+// nondimensional but for V = v times the unit of velocity. The states are eliminated element by
 // element (friction_stage.hpp). V spans twelve decades, so that neither v nor log V is a good
 // unknown: the friction of an element at rest hardly depends on v, that of a fast one not on log V.
 // The unknown is z = c v + N f, the force on an element that its own stage balances, c the
@@ -36,7 +36,7 @@ public:
     /// @throws std::invalid_argument where the bound cannot be met.
     StageStiffness(const StrikeSlipFault& fault, double bound);
 
-    /// g, positive, without units.
+    /// g, positive, nondimensional.
     void set_length(double g);
     [[nodiscard]] double length() const noexcept { return g_; }
 
@@ -75,9 +75,9 @@ struct FaultStageEquation {
     Eigen::VectorXd xi;     ///< xi^
 };
 
-/// Where the elements are at the end of a stage.
+/// State of the elements at the end of a stage.
 struct FaultStagePoint {
-    Eigen::VectorXd v;         ///< without units
+    Eigen::VectorXd v;         ///< nondimensional
     Eigen::VectorXd xi;        ///< log(V* theta / D_RS)
     Eigen::VectorXd friction;  ///< coefficient
     Eigen::VectorXd ease;      ///< dv/dz, in [0, 1/c] where friction rises with the velocity
@@ -101,7 +101,7 @@ struct FaultStageOptions {
 template <EliminableLaw Law>
 class FaultFrictionStage {
 public:
-    /// @param normal  N of each element, without units
+    /// @param normal  N of each element, nondimensional
     FaultFrictionStage(const Law& law, const StrikeSlipFault& fault, StageStiffness& stiffness,
                        const Eigen::VectorXd& normal, const FaultStageOptions& options = {})
         : law_(law),

@@ -25,7 +25,7 @@ enum class Recipe {
     ballistic,  ///< the guard's height and rate in units of what its curvature does in one step
 };
 
-/// What a model file calls it.
+/// Name in a model file.
 [[nodiscard]] constexpr std::string_view name(Recipe recipe) noexcept
 {
     return recipe == Recipe::state ? "state" : "ballistic";
@@ -148,7 +148,7 @@ void features(Recipe recipe, const System& system, double t, const X& x, const X
     }
 }
 
-/// As above, with the flow evaluated here, into a copy of the state.
+/// Same, with the flow evaluated here, into a copy of the state.
 template <class System, class X>
 void features(Recipe recipe, const System& system, double t, const X& x, double h,
               double* out) noexcept

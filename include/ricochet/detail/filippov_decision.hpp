@@ -32,7 +32,7 @@ public:
     /// largest rate: 2e-13.
     static constexpr double negligible = 0x1p-42;
 
-    /// Which exits have fired, a bit each, numbered as in `Exits`.
+    /// Exits that have fired, a bit each, numbered as in `Exits`.
     using FiredExits = unsigned;
 
     [[nodiscard]] static constexpr FiredExits exit_bit(std::size_t surface, Place side) noexcept
@@ -40,7 +40,7 @@ public:
         return 1u << (2 * surface + (side == Place::above ? 1 : 0));
     }
 
-    /// Where a motion goes that is on the surfaces in `on`, without a history.
+    /// Places of a motion that starts on the surfaces in `on`, without a history.
     template <class X>
     [[nodiscard]] Places decide(const Places& at, Surfaces on, double t, const X& x) const
     {
@@ -94,7 +94,7 @@ public:
         const RegionRates rates = normalised(around(both, slides, t, x).rates);
         const Continuation way = follow_shares(rates, from);
         if (way.to == slides) return slides;
-        // What leaves at no rate may turn back.
+        // A motion that leaves at a rate of zero may turn back.
         const auto later = [&](double time, const X& at) {
             const RegionRates r = around(both, slides, time, at).rates;
             const Continuation same = follow_shares(normalised(r), middle_of(way.to));
@@ -252,7 +252,7 @@ public:
 
     /// Moves x along its motion by the least that there is, or onto its own side of the
     /// surfaces in `on`. Where a surface was met but the motion stays on its side, that
-    /// makes the loop judge it anew from here.
+    /// makes the loop judge it again from here.
     template <class X>
     void go_on(Surfaces on, const Places& at, double t, X& x) const
     {

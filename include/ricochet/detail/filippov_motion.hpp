@@ -187,7 +187,7 @@ public:
     }
 
     /// The same, and 0 where it is no more than the rounding of its terms, those of the
-    /// single components of v. Only a rate that is small by any measure is worth the look.
+    /// single components of v. Only a rate that is small by any measure is worth the check.
     template <class X>
     [[nodiscard]] double resolved_rate(std::size_t which, double t, const X& x, const X& v) const
     {

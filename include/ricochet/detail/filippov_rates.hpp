@@ -13,14 +13,14 @@
 
 namespace ricochet {
 
-/// Where a motion is with respect to a switching surface h = 0.
+/// Place of a motion with respect to a switching surface h = 0.
 enum class Place : std::uint8_t {
     below,    ///< h < 0
     above,    ///< h > 0
     sliding,  ///< held on h = 0 by the fields of both sides
 };
 
-/// What happens to a motion that is on a switching surface.
+/// Fate of a motion that is on a switching surface.
 enum class Meeting : std::uint8_t {
     crossing_up,    ///< both fields lead up
     crossing_down,  ///< both fields lead down
@@ -93,7 +93,7 @@ struct SlidingShares {
 /// zero nearest to (1/2, 1/2).
 [[nodiscard]] SlidingShares sliding_shares(const RegionRates& rates) noexcept;
 
-/// Where a motion goes from the intersection of two surfaces.
+/// Places of a motion that starts on the intersection of two surfaces.
 struct Continuation {
     Places to{Place::sliding, Place::sliding};
     double margin = 0;  ///< least rate, of normalised rates, at which it leaves a surface

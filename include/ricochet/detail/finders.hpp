@@ -14,7 +14,7 @@
 
 namespace ricochet::detail {
 
-/// What a network that predicts the events of a step is shown of it.
+/// Inputs of a network that predicts the events of a step.
 template <class System, class X>
 class StepToCome {
     using D = Door<System, X>;

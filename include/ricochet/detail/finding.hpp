@@ -17,7 +17,7 @@ concept LooksInside = requires
     requires Detector::looks_inside;
 };
 
-/// How steps are screened for guards that deserve a look, as a detector declares it; without a
+/// How steps are screened for guards that need a check, as a detector declares it; without a
 /// word, by a function of its own.
 enum class Screening : std::uint8_t {
     ends,      ///< as `Ends`
@@ -43,10 +43,10 @@ struct Watch {
     double touch = 0;      ///< |g| at an extremum that counts as being on the surface, at least
     double scale = 0;      ///< the largest |g| that the ends of the step suggest
     bool departs = false;  ///< an event of the guard, or what enabled it, is at the start
-    Side side_after = Side::plateau;  ///< at the end, if the stretch is clear
+    Side side_after = Side::plateau;  ///< at the end, if the interval is clear
 };
 
-/// Either "clear", with its evidence; or a stretch in which the guard leaves `side`:
+/// Either "clear", with its evidence; or an interval in which the guard leaves `side`:
 /// still on it at `lo`, across or on the surface at `hi`; or a touch at `hi`.
 struct Finding {
     bool hit = false;

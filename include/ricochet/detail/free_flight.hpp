@@ -8,7 +8,7 @@
 //             of friction, for all contacts that closed at that instant at once
 //
 // The system is a value as `TimeStepping` takes it. Nothing holds a contact that stays
-// closed: there the run ends (`Outcome::zeno`), and `contact_motion.hpp` goes on.
+// closed: there the run ends (`Outcome::zeno`), and `contact_motion.hpp` continues.
 #pragma once
 
 #include <array>

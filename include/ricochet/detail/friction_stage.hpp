@@ -30,7 +30,7 @@ struct StageResponse {
     double xi = 0, xi_y = 0;
 };
 
-/// What the elimination needs of a law: friction and rate with gradients, the rate falling
+/// Requirements of the elimination on a law: friction and rate with gradients, the rate falling
 /// with xi, and V*. (With the asinh form that of the slip law rises where V is below w and
 /// V theta / D_RS below 1e-16; what is found there is one of several states.)
 template <class Law>
@@ -146,7 +146,7 @@ public:
         const double strength = f_star_ + b_ * xi;
         const double friction = strength + a_ * y;
         if constexpr (effect == DirectEffect::asinh) {
-            // Else w, by which the two forms differ, would count: h w / D_RS > 1e-17.
+            // Otherwise w, by which the two forms differ, would matter: h w / D_RS > 1e-17.
             if (!(friction > 40 * a_ && strength > a_ * (40 + log_a_))) {
                 return detail::implicit_response(*law_, h_, v, before, xi);
             }

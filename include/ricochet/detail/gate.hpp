@@ -73,7 +73,7 @@ public:
         return classifier_->in_domain(features);
     }
 
-    /// What the gate says of a state.
+    /// Answer of the gate about a state.
     struct Answer {
         double cleared = 0;
         bool outside = false;  ///< of the domain; nothing is cleared

@@ -39,7 +39,7 @@ struct GateRecipe {
     friend bool operator==(const GateRecipe&, const GateRecipe&) = default;
 };
 
-/// As a model spells it, e.g. "state-phase(0.7) mode(3)".
+/// Name as a model spells it, e.g. "state-phase(0.7) mode(3)".
 [[nodiscard]] std::string to_string(const GateRecipe& recipe);
 
 /// @throws std::invalid_argument naming what was given and what is known.

@@ -43,7 +43,7 @@ private:
     Held held_;
 };
 
-/// What is particular to a system: where its runs start, and how long they and their steps are.
+/// Properties of the runs of a system: where they start, and how long they and their steps are.
 struct GateSpec {
     GateSystem system;
     std::string recipe;            ///< of the features

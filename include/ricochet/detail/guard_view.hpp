@@ -16,7 +16,7 @@
 
 namespace ricochet {
 
-/// The guard at one time inside a step. The rate is NaN where nobody asked for it.
+/// The guard at one time inside a step. The rate is NaN where it was not computed.
 struct GuardSample {
     double s = 0;      ///< [s] offset from the start of the step
     double value = 0;  ///< g
@@ -120,7 +120,7 @@ public:
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
     [[nodiscard]] Crossing crossing() const noexcept { return crossing_; }
 
-    /// Of the guard as a polynomial in time and state; 0: not declared.
+    /// Degree of the guard as a polynomial in time and state; 0: not declared.
     [[nodiscard]] int degree() const { return guard_info_of<X>(*system_, which_).degree; }
 
     /// Counts an evaluation that somebody else makes.

@@ -32,7 +32,7 @@ struct RICOCHET_ALIGNED Stage {
 
 }  // namespace detail
 
-/// What became of a stage.
+/// Result of a stage.
 struct StageReport {
     bool converged = false;
     double residual = std::numeric_limits<double>::infinity();  ///< see above
@@ -97,7 +97,7 @@ struct RICOCHET_ALIGNED StageFactor {
     }
 };
 
-/// What the stage solvers need to know of one another's work, and their memory.
+/// Results that the stage solvers share, and their memory.
 template <int N, int M>
 struct RICOCHET_ALIGNED StageScratch {
     using Matrices = AnyMatrices<N, M>;

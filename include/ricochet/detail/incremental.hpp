@@ -36,7 +36,7 @@ struct IncrementalJet {
     double xx = 0, xxi = 0, xixi = 0;  ///< [N/m], [N], [J]
 };
 
-/// What a step begins with.
+/// Start of a step.
 struct IncrementalStart {
     double x = 0, x_before = 0;  ///< x_n and x_{n-1} [m]
     double xi = 0;               ///< xi_n

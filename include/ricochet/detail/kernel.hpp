@@ -173,7 +173,7 @@ RICOCHET_INLINE void known_outputs(const T* parameters, const T* x, std::size_t 
     }
 }
 
-/// As `dense`.
+/// Same as `dense`.
 template <class T, class Activation, std::size_t Outputs>
 RICOCHET_INLINE void known_dense(const T* parameters, const T* x, std::size_t inputs, T* y) noexcept
 {

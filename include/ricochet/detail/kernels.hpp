@@ -58,7 +58,7 @@ requires(NameOf<Method>::known ||
 template <class X>
 inline constexpr bool fits_registers = is_small<X>&& std::is_trivially_copyable_v<X>;
 
-/// In the place of a system: its flow is called by pointer.
+/// Stands for a system whose flow is called by pointer.
 struct ByPointer {};
 
 template <class System, class X, class Method>
@@ -83,7 +83,7 @@ class KernelOf {
         return *static_cast<StepperDoor<System, X, Method>*>(static_cast<Door<System, X>*>(door));
     }
 
-    /// Where the flow is called, and what that has come to.
+    /// State at which the flow is called, and its result.
     struct Caller {
         void* door;
         bool (*flow)(void* door, Mode mode, double t, const C& x, C& dxdt);
@@ -120,7 +120,7 @@ class KernelOf {
         }
     }
 
-    /// What a step starts from.
+    /// Start of a step.
     struct Origin {
         const Y& x;
         const Y& rate;
@@ -185,7 +185,7 @@ class KernelOf {
         return to;
     }
 
-    /// The step in hand, from the registers.
+    /// The current step, from the registers.
     template <class Stages>
     [[gnu::always_inline]] static void store(State& step, [[maybe_unused]] const Stages& k,
                                              const X& w, [[maybe_unused]] const X& w_rate,
@@ -551,7 +551,7 @@ class KernelOf {
         put(remainder, step.remainder);
     }
 
-    /// Leaves the step in hand where the loop looks for it.
+    /// Leaves the current step where the loop searches for it.
     template <class Stages>
     [[gnu::always_inline]] static void leave(State& step, const Caller& caller, double h,
                                              const X& x0, const X& rate0, const X& remainder,

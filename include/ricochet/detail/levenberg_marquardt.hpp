@@ -24,7 +24,7 @@ struct LevenbergMarquardtOptions {
 
 struct LevenbergMarquardtReport {
     int iterations = 0;      ///< accepted steps
-    int trials = 0;          ///< sums of squares looked at
+    int trials = 0;          ///< sums of squares examined
     double sum = 0;          ///< of squares, at the end
     bool converged = false;  ///< no parameter moves, or the target is met
 };

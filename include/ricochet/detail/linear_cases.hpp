@@ -21,7 +21,7 @@
 
 namespace ricochet {
 
-/// Where a pair lies on its graph. For a set of reactions `inside` is sticking and a bound
+/// Branch of its graph on which a pair lies. For a set of reactions `inside` is sticking and a bound
 /// is sliding; for a set of states `inside` is free and a bound is contact.
 enum class Branch : signed char { lower = -1, inside = 0, upper = 1 };
 

@@ -39,19 +39,19 @@ struct MeterOptions {
         every_step,  ///< is checked: nothing is planned either
     };
     Decision decision = Decision::measured;
-    /// [s] of a look at the guard, an answer of the network and a step, if `counted`; not
+    /// [s] of a check of the guard, an answer of the network and a step, if `counted`; not
     /// negative, and the step above 0.
     double guard = 0;
     double network = 0;
     double step = 0;
-    /// Of the run's time that trials may cost in vain, in [0, 1].
+    /// Fraction of the run's time that useless trials may cost, in [0, 1].
     double trials = 0.01;
     std::uint64_t piece = 128;  ///< steps between decisions, at least 1
 };
 
-/// What a meter has found so far. Costs in seconds, 0 before the first sample.
+/// Measurements of a meter so far. Costs in seconds, 0 before the first sample.
 struct MeterReading {
-    double guard = 0;    ///< of a look
+    double guard = 0;    ///< of a check
     double network = 0;  ///< of an answer
     double step = 0;     ///< of a step without looks and answers, in the way that is best
     std::uint64_t asked = 0;
@@ -124,7 +124,7 @@ public:
     }
 
     /// Called now and then, with the counts of the run so far.
-    void look_back(const Statistics& counts)
+    void review(const Statistics& counts)
     {
         if (!decides_) return;
         if (counts.steps >= next_steps_ ||
@@ -208,7 +208,7 @@ private:
     std::uint64_t next_check_ = 0;
     Counts then_;       ///< when the piece began
     double began_ = 0;  ///< [s] when the piece began
-    double spent_ = 0;  ///< [s] on trials in vain
+    double spent_ = 0;  ///< [s] on useless trials
     double total_ = 0;  ///< [s] of the run
 };
 

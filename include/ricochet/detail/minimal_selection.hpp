@@ -171,7 +171,7 @@ template <int N, int M>
         detail::SelectionProblem<N, M> problem{inclusion, t,        w,
                                                delassus,  constant, mean > 0 ? 1 / mean : 1};
         (void)semismooth_newton(problem, reaction, {.tolerance = 1e-13, .max_iterations = 100});
-        // Where Newton stalls at a kink the fixed point gets there, at its own pace.
+        // Where Newton's method stalls at a kink the fixed point converges, more slowly.
         const double rho = 1 / std::max(delassus.norm(), std::numeric_limits<double>::min());
         for (int i = 0; i < 20000; ++i) {
             Reaction z = reaction - rho * (constant + delassus * reaction);

@@ -14,10 +14,10 @@
 
 namespace ricochet {
 
-/// What a host is to do next.
+/// Decision of a monitor about a step.
 enum class Verdict {
-    stands,  ///< the step stands: go on from its end
-    cut,     ///< the step ends at a set of events: go on from `cut().after`, and `resume`
+    stands,  ///< the step stands: continue from its end
+    cut,     ///< the step ends at a set of events: continue from `cut().after`, and `resume`
     rests,   ///< the motion has come to rest: keep the state until `must_stop_at`, then `hold`
     ended,   ///< the run is over; `outcome` says why
 };
@@ -35,7 +35,7 @@ struct Cut {
     std::vector<std::size_t> fired;
     bool on_time = false;        ///< with a time event
     bool accumulation = false;   ///< `after` is what `rest` makes of the limit, `t` its time
-    bool state_changed = false;  ///< false: the host need not start anew
+    bool state_changed = false;  ///< false: the host need not start again
 };
 
 namespace detail {
@@ -68,7 +68,7 @@ public:
     [[nodiscard]] virtual double quiet_until() const noexcept = 0;
     virtual void skip_to(const Instant& t, const X& x, const double* dxdt) = 0;
     [[nodiscard]] virtual Side side(std::size_t guard) const = 0;
-    /// What has been recorded so far; its time and state are those of the last `start`.
+    /// Records so far; their time and state are those of the last `start`.
     [[nodiscard]] virtual const Run<X>& run() const noexcept = 0;
     virtual void clear_events() noexcept = 0;
     [[nodiscard]] virtual Snapshot save() = 0;

@@ -7,7 +7,7 @@
 
 namespace ricochet::detail {
 
-/// Owns what `clone` makes of a `Base`; a copy owns one of its own.
+/// Owner of a `Base`; a copy owns a clone.
 template <class Base>
 class Owned {
 public:

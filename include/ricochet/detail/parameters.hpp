@@ -37,7 +37,7 @@ enum class StateEvolution {
     prz,     ///< theta' = 1 - (V theta / 2 D_RS)^2 (Perrin, Rice and Zheng)
 };
 
-/// Which pair of potentials gives a law exactly.
+/// Pair of potentials that gives a law exactly.
 enum class PotentialKind {
     quadratic,               ///< D*(d) = d^2 / (2 b D_RS), of d alone and convex
     state_dependent_convex,  ///< D*(d; xi), convex in d for every state

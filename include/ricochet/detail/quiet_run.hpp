@@ -3,7 +3,7 @@
 // Steps in a row in which nothing happens.
 //
 // Of a small state with at most one guard the loop enters a function of the system's own, with
-// flow and guard inlined, or one of the library's that calls them by pointer, which goes on until a step deserves a look, or the end is near. Bits and
+// flow and guard inlined, or one of the library's that calls them by pointer, which continues until a step needs a check, or the end is near. Bits and
 // counts are those of the loop.
 #pragma once
 
@@ -14,12 +14,12 @@
 
 namespace ricochet::detail {
 
-/// Why the loop is to go on.
+/// Why the loop is to continue.
 enum class QuietEnd : std::uint8_t {
     due,     ///< the next step is not one of these
-    failed,  ///< the step in hand cannot be accepted, nor be repeated by its error alone
-    moving,  ///< the state hardly changes in the step in hand, which is to be looked at closely
-    doubt,   ///< the guard may have an event in the step in hand
+    failed,  ///< the current step cannot be accepted, nor be repeated by its error alone
+    moving,  ///< the state hardly changes in the current step, which is to be examined closely
+    doubt,   ///< the guard may have an event in the current step
 };
 
 struct QuietRun {

@@ -71,7 +71,7 @@ public:
         return static_cast<std::size_t>(uniform() * static_cast<double>(n));
     }
 
-    /// Of the standard normal distribution (Box and Muller, 1958, the cosine of the pair).
+    /// Draws from the standard normal distribution (Box and Muller, 1958, the cosine of the pair).
     double normal() noexcept
     {
         const double radius = std::sqrt(-2 * std::log(1 - uniform()));

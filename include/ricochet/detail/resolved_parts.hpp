@@ -14,14 +14,14 @@
 
 namespace ricochet::detail {
 
-/// The inner nodes of one guard's parts in the step in hand. The step stands: its polynomial
+/// The inner nodes of one guard's parts in the current step. The step stands: its polynomial
 /// is evaluated, at the price of guard calls alone.
 class ResolvedParts {
 public:
     /// Forgets the nodes: another step.
     void clear() noexcept { guard_ = nobody; }
 
-    /// Divides the stretch that guard i is watched in, unless it is divided already.
+    /// Divides the interval that guard i is watched in, unless it is divided already.
     /// `everywhere`: at all places of `CubicLook::places` to begin with.
     void resolve(GuardPath& path, std::size_t i, const Watch& watch, double declared_touch,
                  bool everywhere);
@@ -37,7 +37,7 @@ public:
     }
 
     [[nodiscard]] bool divided() const noexcept { return divided_; }
-    /// Whether the guard is a cubic in the whole stretch but for a 64th of its size.
+    /// Whether the guard is a cubic in the whole interval but for a 64th of its size.
     [[nodiscard]] bool nearly_cubic() const noexcept { return nearly_cubic_; }
     [[nodiscard]] const Watch& whole() const noexcept { return whole_; }
     [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
@@ -45,7 +45,7 @@ public:
 private:
     static constexpr std::size_t nobody = static_cast<std::size_t>(-1);
     static constexpr double smallest_part = 0x1p-12;  ///< of the step
-    /// Where a stretch is divided: nowhere that a symmetry of the guard could single out.
+    /// Part at which an interval is divided: none that a symmetry of the guard could single out.
     static constexpr double cut = 0.4142135;
     static constexpr int shallow = 3;  ///< divisions before rounding is thought of
 
@@ -54,7 +54,7 @@ private:
     void keep(const GuardSample& node);
 
     std::size_t guard_ = nobody;
-    Watch whole_;                      ///< the stretch that is divided
+    Watch whole_;                      ///< the interval that is divided
     std::size_t count_ = 0;            ///< of nodes
     std::array<GuardSample, 32> few_;  ///< the first of them: seldom more, and no allocation
     std::vector<GuardSample> many_;    ///< the others

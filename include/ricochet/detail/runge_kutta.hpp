@@ -255,7 +255,7 @@ public:
     template <class Row>
     static constexpr std::size_t terms = used<Row>.count;
 
-    /// What a row's rates are multiplied by in a step of length h.
+    /// Factors of a row's rates in a step of length h.
     template <class Row>
     [[nodiscard, gnu::always_inline]] static auto weights_of(double h) noexcept
     {

@@ -19,7 +19,7 @@
 
 namespace ricochet::detail {
 
-/// What the polynomial of a guard does first in a stretch of a step, apart from a root at its
+/// First event of the polynomial of a guard in an interval of a step, apart from a root at its
 /// start.
 struct SeriesStretch {
     enum class Kind {
@@ -72,7 +72,7 @@ struct SeriesStretch {
 [[nodiscard]] bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign,
                                          double h, double touch, bool from_surface) noexcept;
 
-/// What guard i, times `sign`, does first between the samples `start` and `end` in a step of length
+/// First event of guard i, times `sign`, between the samples `start` and `end` in a step of length
 /// h. Where these differ from the series, which leaves out its last terms, nothing smaller than
 /// that is sure.
 [[nodiscard]] SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign,

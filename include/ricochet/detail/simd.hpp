@@ -99,7 +99,7 @@ RICOCHET_INLINE V product_plus(V a, V b, V c) noexcept
 }
 
 /// Adds a rounded product. The sum passes through the assembler too, because g++
-/// would else put off long chains of sums and spill their products meanwhile.
+/// would else deferred long chains of sums and spill their products meanwhile.
 template <class V>
 RICOCHET_INLINE void accumulate(V& sum, V product) noexcept
 {

@@ -28,9 +28,9 @@ namespace ricochet::learn {
 enum class StepReward {
     /// The source's equation 7, with x = (h - h_min) / (h_max - h_min) of the step taken:
     ///
-    ///     x (1 - (w - 1) / (dear - 1)) exp(-alpha E),  or -x of a step that cannot be solved
+    ///     x (1 - (w - 1) / (expensive - 1)) exp(-alpha E),  or -x of a step that cannot be solved
     ///
-    /// where w are the Newton iterations per solve, at most `dear`; systems whose solves all
+    /// where w are the Newton iterations per solve, at most `expensive`; systems whose solves all
     /// cost the same have 1. E is the scaled error of the step.
     published,
     /// -work / work_unit - lambda (integral over the step of |y - y_ref|^2) / (that of |y_ref|^2
@@ -38,7 +38,7 @@ enum class StepReward {
     additive,
 };
 
-/// From an action in [-1, 1] to a step in [h_min, h_max].
+/// Map from an action in [-1, 1] to a step in [h_min, h_max].
 enum class StepScale {
     linear,       ///< as the source's code
     logarithmic,  ///< equal factors
@@ -47,7 +47,7 @@ enum class StepScale {
 struct StepWorldOptions {
     StepReward reward = StepReward::published;
     double alpha = 2;       ///< zero or positive
-    double dear = 10;       ///< iterations per solve that earn nothing; above 1
+    double expensive = 10;  ///< iterations per solve that earn nothing; above 1
     double lambda = 100;    ///< zero or positive
     double work_unit = 10;  ///< iterations of a fault, solves of other systems; positive
     StepScale scale = StepScale::logarithmic;
@@ -58,7 +58,7 @@ struct StepWorldOptions {
     ErrorEstimate estimate = ErrorEstimate::embedded;
     FirstStage first_stage = FirstStage::averaged;  ///< at_end: the source's
     double tolerance = 1e-3;                        ///< to which E is scaled, positive
-    /// A fault's episode ends when nothing moves any more, nor will. The source goes on.
+    /// A fault's episode ends when nothing moves any more, nor will. The source continues.
     bool until_rest = false;
     std::uint64_t max_attempts = 20'000;  ///< then an episode is cut
     /// Told of the reference's run and of an episode after every step; false ends them.
@@ -71,7 +71,7 @@ struct StepWorldOptions {
 /// How often in a row a step may not be solved before an episode ends.
 inline constexpr int step_world_failures = 10;
 
-/// An environment, and what the run in it has come to. Copies share the run.
+/// An environment and the state of the run in it. Copies share the run.
 struct StepWorld {
     /// Nine observations of order one: the error, length and share of switches of the last step,
     /// and the state as of the system's `StepLayout`. Every episode is the same run.

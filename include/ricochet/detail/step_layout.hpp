@@ -20,13 +20,13 @@ struct StepInput {
     double width = 1;
 };
 
-/// What a policy of one system is asked about.
+/// Inputs of the policies of one system.
 struct StepLayout {
     std::string_view system;  ///< e.g. "fault"
     int version = 1;          ///< of the meaning of the names
     std::array<StepInput, StepView::state_inputs> state;
 
-    /// As a model file has it: "step-inputs-1: log_error log_tolerance ...".
+    /// Text in a model file: "step-inputs-1: log_error log_tolerance ...".
     [[nodiscard]] std::string recipe() const;
 };
 

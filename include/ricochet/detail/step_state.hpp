@@ -28,7 +28,7 @@ template <class X>
 using CoreState = std::conditional_t<(fixed_size<X>() >= 1 && fixed_size<X>() <= 4),
                                      std::array<double, fixed_size<X>()>, std::vector<double>>;
 
-/// Where a step starts, to the last bit.
+/// Start of a step, to the last bit.
 template <class X>
 struct StepStart {
     Instant t;
@@ -65,7 +65,7 @@ struct StepState {
         if constexpr (!is_small<X>) large.remainder1 = remainder;
     }
 
-    /// Of the system, for kernels that do not have it inlined; see `SystemTable::flow`.
+    /// Flow of the system, for kernels that do not have it inlined; see `SystemTable::flow`.
     bool (*flow)(void* door, Mode mode, double t, const X& x, X& dxdt) = nullptr;
 
     Instant start;
@@ -80,9 +80,9 @@ struct StepState {
     X x1, rate1;
     X error, at;
     const double* component_atol =
-        nullptr;  ///< one for each component, in the place of one for all
+        nullptr;  ///< one for each component, in place of one for all
 
-    /// Of the step in hand, and of the last step that was repeated to an inner time.
+    /// Of the current step, and of the last step that was repeated to an inner time.
     std::array<X, most_kept_stages> stages{};
     struct None {};
     struct Large {
@@ -95,7 +95,7 @@ struct StepState {
     mutable bool has_middle = false;
     mutable std::size_t asked_alone = 0;  ///< components of the middle, by views
 
-    const HostStepTable* host = nullptr;  ///< the step in hand, where a host has taken it
+    const HostStepTable* host = nullptr;  ///< the current step, where a host has taken it
 
     [[nodiscard]] double in_time(double s) const noexcept { return backward ? -s : s; }
     [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }
@@ -125,18 +125,18 @@ struct StepKernel {
     /// Takes a step of length h: `w`, `x1`, `rate1`, and `stages` where they have an interpolant.
     /// False: the end or the flow there is not finite.
     bool (*take)(void* door, StepState<X>& step, double h) = nullptr;
-    /// As `take`. Returns its largest estimated error over atol + rtol max(|x0|, |x1|); NaN if
+    /// Takes a step like `take`. Returns its largest estimated error over atol + rtol max(|x0|, |x1|); NaN if
     /// anything is not finite. Null without an estimate.
     double (*attempt)(void* door, StepState<X>& step, double h, double rtol, double atol) = nullptr;
-    /// The departure after a step of length s, with its rate where the method gives it; the step
-    /// in hand stays as it is.
+    /// The departure after a step of length s, with its rate where the method gives it; the current
+    /// step stays as it is.
     void (*depart)(void* door, StepState<X>& step, double s, X& w, X& rate) = nullptr;
     /// The length of the step from here that meets the tolerance; then `attempt` at no more than that
     /// returns 0. Null where a length is known to be right only afterwards.
     double (*reach)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
     /// w(s) on an interpolant of the method's own, or null.
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
-    /// The step in hand where it is a power series, or null.
+    /// The current step where it is a power series, or null.
     SeriesTerms (*series)(void* door, const StepState<X>& step) = nullptr;
     /// The guards on it, all of them, or null.
     SeriesTerms (*guard_series)(void* door, const StepState<X>& step) = nullptr;

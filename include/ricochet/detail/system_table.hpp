@@ -53,14 +53,14 @@ struct SystemTable {
     /// One guard, at a state or a view of the step's polynomial.
     double (*guard)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     double (*guard_on)(Door, std::size_t which, Mode, double t, const View& x) = nullptr;
-    /// Its rate with x' = dxdt: in closed form, else the central difference over 1e-5 `scale`, at
+    /// Rate of a guard with x' = dxdt: in closed form, else the central difference over 1e-5 `scale`, at
     /// the price of `calls_of_rate` evaluations of the guard.
     double (*rate)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
                    const X& dxdt, double scale) = nullptr;
     double (*rate_on)(Door, std::size_t which, Mode, bool backward, double t, const View& x,
                       const RateView& dxdt, double scale) = nullptr;
     unsigned calls_of_rate = 0;
-    /// Both at once. Null where a system computes guards or rates all together.
+    /// Value and rate in one call. Null where a system computes guards or rates all together.
     GuardPoint (*point)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
                         const X& dxdt, double scale) = nullptr;
     /// All rates, from one call of the system, with respect to the time itself.

@@ -29,10 +29,10 @@ namespace ricochet {
 namespace detail {
 
 inline constexpr int most_bernstein_degree = 32;
-/// Of the interpolant of a guard whose degree is not known.
+/// Degree of the interpolant of a guard whose degree is not known.
 inline constexpr int sampled_degree = 8;
 
-/// Where a polynomial on [0, 1] is sampled: the extrema of the Chebyshev polynomial of
+/// Points at which a polynomial on [0, 1] is sampled: the extrema of the Chebyshev polynomial of
 /// that degree, ascending, `degree` + 1 of them. @param degree in [1, 32]
 [[nodiscard]] const double* bernstein_nodes(int degree) noexcept;
 
@@ -48,7 +48,7 @@ private:
     GuardPath* path_;
 };
 
-/// What is looked for, and on what.
+/// Goal and interval of a search.
 struct BernsteinTask {
     Crossing crossing = Crossing::falling;
     int degree = 0;        ///< of the guard in the offset; 0: not known
@@ -61,7 +61,7 @@ struct BernsteinTask {
 [[nodiscard]] bool stays_on_side(const BernsteinTask& task, const Watch& watch,
                                  const double* values) noexcept;
 
-/// The first event of the stretch. @param values as for `stays_on_side`
+/// The first event of the interval. @param values as for `stays_on_side`
 [[nodiscard]] Finding first_event(const BernsteinTask& task, Watch& watch, const double* values,
                                   const GuardCurve& curve);
 
@@ -75,7 +75,7 @@ struct Bernstein {
     static constexpr Screening screening = Screening::every;
     static constexpr Evidence evidence = Evidence::proved;  ///< of a step without armed guards
 
-    /// Every step deserves a look.
+    /// Every step needs a check.
     [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
                                                  double /*g1*/, double /*rate1*/,
                                                  double /*h*/) noexcept
@@ -83,7 +83,7 @@ struct Bernstein {
         return sign != 0;
     }
 
-    /// What the ends tell is never enough.
+    /// Returns false: the values at the ends alone never prove a single crossing.
     [[nodiscard]] static constexpr bool leaves_plainly(double /*sign*/,
                                                        const GuardSample& /*start*/,
                                                        const GuardSample& /*end*/,

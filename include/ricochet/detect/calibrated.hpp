@@ -1,4 +1,4 @@
-// Calibrated gates: checks put off on the word of a network.
+// Calibrated gates: checks deferred on the word of a network.
 //
 // Nothing else in the library skips a check without proof, so that it is asked for by name.
 // What is skipped counts as `gated`; how often events are missed was measured, on runs, when the
@@ -15,7 +15,7 @@
 //                       is. Misses events only where that bound is wrong; where that is seen,
 //                       the run ends as `Outcome::wrong_bound`.
 //     Foreseen          a horizon gate as the forecast of `Planned`, and nothing more: it says
-//                       when to look, exact values and declared bounds close every stretch.
+//                       when to look, exact values and declared bounds close every interval.
 //                       Verified: with any weights the events are those of the exact detector, bit
 //                       for bit.
 #pragma once
@@ -43,7 +43,7 @@ class AsksGate : public Base {
 public:
     [[nodiscard]] const gates::Gate& gate() const noexcept { return gate_; }
 
-    /// As `Gate::check`.
+    /// Checks the system like `Gate::check`.
     template <class System, class X>
     void check(const System& system, const X& x, double smallest, double largest) const
     {
@@ -65,6 +65,9 @@ private:
 
 }  // namespace detail
 
+/// Defers checks while a calibrated gate predicts that no event is near: misses events at the rate
+/// of its calibration, and needs no bounds. Backward runs check every step.
+/// @tparam Exact  detector of the steps that are checked
 template <class Exact = Extremum>
 class Calibrated : public detail::AsksGate<detail::PutsOff<Exact>> {
     using Base = detail::AsksGate<detail::PutsOff<Exact>>;
@@ -74,7 +77,7 @@ public:
     static constexpr Evidence put_off = Evidence::gated;
 
     /// @param longest_stretch  steps without a check, at most; as many starts are kept
-    /// @throws std::invalid_argument for a level gate, or if there is no stretch.
+    /// @throws std::invalid_argument for a level gate, or if there is no interval.
     explicit Calibrated(gates::Gate gate, std::size_t longest_stretch = 256,
                         const Exact& exact = {})
         : Base(std::move(gate), true, exact), longest_(longest_stretch)
@@ -108,6 +111,8 @@ private:
     std::size_t longest_;
 };
 
+/// Uses the levels of a calibrated gate as lower bounds of the guard in the planner, beside the
+/// bounds that the system declares: misses events at the rate of its calibration.
 template <class Exact = Extremum>
 class CalibratedBounds : public detail::AsksGate<Planned<Exact>> {
 public:
@@ -135,6 +140,8 @@ public:
     }
 };
 
+/// Uses a horizon gate as a forecast of when a check is worth making; declared bounds close every
+/// interval, so that the events are those of `Exact`, bit for bit, whatever the weights.
 template <class Exact = Extremum>
 class Foreseen : public detail::AsksGate<Planned<Exact>> {
 public:
@@ -146,7 +153,7 @@ public:
     {
     }
 
-    /// When [s] to look at last.
+    /// When [s] to examine last.
     template <class System, class X>
     [[nodiscard]] gates::Gate::Answer horizon(const System& system, Mode mode, double t,
                                               const X& x) const

@@ -1,7 +1,7 @@
 // The certified gate: what a network clears has been proved.
 //
 // A certificate (nn/certificate.hpp) says that where the network clears, the first guard is above
-// a margin. With the system's own bounds that is as good as a value: `Planned` closes stretches
+// a margin. With the system's own bounds that is as good as a value: `Planned` closes intervals
 // with it, and no exact look is needed where that is enough. Such steps are `proved`, and the
 // events are those of the exact detector, bit for bit. Outside the box of the certificate, in a
 // box that it lists as unproved, in modes other than 0 and for other guards the exact guard is
@@ -22,6 +22,8 @@
 
 namespace ricochet {
 
+/// Uses the levels of a gate that a certificate proves as lower bounds of the guard in the planner:
+/// the events are those of `Exact`, bit for bit.
 template <class Exact = Extremum>
 class Certified : public Planned<Exact> {
 public:

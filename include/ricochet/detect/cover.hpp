@@ -1,10 +1,10 @@
-// How long a bound on its speed keeps a guard away from its surface.
+// Time over which a bound on its speed keeps a guard away from its surface.
 //
 // A guard that is a distance d from its surface and changes by at most v per second now,
 // where v changes by at most A per second per second, covers
 //
 //     v tau + A tau^2 / 2 < d        from one value: conservative advancement
-//     path(tau) < d0 + d1            from two values, with speeds v0 and v1: whoever
+//     path(tau) < d0 + d1            from two values, with speeds v0 and v1: the one that
 //                                    goes to the surface has to come back from it
 //
 // Every function answers a doubt (a negative or infinite speed, anything that is not a
@@ -77,7 +77,7 @@ struct GuardBound {
 }
 
 /// A guess at the longest time after which `stays_clear` will say yes, if the speed stays
-/// what it is and the guard goes on with `slope` [1/s], which bends towards the surface as
+/// what it is and the guard continues with `slope` [1/s], which bends towards the surface as
 /// fast as it can: the root of
 ///
 ///     2 d + slope tau - A tau^2 / 2 = v tau + A tau^2 / 4

@@ -8,12 +8,14 @@
 
 namespace ricochet {
 
+/// Detector that compares the signs of a guard at both ends of a step, at one guard call a step.
+/// Two crossings within one step cancel and are not found.
 struct Ends {
     static constexpr bool uses_rates = false;
     static constexpr Screening screening = Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
 
-    /// Whether a step deserves a look, in the guard times `sign`, positive on its
+    /// Whether a step needs a check, in the guard times `sign`, positive on its
     /// armed side.
     [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
                                                  double g1, double /*rate1*/, double /*h*/) noexcept
@@ -21,7 +23,7 @@ struct Ends {
         return !(sign * g1 > 0);
     }
 
-    /// Whether the stretch holds one crossing and nothing else, as far as its ends tell.
+    /// Whether the interval holds one crossing and nothing else, as far as its ends tell.
     [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& /*start*/,
                                              const GuardSample& end, double /*touch*/) noexcept
     {

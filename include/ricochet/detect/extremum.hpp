@@ -14,13 +14,15 @@
 
 namespace ricochet {
 
+/// Detector that evaluates a guard at both ends of a step and once inside, compares it with the
+/// cubic through values and rates, and searches for extrema where that leaves a doubt: the default.
 struct Extremum {
     static constexpr bool uses_rates = true;
     static constexpr Screening screening = Screening::extremum;
     static constexpr bool looks_inside = true;  ///< compares each step with the cubic of its ends
     static constexpr Evidence evidence = Evidence::checked;  ///< of a step not suspected
 
-    /// Whether a step deserves a look, in the guard times `sign`, positive on its
+    /// Whether a step needs a check, in the guard times `sign`, positive on its
     /// armed side: it has left, or the control points of its cubic reach across, or it
     /// turns back from the surface. A guard that turns five times further away than it
     /// bends would have to bend five times more than its ends show.
@@ -44,7 +46,7 @@ struct Extremum {
         return !clear;
     }
 
-    /// Whether the stretch holds one crossing and nothing else, as far as its ends tell:
+    /// Whether the interval holds one crossing and nothing else, as far as its ends tell:
     /// the cubic is beyond the surface at the end, and its control points do not come
     /// back.
     [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,

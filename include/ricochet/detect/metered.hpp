@@ -22,6 +22,8 @@ concept KeepsEvents = requires
     requires Detector::keeps_events;
 };
 
+/// Detector that asks its network only while that saves time, measured on the run itself; the
+/// events are those of `Detector`.
 template <KeepsEvents Detector>
 class Metered : public Detector {
 public:

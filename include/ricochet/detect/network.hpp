@@ -1,4 +1,4 @@
-// The bare network: a prediction decides whether the guard is looked at.
+// The bare network: a prediction decides whether the guard is examined.
 //
 // Before a step the network is asked whether the step will meet the event surface
 // (Saunders, Steyer and Kuether, SAND2023-06682C, eq. 4). If not, the guard is not
@@ -36,7 +36,7 @@ void check_model_features(const Model& model, Recipe recipe, std::size_t feature
 /// @throws std::invalid_argument: no step [s] taken is one the model was trained for.
 void check_model_step(const Model& model, double smallest, double largest);
 
-/// Looks at the end of a step that was not cleared. An event whose guard had left
+/// Examines the end of a step that was not cleared. An event whose guard had left
 /// its side before the step began was missed by an earlier prediction, and is late.
 [[nodiscard]] inline Finding examine_prediction(GuardPath& probe, Watch& watch)
 {
@@ -50,6 +50,8 @@ void check_model_step(const Model& model, double smallest, double largest);
 
 }  // namespace detail
 
+/// Detector that evaluates a guard only after steps for which a network predicts an event. Nothing
+/// is proved: an event that the network does not predict is missed, or found late.
 class Network {
 public:
     static constexpr bool uses_rates = false;
@@ -110,7 +112,7 @@ public:
         return Ends::suspects(sign, g0, rate0, g1, rate1, h);
     }
 
-    /// A prediction may have been late, so that every event is looked at with care.
+    /// A prediction may have been late, so that every event is examined with care.
     [[nodiscard]] static bool leaves_plainly(double, const GuardSample&, const GuardSample&,
                                              double) noexcept
     {

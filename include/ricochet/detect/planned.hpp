@@ -1,16 +1,16 @@
-// Detectors that put off exact checks.
+// Detectors that defer exact checks.
 //
-// A detector of this kind wraps an exact one, and says of a guard that has just been
-// looked at how long it need not be looked at again, how long it is hoped to need none,
-// and whether two looks close the stretch between them. The loop keeps the calendar: it
-// goes on without a look while every guard is covered, tentatively while there is hope,
-// and returns to the first step that could not be closed to put it before the exact
-// detector. The steps are those of a run without any of this.
+// A detector of this kind wraps an exact one. For a guard that has just been evaluated it
+// says for how long no check is needed, for how long none is expected to be needed, and whether
+// two checks close the interval between them. The loop keeps the queue of deadlines: it continues
+// without a check while every guard is covered, tentatively while an interval is expected to be
+// closed, and returns to the first step that could not be closed, which the exact detector then
+// examines. The steps are those of a run in which every step is checked.
 //
 //     Planned      by declared bounds (hybrid/bounds.hpp); the events are those of the exact
 //                  detector, bit for bit, and what is skipped is `proved`
-//     EveryK       looks every k steps and returns where the sign has changed; two crossings
-//                  between two looks are missed
+//     EveryK       checks every k-th step and returns where the sign has changed; two crossings
+//                  between two checks are missed
 //     SlopeSkip    skips a fraction of the time in which the guard would reach its surface at
 //                  its last slope; may miss, too
 //
@@ -33,7 +33,7 @@ namespace ricochet {
 
 /// How `Planned` plans.
 struct PlannerOptions {
-    /// Look ahead: a stretch is taken before it is closed by the value at its end, and
+    /// Look ahead: an interval is taken before it is closed by the value at its end, and
     /// taken back where it could not be. Off: only as far as the bound covers for certain.
     bool two_ended = true;
     /// Steps taken before they are closed, at most; as many starts of steps are kept.
@@ -42,7 +42,7 @@ struct PlannerOptions {
     /// fraction. At least 0.
     double margin = 0.01;
     /// Compare bounds with the values of the guard as they are taken, with one taken for that at
-    /// every eighth lower bound that is relied on and in every 64th step without a look; one
+    /// every eighth lower bound that is relied on and in every 64th step without a check; one
     /// that is wrong, negative or no number ends the run as `Outcome::wrong_bound`. Without this,
     /// too, a guard that is found beyond its surface where a bound has excluded it does, at the
     /// end of the run at the latest.
@@ -68,14 +68,34 @@ public:
 
 }  // namespace detail
 
+/// Detector that defers the checks of `Exact` as long as declared bounds exclude a crossing.
+///
+/// With d = |g| at the last check of a guard, v its speed bound there (path per second times its Lipschitz constant) and A its
+/// acceleration bound, both enlarged by the margin, the guard is covered for the time tau with
+///
+///     v tau + A tau² / 2 = d             from one value
+///     path(tau) = d0 + d1                from the values d0, d1 at both ends of an interval
+///
+/// and the loop takes steps as follows:
+///
+///     while every guard is covered at the end of the next step: take it
+///     else take it tentatively, and keep its start
+///     when two values are expected to cover the interval: check its end
+///         covered: the interval is closed; its steps stand
+///         else:    halve it at the kept starts; the first single step that is not covered is
+///                  taken again, and examined by `Exact`
+///
+/// The two-valued cover holds because a guard that reaches its surface has to come back from it. The events are those of `Exact` at every step, bit for bit,
+/// as long as the bounds are true; a bound that is found to be wrong ends the run as
+/// `Outcome::wrong_bound`.
 template <class Exact = Extremum>
 class Planned : public detail::PutsOff<Exact> {
 public:
     static constexpr bool needs_bounds = true;
-    static constexpr Evidence put_off = Evidence::proved;  ///< of a step without a look
+    static constexpr Evidence put_off = Evidence::proved;  ///< of a step without a check
 
     Planned() : Planned(PlannerOptions{}) {}
-    /// @throws std::invalid_argument if the margin is negative or there is no stretch.
+    /// @throws std::invalid_argument if the margin is negative or there is no interval.
     explicit Planned(const PlannerOptions& options, const Exact& exact = {})
         : detail::PutsOff<Exact>(exact), options_(options)
     {
@@ -96,7 +116,7 @@ public:
         return time_covered(at);
     }
 
-    /// Time [s] after which a second look is hoped to close the stretch.
+    /// Time [s] after which a second check is hoped to close the interval.
     [[nodiscard]] double hoped(GuardBound at, double slope, double band) const noexcept
     {
         at.distance -= band;
@@ -113,7 +133,7 @@ private:
     PlannerOptions options_;
 };
 
-/// The simplest rival: every k-th step is looked at.
+/// The simplest rival: every k-th step is examined.
 template <class Exact = Extremum>
 class EveryK : public detail::PutsOff<Exact> {
 public:
@@ -131,7 +151,7 @@ public:
     [[nodiscard]] static constexpr bool checks_bounds() noexcept { return false; }
     [[nodiscard]] static constexpr double margin() noexcept { return 0; }
     [[nodiscard]] static double sure(const GuardBound&, double) noexcept { return 0; }
-    /// From its surface, where an event has left it, one step.
+    /// One step from the surface, where an event has left the guard.
     [[nodiscard]] static double hoped(const GuardBound& at, double, double band) noexcept
     {
         return at.distance > band ? std::numeric_limits<double>::infinity() : 0;
@@ -147,7 +167,7 @@ private:
 };
 
 /// The rival where no bound is known: skips `fraction` |g| / |slope|, with the slope of the
-/// last two looks, and at most `longest` steps.
+/// last two checks, and at most `longest` steps.
 template <class Exact = Extremum>
 class SlopeSkip : public detail::PutsOff<Exact> {
 public:
@@ -183,7 +203,7 @@ private:
     std::size_t longest_;
 };
 
-/// Whether a run of `System` on states X with this detector puts off checks.
+/// Whether a run of `System` on states X with this detector defers checks.
 template <class Detector, class System, class X>
 [[nodiscard]] constexpr bool puts_off_checks() noexcept
 {

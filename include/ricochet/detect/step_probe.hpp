@@ -21,7 +21,7 @@
 
 namespace ricochet {
 
-/// Where the guard left its side, as offsets [s] from the start of the step.
+/// Place at which the guard left its side, as offsets [s] from the start of the step.
 struct Location {
     double lo = 0;                                            ///< still on the armed side
     double hi = 0;                                            ///< across the surface or on it
@@ -46,20 +46,21 @@ struct ProbeSpace {
     X x, dxdt, root;
 };
 
+/// How states inside a step are obtained.
 enum class Path {
     restep,  ///< the method's own map from the start of the step
     dense,   ///< the step's polynomial
 };
 
-/// What is known of a guard on a step before it is evaluated.
+/// Properties of a guard on a step that are known before it is evaluated.
 struct PathProperties {
     double h = 0;  ///< [s] length of the step
     Crossing crossing = Crossing::falling;
     bool is_rated = true;        ///< the system gives the guard's rate; else it is a difference
-    bool is_polynomial = false;  ///< the step has a polynomial, which goes on beyond its end
+    bool is_polynomial = false;  ///< the step has a polynomial, which continues beyond its end
 };
 
-/// A guard on a step as a function of the offset s in [0, h]: all that a detector or a locator sees
+/// A guard on a step as a function of the offset s in [0, h]: the only view that a detector or a locator has
 /// of a motion. Evaluations may cost a step of the method.
 class GuardPath {
 public:
@@ -74,16 +75,17 @@ public:
     /// Whether samples are taken from the step's polynomial.
     [[nodiscard]] bool on_polynomial() const noexcept { return path_ == Path::dense; }
 
-    /// The side whose leaving is looked for.
+    /// The side from which a departure is searched for.
     [[nodiscard]] Side side() const noexcept { return side_; }
 
-    /// The guard's leaving of `side` is what is looked for from here on.
+    /// Searches for a departure from `side` from here on.
     void watch(Side side) noexcept
     {
         side_ = side;
         settled_ = false;
     }
 
+    /// Whether the guard of a sample has left the side that is watched.
     [[nodiscard]] bool has_left(const GuardSample& sample) const noexcept
     {
         return ricochet::has_left(side_, sample.value);
@@ -118,11 +120,11 @@ public:
     virtual void settle(double correction) = 0;
     /// The rate of the guard at a sample where it is not known yet.
     virtual void complete(GuardSample& sample) = 0;
-    /// What 8 units in the last place of the time and of each component of the state make of
-    /// the guard at offset s, by its slopes.
+    /// Change of the guard at offset s for 8 units in the last place of the time and of each component
+    /// of the state, from its slopes.
     [[nodiscard]] virtual double rounding(double s) = 0;
-    /// What 64 units in the last place of the time and of each component of the state make of
-    /// the guard at offset s, at a kink, too.
+    /// Change of the guard at offset s for 64 units in the last place of the time and of each component
+    /// of the state, from values, so that it holds at a kink, too.
     [[nodiscard]] virtual double blur(double s) = 0;
     /// Degree of the guard in the offset on the step's polynomial; 0: not known.
     [[nodiscard]] virtual int degree() const = 0;
@@ -158,6 +160,7 @@ private:
     }
 };
 
+/// The path of one guard along one step of a method.
 template <class Guard, class Step>
 class StepProbe final : public GuardPath {
 public:
@@ -226,8 +229,8 @@ public:
         return nudged(s, 64 * std::numeric_limits<double>::epsilon());
     }
 
-    /// Detection looked at the polynomial. Where the step's own map disagrees with it about the
-    /// near end of the bracket, the bracket starts where the stretch does; about the far end,
+    /// Detection examined the polynomial. Where the step's own map disagrees with it about the
+    /// near end of the bracket, the bracket starts where the interval does; about the far end,
     /// as it can near tangency, the polynomial is used from here on.
     void agree_on(GuardSample& lo, const GuardSample& hi, const GuardSample& start)
     {
@@ -425,10 +428,10 @@ private:
     double placed_ = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// A detector's look at a whole step of a host's own integrator: the guard armed on
+/// A detector's check of a whole step of a host's own integrator: the guard armed on
 /// `watch.side` and sampled at the start; its sample at the end is filled in.
 template <class Detector, class Guard, class Step>
-[[nodiscard]] Finding look_at(const Detector& detector, const Guard& guard, const Step& step,
+[[nodiscard]] Finding examine_step(const Detector& detector, const Guard& guard, const Step& step,
                               Watch& watch)
 {
     const double h = step.h();

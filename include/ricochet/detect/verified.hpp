@@ -1,10 +1,10 @@
 // The verified gate: a network may change what a run costs, never what it finds.
 //
-// The network proposes which exact checks to put off, and every stretch is closed
-// by an exact check that covers all of it. What covers a stretch longer than one
-// step is a bound on the guard's rate; a guard that declares none gives nothing to
-// cover with, and every step keeps its exact check. The network is then asked in
-// vain, and the statistics say so: no checks put off, and how often it would have
+// The network proposes which exact checks to defer, and every interval is closed
+// by an exact check that covers all of it. What covers an interval longer than one
+// step is a bound on the guard's rate; without a declared bound no interval can be
+// covered, and every step keeps its exact check. The network is then evaluated without
+// gain, and the statistics show it: no checks deferred, and how often it would have
 // been right. With any weights whatever the events are those of the exact detector,
 // bit for bit.
 #pragma once
@@ -17,25 +17,28 @@
 
 namespace ricochet {
 
+/// Detector that counts how often a network predicts what `Exact` finds, and defers checks where
+/// the guard declares bounds. The events are those of `Exact`, bit for bit, whatever the weights.
 template <class Exact = Extremum>
 class Verified : public detail::Around<Exact> {
 public:
     static constexpr bool checks_every_step = true;
     static constexpr bool keeps_events = true;
 
+    /// Takes the network that predicts and the detector that decides.
     explicit Verified(Network network, const Exact& exact = {})
         : detail::Around<Exact>(exact), network_(std::move(network))
     {
     }
 
-    /// As `Network::check`.
+    /// Checks the system like `Network::check`.
     template <class System, class X>
     void check(const System& system, const X& x, double smallest, double largest) const
     {
         network_.check(system, x, smallest, largest);
     }
 
-    /// What the network predicts of the step, for the statistics.
+    /// Prediction of the network for the step, for the statistics.
     template <class Guard, class Step>
     [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
     {

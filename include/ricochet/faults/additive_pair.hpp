@@ -38,12 +38,14 @@ struct MonotoneNet {
     [[nodiscard]] std::size_t parameters() const noexcept { return 3 * units + 2; }
 };
 
-/// Where a pair was trained.
+/// Domain in which a pair was trained.
 struct PairDomain {
     double v_min = 0, v_max = 0;  ///< [m/s]
     double xi_min = 0, xi_max = 0;
 };
 
+/// A learned pair of potentials, Ddag(V, xi) and D*(d), whose friction is A(log V/V*) + beta xi
+/// with monotone networks.
 class AdditivePair {
 public:
     static constexpr PotentialKind kind = PotentialKind::quadratic;  ///< D* of d alone
@@ -70,7 +72,7 @@ public:
     [[nodiscard]] FrictionAndRate evaluate(double v, double xi) const;
     [[nodiscard]] FrictionAndRateGradient gradient(double v, double xi) const;
 
-    /// Its value by quadrature: microseconds.
+    /// Ddag(V, xi) with its derivatives; the value is found by quadrature, in microseconds.
     [[nodiscard]] RateStateJet rate_potential(double v, double xi) const;
     [[nodiscard]] ScalarJet dual(double d, double /*xi*/ = 0) const;
     /// @throws std::invalid_argument for a rate that G does not reach.

@@ -24,7 +24,7 @@
 
 namespace ricochet {
 
-/// Where the strength of a stage is taken.
+/// Slip at which the strength of a stage is taken.
 enum class FaultBound {
     implicit,  ///< at the path of the stage's end
     /// at the path extrapolated with the velocity of its start: always convex, also of order 2
@@ -41,7 +41,7 @@ enum class FaultNorm {
     components,
 };
 
-/// A step that was taken, without units (`StrikeSlipFault`): the fields at its start, at the end
+/// A step that was taken, nondimensional (`StrikeSlipFault`): the fields at its start, at the end
 /// of its first stage and at its end.
 struct BatheStep {
     double t = 0;  ///< of its start
@@ -50,6 +50,7 @@ struct BatheStep {
     std::array<const Eigen::VectorXd*, 3> path{};
 };
 
+/// Options of implicit runs of the fault.
 struct BatheOptions {
     FirstStage first_stage = FirstStage::averaged;  ///< or at_end, the published scheme: order 1
     FaultBound bound = FaultBound::implicit;
@@ -68,10 +69,10 @@ struct BatheOptions {
     std::function<void(const BatheStep&)> observer{};
 };
 
-/// What a step policy is asked about: of the fields at the end of an attempt, without units, the
+/// Inputs of a step policy for the fault: of the fields at the end of an attempt, nondimensional, the
 /// logarithm of the root mean square velocity, the rate of growth of its square (half of it, as
 /// asinh) and the logarithm of the time in which it would vanish at that rate, the mean of
-/// exp(-path), the share of elements that slip, and the logarithm of the mean drop of strength.
+/// exp(-path), the fraction of elements that slip, and the logarithm of the mean drop of strength.
 [[nodiscard]] const StepLayout& fault_step_layout() noexcept;
 
 /// @throws std::invalid_argument naming the option.
@@ -91,6 +92,7 @@ void validate(const BatheOptions& options);
 /// The steps are those of `simulate`, to the bit. What made it must outlive it.
 class BatheMotion {
 public:
+    /// Moves the run; made by `BatheRuns::start`.
     BatheMotion(BatheMotion&&) noexcept;
     BatheMotion& operator=(BatheMotion&&) noexcept;
     ~BatheMotion();
@@ -99,13 +101,14 @@ public:
     /// nothing moves: false. The controller of the options is not asked.
     bool step(double h);
 
+    /// Whether the run has ended.
     [[nodiscard]] bool ended() const noexcept;
     [[nodiscard]] double t() const noexcept;  ///< [s]
-    /// Whether nothing moves any more, nor will.
+    /// Whether nothing moves, and nothing will.
     [[nodiscard]] bool rests();
     /// The scaled error of the last step; 0 if none is estimated.
     [[nodiscard]] double error() const noexcept;
-    /// Of the last step, or of the start.
+    /// View of the last step, or of the start, for a step policy.
     [[nodiscard]] const StepView& view() const noexcept;
     [[nodiscard]] const RuptureStatistics& statistics() const noexcept;
     [[nodiscard]] double mean_slip() const;  ///< path [m]
@@ -128,7 +131,7 @@ public:
     ~BatheRuns();
 
     [[nodiscard]] const StrikeSlipFault& fault() const noexcept;
-    /// As the function of that name.
+    /// Runs like the function `simulate`, with the products of this fault computed once.
     [[nodiscard]] Rupture simulate(const RuptureOptions& options, const BatheOptions& bathe);
     /// A run to be stepped, which must end before another begins. `RuptureOptions::step` is not
     /// used, but for being positive.

@@ -38,13 +38,14 @@ struct FaultFriction {
     double slip_rate = 1e-9;       ///< V at the start [m/s], not zero; positive with the log form
     std::optional<double> theta{};  ///< [s] at the start, positive; none: steady at |slip_rate|
     /// tau = (1 + overload) sigma f at the start, above -1. With 0 a start at `plate_velocity` and
-    /// its steady state goes on sliding so, stable or not.
+    /// its steady state continues sliding so, stable or not.
     double overload = 1e-5;
 };
 
+/// Options of runs with rate-and-state friction.
 struct RateStateOptions {
     /// 1, 2 or 4. A step of order 4 that leaves an element creeping which it brakes to rest is
-    /// taken anew with order 2. The time of the first onset depends on the order: at rtol 1e-3
+    /// taken again with order 2. The time of the first onset depends on the order: at rtol 1e-3
     /// order 4 is off by 1e-5 of it and order 2 by 5e-4; with the least `overload`, so that V is
     /// steady within that tolerance for most of the time, by 1.4e-3 and 9e-3. Order 4 costs 1.2
     /// to 1.5 times more.
@@ -70,6 +71,7 @@ struct FaultEarthquake {
     double largest_velocity = 0;                            ///< of an element [m/s]
 };
 
+/// Result of a run with rate-and-state friction.
 struct RateStateRupture {
     /// Slip is d, and so are the means; `arrest_time` is relative to the fastest of all times.
     /// `statistics.rejected` are steps beyond the error or with a stage that was not solved.

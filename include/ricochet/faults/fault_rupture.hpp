@@ -21,6 +21,7 @@
 
 namespace ricochet {
 
+/// Options of runs of the fault.
 struct RuptureOptions {
     double t_end = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     /// [s] the longest; 0: 0.29 time units, 0.25 s at 3 km, and n / 100 of it from n = 100 down to
@@ -29,7 +30,7 @@ struct RuptureOptions {
     /// Error of a step allowed, relative to the present velocity and slip of the whole field;
     /// infinity: constant steps.
     double rtol = 1e-4;
-    /// Of the polynomial that stands for sqrt(K), relative on its whole spectrum; 0: 1e-4, and
+    /// Error of the polynomial that stands for sqrt(K), relative on its whole spectrum; 0: 1e-4, and
     /// (n / 100)^2 of it from n = 100 down to 10.
     double polynomial_bound = 0;
     std::vector<double> snapshot_times{};  ///< [s] ascending
@@ -48,6 +49,7 @@ struct RuptureSnapshot {
     Eigen::VectorXd velocity;  ///< [m/s]
 };
 
+/// Counts over one run of the fault.
 struct RuptureStatistics {
     std::uint64_t steps = 0;        ///< accepted
     std::uint64_t rejected = 0;     ///< by the error or for want of a solution
@@ -63,13 +65,14 @@ struct RuptureStatistics {
     double bound = 0;               ///< its relative error at most
 };
 
+/// Result of a run of the fault.
 struct Rupture {
     Outcome outcome = Outcome::reached_end;
     double t = 0;              ///< [s] reached
     double mean_slip = 0;      ///< path, mean over the square [m]
     double peak_velocity = 0;  ///< of the mean velocity [m/s]
     double peak_time = 0;      ///< [s]
-    /// From here the mean velocity stays below 1e-3 of its peak [s]; of a single element, when it
+    /// Time from which the mean velocity stays below 1e-3 of its peak [s]; of a single element, when it
     /// stops. NaN if it does not.
     double arrest_time = std::numeric_limits<double>::quiet_NaN();
     /// When the last element stopped [s]. NaN if one still moves, or could.

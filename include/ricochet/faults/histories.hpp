@@ -12,6 +12,7 @@ namespace ricochet {
 
 /// Slip rate and friction coefficient at rising times.
 struct FrictionHistory {
+    /// How the slip rate continues between samples.
     enum class Between {
         constant,  ///< the slip rate holds from its sample to the next, and jumps there
         linear,    ///< it goes linearly from sample to sample
@@ -36,6 +37,7 @@ struct AgeingState {
     double theta = 0;     ///< [s]
     double by_log_l = 0;  ///< dtheta / dlog(D_RS) [s]
 };
+/// Advances theta of the ageing law by h [s], see `AgeingState`.
 [[nodiscard]] AgeingState advance_ageing(const AgeingState& from, double d_rs, double v0, double v1,
                                          double h);
 
@@ -46,7 +48,7 @@ struct AgeingState {
 /// |found - expected| / |expected| in the Euclidean norm.
 [[nodiscard]] double relative_error(const std::vector<double>& found,
                                     const std::vector<double>& expected);
-/// The same relative to expected - f*, which is what the state and the rate make of it.
+/// Same, relative to expected - f*, the part of friction that depends on state and rate.
 [[nodiscard]] double relative_error_beyond(const std::vector<double>& found,
                                            const std::vector<double>& expected, double f_star);
 
@@ -57,9 +59,11 @@ struct AgeingState {
 [[nodiscard]] std::vector<FrictionHistory> make_histories(
     std::size_t count, std::uint64_t seed, const RateStateParameters& parameters = {});
 
+/// Histories for training, validation and test.
 struct FrictionData {
     std::vector<FrictionHistory> training, validation, test;  ///< 480, 160, 160
 };
+/// Makes 480, 160 and 160 histories by `make_histories` from one seed.
 [[nodiscard]] FrictionData make_friction_data(std::uint64_t seed,
                                               const RateStateParameters& parameters = {});
 

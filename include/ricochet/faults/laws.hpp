@@ -6,7 +6,7 @@
 //     f = a asinh(V / w),     w(xi) = 2 V* exp(-(f* + b xi) / a),
 //
 // odd in V and smooth through V = 0. The speed that drives the state is then
-// s = sqrt(V^2 + w^2) - w in the place of |V|, for which exact potentials exist; the two
+// s = sqrt(V^2 + w^2) - w in place of |V|, for which exact potentials exist; the two
 // differ by less than w, of the order of 1e-24 m/s, but where |V| is as small as that.
 #pragma once
 
@@ -28,6 +28,7 @@ struct FrictionAndRate {
     double friction = 0, rate = 0;
 };
 
+/// Friction and state rate with their derivatives by V and xi.
 struct FrictionAndRateGradient {
     double friction = 0, friction_v = 0, friction_xi = 0;
     double rate = 0, rate_v = 0, rate_xi = 0;
@@ -110,12 +111,14 @@ public:
         return detail::state_rate<evolution>(p_, direct(v, xi).s, xi);
     }
 
+    /// Friction f(V, xi) and state rate xi'(V, xi) [1/s].
     [[nodiscard]] FrictionAndRate evaluate(double v, double xi) const
     {
         const detail::DirectTerms t = direct(v, xi);
         return {t.friction, detail::state_rate<evolution>(p_, t.s, xi)};
     }
 
+    /// Friction and state rate with their derivatives by V [m/s] and xi.
     [[nodiscard]] FrictionAndRateGradient gradient(double v, double xi) const
     {
         const detail::DirectTerms t = direct(v, xi);

@@ -75,11 +75,13 @@ public:
                 p.b * s.xi + heal};
     }
 
+    /// D*(d) = d² / (2 b D_RS) with its first two derivatives.
     [[nodiscard]] ScalarJet dual(double d, double /*xi*/ = 0) const
     {
         const double stiffness = law_.parameters().b * law_.parameters().d_rs;
         return {d * d / (2 * stiffness), d / stiffness, 1 / stiffness};
     }
+    /// D(xi') = b D_RS xi'² / 2 with its first two derivatives.
     [[nodiscard]] ScalarJet primal(double rate, double /*xi*/ = 0) const
     {
         const double stiffness = law_.parameters().b * law_.parameters().d_rs;

@@ -30,6 +30,7 @@ public:
     RateStateSlider(const SpringSlider& slider, double threshold);
 
     static constexpr std::string_view name = "rate-state-slider";
+    /// Start state of the event-driven run that corresponds to `at`.
     [[nodiscard]] State start(const SliderState& at) const;
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t /*which*/) noexcept

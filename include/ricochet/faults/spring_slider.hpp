@@ -15,12 +15,13 @@ namespace ricochet {
 /// The far end of the spring: piecewise at constant velocity, continuous.
 class SliderLoad {
 public:
+    /// A piece of constant velocity.
     struct Piece {
         double t = 0;         ///< [s] from when on
         double velocity = 0;  ///< [m/s]
     };
 
-    /// From `start` [m] at the time of the first piece.
+    /// Starts from `start` [m] at the time of the first piece.
     /// @throws std::invalid_argument unless there is a piece, and their times rise.
     SliderLoad(double start, std::vector<Piece> pieces);
     SliderLoad(double start, double velocity) : SliderLoad(start, {{0, velocity}}) {}
@@ -41,6 +42,7 @@ private:
     std::vector<double> position_;
 };
 
+/// A block on a spring with rate-and-state friction, whose far end is pulled.
 struct SpringSlider {
     RateStateParameters friction{};
     StateEvolution evolution = StateEvolution::ageing;
@@ -48,32 +50,36 @@ struct SpringSlider {
     SliderLoad load{0, 1e-4};
 };
 
-/// What may happen to the slip rate.
+/// Kinds of events of the slip rate.
 enum class SliderEventKind {
     onset,     ///< it rises through the threshold: slip begins
     arrest,    ///< it falls through the threshold
     reversal,  ///< it passes through zero
 };
+/// Name of the enumerator, e.g. "onset".
 [[nodiscard]] std::string_view name(SliderEventKind kind) noexcept;
 
+/// An event of the slip rate and the state at it.
 struct SliderEvent {
     SliderEventKind kind = SliderEventKind::onset;
     SliderState at{};
 };
 
+/// Options of runs of the slider.
 struct SliderOptions {
     double t_end = 2;          ///< [s], after the start
     int order = 4;             ///< 1, 2 or 4
     double step = 0;           ///< [s]; 0: by error control
     double rtol = 1e-8;        ///< of the slip rate, of x against |x| + D_RS, of xi against 1
     double first_step = 1e-5;  ///< [s] under error control
-    double threshold = 0;      ///< [m/s] of onset and arrest; 0: not looked for
+    double threshold = 0;      ///< [m/s] of onset and arrest; 0: not searched for
     std::size_t samples = 0;   ///< evenly over the run, both ends included; 0: none
     std::size_t max_steps = 10'000'000;
     /// Set from another thread or a signal handler, it ends the run after the step in progress.
     const std::atomic<bool>* cancelled = nullptr;
 };
 
+/// Result of a run of the slider.
 struct SliderRun {
     Outcome outcome = Outcome::reached_end;
     SliderState state{};

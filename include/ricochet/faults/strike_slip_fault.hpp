@@ -10,7 +10,7 @@
 
 namespace ricochet {
 
-/// What surrounds the fault.
+/// Medium around the fault.
 enum class FaultMedium {
     full_space,  ///< elastic, without bounds: K depends on distances alone
     half_space,  ///< under a free surface at depth 0, which the fault reaches
@@ -42,7 +42,7 @@ enum class FaultMesh {
 /// From an unstable rest the time of the rupture depends on the overload: each decade moves its
 /// peak by 1.6 s (side 3 km).
 ///
-/// Here everything is without units: slip in slip_distance, time in `time_unit`, hence
+/// Here everything is nondimensional: slip in slip_distance, time in `time_unit`, hence
 ///
 ///     v' = overload b(0) + b(0) - b(s) - K d - H v   where v > 0,   H = 2 zeta sqrt(K).
 class StrikeSlipFault {
@@ -92,7 +92,7 @@ public:
 
     /// sigma L / (G slip_distance) of each element.
     [[nodiscard]] const Eigen::VectorXd& weight() const noexcept { return weight_; }
-    /// b(s) of an element, without units.
+    /// b(s) of an element, nondimensional.
     [[nodiscard]] double strength(Eigen::Index which, double path) const;
     /// b(0) - b(s) of an element.
     [[nodiscard]] double weakening(Eigen::Index which, double path) const;

@@ -63,6 +63,7 @@ struct ArkCalls {
 /// Does not own the integrator.
 class ErkStep : public detail::SundialsHost<detail::ErkCalls> {
 public:
+    /// Attaches to an initialised integrator of ERKStep, and does not own it.
     ErkStep(void* erk, ARKRhsFn flow, void* data, double t, N_Vector x, double scale = 1e-3)
         : SundialsHost({erk, flow, data}, t, x, scale)
     {
@@ -72,6 +73,7 @@ public:
 /// Does not own the integrator.
 class ArkStep : public detail::SundialsHost<detail::ArkCalls> {
 public:
+    /// Attaches to an initialised integrator of ARKStep, and does not own it.
     ArkStep(void* ark, ARKRhsFn slow, ARKRhsFn fast, void* data, double t, N_Vector x,
             double scale = 1e-3)
         : SundialsHost({ark, slow, fast, data}, t, x, scale)

@@ -1,4 +1,4 @@
-// A rigid body of Bullet as a host: the world goes on in steps of a fixed length, and events are
+// A rigid body of Bullet as a host: the world continues in steps of a fixed length, and events are
 // located by putting the body back and taking the step again, shorter.
 //
 //     hosts::BulletBody host({&world, &body}, t, 0.01);
@@ -21,6 +21,7 @@ struct BulletEngine {
     btDynamicsWorld* world;
     btRigidBody* body;
 
+    /// State of the body that a repeated step starts from.
     struct Body {
         std::array<double, 6> x{};
         btTransform place{};

@@ -1,5 +1,5 @@
 // CVODE of SUNDIALS as a host: its steps are shown one by one, events are located on its dense
-// output, and it is initialised anew where an event changes the state or the mode.
+// output, and it is initialised again where an event changes the state or the mode.
 //
 //     void* cvode = CVodeCreate(CV_BDF, context);
 //     CVodeInit(cvode, flow, t, x);                       // and tolerances, a linear solver, ...

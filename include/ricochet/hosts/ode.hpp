@@ -1,4 +1,4 @@
-// A body of the Open Dynamics Engine as a host: the world goes on in steps of a fixed length, and
+// A body of the Open Dynamics Engine as a host: the world continues in steps of a fixed length, and
 // events are located by putting the body back and taking the step again, shorter.
 //
 //     hosts::OdeBody host({world, body}, t, 0.01);
@@ -22,6 +22,7 @@ struct OdeEngine {
     dBodyID body;
     int (*step)(dWorldID, dReal) = dWorldQuickStep;  ///< or dWorldStep
 
+    /// State of the body that a repeated step starts from.
     struct Body {
         std::array<double, 6> x{};
         std::array<dReal, 4> attitude{};

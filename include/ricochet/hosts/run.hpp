@@ -19,7 +19,7 @@
 namespace ricochet::hosts {
 
 /// Moves `host` from where it is to t_end, through all events; `at_cut` is called with every cut,
-/// before the host goes on from it.
+/// before the host continues from it.
 /// @return `stands` at t_end, `rests` there, or `ended`; `monitor.outcome()` says why
 template <class Host, class Monitor, class AtCut>
 Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mode mode = 0)

@@ -1,4 +1,4 @@
-// What a system may promise about how fast its guards can change.
+// Bounds that a system may declare on how fast its guards change.
 //
 //     speed_bound(which, t, x)         path per second at (t, x): at most this, now
 //     acceleration_bound(which, t, x)  how fast that speed can change, per second, optional
@@ -7,8 +7,8 @@
 //     upper_bound(which, t, x)         guard <= upper_bound, the same for a guard that is
 //                                      armed below its surface, optional
 //
-// `path` is whatever the system likes to measure its motion by: the way of a ball's
-// centre, the largest way of any point of a body. A guard of explicit time counts its
+// `path` is any measure of the motion that the system chooses: the path length of a ball's
+// centre, the largest path length of any point of a body. A guard of explicit time counts its
 // change by time as path. A system with modes takes the mode before t. A system without
 // `guard_count` may leave out `which`; one with it may leave out both, where its guards
 // share a bound.
@@ -70,7 +70,7 @@ concept HasUpperBound = requires(const System& s, double t, const X& x) { { s.up
 
 }  // namespace detail
 
-/// Its guards change no faster than it says.
+/// A system that bounds how fast its guards change.
 template <class System, class X>
 concept Bounded = Guarded<System, X> && detail::HasSpeedBound<System, X>;
 
@@ -121,7 +121,7 @@ template <class System, class X>
     return call_bound<System>(call, which, mode, t, x);
 }
 
-/// As `check_declarations`, of bounds that are there but do not fit.
+/// Refuses bounds that are declared but do not fit, like `check_declarations`.
 template <class System, class X>
 constexpr void check_bound_declarations()
 {

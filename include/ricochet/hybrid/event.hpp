@@ -8,7 +8,7 @@
 
 namespace ricochet {
 
-/// What happened.
+/// Kind of an event.
 enum class EventKind : std::uint8_t {
     crossing,      ///< the guard changed sign
     touch,         ///< the guard reached its surface and turned back
@@ -26,10 +26,10 @@ enum class EventKind : std::uint8_t {
     return kind == EventKind::crossing || kind == EventKind::jump;
 }
 
-/// `Event::guard` of an event that no guard made.
+/// `Event::guard` of an event without a guard.
 inline constexpr std::size_t no_guard = static_cast<std::size_t>(-1);
 
-/// In the place of a guard: the reset of a time event, where a guard's contradicts it.
+/// `Run::other_guard` where the reset of a time event contradicts that of a guard.
 inline constexpr std::size_t time_event_reset = static_cast<std::size_t>(-2);
 
 /// Two times [s] between which the guard leaves its armed side: still on it at `lo`,
@@ -43,7 +43,7 @@ struct Bracket {
 
 /// One event. `t` lies in `bracket`, at the root of the guard as exactly as it is
 /// known, and `before` is the state there: on its surface up to rounding, on either
-/// side. The members of a set happen at one time, that of the set: for all but the
+/// side. The events of a set happen at one time, that of the set: for all but the
 /// first, `t` may lie outside their own `bracket`, by no more than the window, and
 /// `before` as far from their surface.
 template <class State>

@@ -82,7 +82,7 @@ struct FilippovState<Fields> {
 ///     2  exit below     while sliding: zero where the motion may leave to h < 0
 ///     3  exit above     while sliding: zero where it may leave to h > 0
 ///
-/// The first two are unilateral, so that no motion goes on unseen beyond a surface: a
+/// The first two are unilateral, so that no motion continues unseen beyond a surface: a
 /// start on the wrong side is refused, and a run that a reset leaves there ends with
 /// `Outcome::outside_mode`. That may happen where rounding hides a surface, as at the end
 /// of twisting in skew coordinates. Sliding has no such bound: with surfaces whose rates
@@ -116,24 +116,26 @@ public:
 
     // --- modes and guards by name ---
 
+    /// Mode of a motion at `place` with respect to the surface.
     [[nodiscard]] static constexpr Mode mode_of(Place place) noexcept requires(surface_count == 1)
     {
         return static_cast<Mode>(place);
     }
 
+    /// Mode of a motion at `first` and `second` with respect to the two surfaces.
     [[nodiscard]] static constexpr Mode mode_of(Place first, Place second) noexcept
         requires(surface_count == 2)
     {
         return number({first, second});
     }
 
-    /// Where a motion in `mode` is with respect to surface `which`.
+    /// Place of a motion in `mode` with respect to surface `which`.
     [[nodiscard]] static constexpr Place place(std::size_t which, Mode mode) noexcept
     {
         return static_cast<Place>(which == 0 ? mode % 3 : mode / 3 % 3);
     }
 
-    /// For example "sliding, above": on surface 0, beside surface 1.
+    /// Name of a mode, for example "sliding, above": on surface 0, beside surface 1.
     [[nodiscard]] static std::string_view mode_name(Mode mode) noexcept
     {
         return detail::filippov_mode_name(surface_count, mode);
@@ -215,26 +217,26 @@ public:
         }
     }
 
-    /// What becomes of a motion that has met surfaces, or may leave those on which it
+    /// Mode of a motion that has met surfaces, or may leave the surfaces on which it
     /// slides; x is moved onto the surfaces on which it is to slide or has slid, by the
     /// rounding and drift that separates it from them, along the jumps of the field. The
     /// decision is made exactly on the surfaces.
     ///
-    /// On one surface: a field that leads away from it on its own side is a way out. If
+    /// On one surface: a field that leads away from it on its own side is an exit. If
     /// there is none, the surface attracts and the motion slides. If there is one, it
     /// is taken. If there are two, the surface is repulsive and the solution not unique:
-    /// the way of the larger rate is taken, of equals the one up. A rate that is zero,
+    /// the exit with the larger rate is taken, of equal rates the one upward. A rate that is zero,
     /// to 2e-13 of the larger, takes the sign that it will have next along its field; an
-    /// exit that has fired is a way out.
+    /// exit that has fired counts.
     ///
     /// A surface that the state is on or beyond counts as met, whichever guard has fired.
     ///
     /// On two surfaces: as steep but continuous switching would do, see
     /// `detail::follow_shares`, with the rates of each surface in units of the largest.
-    /// It starts from the shares with which the motion arrives; after an exit from those
-    /// of a moment later; at a start or time event from (1/2, 1/2).
+    /// It starts from the weights with which the motion arrives; after an exit from the weights
+    /// a moment later; at a start or time event from (1/2, 1/2).
     ///
-    /// `meeting` tells beforehand.
+    /// `meeting` returns the result beforehand.
     template <StateVector X>
     [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, X& x) const
     {
@@ -292,7 +294,7 @@ public:
     }
 
     /// The jump of the fields' own `time_reset`, if any. Fields may also have changed:
-    /// what slides is decided anew.
+    /// what slides is decided again.
     template <StateVector X>
     [[nodiscard]] Mode time_reset(Mode mode, double t, X& x) const requires Timed<Fields>
     {
@@ -326,7 +328,7 @@ public:
         return rules_.meeting(which, places(mode), t, x);
     }
 
-    /// For each surface the share a in [0, 1] of the field above in the motion: 0 below,
+    /// Weight a in [0, 1] of the field above in the motion, for each surface: 0 below,
     /// 1 above. While sliding it is what the switching would be on average, such as the
     /// force of sticking friction in units of its bounds.
     template <StateVector X>
@@ -408,7 +410,7 @@ private:
         return std::fabs(rate) <= Rules::negligible * size ? 0 : rate;
     }
 
-    /// Where the motion is after the fields' own time reset: off the surfaces on which it
+    /// Places of the motion after the fields' own time reset: off the surfaces on which it
     /// slid, if that has moved it.
     template <class X>
     [[nodiscard]] Places after_time_event(Places at, double t, X& x) const

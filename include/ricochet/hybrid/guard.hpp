@@ -29,15 +29,15 @@ enum class Crossing {
     either,
 };
 
-/// Where a guard was when it was armed: its sign, or on its surface the sign of
-/// its first nonzero derivative along the flow. A plateau has neither, and waits.
+/// Side on which a guard was armed: its sign, or on its surface the sign of its first nonzero
+/// derivative along the flow. On a plateau all of these vanish, and the guard waits.
 enum class Side { below, plateau, above };
 
-/// What a system says of one of its guards.
+/// Properties of a guard that a system declares.
 struct GuardInfo {
     std::string_view name{};
     Crossing crossing = Crossing::falling;
-    bool resets = true;            ///< false: a notification, where the system has a reset
+    bool resets = true;            ///< false: events are only recorded
     std::uint32_t stop_after = 0;  ///< the run ends with this many events; 0: never
     bool unilateral = false;       ///< g >= 0 bounds the motion
     bool boolean = false;          ///< only the sign means anything: no rates, bisection
@@ -52,6 +52,7 @@ struct GuardInfo {
     return value > 0 ? Side::above : value < 0 ? Side::below : Side::plateau;
 }
 
+/// The other side of the surface; of a plateau the plateau.
 [[nodiscard]] constexpr Side opposite(Side side) noexcept
 {
     return side == Side::above ? Side::below : side == Side::below ? Side::above : Side::plateau;
@@ -78,7 +79,7 @@ struct GuardInfo {
 /// Whether a guard armed on `side` and worth `g_end` at the end of a step has
 /// triggered. The end is included, so a zero on the boundary of two steps counts
 /// once; the start is represented by `side`, so a step that begins on the
-/// surface, as after a bounce, is judged like any other.
+/// surface, as after a bounce, is assessed like any other.
 [[nodiscard]] constexpr bool triggers(Side side, double g_end, Crossing crossing) noexcept
 {
     return has_left(side, g_end) && counts(side, crossing);

@@ -1,4 +1,4 @@
-// What a run did, counted.
+// Counts over a run.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@ namespace ricochet {
 /// Why a step was taken to hold no event.
 enum class Evidence : std::uint8_t {
     proved,   ///< a bound or polynomial excludes a root
-    checked,  ///< the ends and the interior extremum were looked at
+    checked,  ///< evaluated at the ends and at the interior extremum
     gated,    ///< a calibrated network skipped the check, within its miss rate
-    assumed,  ///< only the ends were looked at, or a bare network said so
+    assumed,  ///< evaluated at the ends only, or predicted by a bare network
 };
 
 /// How many steps were taken to be free of events, and on what evidence.
@@ -44,14 +44,14 @@ struct Statistics {
     std::uint64_t false_alarms = 0;      ///< a network predicted an event and there was none
     std::uint64_t missed_events = 0;     ///< events in a step that a network had cleared
     std::uint64_t late_events = 0;       ///< missed events that only a later step found
-    std::uint64_t checks_put_off = 0;    ///< steps whose exact check a network or a plan saved
+    std::uint64_t checks_put_off = 0;    ///< steps whose exact check a network or a plan deferred for good
     std::uint64_t outside_domain = 0;    ///< states outside the box of a gate: checked exactly
     std::uint64_t bound_calls = 0;       ///< evaluations of `lower_bound`, `upper_bound`
-    std::uint64_t rollbacks = 0;         ///< stretches taken back to a step that was not closed
+    std::uint64_t rollbacks = 0;         ///< intervals taken back to a step that was not closed
     std::uint64_t repeated_steps = 0;    ///< steps taken again for that
     std::uint64_t events = 0;
     std::uint64_t suppressed = 0;  ///< repeats of an event inside its own window
-    std::uint64_t disabled = 0;    ///< crossings that `enabled` said were no events
+    std::uint64_t disabled = 0;    ///< crossings that `enabled` rejected
     EvidenceCounts evidence;
 };
 

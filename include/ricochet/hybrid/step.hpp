@@ -1,4 +1,4 @@
-// What a detector or a locator sees of a step.
+// The view of a step that detectors and locators use.
 //
 // Times inside a step are offsets s in [0, h] from its start, because an offset
 // resolves what a time of day cannot: at t = 20 s neighbouring doubles are 4e-15 s

@@ -1,4 +1,4 @@
-// What a hybrid system is: a value that declares only what it has.
+// Hybrid systems: values that declare only the functions that they have.
 //
 //     flow(t, x, dxdt)          x' = f(t, x)                       always
 //     guard(t, x)               g, positive inside the mode        for events
@@ -29,7 +29,7 @@
 // reset and rest return the next mode:
 //
 //     flow(mode, t, x, dxdt), guard(which, mode, t, x), Mode reset(which, mode, t, x), ...
-//     enabled(which, mode)      whether the guard is looked at in that mode
+//     enabled(which, mode)      whether the guard is examined in that mode
 //     mode_count, mode_name(mode)
 //
 // A reset may also change the dimension of a state that is sized at run time: longer at any
@@ -82,6 +82,7 @@ concept StateVector = std::copyable<X> && requires(X& x, const X& y, std::size_t
 /// The guards that fired together, ascending.
 class FiredGuards {
 public:
+    /// Keeps a view of `guards`, which are ascending.
     explicit FiredGuards(std::span<const std::size_t> guards, bool time_event = false) noexcept
         : guards_(guards), time_event_(time_event)
     {
@@ -91,6 +92,7 @@ public:
     [[nodiscard]] auto end() const noexcept { return guards_.end(); }
     [[nodiscard]] std::size_t size() const noexcept { return guards_.size(); }
     [[nodiscard]] std::size_t operator[](std::size_t i) const noexcept { return guards_[i]; }
+    /// Whether guard `which` belongs to the set.
     [[nodiscard]] bool contains(std::size_t which) const noexcept
     {
         for (const std::size_t guard : guards_) {
@@ -274,7 +276,7 @@ concept SingleInfo = !CountsGuards<System> && requires(const System& system) {
     { system.guard_info() } -> std::convertible_to<GuardInfo>;
 };
 
-/// Whether a guard is looked at depends on the mode.
+/// Whether a guard is examined depends on the mode.
 template <class System>
 concept EnabledIn =
     (CountsGuards<System> && requires(const System& system, std::size_t which, Mode mode) { { system.enabled(which, mode) } -> std::convertible_to<bool>; }) ||
@@ -360,7 +362,7 @@ template <class X, class System>
     }
 }
 
-/// What the system says of a guard.
+/// Properties of a guard: as the system declares them, else the defaults.
 template <class X, class System>
 [[nodiscard]] constexpr GuardInfo guard_info_of(const System& system, std::size_t which)
 {
@@ -499,7 +501,7 @@ template <class System, class X>
     }
 }
 
-/// The reset of all that fired; returns the mode after it.
+/// Applies the reset of all guards that fired; returns the mode after it.
 template <class System, class X>
 [[nodiscard]] Mode call_reset_set(const System& system, const FiredGuards& fired, [[maybe_unused]] Mode mode, double t, X& x)
 {

@@ -46,7 +46,7 @@ requires Flowing<System, X> && StateVector<X>
                                  x0);
 }
 
-/// What has no flow for such a state.
+/// Systems without a flow for such a state.
 template <class System, class X>
 concept NotIntegrable = !(Flowing<System, X> && StateVector<X>);
 
@@ -66,7 +66,7 @@ template <class System, class X>
 
 }  // namespace detail
 
-/// What cannot be integrated is refused with a sentence instead of a list of concepts.
+/// Refuses at compile time a system that cannot be integrated, with a sentence instead of a list of concepts.
 template <class System, class X = typename System::State, class... Choices>
 requires NotIntegrable<System, X> Run<X> integrate(const System&, const X&, const Options&,
                                                    const Choices&...)

@@ -14,9 +14,8 @@ struct explicit_error_stepper_fsal_tag;
 
 namespace ricochet {
 
-/// A complete stepper type, odeint's (see `ricochet/odeint.hpp`) or the user's own, for its
-/// one state type, with odeint's `do_step`.
-/// It must be a one-step method: a multistep method has a memory that an event
+/// Method made of a complete stepper type, odeint's (see `ricochet/odeint.hpp`) or the user's own, for its
+/// one state type, with odeint's `do_step`. It must be a one-step method: a multistep method has a memory that an event
 /// makes stale.
 template <class GivenStepper>
 struct ThisStepper {
@@ -26,6 +25,7 @@ struct ThisStepper {
 
 // Explicit Runge-Kutta methods with the bits of Boost.Odeint's steppers.
 
+/// Euler's method, of order 1.
 struct Euler {
     template <class State>
     using Stepper = detail::RungeKutta<detail::EulerTableau, State>;
@@ -37,20 +37,20 @@ struct Rk4 {
     using Stepper = detail::RungeKutta<detail::Rk4Tableau, State>;
 };
 
-/// Of order 5, with an error estimate.
+/// Cash and Karp's method of order 5, with an error estimate of order 4.
 struct CashKarp54 {
     template <class State>
     using Stepper = detail::RungeKutta<detail::CashKarp54Tableau, State>;
 };
 
-/// Of order 5, with an error estimate, an interpolant of order 4 and the rate at the end of
-/// the step for nothing.
+/// Dormand and Prince's method of order 5, with an error estimate, an interpolant of order 4 and the rate
+/// at the end of the step at no cost: the default.
 struct Dopri5 {
     template <class State>
     using Stepper = detail::RungeKutta<detail::Dopri5Tableau, State>;
 };
 
-/// Of order 8, the cheapest for small errors. Its error estimate, a multiple of
+/// Fehlberg's method of order 8, the cheapest for small errors. Its error estimate, a multiple of
 /// k1 + k11 - k12 - k13, is blind to components whose rate depends on time alone: k1 and
 /// k12 are taken at the start of the step, k11 and k13 at its end. Where such quadratures
 /// stand alone, use Dopri5, or bound the step by `Options::h_max`.
@@ -59,16 +59,16 @@ struct Fehlberg78 {
     using Stepper = detail::RungeKutta<detail::Fehlberg78Tableau, State>;
 };
 
+/// The methods that `MethodByName` can be.
 enum class MethodName : std::uint8_t { euler, rk4, cash_karp54, dopri5, fehlberg78 };
 
-/// One of the five above, chosen at run time, with the same bits: for programs that offer all of
-/// them. The flow is called through a pointer, which costs small states a few nanoseconds a call.
+/// A method chosen at run time, with the same bits: for programs that offer all of them. The flow is called through a pointer, which costs small states a few nanoseconds a call.
 struct MethodByName {
     MethodName name = MethodName::dopri5;
 };
 
 /// Steps of the size `Options::step`; the last one is cut to end at `t_end`, and
-/// the grid starts anew at every event.
+/// the grid starts again at every event.
 template <class Method = Rk4>
 struct FixedStep {
     using method = Method;
@@ -87,7 +87,7 @@ namespace detail {
 
 namespace odeint = boost::numeric::odeint;
 
-/// One of our own, which departs from the tangent by itself.
+/// A method of ours, which departs from the tangent by itself.
 template <class Stepper>
 concept Departing = requires { Stepper::estimates_error; };
 

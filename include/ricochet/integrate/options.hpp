@@ -1,4 +1,4 @@
-// What a caller can ask of a run.
+// Options of a run.
 #pragma once
 
 #include <atomic>
@@ -25,7 +25,7 @@ struct Options {
     /// component stays below atol + rtol |x|. Ignored by fixed steps.
     double rtol = 1e-8;
     double atol = 1e-10;
-    /// One for each component of the start, in the place of `atol`; of components that a reset
+    /// One for each component of the start, in place of `atol`; of components that a reset
     /// adds it is `atol`.
     std::vector<double> component_atol{};
     double h_min = 0;  ///< 0: a few units in the last place of the time
@@ -44,7 +44,7 @@ struct Options {
     /// Whether detectors that can (`LooksInside`) evaluate every guard once inside each step,
     /// too, and divide a step in which a cubic through its ends does not tell what the guard
     /// does. Without it a guard that moves faster than the state may be lost. Guards that
-    /// declare bounds, and may be expensive, are never looked at inside.
+    /// declare bounds, and may be expensive, are never examined inside.
     bool look_inside = true;
 
     bool stop_at_event = false;

@@ -1,10 +1,11 @@
-// How a run ended.
+// Outcomes of runs.
 #pragma once
 
 #include <string_view>
 
 namespace ricochet {
 
+/// How a run or a motion ended.
 enum class Outcome {
     reached_end,
     stopped_by_event,

@@ -1,4 +1,4 @@
-// What a run returns. Nothing that was computed is lost: whatever the outcome,
+// Result of a run. Nothing that was computed is lost: whatever the outcome,
 // the time, the state and the events up to there are here.
 #pragma once
 
@@ -28,11 +28,13 @@ struct WrongBound {
     double t = 0;              ///< [s]
     State x{};                 ///< where it was seen
     double value = 0;          ///< of the guard there
-    double since = 0;          ///< [s] when it was last looked at; t for a bound of the value
+    double since = 0;          ///< [s] when it was last examined; t for a bound of the value
     double value_then = 0;     ///< of the guard then
     double allowed = 0;        ///< the bound, or the largest change since then
 };
 
+/// Result of a run: why, when and where it ended, and everything computed until then, whatever the
+/// outcome.
 template <class State>
 struct Run {
     Outcome outcome = Outcome::reached_end;

@@ -4,7 +4,7 @@
 //     guards at its end             screened, all at once
 //     search                        the first set of events in the step
 //     resets                        x⁻ becomes x⁺, the mode may change
-//     arming                        every guard anew; guards that a reset carried across fire
+//     arming                        every guard again; guards that a reset carried across fire
 //
 // Steps are half-open, (t, t + h]. Between the first step and the last nothing is allocated for
 // states of fixed size, unless something is recorded.
@@ -36,7 +36,7 @@ namespace ricochet {
 
 namespace detail {
 
-/// What a run needs besides its start and its options, in a place that does not move.
+/// Parts of a run besides its start and its options, in a place that does not move.
 template <class System, class X, class Stepping, class Detector, class Locator>
 class PartsOfRun {
     using Method = typename Stepping::method;
@@ -227,11 +227,33 @@ template <class X>
 
 }  // namespace detail
 
-/// A run that the caller drives.
+/// A run that the caller drives, from (t_start, x0) to t_end.
 ///
-/// Exceptions from the functions of the system pass through unchanged. The simulation then stands
+/// With the mode q, the method's map Phi(h; q, t, x), guards g_i that are armed on a side each, and resets r_i,
+/// one `step` is
+///
+///     h        = the length that error control or `Options::step` asks for, at most up to t_end and
+///                to the next time event; shorter until the error of Phi(h; q, t, x) is accepted
+///     F, s     = the earliest set of acting guards that leave their side within (0, h], and its
+///                offset; nothing and h if there is none
+///     record the events of all other guards within (0, s], located on the step's polynomial
+///     t, x⁻    = t + s, Phi(s; q, t, x)
+///     while F is not empty, at most 100 times:
+///         x⁺, q⁺   = r_F(q, t, x⁻), where every reset of F reads x⁻
+///         x⁺, q⁺   = rest(t, x⁺) where the events of a guard of F accumulate at t
+///         record (t, F, q, x⁻, q⁺, x⁺)
+///         arm every guard at (q⁺, t, x⁺): on its sign, or on its surface on the sign of its rate
+///         F        = the guards that x⁺ has carried across their surfaces in their direction
+///         x⁻, q    = x⁺, q⁺
+///     x        = x⁻
+///
+/// so that steps are half-open, (t, t + h]: a zero at the end of a step belongs to it, a zero at its start to
+/// the step before. A guard acts if it has a reset or may end the run. The set F does not depend on the order
+/// in which guards are declared. Events are those of one call of `integrate`, however the run is driven.
+///
+/// Exceptions from the functions of the system pass through unchanged. The simulation is then
 /// at the end of its last complete step with its events (`take`: at most as far back as its last
-/// step in which anything happened), and the next call goes on with the bits of a run in which
+/// step in which anything happened), and the next call continues with the bits of a run in which
 /// nothing was thrown.
 template <class System, class X, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
@@ -242,7 +264,7 @@ class Simulation {
     static constexpr bool same = std::is_same_v<X, C>;
 
 public:
-    /// As `integrate`, but does not start. Keeps a reference to `system`.
+    /// Prepares a run with the arguments of `integrate`. Keeps a reference to `system`.
     Simulation(const System& system, const X& x0, const Options& options,
                const Stepping& stepping = {}, const Detector& detector = {},
                const Locator& locator = {})
@@ -266,7 +288,7 @@ public:
     }
     [[nodiscard]] Mode mode() const noexcept { return loop_->mode(); }
     [[nodiscard]] bool ended() const noexcept { return loop_->ended(); }
-    /// What has been computed so far; its time and state are brought up to date by
+    /// Result so far; its time and state are brought up to date by
     /// `finish`.
     [[nodiscard]] const Run<X>& run() const
     {
@@ -278,11 +300,11 @@ public:
         }
     }
 
-    /// Of a `Metered` detector: what asking its network has cost and saved so far.
+    /// Cost and savings of the network of a `Metered` detector so far.
     [[nodiscard]] MeterReading meter() const requires Metering<Detector> { return loop_->meter(); }
 
     /// Takes one step, with whatever events it holds. False: the run has ended. A detector
-    /// that puts off checks does not look ahead here, since every step is final.
+    /// that defers checks does not look ahead here, since every step is final.
     bool step() { return loop_->step(); }
 
     /// Goes on to the next sample time, or to the end of the next step that holds events;
@@ -313,7 +335,7 @@ public:
         loop_->show_all();
     }
 
-    /// Goes on to the end and hands over all that was computed.
+    /// Advances to the end and returns the result.
     [[nodiscard]] Run<X> take() { return detail::as_callers<X>(loop_->take(), shown_.x); }
 
     /// Hands over what has been computed so far; before the end its outcome is `cancelled`. The
@@ -321,7 +343,7 @@ public:
     [[nodiscard]] Run<X> finish() { return detail::as_callers<X>(loop_->finish(), shown_.x); }
 
     /// All that the future depends on. A simulation of the same system with the same
-    /// options, stepping, detector and locator that restores it goes on with the same
+    /// options, stepping, detector and locator that restores it continues with the same
     /// bits; only its end, its sample times and what it records may be others. What was
     /// recorded is not part of it.
     [[nodiscard]] Snapshot save() { return loop_->save(); }
@@ -331,7 +353,7 @@ public:
     void restore(const Snapshot& snapshot) { loop_->restore(snapshot); }
 
 private:
-    /// What is shown of a run whose states are of another type than the loop's.
+    /// Result of a run whose states are of another type than the loop's.
     struct Shown {
         explicit Shown(const X& like) : x(like) {}
         X x;

@@ -17,7 +17,7 @@
 
 namespace ricochet {
 
-/// What two runs have to have in common if one is to go on where the other was saved, as text:
+/// A property, as text, in which a run must agree with the run that was saved in order to continue it:
 /// {"method", "FixedStep<Euler>"}, {"rtol", "1e-08"}.
 struct RunProperty {
     std::string name;
@@ -26,7 +26,7 @@ struct RunProperty {
     [[nodiscard]] bool operator==(const RunProperty&) const = default;
 };
 
-/// What `Simulation::save` returns. Real numbers and the rest, in the order in which
+/// State of a simulation, as `Simulation::save` returns it: real numbers and other values, in the order in which
 /// the simulation lists them.
 struct Snapshot {
     std::vector<RunProperty> run;  ///< the run that it belongs to
@@ -56,7 +56,7 @@ template <class T>
     return __PRETTY_FUNCTION__;
 }
 
-/// That name without namespaces, the same from every compiler: `Planned<Extremum>`.
+/// Name of a type without namespaces, the same from every compiler: `Planned<Extremum>`.
 [[nodiscard]] std::string plain_type_name(std::string_view written);
 
 /// The name that a system declares, else that of its type.
@@ -74,7 +74,7 @@ template <class System>
     }
 }
 
-/// What a run is made of.
+/// Parts of a run, by name.
 struct RunParts {
     std::string system;
     std::string stepping, detector, locator;

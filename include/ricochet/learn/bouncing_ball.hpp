@@ -17,6 +17,7 @@
 
 namespace ricochet::learn {
 
+/// Kinds of classifiers of the ball.
 enum class BallModel {
     fixed_step,  ///< features (u, v), one step and one gravity, as in the source paper
     any_step,    ///< recipe `ballistic`: every gravity, restitution, height and step
@@ -28,7 +29,7 @@ enum class BallModel {
 /// @throws std::invalid_argument naming what was given and what is known.
 [[nodiscard]] BallModel ball_model_named(std::string_view name);
 
-/// What a classifier of the ball is trained on, and how.
+/// Data and options of a training of a classifier of the ball.
 struct BallTraining {
     // Of a fixed-step model only.
     double gravity = 9.81;  ///< [m/s^2], positive

@@ -80,7 +80,7 @@ concept LeastGuard = SlackedGuard<System, X> && requires(const System& system, c
 
 namespace ricochet::learn {
 
-/// What has to be proved of a model, as functions of its raw features. Both are called from
+/// The guard that a model is to be proved against, as functions of its raw features. They are called from
 /// several threads at a time.
 struct GuardProblem {
     std::function<double(const double* x)> guard;
@@ -89,6 +89,7 @@ struct GuardProblem {
     std::function<double(const double* lower, const double* upper)> least{};
 };
 
+/// Options of a proof.
 struct CertifyOptions {
     double margin = 0;       ///< of the first level, in units of the guard
     std::size_t levels = 1;  ///< 1 to 32
@@ -112,8 +113,8 @@ struct CertifyOptions {
     bool resume = false;                 ///< continue from `checkpoint`
 };
 
-/// What a proof will take, by random descent: a path is followed to a leaf, and 2^depth
-/// is an estimate of the number of leaves without bias (Knuth, "Estimating the efficiency of
+/// Estimated cost of a proof, by random descent: a path is followed to a leaf, and 2^depth
+/// is an unbiased estimate of the number of leaves (Knuth, "Estimating the efficiency of
 /// backtrack programs", Math. Comp. 29, 1975). The top of the tree is counted, not estimated.
 struct Estimate {
     double boxes = 0;
@@ -122,6 +123,7 @@ struct Estimate {
     double error = 0;     ///< relative standard error of `boxes`
 };
 
+/// Progress of a proof, as its callback sees it.
 struct CertifyProgress {
     std::size_t level = 0;  ///< from 0
     std::size_t levels = 0;
@@ -139,6 +141,7 @@ struct CertifyProgress {
 /// estimate before any of it is spent.
 using CertifyCallback = std::function<bool(const CertifyProgress&)>;
 
+/// How a proof ended.
 enum class CertifyOutcome {
     proved,         ///< all levels, without exception
     partly_proved,  ///< all levels, but for unproved boxes that are listed
@@ -157,6 +160,7 @@ struct CertifyInterrupted {};
 /// One sentence with the remedy.
 [[nodiscard]] std::string_view describe(CertifyOutcome outcome) noexcept;
 
+/// Result and cost of a proof.
 struct CertifyReport {
     CertifyOutcome outcome = CertifyOutcome::proved;
     std::vector<CertificateLevel> levels{};  ///< that were finished
@@ -174,6 +178,7 @@ struct CertifiedModel {
     Model model;
     CertifyReport report;
 
+    /// Whether all levels or some of them are proved.
     [[nodiscard]] bool proved() const noexcept
     {
         return report.outcome == CertifyOutcome::proved ||
@@ -194,7 +199,7 @@ struct CertifiedModel {
                                      const CertifyOptions& options,
                                      const CertifyCallback& progress = {});
 
-/// What the proof of one statement over the domain of the model will take.
+/// Estimates the cost of the proof of one statement over the domain of the model.
 /// @throws as `certify`
 [[nodiscard]] Estimate estimate(const Model& model, const GuardProblem& problem, double margin,
                                 double threshold, const CertifyOptions& options);

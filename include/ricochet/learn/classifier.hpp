@@ -40,9 +40,9 @@ struct TrainingOptions {
     double hard_pool = 0.05;        ///< share of the training states that count as hardest
     std::size_t hard_every = 1000;  ///< iterations between two searches for them
 
-    double test_share = 0.1;           ///< held out and never looked at in training
+    double test_share = 0.1;           ///< held out and never examined in training
     double validation_share = 0.1;     ///< of the rest; chooses weights and threshold
-    std::size_t evaluate_every = 500;  ///< iterations between two looks at the validation set
+    std::size_t evaluate_every = 500;  ///< iterations between two checks at the validation set
     double logit_margin = 1;  ///< the threshold is at least that much below the lowest event
     double gap_share = 0.5;   ///< and by that share of the gap down to the highest clear state
     double cleared_at_least = 0.5;  ///< share of clear states a threshold must leave cleared
@@ -55,7 +55,7 @@ struct TrainingOptions {
     const std::atomic<bool>* cancelled = nullptr;
 };
 
-/// Where a training is; given at every look at the validation set.
+/// Progress of a training; given at every check of the validation set.
 struct Progress {
     std::size_t iteration = 0;
     std::size_t total = 0;
@@ -74,8 +74,8 @@ struct Rival {
     std::uint64_t events = 0;  ///< that it found
 };
 
-/// What is fastest, and what the last of them, the network, takes: one sentence, empty if there are
-/// none. The first is `Extremum` at every step.
+/// One sentence that names the fastest rival and the cost of the last one, the network; empty without rivals.
+/// The first rival is `Extremum` at every step.
 [[nodiscard]] std::string describe(const std::vector<Rival>& rivals);
 
 /// Draws a bar, or returns false to stop the training; the best so far is kept.
@@ -92,8 +92,7 @@ enum class TrainingOutcome {
 /// One sentence with the remedy.
 [[nodiscard]] std::string_view describe(TrainingOutcome outcome) noexcept;
 
-/// What came out of a training. All figures are of the stored weights, rounded
-/// to float.
+/// Result of a training. All figures are those of the stored weights, rounded to float.
 struct Report {
     TrainingOutcome outcome = TrainingOutcome::finished;
     std::size_t iterations = 0;  ///< done
@@ -107,6 +106,7 @@ struct Report {
     std::string checkpoint_trouble{};
 };
 
+/// A trained classifier and its report.
 struct Trained {
     Model model;
     Report report;

@@ -1,4 +1,4 @@
-// What a reinforcement learner acts in.
+// The environment in which a reinforcement learner acts.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace ricochet::learn {
 
-/// What came of an action, beside the observation after it.
+/// Reward and end of an action; the observation after it is returned apart.
 struct Reaction {
     double reward = 0;
     bool terminal = false;   ///< the episode is over, and no reward can follow

@@ -28,12 +28,13 @@ namespace ricochet::learn {
 /// is to be repeated. Infinity refuses x; NaN does so too, and ranks behind it.
 using Objective = std::function<double(std::span<const double> x)>;
 
+/// Options of a search.
 struct EvolutionOptions {
     std::size_t population = 0;    ///< per generation, at least 4; 0: 4 + floor(3 ln n)
     double spread = 0.5;           ///< standard deviation at the start, positive
     std::vector<double> scales{};  ///< of the spread per component, positive; empty: 1
     std::uint64_t seed = 1;
-    /// What the score is of; a checkpoint of another problem is not resumed.
+    /// Name of the problem; a checkpoint of another problem is not resumed.
     std::string problem{};
 
     /// The search ends after the generation in which one of these is reached.
@@ -68,6 +69,7 @@ using EvolutionCallback = std::function<bool(const EvolutionProgress&)>;
 /// what was tried of the generation in progress is tried again when it is resumed.
 struct SearchStopped {};
 
+/// How a search ended.
 enum class EvolutionOutcome {
     max_evaluations,
     max_seconds,
@@ -84,6 +86,7 @@ enum class EvolutionOutcome {
 /// halves the spread, about where the search has been allowed last.
 inline constexpr std::size_t fruitless_generations = 30;
 
+/// Result of a search.
 struct EvolutionResult {
     EvolutionOutcome outcome = EvolutionOutcome::max_evaluations;
     std::vector<double> x;  ///< with the least score of all that were tried, the start among them
@@ -100,7 +103,7 @@ struct EvolutionResult {
 ///
 /// On one machine the result follows from score, x0, population, spread, scales and
 /// seed, to the bit, however many threads run and however often the search was
-/// interrupted and resumed. A search that had ended at a limit goes on when it is
+/// interrupted and resumed. A search that had ended at a limit continues when it is
 /// resumed with a higher one. Any other exception than `SearchStopped` thrown by `score` or
 /// `progress` is thrown on.
 /// @throws std::invalid_argument if x0 is empty or not finite, or an option is outside its range.

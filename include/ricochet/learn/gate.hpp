@@ -1,11 +1,11 @@
 // Gates for a user's system: training, thresholds, and what they miss.
 //
 // A *horizon* gate is for guards of which nothing is known but the value or the sign. States
-// come from runs; each is labelled with the time to the next event. Since a gated run looks at
+// come from runs; each is labelled with the time to the next event. Since a gated run examines
 // the guard at the end of every horizon, it finds an event that was cleared, unless the guard,
 // followed without its reset, has come back by then. Such states are *fatal*. The threshold of
 // each horizon lies below the logit of every fatal state that was seen, and below what makes
-// ways back dearer than the checks that they save.
+// ways back more expensive than the checks that they save.
 //
 // A *level* gate is for a guard with a bound and a value: a regression from below of the guard,
 // with a threshold for each level below the logit of every state whose guard is not above it.
@@ -84,7 +84,7 @@ enum class GateKind { horizon, level };
 /// "gate-horizon" or "gate-level", as a model spells it.
 [[nodiscard]] std::string_view name(GateKind kind) noexcept;
 
-/// What a gate is trained for, and how.
+/// Purpose and options of a training of a gate.
 struct GateTraining {
     GateKind kind = GateKind::horizon;
     GateRecipe recipe{};
@@ -137,10 +137,12 @@ struct GateSamples {
     std::vector<Interval> box;  ///< that the runs stayed in
 
     [[nodiscard]] std::size_t size() const noexcept { return event.size(); }
+    /// Features of state i.
     [[nodiscard]] std::span<const double> row(std::size_t i) const noexcept
     {
         return {features.data() + i * width, width};
     }
+    /// Appends one state.
     void append(std::span<const double> row, double event, double back, double value,
                 double weight);
     /// All states of `other`, which are of as many features.
@@ -154,7 +156,7 @@ struct GateTrial {
     std::uint64_t events = 0;       ///< of the exact runs
     std::uint64_t misses = 0;       ///< of these, not found, or not at the same time but for errors
     std::uint64_t steps = 0;        ///< of the exact runs
-    std::uint64_t exact_calls = 0;  ///< of the guard, with a look at every step
+    std::uint64_t exact_calls = 0;  ///< of the guard, with a check of every step
     std::uint64_t gated_calls = 0;  ///< of the guard, with the gate
     std::uint64_t network_calls = 0;  ///< of the gate
     std::uint64_t outside = 0;        ///< of its box
@@ -171,6 +173,7 @@ struct GateTrial {
     }
 };
 
+/// Result and cost of a training of a gate.
 struct GateReport {
     TrainingOutcome outcome = TrainingOutcome::finished;
     std::size_t iterations = 0;
@@ -184,6 +187,7 @@ struct GateReport {
     std::string checkpoint_trouble{};
 };
 
+/// A trained gate and its report.
 struct TrainedGate {
     Model model;
     GateReport report;
@@ -216,6 +220,7 @@ public:
     /// The best so far. System, parameters and step range are left to the caller.
     [[nodiscard]] Model model() const;
 
+    /// Report of the training so far.
     [[nodiscard]] GateReport report() const;
 
 private:

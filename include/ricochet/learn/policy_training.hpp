@@ -1,4 +1,4 @@
-// What the trainers of policies have in common: options, progress, result.
+// Options, progress and result that all trainers of policies share.
 //
 // A policy is a network from observations to actions, which a reinforcement learner finds by
 // acting. It acts once per step in an `Environment`, keeps what came of it, and learns from a batch
@@ -20,6 +20,7 @@
 
 namespace ricochet::learn {
 
+/// Options that all trainers of policies share.
 struct PolicyTraining {
     std::size_t steps = 20'000;      ///< in the environment
     std::size_t random_steps = 100;  ///< the first ones: uniform actions, and nothing learnt yet
@@ -48,7 +49,7 @@ struct PolicyProgress {
     std::size_t step = 0;      ///< done so far
     std::size_t steps = 0;     ///< of the training
     std::size_t episodes = 0;  ///< ended so far
-    /// Of the episodes that ended since the last report, undiscounted; NaN: none.
+    /// Mean return of the episodes that ended since the last report, undiscounted; NaN: none.
     double mean_return = 0;
     /// Of the last batch; NaN where there is none, or no report was due. So the next two.
     double critic_loss = 0;
@@ -60,6 +61,7 @@ struct PolicyProgress {
 /// Gets the deterministic policy as it is now. False stops the training; what was learnt is kept.
 using PolicyCallback = std::function<bool(const PolicyProgress&, const Model& policy)>;
 
+/// How a training of a policy ended.
 enum class PolicyOutcome {
     finished,     ///< all steps
     max_seconds,  ///< reached
@@ -71,6 +73,7 @@ enum class PolicyOutcome {
 /// One sentence with the remedy.
 [[nodiscard]] std::string_view describe(PolicyOutcome outcome) noexcept;
 
+/// A trained policy and its report.
 struct TrainedPolicy {
     PolicyOutcome outcome = PolicyOutcome::finished;
     std::string message;  ///< what was not finite, and where; else empty

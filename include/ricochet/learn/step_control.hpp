@@ -30,7 +30,7 @@ class StrikeSlipFault;
 
 namespace ricochet::learn {
 
-/// What is told how far something has come, as a share; false ends it.
+/// Callback that is told the fraction of the work that is done; false ends it.
 using StepWatch = std::function<bool(double done)>;
 
 /// A rule with its tolerance, or with the length of constant steps.
@@ -44,10 +44,10 @@ struct StepRule {
     StepWatch watch{};
 };
 
-/// [s] The first step of a rule on a problem whose usual step is that.
+/// First step [s] of a rule on a problem with the given usual step.
 [[nodiscard]] double first_step(const StepRule& rule, double usual_step);
 
-/// What a rule did on a problem.
+/// Work and errors of a rule on a problem.
 struct StepTrial {
     bool ended = false;      ///< reached the end
     double work = 0;         ///< Newton iterations, or solves
@@ -77,6 +77,7 @@ struct StepFamily {
     std::vector<double> tolerances;  ///< of a training
 };
 
+/// Ranges of the parameters of a family of faults.
 struct FaultFamilyOptions {
     std::uint64_t seed = 1;
     /// How many faults of 1 x 1, 2 x 2, ... elements.
@@ -147,6 +148,7 @@ public:
         double off = 0;         ///< log(error / error of the classical rule)
         double failed = 0;      ///< share that did not reach the end
     };
+    /// Terms of the score of `rule`, by group and tolerance.
     [[nodiscard]] std::vector<Part> parts(const LearnedStep& rule) const;
 
 private:
@@ -161,6 +163,7 @@ private:
     std::vector<Group> groups_;
 };
 
+/// Result of a search for the steps of one run.
 struct SearchedSteps {
     std::vector<double> lengths;  ///< [s]
     StepTrial trial;
@@ -173,6 +176,7 @@ struct SearchedSteps {
                                          std::size_t evaluations, std::uint64_t seed = 1,
                                          unsigned threads = 2, const StepWatch& watch = {});
 
+/// Options of a training of a step policy.
 struct StepTrainingOptions {
     std::uint64_t seed = 1;
     std::size_t evaluations = 15'000;
@@ -185,6 +189,7 @@ struct StepTrainingOptions {
     std::function<bool()> goes_on{};
 };
 
+/// A trained step policy and its report.
 struct TrainedStepPolicy {
     Model model;
     EvolutionResult search;

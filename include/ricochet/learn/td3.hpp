@@ -15,6 +15,7 @@
 
 namespace ricochet::learn {
 
+/// Options of `train_td3`.
 struct Td3Options {
     PolicyTraining training{};
     std::vector<std::size_t> actor{64, 64};       ///< hidden layers, ReLU
@@ -26,7 +27,7 @@ struct Td3Options {
     std::size_t delay = 2;  ///< the policy and the targets move at every so many-th update
 };
 
-/// As `train_tqc`.
+/// Trains a policy by TD3 (Fujimoto, van Hoof and Meger 2018), with the contract of `train_tqc`.
 [[nodiscard]] TrainedPolicy train_td3(const Environment& environment,
                                       const Td3Options& options = {},
                                       const PolicyCallback& progress = {});

@@ -21,6 +21,7 @@
 
 namespace ricochet::learn {
 
+/// Options of `train_tqc`.
 struct TqcOptions {
     PolicyTraining training{};
     std::vector<std::size_t> actor{64, 64};       ///< hidden layers, ReLU
@@ -35,7 +36,7 @@ struct TqcOptions {
 
 /// Trains a policy. Everything follows from options and environment, to the bit on one machine,
 /// however many threads run and however often it was interrupted and resumed. A training that had
-/// ended goes on if it is resumed with more steps.
+/// ended continues if it is resumed with more steps.
 /// @throws std::invalid_argument if an option is outside its range, or the environment is
 /// incomplete.
 /// @throws std::runtime_error if the checkpoint cannot be written or read, is of another training,

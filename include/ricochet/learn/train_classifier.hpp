@@ -37,6 +37,7 @@
 
 namespace ricochet::learn {
 
+/// Options of `train_classifier`.
 struct ClassifierTraining {
     double step = 0;         ///< [s] of the fixed steps that it is for, positive
     double run_length = 10;  ///< [s] of a run; the next one starts somewhere else
@@ -68,15 +69,17 @@ struct ClassifierTrial {
     std::vector<Rival>
         rivals{};  ///< other ways of looking, on some of these runs; the network last
 
-    /// One sentence: "looking at the end of every step is faster: with the network ...".
+    /// One sentence that says which way of checking is faster, and what the network misses.
     [[nodiscard]] std::string describe() const;
 };
 
+/// A trained classifier, its report, and its comparison with other detectors.
 struct TrainedClassifier {
     Model model;
     Report report;
     ClassifierTrial trial;
 
+    /// Whether the classifier misses no event of its test set.
     [[nodiscard]] bool misses_none() const noexcept { return Trained{model, report}.misses_none(); }
 };
 
@@ -89,7 +92,7 @@ void check(const ClassifierTraining& training);
 /// @throws std::invalid_argument: a network sees at most as many components.
 [[noreturn]] void throw_too_many_components(std::size_t found, std::size_t most);
 
-/// Before and after the training it is asked now and then whether to go on.
+/// Before and after the training it is asked now and then whether to continue.
 class Asked {
 public:
     struct Stopped {};

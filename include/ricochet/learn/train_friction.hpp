@@ -25,6 +25,7 @@ namespace detail {
 class FrictionModel;
 }
 
+/// Classes of potentials that can be fitted.
 enum class FrictionNetwork {
     /// AdditivePair: f = A(log V) + beta sum of xi_j, with monotone nets.
     additive,
@@ -34,6 +35,7 @@ enum class FrictionNetwork {
     general,
 };
 
+/// Options of `train_friction`.
 struct FrictionTrainingOptions {
     FrictionNetwork network = FrictionNetwork::additive;
     int internal = 1;               ///< internal variables: 0, 1 or 2 (general: 1)
@@ -46,7 +48,7 @@ struct FrictionTrainingOptions {
     int iterations = 60;
     double seconds = 60;   ///< of processor time
     double target = 1e-7;  ///< stop at this root mean square relative error
-    /// Moves by Adam's method first, each on a few histories; Levenberg-Marquardt goes on.
+    /// Moves by Adam's method first, each on a few histories; Levenberg-Marquardt continues.
     int adam_iterations = 0;
     double adam_rate = 3e-3;
     const std::atomic<bool>* cancelled = nullptr;  ///< true ends it with what was fitted so far
@@ -55,6 +57,7 @@ struct FrictionTrainingOptions {
 /// A fit, ready to use.
 class LearnedFriction {
 public:
+    /// Takes a fitted model; made by `train_friction`.
     explicit LearnedFriction(std::shared_ptr<const detail::FrictionModel> model);
 
     /// Friction along a history. `refine` halves the steps of the integration as many times.
@@ -94,10 +97,12 @@ private:
                                             const std::vector<FrictionHistory>& histories,
                                             const FrictionTrainingOptions& options);
 
+/// Errors of a fit over many histories.
 struct FrictionErrors {
     double mean = 0, deviation = 0, most = 0;  ///< of relative L2 errors of friction
     double mean_beyond = 0;                    ///< mean of those relative to f - f*
 };
+/// Errors of `fit` on histories with friction; `f_star` is f*.
 [[nodiscard]] FrictionErrors assess(const LearnedFriction& fit,
                                     const std::vector<FrictionHistory>& histories, double f_star);
 

@@ -8,7 +8,7 @@
 //         system, learn::from_box<State>(lower, upper), FixedStep<Rk4>{}, {}, training);
 //     integrate(system, x0, options, FixedStep<Rk4>{}, Calibrated(Gate(gate.model)));
 //
-// Runs with the exact detector give the states; a system whose guard is dear is best trained on
+// Runs with the exact detector give the states; a system whose guard is expensive is best trained on
 // while its guard is cheap, as where a waiting time is a parameter. The same seed gives the
 // same gate, to the bit on one machine.
 #pragma once
@@ -80,7 +80,7 @@ template <class System, class X, class Stepping>
     trained.report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (runs.stopped()) return stop();
-    // Of weights that are no numbers nothing is to be measured.
+    // With weights that are not numbers there is nothing to measure.
     const bool usable = trained.report.outcome != TrainingOutcome::stopped &&
                         trained.report.outcome != TrainingOutcome::diverged;
     if (training.fresh_events == 0 || !usable) return trained;

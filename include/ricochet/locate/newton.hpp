@@ -24,6 +24,7 @@ namespace detail {
 
 }  // namespace detail
 
+/// Locator by Newton's method inside a bracket, with the slope along the flow: the default.
 struct Newton {
     [[nodiscard]] Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
                                   double tolerance) const;

@@ -1,4 +1,4 @@
-// What has been proved of a model, as it is kept in its file, and how it is used.
+// Certificates: statements that were proved of a model, as they are kept in its file and used.
 //
 // A certificate says, for every state in a box and for each of its levels:
 //
@@ -31,6 +31,7 @@ struct CertificateLevel {
     std::vector<std::vector<Interval>> unproved{};  ///< boxes, to be asked exactly
 };
 
+/// A proof that wherever a network clears, the guard of its system is above a margin.
 struct Certificate {
     std::string tool;         ///< "ricochet 0.1.0"
     std::string fingerprint;  ///< of the model
@@ -41,10 +42,10 @@ struct Certificate {
     std::vector<CertificateLevel> levels;
 };
 
-/// Of all that a certificate depends on, 16 hexadecimal digits (FNV-1a, 64 bits).
+/// Hash of everything that a certificate depends on, as 16 hexadecimal digits (FNV-1a, 64 bits).
 [[nodiscard]] std::string fingerprint(const Model& model);
 
-/// As it is stored in a model, one line of JSON; numbers keep their bits.
+/// Text of a certificate as it is stored in a model, one line of JSON; numbers keep their bits.
 [[nodiscard]] std::string to_text(const Certificate& certificate);
 
 /// @throws std::invalid_argument in one sentence if the text is no certificate.

@@ -16,14 +16,14 @@
 
 namespace ricochet {
 
-/// What a kernel is compiled for. Other processors than x86-64 have the baseline only.
+/// Instruction set that a kernel is compiled for. Processors other than x86-64 have the baseline only.
 enum class InstructionSet {
     baseline,   ///< whatever the library is compiled for, e.g. SSE2
     x86_64_v3,  ///< AVX2
     x86_64_v4,  ///< AVX-512
 };
 
-/// As gcc spells it: "baseline", "x86-64-v3" or "x86-64-v4".
+/// Name of an instruction set as gcc spells it: "baseline", "x86-64-v3" or "x86-64-v4".
 [[nodiscard]] std::string_view name(InstructionSet set) noexcept;
 
 /// Whether this build has kernels for `set` and this processor runs them.
@@ -34,7 +34,7 @@ enum class InstructionSet {
 
 namespace detail {
 
-/// What a kernel reads; the pointers are into memory that an `Mlp` owns.
+/// Input of a kernel; the pointers are into memory that an `Mlp` owns.
 template <class T>
 struct Network {
     const T* parameters = nullptr;          ///< as `pack` stores them, aligned to 64 bytes
@@ -48,6 +48,7 @@ using Kernel = void (*)(const Network<T>&, const T* in, T* out, std::size_t samp
 
 }  // namespace detail
 
+/// Options of the inference.
 struct MlpOptions {
     InstructionSet instruction_set = best_instruction_set();
     bool common_shapes = true;  ///< use an instance of its own for a common shape

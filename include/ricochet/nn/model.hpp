@@ -12,7 +12,7 @@
 
 namespace ricochet {
 
-/// What follows every hidden layer; the last layer is linear.
+/// Activation after every hidden layer; the last layer is linear.
 enum class Activation { relu, tanh };
 
 /// How the weights are stored, and in what arithmetic they are evaluated.
@@ -49,7 +49,7 @@ struct GateLevel {
     double threshold = 0;
 };
 
-/// What a gate was seen to do on runs that it was not made from.
+/// Behaviour of a gate on runs that it was not made from.
 struct Calibration {
     std::uint64_t events = 0;  ///< of the runs; 0: none were made
     std::uint64_t misses = 0;  ///< of these, events that a gated run did not find

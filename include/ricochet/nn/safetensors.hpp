@@ -44,6 +44,7 @@ public:
     using std::runtime_error::runtime_error;
 };
 
+/// Options of `load_model`.
 struct LoadOptions {
     bool allow_non_finite = false;  ///< accept NaN and infinite weights
 };

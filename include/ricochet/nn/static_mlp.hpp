@@ -46,9 +46,9 @@ public:
         detail::RICOCHET_KERNEL_NAMESPACE::pack(model, parameters_.data());
     }
 
-    /// Reads `inputs()` values and writes `outputs()`.
     // Inlined without exception, so that translation units with different flags do
     // not share one definition; the same holds for all it calls.
+    /// Reads `inputs()` values and writes `outputs()`.
     RICOCHET_INLINE void forward(const T* in, T* out) const noexcept
     {
         detail::RICOCHET_KERNEL_NAMESPACE::evaluate<T, activation == Activation::relu, Widths...>(
@@ -82,11 +82,11 @@ private:
     alignas(64) std::array<T, size()> parameters_;
 };
 
-/// With max(0, x) after the hidden layers: `StaticMlp<float, 4, 16, 16, 1>`.
+/// Network with max(0, x) after the hidden layers: `StaticMlp<float, 4, 16, 16, 1>`.
 template <class T, std::size_t... Widths>
 using StaticMlp = BasicStaticMlp<Activation::relu, T, Widths...>;
 
-/// With tanh(x) after the hidden layers.
+/// Network with tanh(x) after the hidden layers.
 template <class T, std::size_t... Widths>
 using StaticTanhMlp = BasicStaticMlp<Activation::tanh, T, Widths...>;
 

@@ -38,6 +38,7 @@ concept Contacting = requires(const System& system,
     System::tangents;
 };
 
+/// Counts over one run with contacts.
 struct ContactStatistics {
     Statistics event_driven;
     TimeSteppingStatistics time_stepping;
@@ -160,7 +161,7 @@ private:
     void touch_down(PhaseCause cause)
     {
         if (options_.events_only) return end_with(Outcome::not_handed_over);
-        // Who is back at once stays longer.
+        // A phase that is re-entered immediately is kept longer each time.
         const bool at_once = run_.t - run_.phases.back().from < 10 * options_.set_valued.step;
         patience_ = at_once ? std::min(2 * patience_, std::uint64_t{1} << 20) : 1;
         in_contact_ = true;
@@ -219,7 +220,7 @@ private:
 
     // --- samples ---
 
-    /// On straight lines, which is as accurate as the steps are.
+    /// Interpolates on straight lines, which is as accurate as the steps.
     void emit_samples(double t_before, const X& before)
     {
         while (run_.trajectory.t.size() < options_.sample_times.size()) {
@@ -269,8 +270,8 @@ AnyContactRun<N> AnyContactMotion<N>::take()
 
 }  // namespace detail
 
-/// Of `HandOverOptions` those of the event-driven phases count, and `set_valued.step` as the
-/// step of time stepping.
+/// Motion of a mechanical system with contacts: flights between impacts by events, closed contacts by time stepping.
+/// `HandOverOptions` are those of the event-driven phases, with `set_valued.step` as the step of time stepping.
 template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
 class ContactMotion {
     static constexpr int N = System::coordinates;
@@ -290,7 +291,7 @@ public:
     {
     }
 
-    /// To the end; whatever the outcome, what was computed is there.
+    /// Advances to the end and returns the result, whatever the outcome.
     [[nodiscard]] ContactRun<System> take() { return {by_.take()}; }
 
 private:

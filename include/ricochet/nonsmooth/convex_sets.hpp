@@ -67,7 +67,7 @@ void clamp_derivative(const Box& box, std::span<const double> z, std::span<doubl
     }
 }
 
-/// What is wrong with an interval, nothing if it is one.
+/// Sentence that says why an interval is not valid; empty if it is.
 [[nodiscard]] constexpr std::string_view interval_fault(double lower, double upper) noexcept
 {
     if (lower <= upper) return "";
@@ -83,6 +83,7 @@ namespace sets {
 /// (sign), Coulomb friction of one direction. As a set of states: stops, a saturation.
 class IntervalSet {
 public:
+    /// [lower, upper]; lower above upper is a fault, see `fault`.
     constexpr IntervalSet(double lower, double upper) noexcept : lower_(lower), upper_(upper) {}
 
     /// [-bound, bound]: friction in one direction. A negative bound is a fault.
@@ -122,6 +123,7 @@ private:
 template <std::size_t N>
 class Box {
 public:
+    /// Takes the bounds of each component, which may be infinite.
     constexpr Box(const std::array<double, N>& lower, const std::array<double, N>& upper) noexcept
         : lower_(lower), upper_(upper)
     {
@@ -177,6 +179,7 @@ public:
 template <std::size_t N>
 class Ball {
 public:
+    /// Takes the radius, which may be infinite.
     explicit constexpr Ball(double radius) noexcept : radius_(radius) {}
 
     [[nodiscard]] static constexpr std::size_t dimension() noexcept { return N; }
@@ -237,6 +240,7 @@ class FrictionCone {
     static_assert(N >= 2);
 
 public:
+    /// Takes the coefficient of friction.
     explicit constexpr FrictionCone(double friction) noexcept : friction_(friction) {}
 
     [[nodiscard]] static constexpr std::size_t dimension() noexcept { return N; }
@@ -312,6 +316,7 @@ private:
 template <class... Sets>
 class Product {
 public:
+    /// Takes the factors, in the order of the components.
     explicit constexpr Product(const Sets&... sets) noexcept : sets_(sets...) {}
 
     [[nodiscard]] constexpr std::size_t dimension() const noexcept
@@ -393,7 +398,7 @@ private:
 
 }  // namespace sets
 
-/// What is wrong with `set`, nothing if it is fine or does not say.
+/// Sentence that says why `set` is not valid; empty if it is, or does not say.
 template <ConvexSet Set>
 [[nodiscard]] std::string_view fault_of(const Set& set) noexcept
 {
@@ -414,7 +419,7 @@ void check_projection(std::size_t dimension, const Projection& project,
 
 /// Samples the projection at pairs of random points of several magnitudes: P P z = P z,
 /// |P z - P y|^2 <= (P z - P y).(z - y), which hold for every projection on a closed
-/// convex set and together for nothing else; and the derivative against differences of
+/// convex set and together at no cost else; and the derivative against differences of
 /// the projection, where these do not straddle a kink.
 ///
 /// @throws std::invalid_argument naming what failed and where.

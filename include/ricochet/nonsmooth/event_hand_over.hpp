@@ -3,7 +3,7 @@
 // A system with a flow and guards of its own may declare
 //
 //     set_valued()         an Inclusion (inclusion.hpp) of the same state
-//     start_mode(t, x)     where it has modes: the one in which it goes on from (t, x)
+//     start_mode(t, x)     where it has modes: the one in which it continues from (t, x)
 //
 // `integrate` then follows its events while they lead on. Where they do not (switchings that
 // accumulate or chatter, a motion that presses on its guard, resets that contradict one another)
@@ -68,7 +68,7 @@ template <class To, class From>
 /// error of a step. Error control then chooses how often it switches, not the motion.
 class SwitchingWatch {
 public:
-    /// Of the events recorded until now; `error` is what a step may be off by.
+    /// Reviews the events recorded until now; `error` is the error of a step.
     template <class X, class Error>
     [[nodiscard]] bool operator()(const std::vector<Event<X>>& events, const Error& error)
     {
@@ -127,7 +127,7 @@ public:
         hand_over_.until_released = true;
     }
 
-    /// To the end; whatever the outcome, what was computed is there.
+    /// Advances to the end and returns the result, whatever the outcome.
     [[nodiscard]] MixedRun<X> take()
     {
         bool ended = false;
@@ -146,7 +146,7 @@ public:
     }
 
 private:
-    /// Why the inclusion is to go on; nothing if the run is over.
+    /// Why the inclusion is to continue; nothing if the run is over.
     [[nodiscard]] std::optional<PhaseCause> follow_events()
     {
         if (steps_taken() >= options_.max_steps) {
@@ -224,7 +224,7 @@ private:
         return false;
     }
 
-    /// What a step that ends at x may be off by.
+    /// Error of a step that ends at x.
     [[nodiscard]] double error_of(const X& x) const
     {
         double largest = 0;
@@ -232,7 +232,7 @@ private:
         return options_.atol + options_.rtol * largest;
     }
 
-    /// Of both kinds, attempts included.
+    /// Number of steps of both kinds, attempts included.
     [[nodiscard]] std::uint64_t steps_taken() const noexcept
     {
         return run_.statistics.event_driven.steps + run_.statistics.set_valued.attempted;

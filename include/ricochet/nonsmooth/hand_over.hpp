@@ -7,7 +7,7 @@
 //                    determine, switching that accumulates; and sets that have no such
 //                    branches at all. Bathe's steps, until the branches are plain again
 //
-// The reaction with which a phase starts is the minimal selection. Who declares no inclusion
+// The reaction with which a phase starts is the minimal selection. A system that declares no inclusion
 // includes nothing of this.
 #pragma once
 
@@ -45,7 +45,7 @@ public:
     {
     }
 
-    /// To the end; whatever the outcome, what was computed is there.
+    /// Advances to the end and returns the result, whatever the outcome.
     [[nodiscard]] HandOverRun<System> take() { return {by_.take()}; }
 
 private:

@@ -28,7 +28,7 @@
 //     act(G)                           G; the transpose of E
 //     offset(t, s)                     s(t), continuous, the motion of what y is relative to; zero
 //     offset_rate(t, s)                its rate; a difference without it, wrong beside a kink
-//     branch_bound(t, w, i, branch)    a bound that goes on smoothly beyond y = 0, see
+//     branch_bound(t, w, i, branch)    a bound that continues smoothly beyond y = 0, see
 //                                      branch_modes.hpp
 //     bound_gradient(t, w, i, g)       d upper_i / dw of a BoxSet of symmetric intervals
 //                                      that depend on the state
@@ -49,7 +49,7 @@
 
 namespace ricochet {
 
-/// What the set of an inclusion holds.
+/// Quantity that the set of an inclusion restricts.
 enum class Confines {
     reaction,  ///< friction, relays, diodes, contacts
     state,     ///< stops

@@ -3,7 +3,7 @@
 //     SetValuedMotion motion(DiodeCircuit{}, w0, {.t_end = 20, .step = 0.01});
 //     const Outcome outcome = motion.run();
 //
-// A step is computed, its error judged by the controller, and accepted or repeated; a
+// A step is computed, its error assessed by the controller, and accepted or repeated; a
 // stage that has no solution shortens the step and in the end stops the run. The state,
 // with its reaction, is all that a step depends on.
 #pragma once
@@ -21,15 +21,17 @@
 
 namespace ricochet {
 
+/// How the error of a step is estimated.
 enum class ErrorEstimate {
     none,      ///< what a `ConstantStep` needs
     embedded,  ///< `CompositeStep::embedded_error`: Bathe's scheme, averaged reaction
     doubling,  ///< one step against two of half the length, of which the result is kept
 };
 
+/// How changes of branch inside a step are treated.
 enum class Switches {
     stepped_over,  ///< as the source does: of order 1 at a jump of the reaction
-    /// Where a branch changes within a step, the step ends there: the last instant at
+    /// Ends a step where a branch changes within it: the last instant at
     /// which the motion on the branches of its start agrees with them. Boxes only.
     located,
 };
@@ -44,6 +46,7 @@ struct ErrorField {
     double floor = 0;        ///< in the units of the state
 };
 
+/// Options of set-valued motion.
 struct SetValuedOptions {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();
@@ -65,6 +68,7 @@ struct SetValuedOptions {
 /// @throws std::invalid_argument naming the option, what was given and what was expected.
 void validate(const SetValuedOptions& options);
 
+/// Counts over one set-valued motion.
 struct SetValuedStatistics {
     std::uint64_t attempted = 0;
     std::uint64_t accepted = 0;
@@ -104,7 +108,7 @@ public:
     void restart(const State& state);
 
     [[nodiscard]] const State& state() const noexcept { return now_; }
-    /// Where the last accepted step began, and its middle stage.
+    /// Start of the last accepted step, and its middle stage.
     [[nodiscard]] const State& before() const noexcept { return before_; }
     [[nodiscard]] const State& middle() const noexcept { return step_.middle(); }
     [[nodiscard]] const SetValuedStatistics& statistics() const noexcept { return statistics_; }
@@ -113,11 +117,11 @@ public:
     [[nodiscard]] const StageReport& failure() const noexcept { return failure_; }
     /// The step that will be tried next.
     [[nodiscard]] double next_step() const noexcept { return h_; }
-    /// For whoever chooses steps himself, positive.
+    /// Sets the next step, positive, for callers that choose the steps themselves.
     void next_step(double h) noexcept { h_ = h; }
     /// The scaled error of the last attempt.
     [[nodiscard]] double error() const noexcept { return scaled_error_; }
-    /// With the counts of a `LearnedStep`.
+    /// Counts, with those of a `LearnedStep`.
     [[nodiscard]] const StepController& controller() const noexcept { return options_.controller; }
     [[nodiscard]] AnyStep<N, M>& stepper() noexcept { return step_; }
     [[nodiscard]] const Matrices& matrices() const noexcept { return step_.matrices(); }
@@ -153,7 +157,7 @@ public:
 
     /// The state within the last step at which the scalar `g(state)`, of opposite signs at
     /// its ends, vanishes: by repeating the step with other lengths, so that it is as
-    /// accurate as a step; to `tolerance` in time. `g` may look at the reaction, as for the
+    /// accurate as a step; to `tolerance` in time. `g` may examine the reaction, as for the
     /// release of what sticks. Nothing if the signs are equal or a step fails.
     template <class Function>
     [[nodiscard]] std::optional<State> locate(const Function& g, double tolerance = 0)
@@ -239,7 +243,7 @@ private:
         return report;
     }
 
-    /// What a policy is told of the attempt.
+    /// Inputs of a policy about the attempt.
     [[nodiscard]] StepView view(double h)
     {
         StepView out{.step = h};
@@ -308,7 +312,7 @@ private:
             // Out and back again within the step? The middle stage would show it.
             const double middle = step_.slack(step_.middle(), start_branches_);
             if (middle >= 0) {
-                // The two half steps of `doubling` are better than the one that was looked at.
+                // The two half steps of `doubling` are better than the one that was examined.
                 const bool keep = options_.estimate == ErrorEstimate::doubling &&
                                   step_.slack(trial_, start_branches_) >= 0;
                 if (!keep) trial_ = half_;
@@ -405,7 +409,7 @@ private:
             last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
             return;
         }
-        // Sliding has come to a stop: it sticks, or goes on across.
+        // Sliding has come to a stop: it sticks, or continues across.
         zero_observed(which);
         try {
             now_.reaction = minimal_selection(step_.matrices(), now_.t, now_.w);
@@ -416,7 +420,7 @@ private:
         last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
     }
 
-    /// Of reaction `which`, and of those whose y is zero up to rounding.
+    /// Sets y to exactly zero for reaction `which`, and for the reactions whose y is zero up to rounding.
     void zero_observed(Eigen::Index which)
     {
         if (!traits().of_reactions()) return;
@@ -555,6 +559,15 @@ Outcome AnyMotion<N, M>::advance()
 
 }  // namespace detail
 
+/// Motion of a differential inclusion by implicit steps.
+///
+/// A step of length h from (w_n, r_n) solves for (w_n+1, r_n+1)
+///
+///     A w' = f(t, w) + G r,    y = E w - s(t),    -y in the normal cone of K at r
+///
+/// in the stages of Bathe's scheme, is assessed by the step controller, and is accepted or repeated
+/// with another length. The reaction is part of the state, so that the same (t, w, r) and h give
+/// the same bits.
 template <Inclusion System>
 class SetValuedMotion : public detail::AnyMotion<state_size<System>, reaction_size<System>> {
 public:

@@ -21,6 +21,7 @@
 
 namespace ricochet {
 
+/// Decision of a step controller: whether the step is accepted, and the factor of the next length.
 struct StepVerdict {
     bool accepted = true;
     double factor = 1;  ///< the next step over this one
@@ -68,7 +69,7 @@ struct HeuristicStep {
     void reset() const noexcept {}
 };
 
-/// What the code of the same authors runs under the name of a heuristic: accepted where
+/// Rule that the published code of the same authors calls a heuristic: a step is accepted where
 /// error <= 1, with the factor
 ///
 ///     0.9 error^(-0.7 / (order + 1)) error_before^(-0.4 / (order + 1)) in [down, up],
@@ -161,7 +162,7 @@ struct PrescribedSteps {
 class StepPolicy;
 class StepRanges;
 
-/// What a learned rule is told of an attempt, besides its error.
+/// Inputs of a learned rule about an attempt, besides its error.
 struct StepView {
     static constexpr std::size_t state_inputs = 6;
 
@@ -180,7 +181,7 @@ struct LearnedStep {
     StepRanges* seen = nullptr;  ///< widened by every input, unless null
 
     [[nodiscard]] StepVerdict judge(double error, double h, const StepView& view) noexcept;
-    /// Without a view, as `plain`.
+    /// Same as `plain` for callers without a view.
     [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
     [[nodiscard]] double failed() const noexcept { return plain.failed(); }
     void reset() const noexcept {}

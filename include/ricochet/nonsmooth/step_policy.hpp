@@ -29,6 +29,7 @@ public:
     static constexpr std::size_t inputs = 4 + StepView::state_inputs;
     using Inputs = std::array<double, inputs>;
 
+    /// Widens the ranges to hold `inputs`, or those of `other`.
     void include(const Inputs& inputs) noexcept;
     void include(const StepRanges& other) noexcept;
     [[nodiscard]] bool empty() const noexcept { return !(lower_[0] <= upper_[0]); }

@@ -36,6 +36,7 @@
 
 namespace ricochet {
 
+/// Options of time stepping.
 struct TimeSteppingOptions {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();
@@ -56,6 +57,7 @@ void check_contact(int contact, double restitution, double friction, double gap,
 
 }  // namespace detail
 
+/// Counts over one motion by time stepping.
 struct TimeSteppingStatistics {
     std::uint64_t steps = 0;
     std::uint64_t problems = 0;    ///< steps with a closed contact

@@ -77,7 +77,7 @@ Integration integration(const RunRequest& run)
     }
     if (out.integrator == "bathe-published") out.bathe.first_stage = FirstStage::at_end;
     if (out.controller == "constant") {
-        if (run.rtol) throw BadInput("--rtol needs a --controller that looks at errors");
+        if (run.rtol) throw BadInput("--rtol needs a --controller that uses errors");
         return out;
     }
     if (run.rtol) out.bathe.rtol = *run.rtol;

@@ -1,4 +1,4 @@
-// What the parameters of the fault, as typed, are to the library.
+// From the parameters of the fault as typed to those of the library.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What is done of something that takes long, on standard error.
+// Progress of a long command, on standard error.
 #pragma once
 
 #include <fmt/format.h>

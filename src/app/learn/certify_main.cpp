@@ -23,7 +23,7 @@ void add_certify(CLI::App& app, int& status)
                      "margins that grow by --ratio, each with a threshold; default 1");
     add_number(command, "--ratio", request->ratio, "R", "between margins, default 2");
     command.add_flag("--keep-threshold", request->keep_threshold,
-                     "prove the stored threshold; else the highest that can be is looked for");
+                     "prove the stored threshold; else the highest provable one is searched for");
     add_number(command, "--limit", request->limit, "S",
                "begin nothing that takes longer by estimate [s], default 300");
     add_number(command, "--time-limit", request->time_limit, "S",
@@ -39,7 +39,7 @@ void add_certify(CLI::App& app, int& status)
         .add_option("--checkpoint", request->checkpoint,
                     "where an interrupted proof is kept, default MODEL.checkpoint")
         ->type_name("FILE");
-    command.add_flag("--resume", request->resume, "go on from the checkpoint");
+    command.add_flag("--resume", request->resume, "continue from the checkpoint");
     command.add_flag("--json", request->json, "print the result as JSON");
     command.footer("Example:\n  ricochet certify room.safetensors --margin 0.05 --levels 4");
     command.callback([&status, request] { status = certify(*request); });

@@ -1,4 +1,4 @@
-// What a certificate of a model has to prove, for each system whose guard is bounded.
+// Statements that a certificate of a model has to prove, for each system whose guard is bounded.
 #pragma once
 
 #include <string_view>

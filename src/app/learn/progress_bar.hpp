@@ -1,4 +1,4 @@
-// How a training gets on, on standard error.
+// Progress of a training, on standard error.
 #pragma once
 
 #include <fmt/format.h>

@@ -106,7 +106,7 @@ int train_policy(const TrainPolicyRequest& request)
     if (request.evaluations) options.evaluations = *request.evaluations;
     if (request.seconds) options.seconds = *request.seconds;
     if (request.threads) options.threads = *request.threads;
-    const RunWatch watch(0.5);  // a generation, and what is judged in the end, may take long
+    const RunWatch watch(0.5);  // a generation, and what is assessed in the end, may take long
     const learn::StepFamily family = step_family(request.system, seed);
     const learn::TrainedStepPolicy trained = trained_policy(family, options);
     const bool stopped = trained.search.outcome == learn::EvolutionOutcome::stopped;

@@ -18,7 +18,7 @@ namespace ricochet::app {
 /// @throws BadInput or ModelError if it is not there or something else.
 [[nodiscard]] Model shipped_actor(std::string_view system);
 
-/// How an actor is judged: it takes the steps that it was trained with, until nothing moves.
+/// How an actor is assessed: it takes the steps that it was trained with, until nothing moves.
 [[nodiscard]] learn::StepWorldOptions judged(const Model& actor);
 
 }  // namespace ricochet::app

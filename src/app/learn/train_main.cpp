@@ -92,7 +92,7 @@ void add_train(CLI::App& app, int& status)
         .add_option("--checkpoint", training.checkpoint,
                     "where an interrupted training is kept, default FILE.checkpoint")
         ->type_name("FILE");
-    command.add_flag("--resume", training.resume, "go on from the checkpoint");
+    command.add_flag("--resume", training.resume, "continue from the checkpoint");
     command.add_flag("--allow-misses", request->allow_misses,
                      "write the model even if it misses events");
     command.add_flag("--json", request->json, "print the report as JSON");

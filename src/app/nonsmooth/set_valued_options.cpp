@@ -101,7 +101,7 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
            "of a differential inclusion follows from its state");
     refuse(steps && request.stepper, "--stepper", "is for --integrator handover and event");
     refuse(steps && !controlled && (request.rtol || request.atol), "--rtol and --atol",
-           "need a --controller that looks at errors");
+           "need a --controller that uses errors");
     refuse(!steps && request.step && chosen.integrator == "event", "--step",
            "is for set-valued steps, and --integrator event has none");
     chosen.step = request.step.value_or(system.set_valued_step);

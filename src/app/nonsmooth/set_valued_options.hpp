@@ -1,4 +1,4 @@
-// How differential inclusions are integrated: from requests to settings, from settings to the
+// Settings of differential inclusions: from requests to settings, from settings to the
 // options of the integrators, and their outcomes.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What there is to know of bodies in contact; `ricochet-nonsmooth` runs them.
+// Descriptions of bodies in contact; `ricochet-nonsmooth` runs them.
 #include "entries.hpp"
 #include "problems/incline_block.hpp"
 #include "problems/rolling_ball.hpp"

@@ -1,4 +1,4 @@
-// What there is to know of differential inclusions; `ricochet-nonsmooth` runs them.
+// Descriptions of differential inclusions; `ricochet-nonsmooth` runs them.
 #include "entries.hpp"
 #include "labels.hpp"
 #include "problems/super_twisting.hpp"

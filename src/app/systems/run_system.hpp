@@ -65,7 +65,7 @@ TimedRun with_gate(const RunSettings& settings, Use&& use)
     const bool blind = settings.detector == DetectorKind::calibrated && horizon;
     if (!blind && !Bounded<System, X>) {
         throw BadInput("the " + std::string(name(settings.detector)) +
-                       " gate closes stretches by bounds, which this system does not declare; "
+                       " gate closes intervals by bounds, which this system does not declare; "
                        "expected --gate calibrated with a horizon gate");
     }
     try {
@@ -111,7 +111,7 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
 }
 
 /// The same run with states of one type for all systems; without its solution, which
-/// nobody asks for here.
+/// is not needed here.
 template <class X>
 [[nodiscard]] Run<std::vector<double>> with_plain_states(Run<X> run)
 {

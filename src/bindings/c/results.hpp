@@ -1,4 +1,4 @@
-// What runs and monitors have come to, as a C program is shown it.
+// Results of runs and monitors, in the structs of C.
 #pragma once
 
 #include <cstddef>

@@ -27,7 +27,7 @@ public:
     virtual bool step() = 0;
     virtual bool advance() = 0;
     virtual void run_to_end() = 0;
-    /// Lets a run that was cancelled go on; true if it was.
+    /// Lets a run that was cancelled continue; true if it was.
     virtual bool continue_cancelled() noexcept = 0;
 
     [[nodiscard]] virtual double t() const noexcept = 0;

@@ -31,7 +31,7 @@ namespace ricochet::c {
 
 namespace {
 
-/// Advances the run by `go`, which says whether it goes on.
+/// Advances the run by `go`, which says whether it continues.
 template <class Go>
 [[nodiscard]] rc_status advance_by(rc_simulation* simulation, int* goes_on, const Go& go) noexcept
 {

@@ -1,4 +1,4 @@
-// Work that goes on while Python treats signals and draws progress.
+// Work that continues while Python treats signals and draws progress.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -19,12 +19,12 @@ namespace ricochet::python {
 
 /// One piece of work in a thread of its own, and what Python has to say of it.
 ///
-/// Every 20 ms the caller's thread looks for signals and shows the latest progress. Where a handler
+/// Every 20 ms the caller's thread checks for signals and shows the latest progress. Where a handler
 /// or the callback raises an exception, or the callback returns False, the work is asked to stop.
 template <class Progress>
 class Background {
 public:
-    /// Draws, and says whether to go on.
+    /// Draws, and says whether to continue.
     using Show = std::function<bool(const Progress&)>;
 
     explicit Background(Show show) : show_(std::move(show)) {}

@@ -198,7 +198,7 @@ private:
     {
         if (!source_.guard_values_) {
             for (std::size_t i = 0; i < g.size(); ++i) {
-                // One that is not looked at in this mode may have no value there.
+                // One that is not examined in this mode may have no value there.
                 g[i] = is_in(i, mode) ? guard(i, mode, t, x) : 1;
             }
             return;

@@ -1,4 +1,4 @@
-// A system of Python's in the place of a user's type, for what is a template over one.
+// A system of Python's in place of a user's type, for what is a template over one.
 #pragma once
 
 #include <algorithm>

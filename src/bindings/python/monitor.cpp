@@ -333,7 +333,7 @@ void bind_monitor(py::module_& module)
         .def("save", &PyMonitor::save,
              "All that the future depends on, between two steps, as a Snapshot.")
         .def("restore", &PyMonitor::restore,
-             "Goes on where the snapshot of a monitor of the same system was taken.")
+             "Continues where the snapshot of a monitor of the same system was taken.")
         .def_property_readonly("t", &PyMonitor::t, "Where the next step begins.")
         .def_property_readonly("x", &PyMonitor::x, "The state there, which may be kept.")
         .def_property_readonly("mode", &PyMonitor::mode, "The mode there.")
@@ -341,9 +341,9 @@ void bind_monitor(py::module_& module)
                                "The next time event, beyond which no step goes; infinite where "
                                "there is none.")
         .def_property_readonly("quiet_until", &PyMonitor::quiet_until,
-                               "The time up to which no guard needs a look, by the bounds that the "
+                               "The time up to which no guard needs a check, by the bounds that the "
                                "system declares: the host may go there by `skip_to`. Where nothing "
-                               "is known it is the time in hand.")
+                               "is known it is the current time.")
         .def_property_readonly("run", &PyMonitor::so_far, "What has been found so far, as a Run.")
         .def_property_readonly(
             "events",

@@ -208,7 +208,7 @@ void bind_network(py::module_& module)
         .def_property_readonly("parameters", meta(&Model::parameters),
                                "The parameters of the system that it depends on.")
         .def_property_readonly("recipe", meta(&Model::recipe),
-                               "How its features are made of a state.")
+                               "Name of the map from a state to its features.")
         .def_property_readonly("threshold", meta(&Model::threshold),
                                "An event is predicted where the output is not below it.")
         .def_property_readonly("seed", meta(&Model::seed), "The seed of its training.")
@@ -238,7 +238,7 @@ void bind_network(py::module_& module)
             "How many features it takes.")
         .def_property_readonly(
             "outputs", [](const PyNetwork& self) { return self.classifier().outputs(); },
-            "How many numbers it makes of them.")
+            "Number of its outputs.")
         .def_property_readonly("layers", &layers_of,
                                "A tuple (weight, bias) for each layer, as views.")
         .def_property_readonly(
@@ -260,7 +260,7 @@ void bind_network(py::module_& module)
             "Of a gate a tuple (value, threshold) for each level.")
         .def_property_readonly(
             "calibration", [](const PyNetwork& self) { return calibration_of(*self.model()); },
-            "What a gate was seen to miss on runs that it was not made from, as a dictionary, or "
+            "Misses of a gate on runs that it was not made from, as a dictionary, or "
             "None.")
         .def_property_readonly(
             "certified", [](const PyNetwork& self) { return self.certified() != nullptr; },

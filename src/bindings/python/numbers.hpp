@@ -23,7 +23,7 @@ namespace ricochet::python {
 /// The numbers that a callback has returned, which is kept alive by the caller.
 class Numbers {
 public:
-    /// @throws PythonError naming `who` and `of`, if these are no numbers
+    /// @throws PythonError naming `who` and `of`, if these are not numbers
     Numbers(PyObject* result, const char* who, const std::string& of);
 
     [[nodiscard]] std::size_t size() const noexcept { return size_; }

@@ -1,4 +1,4 @@
-// What a run has computed, as memory that NumPy can look at without a copy.
+// Results of a run, as memory that NumPy can view without a copy.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What Python asks of a run, in the library's terms.
+// A request from Python for a run, in the library's terms.
 #pragma once
 
 #include <memory>

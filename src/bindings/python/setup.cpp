@@ -18,7 +18,7 @@ namespace ricochet::python {
 
 namespace {
 
-/// In the place of a system in the tables of detectors, which ask it for nothing but bounds, and
+/// In the place of a system in the tables of detectors, which ask it at no cost but bounds, and
 /// for these through the table of the run.
 struct SomeSystem {
     void flow(double /*t*/, const State& /*x*/, State& /*dxdt*/) const {}

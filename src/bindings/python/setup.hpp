@@ -1,4 +1,4 @@
-// What a run is made of, from what Python asks.
+// The parts of a run, made from a request of Python.
 #pragma once
 
 #include <memory>

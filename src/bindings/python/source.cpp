@@ -6,7 +6,7 @@ void SignalWatch::look() noexcept
 {
     using std::chrono::milliseconds;
     const Clock::time_point now = Clock::now();
-    if (looked_ == Clock::time_point{}) looked_ = handled_ = now;  // the first look
+    if (looked_ == Clock::time_point{}) looked_ = handled_ = now;  // the first check
     // As many calls as take a few milliseconds, by what the last ones took.
     const auto took = now - looked_;
     if (took < milliseconds(1)) {

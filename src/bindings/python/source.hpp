@@ -19,7 +19,7 @@
 
 namespace ricochet::python {
 
-/// Lets Python treat signals, such as an interrupt, while a run goes on without the interpreter.
+/// Lets Python treat signals, such as an interrupt, while a run continues without the interpreter.
 ///
 /// `tick` is called by the functions of a system. Every few milliseconds it takes the
 /// interpreter for long enough to have signals handled; where a handler raises an exception the
@@ -34,7 +34,7 @@ public:
     [[nodiscard]] const std::atomic<bool>* cancelled() const noexcept { return &cancelled_; }
     /// What a handler has raised.
     [[nodiscard]] const std::optional<PythonError>& raised() const noexcept { return raised_; }
-    /// The same, to be raised here; what comes after it goes on.
+    /// The same, to be raised here; what comes after it continues.
     [[nodiscard]] std::optional<PythonError> take_raised() noexcept
     {
         cancelled_ = false;

@@ -64,7 +64,7 @@ public:
         }
     }
 
-    /// What the body is besides goes on to t with it. The rate is that of free fall.
+    /// Continues the rest of the body's state to t. The rate is that of free fall.
     void go_on_from(double t, std::span<const double> x, bool /*changed*/)
     {
         if (t < t1_) {

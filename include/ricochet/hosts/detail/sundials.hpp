@@ -68,7 +68,7 @@ public:
         cubic_ ? cubic().interpolate_rate(s, dxdt) : output(s, 1, dxdt);
     }
 
-    /// The method starts anew only where something has changed.
+    /// The method starts again only where something has changed.
     /// @throws std::invalid_argument for another dimension
     void go_on_from(double t, std::span<const double> x, bool changed)
     {
