@@ -1,4 +1,4 @@
-// A gate for a system of your own, trained in seconds and used at once.
+// A gate for a system of your own, trained in seconds and used immediately.
 //
 // A drone flies among columns; whether it hits one is known to a black box that only says yes or
 // no, and takes its time. The gate learns from runs how long nothing will happen, and the run asks

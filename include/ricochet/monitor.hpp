@@ -166,7 +166,7 @@ struct MonitorOptions {
 /// found in the current step is half done.
 ///
 /// After construction nothing is allocated for up to 8 guards and states of fixed size, but what is
-/// recorded, and what a reset of several guards at once merges.
+/// recorded, and the merged state of a reset of several guards.
 template <class System, class X, class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>
 class EventMonitor {

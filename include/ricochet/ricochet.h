@@ -20,7 +20,7 @@
  *
  * Threads. One simulation, or monitor, belongs to one thread at a time: a call while another is in
  * progress, from another thread or from a callback, is refused as RC_BUSY; `rc_cancel` is the
- * exception. Different ones may run at once, also of one system, if its callbacks allow it.
+ * exception. Different ones may run at the same time, also of one system, if its callbacks allow it.
  *
  * Handles. A handle that is null, freed or of another kind is refused as RC_BAD_HANDLE. A freed
  * handle is recognised for certain in debug builds of the library, which keep its memory.
@@ -545,7 +545,7 @@ RC_API rc_status rc_monitor_free(rc_monitor* monitor);
  * rc_monitor_restore. */
 
 /** Arms all guards at a state that no event has led to: at the start, and after whatever a host
- *  does to the state by itself. May be a cut at once. RC_INVALID for a start that is not finite,
+ *  does to the state by itself. May be a cut immediately. RC_INVALID for a start that is not finite,
  *  or behind a surface that bounds the motion; then a start has to follow. */
 RC_API rc_status rc_monitor_start(rc_monitor* monitor, double t, const double* x,
                                   const double* dxdt, size_t n, rc_mode mode, double scale,

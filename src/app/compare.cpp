@@ -179,13 +179,13 @@ double per_step(const Method& method)
     return method.timing.median / static_cast<double>(method.statistics.steps);
 }
 
-/// What a step of `method` takes beyond one of `base`: "+12.3 ns".
+/// Time of a step of `method` beyond one of `base`: "+12.3 ns".
 std::string extra(const Method& method, const Method& base)
 {
     return fmt::format("{:+.1f} ns", (per_step(method) - per_step(base)) * 1e9);
 }
 
-/// What the measured times say, under one stepping, of asking before a step.
+/// Verdict of the measured times, under one stepping, on asking before a step.
 void add_verdict(const std::vector<Method>& methods, bool fixed_step,
                  std::vector<std::string>& sentences)
 {
@@ -231,7 +231,7 @@ std::vector<std::string> verdict(const std::vector<Method>& methods)
     return sentences;
 }
 
-/// What the known times are.
+/// Description of the known times.
 std::string_view reference(const SystemEntry& system)
 {
     return system.numerical_reference ? "reference" : "closed form";

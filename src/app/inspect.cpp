@@ -64,7 +64,7 @@ bool is_actor(const Model& model)
     return model.kind == step_actor_kind;
 }
 
-/// What the features are called, in the order of the inputs; "feature 0" where the
+/// Names of the features, in the order of the inputs; "feature 0" where the
 /// recipe is not known here.
 std::vector<std::string> feature_names(const Model& model)
 {

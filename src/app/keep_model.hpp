@@ -20,7 +20,7 @@ void keep_model(const Model& model, const std::filesystem::path& file,
 void claim_training(const std::filesystem::path& out, std::filesystem::path& checkpoint,
                     bool resume);
 
-/// Of what was interrupted: where it continues from, on standard error.
+/// Says on standard error where an interrupted command continues from.
 /// @param trouble  why its last checkpoint could not be written; empty: it was
 void say_what_is_kept(const std::filesystem::path& checkpoint, const std::string& trouble);
 

@@ -82,7 +82,7 @@ bool jumps_in(const PlainRun& run, std::size_t i)
     return jump > 1e-6 * size;
 }
 
-/// What an axis shows: meaning, symbol and unit, the symbol only where the meaning does not say it
+/// Label of an axis: meaning, symbol and unit, the symbol only where the meaning does not say it
 /// already ("angle of the bird [rad]") and the unit only where there is one.
 std::string axis_label(const Component& component)
 {

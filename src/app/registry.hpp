@@ -52,7 +52,7 @@ struct GuardLabel {
     std::string_view event;  ///< "impact"
 };
 
-/// What set-valued steps did, counted.
+/// Counts over set-valued steps.
 struct SetValuedSteps {
     std::uint64_t attempted = 0, accepted = 0, rejected = 0, unsolved = 0;
     std::uint64_t solves = 0, iterations = 0, switches = 0;
@@ -130,7 +130,7 @@ struct SystemEntry {
     std::vector<double> (*exact_state)(const std::vector<double>& parameters, double t) = nullptr;
     std::vector<std::string_view> published_errors{};  ///< lines of a source
 
-    /// What is known of its solution, in words, where the functions that know it are of `program`.
+    /// Known solution in words, where the functions that compute it belong to `program`.
     std::string_view known_solution{};
 
     /// Another program, `ricochet-<name>`, which simulates it; it has the functions, which are null

@@ -97,7 +97,7 @@ std::string label(const Component& component)
     return fmt::format("{} [{}]", component.name, component.unit);
 }
 
-/// What made the event: the guard, or the time.
+/// Cause of the event: the guard, or the time.
 std::string_view cause(const SystemEntry& system, const PlainEvent& event)
 {
     return event.guard == no_guard ? name(event.kind) : system.guards.at(event.guard).name;

@@ -35,7 +35,7 @@ struct Row {
 /// Header "t [s],u [m],...,event", then `rows`.
 [[nodiscard]] std::string to_csv(const SystemEntry& system, const Run<std::vector<double>>& run);
 
-/// Of a result that is incomplete because the command was ended early: says so on standard error,
+/// Says on standard error that a result is incomplete because the command was ended early,
 /// `where` it ended, and returns the exit status.
 [[nodiscard]] int ended_early(std::string_view where);
 

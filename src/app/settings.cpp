@@ -103,7 +103,7 @@ void choose_stepping(const RunRequest& request, RunSettings& settings)
     }
 }
 
-/// Of a system that is no differential inclusion.
+/// Refuses a set-valued integrator for a system that is no differential inclusion.
 void refuse_integrator(const SystemEntry& system, const RunRequest& request)
 {
     if (request.integrator && *request.integrator != "event") {

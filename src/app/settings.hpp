@@ -41,7 +41,7 @@ enum class LocatorKind { newton, bisection, toms748 };
 /// How a system that is a differential inclusion is integrated.
 struct SetValuedSettings {
     std::string integrator = "handover";  ///< or "event", "bathe", "time-stepping"
-    /// Of bathe: or "error", "heuristic", "pi", "filter", "learned".
+    /// Step controller of bathe: "error", "heuristic", "pi", "filter", "learned".
     std::string controller = "constant";
     double step = 0;                             ///< [s] of set-valued steps
     std::shared_ptr<const StepPolicy> policy{};  ///< of "learned"

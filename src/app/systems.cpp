@@ -67,7 +67,7 @@ std::string text(const SystemEntry& system)
            fmt::format("    {:<15} {:>6} s     default end of a run\n", "t-end", system.t_end);
 }
 
-/// What is known of its solution, in words.
+/// Known solution, in words.
 std::string known_solution(const SystemEntry& system)
 {
     if (!system.known_solution.empty()) return std::string(system.known_solution);

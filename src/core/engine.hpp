@@ -454,7 +454,7 @@ protected:
     bool asked_ = false;        ///< a network, about the current step
     bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
-    /// [s] of the current set. Time and remainder lie apart: copied at once, right after they have
+    /// [s] of the current set. Time and remainder lie apart: copied together, right after they have
     /// been written one by one, they would have the processor wait.
     double set_time_ = 0;
     Mode mode_before_ = 0;

@@ -312,7 +312,7 @@ public:
 
     /// Whether the length of a step is known before it is taken.
     [[nodiscard]] bool knows_reach() const noexcept { return kernel_->reach; }
-    /// That length [s].
+    /// Length [s] of the step, where it is known before.
     [[nodiscard]] double reach(double rtol, double atol)
     {
         return kernel_->reach(system_.door(), state_, rtol, atol);

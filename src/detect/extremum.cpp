@@ -51,12 +51,12 @@ private:
     }
 };
 
-/// Of the scale of the guard, below which rounding of its terms is thought of.
+/// Fraction of the scale of the guard below which rounding of its terms is considered.
 constexpr double near = 1e-3;
 
 constexpr int most_samples = 80;
 
-/// Of a step, below which a rate that is a difference over 1e-5 of it rounds a kink off.
+/// Fraction of a step below which a rate that is a difference over 1e-5 of it rounds a kink off.
 constexpr double coarse_part = 1e-3;
 
 /// Clear, as far as could be seen: what is not a number is no evidence.

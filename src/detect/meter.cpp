@@ -17,10 +17,11 @@ constexpr double memory = 0.98;
 constexpr std::uint64_t fewest = 4;
 /// Pieces after which their noise is believed to a factor of two.
 constexpr double unsure = 2;
-/// Of what a step costs where checks are planned, the least that is left where they are not.
+/// Least fraction of the cost of a planned step that a step without a plan has.
 constexpr double least_step = 0.5;
-/// Of a piece in the best way, what each of the first pieces in which every step is checked may
-/// cost more. Events make pieces uneven: with less, most such pieces ended at their first event.
+/// Excess cost, as a fraction of a piece in the best way, that each of the first pieces in which
+/// every step is checked may have. Events make pieces uneven: with less, most such pieces ended at
+/// their first event.
 constexpr double first_excess = 0.25;
 /// Pieces between trials, at most.
 constexpr std::uint64_t longest_wait = 64;
@@ -153,7 +154,7 @@ void Meter::consider(const Statistics& counts)
     next_steps_ = counts.steps + options_.piece;
 }
 
-/// What is left of the time of a piece, over its steps.
+/// Remaining time of a piece, per step.
 void Meter::sample_step(const Counts& piece)
 {
     const double now = seconds();
@@ -174,7 +175,7 @@ void Meter::close_piece(const Counts& piece, double cost)
     of(way_).add(std::max(piece.steps, 1.0), cost);
 }
 
-/// Of the difference of two means. Few pieces tell little of how much pieces differ.
+/// Uncertainty of the difference of two means. Few pieces determine the spread of pieces badly.
 double Meter::noise_between(Way a, Way b) const noexcept
 {
     const auto pieces = static_cast<double>(std::min(of(a).pieces, of(b).pieces));

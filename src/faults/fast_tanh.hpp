@@ -1,4 +1,4 @@
-// tanh of several numbers at once.
+// tanh of several numbers together.
 #pragma once
 
 #include <array>

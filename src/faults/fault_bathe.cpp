@@ -219,7 +219,7 @@ private:
         return std::max(of_v, of_s) / bathe_.rtol;
     }
 
-    /// What a policy is told of the attempt.
+    /// Inputs of a policy about the attempt.
     [[nodiscard]] StepView view(double h) const
     {
         const FaultFields& e = next_.fields;

@@ -22,7 +22,7 @@ public:
     {
     }
 
-    /// What drives each element beyond b(0): overload b(0) - K d - H v.
+    /// Force that drives each element beyond b(0): overload b(0) - K d - H v.
     void drive(const Eigen::VectorXd& d, const Eigen::VectorXd& v, Eigen::VectorXd& out)
     {
         ++evaluations_;

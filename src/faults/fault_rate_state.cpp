@@ -33,7 +33,7 @@ struct Motion {
     }
 };
 
-/// What a stage leaves for those after it.
+/// Rates of a stage, for the following stages.
 struct StageRates {
     VectorXd u, v, xi;
 };
@@ -228,7 +228,7 @@ private:
         }
     }
 
-    /// Of the whole field, over which its error is taken.
+    /// Norm of the whole field, to which its error is relative.
     [[nodiscard]] double size_of_velocity() const
     {
         const double least = 1e-6 * law_.parameters().v_star / fault_.velocity_unit();

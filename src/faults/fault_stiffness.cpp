@@ -143,7 +143,7 @@ private:
     }
 
     /// The spectra of rows r, r + 1 at frequency k from those of x_r + i x_{r+1}, doubled.
-    /// Both frequencies k and k + 1 at once, if the second exists, as a pair.
+    /// Both frequencies k and k + 1 together, if the second exists, as a pair.
     void gather(int k, int block, std::size_t lane, ComplexPair* out) const
     {
         const ComplexPair* row = row_of(block);

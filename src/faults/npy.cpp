@@ -24,7 +24,7 @@ namespace {
     throw std::invalid_argument(fmt::format("{}: {}", file.string(), why));
 }
 
-/// What follows 'key': in the header, up to `end`.
+/// Text after 'key': in the header, up to `end`.
 std::string_view value_of(const std::filesystem::path& file, std::string_view header,
                           std::string_view key, std::string_view end)
 {

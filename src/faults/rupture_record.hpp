@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// What `RuptureOptions::polynomial_bound` stands for.
+/// Bound that `RuptureOptions::polynomial_bound` stands for.
 [[nodiscard]] double polynomial_bound(const StrikeSlipFault& fault, const RuptureOptions& options);
 
 /// Fields nondimensional.

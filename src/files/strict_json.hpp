@@ -7,13 +7,13 @@
 
 namespace ricochet::detail {
 
-/// What is wrong with a text that should be JSON.
+/// Error in a text that should be JSON.
 class JsonTrouble : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
-/// It is nested deeper than its format is.
+/// Error of a text that is nested deeper than its format.
 class JsonTooDeep : public JsonTrouble {
 public:
     using JsonTrouble::JsonTrouble;

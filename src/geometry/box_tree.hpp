@@ -2,8 +2,8 @@
 //
 // The things are put in an order in which neighbours are near one another; then four of
 // them make a block, four blocks a node, four nodes the node above, and so on. Position
-// alone says who belongs to whom, so there are no pointers, and four boxes are compared
-// with a question at once.
+// alone determines the tree, so there are no pointers, and four boxes are compared
+// with a query together.
 //
 // The nearest so far bounds the search, so it pays to begin with a good guess: with the
 // answer of the last question little more is opened than the way down to the new one. The

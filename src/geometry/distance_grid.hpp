@@ -66,7 +66,7 @@ public:
         return static_cast<double>(values_[index]) - std::sqrt(squared);
     }
 
-    /// As `lower_bound`, one bound for the whole cell: lower, and a root cheaper.
+    /// Bound for the whole cell: lower than `lower_bound`, and a square root cheaper.
     [[nodiscard]] double lower_bound_of_cell(const Point& p) const noexcept
     {
         std::size_t index = 0;

@@ -31,7 +31,7 @@ struct AlignedAllocator {
     friend bool operator==(const AlignedAllocator&, const AlignedAllocator&) { return true; }
 };
 
-/// Its first element begins a cache line.
+/// Vector whose first element begins a cache line.
 template <class T>
 using Buffer = std::vector<T, AlignedAllocator<T>>;
 

@@ -31,7 +31,7 @@ struct Rows {
 template <class T>
 class BatchMlp {
 public:
-    /// What the layers say of a batch, and the derivatives of a loss by it.
+    /// Outputs of the layers for a batch, and the derivatives of a loss by them.
     struct Work {
         std::vector<Buffer<T>> values;  ///< of layer k, rows x padded outputs
         std::vector<Buffer<T>> slopes;
@@ -44,10 +44,10 @@ public:
     [[nodiscard]] std::size_t inputs() const noexcept { return shapes_.front().inputs; }
     [[nodiscard]] std::size_t outputs() const noexcept { return shapes_.back().outputs; }
     [[nodiscard]] std::size_t size() const noexcept { return size_; }  ///< of the parameters
-    /// Of the transposed weights.
+    /// Number of the transposed weights.
     [[nodiscard]] std::size_t transposed_size() const noexcept { return transposed_size_; }
 
-    /// As PyTorch begins: weights and biases uniform within +-1 / sqrt(inputs).
+    /// Initial values like PyTorch's: weights and biases uniform within +-1 / sqrt(inputs).
     void initialise(T* parameters, Random& random) const;
 
     /// The weights, transposed; what `backward` goes back through.

@@ -29,7 +29,7 @@ Ball fall(const Ball& ball, double steps)
             .step = ball.step};
 }
 
-/// What both models share; see `SurfaceProblem`.
+/// Parts that both models share; see `SurfaceProblem`.
 struct Floor {
     using State = Ball;
 
@@ -141,7 +141,7 @@ void check(const BallTraining& training)
     require_positive(training.height, "height");
 }
 
-/// Of order one where the boundary is crossed in a fixed step, and where it bends
+/// Scale of order one where the boundary is crossed in a fixed step, and where it bends
 /// in the logarithms.
 std::vector<double> scale(BallModel kind, const BallTraining& training)
 {

@@ -30,7 +30,7 @@ struct Box {
     double parent_slack = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// What came out of a part of the tree.
+/// Result of a part of the tree.
 struct Tally {
     std::uint64_t boxes = 0;
     double lowest = std::numeric_limits<double>::infinity();  ///< logit in an unproved box

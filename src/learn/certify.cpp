@@ -83,7 +83,8 @@ void draw(const Model& model, Random& random, std::vector<double>& x)
     }
 }
 
-/// What a checkpoint must agree in. The guard is known by its values at a few states.
+/// Properties in which a checkpoint must agree. The guard is identified by its values at a few
+/// states.
 std::string key(const Model& model, const GuardProblem& problem, const CertifyOptions& o)
 {
     Random random(1);
@@ -220,7 +221,7 @@ private:
                      margin);
     }
 
-    /// What fails is tried again further from what cannot be proved.
+    /// Repeats a proof that failed, further away from counterexamples.
     CertifyOutcome search_and_prove(double margin)
     {
         constexpr int attempts = 6;

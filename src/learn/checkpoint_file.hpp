@@ -61,7 +61,7 @@ public:
     void finish() const;
 
 private:
-    /// Of a list of numbers of at least `least_bytes` each.
+    /// Length of a list of numbers of at least `least_bytes` each.
     [[nodiscard]] std::size_t length(std::size_t least_bytes);
 
     std::string_view bytes_;

@@ -11,7 +11,7 @@
 
 namespace ricochet::learn {
 
-/// What is done to a sum before it is stored.
+/// Function of a sum before it is stored.
 enum class After {
     nothing,
     relu,

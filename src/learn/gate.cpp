@@ -174,7 +174,7 @@ public:
 private:
     static constexpr double never = 1e30;
 
-    /// Of all that the training follows from.
+    /// Hash of everything that determines the training.
     [[nodiscard]] std::uint64_t fingerprint() const
     {
         std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a over 64-bit words
@@ -243,7 +243,7 @@ private:
         save_checkpoint(now, options_.checkpoint);
     }
 
-    /// What the checkpoint says of the round that it was written in.
+    /// Restores the round in which the checkpoint was written.
     void restore(Adam& adam)
     {
         const GateCheckpoint& from = *resumed_;

@@ -24,7 +24,7 @@ namespace ricochet::learn {
 template <class T>
 class GaussianActor {
 public:
-    /// What follows from the parameters and e, for a batch to share.
+    /// Values that depend on the parameters and e only, for a batch to share.
     struct Noise {
         Buffer<T> normal;     ///< e, latent x actions; drawn by the caller
         Buffer<T> deviation;  ///< exp(l)

@@ -23,7 +23,7 @@ struct LearnerLosses {
     double temperature = 0;
 };
 
-/// What the loop asks of a learner.
+/// Interface of a learner.
 struct Learner {
     std::string name;  ///< for messages, e.g. "train_tqc"
     /// An action for this observation, with noise.

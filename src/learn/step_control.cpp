@@ -35,7 +35,7 @@ double log_error(double error)
     return std::log(std::clamp(error, tiny, 10.0));
 }
 
-/// What a rule did on the problems of a group.
+/// Work and errors of a rule on the problems of a group.
 struct Mean {
     double work = 0;         ///< mean of the logarithm
     double error = 0;        ///< mean of the logarithm
@@ -226,7 +226,7 @@ StepFamily stoppable(StepFamily family, std::function<bool()> goes_on)
 
 namespace {
 
-/// What the policy and the classical rule meet on the family, a tenth wider.
+/// Ranges of the inputs that the policy and the classical rule meet on the family, a tenth wider.
 auto domain_of(const StepFamily& family, const std::vector<double>& x)
 {
     StepRanges seen;

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t observations = 3 + StepView::state_inputs;
 
-/// What came of an attempt.
+/// Result of an attempt.
 struct Attempt {
     bool solved = false;
     double length = 0;  ///< [s] of the step taken, or asked for

@@ -218,7 +218,7 @@ public:
     }
 
 private:
-    /// What follows from the critics' parameters.
+    /// Values that depend on the critics' parameters only.
     void prepare()
     {
         for (std::size_t c = 0; c < options_.critics; ++c) transpose(c);

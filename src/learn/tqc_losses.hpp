@@ -55,7 +55,7 @@ public:
     [[nodiscard]] const TqcShape& shape() const noexcept { return shape_; }
     [[nodiscard]] const GaussianActor<T>& actor() const noexcept { return actor_; }
     [[nodiscard]] const BatchMlp<T>& critic() const noexcept { return critic_; }
-    /// Of the parameters of all critics, one after the other.
+    /// Number of the parameters of all critics, one after the other.
     [[nodiscard]] std::size_t critics_size() const noexcept
     {
         return shape_.critics * critic_.size();

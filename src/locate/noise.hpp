@@ -15,7 +15,7 @@
 
 namespace ricochet::detail {
 
-/// What is noise: of a guard that reaches |g| = `size` in a step of length `h`.
+/// Level of noise of a guard that reaches |g| = `size` in a step of length `h`.
 struct NoiseScale {
     double size = 0;
     double h = 0;

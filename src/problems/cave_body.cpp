@@ -82,7 +82,7 @@ geometry::Triangles triangles(std::string_view what, const geometry::Mesh& mesh)
 
 }  // namespace
 
-/// What the copies of a scene share.
+/// Data that the copies of a scene share.
 struct CaveBody::Shapes {
     Shapes(const geometry::Mesh& cave_mesh, const geometry::Mesh& body_mesh, std::size_t most)
         : cave(triangles("cave", cave_mesh)),

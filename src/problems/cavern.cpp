@@ -75,7 +75,7 @@ void check(const Cavern::Parameters& p)
 
 }  // namespace
 
-/// What the copies of a cavern share.
+/// Data that the copies of a cavern share.
 struct Cavern::Rock {
     explicit Rock(const std::vector<Point2>& vertices) : wall(vertices) {}
 

@@ -38,7 +38,7 @@ public:
     LastAnswers(const LastAnswers& /*other*/) noexcept {}
     LastAnswers& operator=(const LastAnswers& /*other*/) noexcept { return *this; }
 
-    /// What the calling thread asked last, on loan.
+    /// Last question of the calling thread, on loan.
     class Loan {
     public:
         explicit Loan(LastAnswers& all) noexcept : slot_(&all.slots_[number_of_thread()])

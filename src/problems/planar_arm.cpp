@@ -69,7 +69,7 @@ double distance_to(const Outline& polygon, const Segment2& link)
 
 }  // namespace
 
-/// What the copies of an arm share.
+/// Data that the copies of an arm share.
 struct ArmScene::Place {
     explicit Place(const std::vector<Segment2>& all) : edges(all) {}
 

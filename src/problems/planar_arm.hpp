@@ -44,7 +44,7 @@ namespace ricochet {
 template <std::size_t N>
 class PlanarArm;
 
-/// What does not depend on the number of joints.
+/// Parts that do not depend on the number of joints.
 class ArmScene {
 public:
     enum class Search {
@@ -86,8 +86,8 @@ public:
         return joints_[joint].middle;
     }
 
-    /// Of every joint, drive sin(f t + p) [rad/s²]. The last are remembered: the stages of a step
-    /// share two.
+    /// Drives of all joints, drive sin(f t + p) [rad/s²]. The last ones are kept: the stages of a
+    /// step share two.
     [[nodiscard]] std::array<double, most_joints> torques(double t) const noexcept;
 
     /// `torque`: that of the joint at this time.
@@ -99,7 +99,7 @@ public:
         return torque - j.spring * 2 * y / (1 + y * y) - p_.damping * w;
     }
 
-    /// What the arm and the nearest obstacle touch with.
+    /// Points with which the arm and the nearest obstacle touch.
     struct Contact {
         double distance = 0;      ///< [m]
         std::uint32_t link = 0;   ///< that is nearest
@@ -115,7 +115,7 @@ public:
                                             std::uint32_t link,
                                             geometry::Point2 point) const noexcept;
 
-    /// Of the ends of the links, the largest [m/s].
+    /// Largest speed [m/s] of the ends of the links.
     [[nodiscard]] double largest_speed(const double* angles, const double* rates) const noexcept;
     [[nodiscard]] double largest_acceleration(const double* rates) const noexcept;
     [[nodiscard]] double lower_bound(const double* angles) const noexcept;

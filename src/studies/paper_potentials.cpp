@@ -231,7 +231,7 @@ Exhibit figure_4(const ExhibitSize& /*size*/)
     return out;
 }
 
-/// Of y on x.
+/// Correlation of y with x.
 double correlation(const std::vector<double>& x, const std::vector<double>& y)
 {
     const auto mean = [](const std::vector<double>& v) {

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a user can put right: status 2.
+/// Error that a user can correct: status 2.
 class BadInput : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;

@@ -26,7 +26,7 @@ void append(TrainingSet& set, const learn::DataSet& data, double which)
     }
 }
 
-/// As `train_bouncing_ball` samples, and `train` splits.
+/// Set as `train_bouncing_ball` samples it and `train` splits it.
 template <BallModel kind>
 TrainingSet ball_set(const ProgressCallback& /*progress*/)
 {

@@ -26,7 +26,7 @@ struct TrainingSet {
     }
 };
 
-/// What the column "part" holds.
+/// Value of the column "part".
 namespace part {
 inline constexpr double training = 0;
 inline constexpr double validation = 1;
@@ -36,7 +36,7 @@ inline constexpr double test = 2;
 /// Where the numbers of a model come from.
 struct ModelData {
     std::string_view model;  ///< name of its file, without the extension
-    /// What makes the set, or why there is none.
+    /// Function that makes the set, or the reason why there is none.
     std::string_view origin;
     /// The set, the same for every call; null where there is none.
     /// @param progress  told of runs that take seconds; its answer is not heeded

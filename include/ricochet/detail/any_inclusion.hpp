@@ -78,7 +78,7 @@ public:
     // False where the set is at fault.
     virtual bool project(double t, const State& w, const Reaction& z, Reaction& p) const = 0;
     virtual bool derivative(double t, const State& w, const Reaction& z, double* d) const = 0;
-    /// Of a box.
+    /// Bounds of a box.
     virtual bool bounds(double t, const State& w, Reaction& lower, Reaction& upper) const = 0;
     /// Those, or one of them, smooth beyond y = 0 where the system gives such.
     virtual void branch_bounds(double t, const State& w, Reaction& lower,

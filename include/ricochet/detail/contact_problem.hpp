@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// Several contacts with friction at once, at one instant or over one step.
+// Several contacts with friction together, at one instant or over one step.
 //
 //     u = W p + q,     for every contact c:
 //     0 <= p_n,  u_n >= 0,  p_n u_n = 0,      |p_t| <= friction p_n,

@@ -15,8 +15,9 @@
 //     z + (M - c) P(z) = F.
 //
 // P is near zero below the strength and near a line of slope 1/c above it: a smoothed law of
-// Coulomb, and Newton's method finds who slips as it does there. Its matrix is that of the equation
-// in v, M + diag(N df/dv), scaled from both sides by the root of P': an element at rest drops out.
+// Coulomb, and Newton's method finds the slipping elements as it does there. Its matrix is that of
+// the equation in v, M + diag(N df/dv), scaled from both sides by the root of P': an element at
+// rest drops out.
 #pragma once
 
 #include <Eigen/Core>

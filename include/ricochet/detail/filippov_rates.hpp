@@ -82,7 +82,7 @@ struct Shares {
 /// The shares for which both surfaces keep still.
 struct SlidingShares {
     Shares shares;
-    /// What is left until they cease to exist, because they meet with another such pair:
+    /// Remainder until they cease to exist, because they meet with another such pair:
     /// the discriminant of the quadratic that they solve over the sum of its terms.
     double apart = 1;
 };

@@ -5,7 +5,7 @@
 //     flow    q' = v,   M(q) v' = F(t, q, v)
 //     guards  the gaps, falling
 //     reset   v⁺ = v⁻ + M⁻¹ H' p  with the impulses p of Newton's law of impact and Coulomb's
-//             of friction, for all contacts that closed at that instant at once
+//             of friction, for all contacts that closed at that instant, together
 //
 // The system is a value as `TimeStepping` takes it. Nothing holds a contact that stays
 // closed: there the run ends (`Outcome::zeno`), and `contact_motion.hpp` continues.

@@ -11,7 +11,7 @@ namespace ricochet::detail {
 
 /// Arrays have as many elements as the state. Rates are with respect to the offset s in [0, h].
 ///
-/// Time and remainder lie apart: a compiler that copies both at once, right after they have been
+/// Time and remainder lie apart: a compiler that copies both together, right after they have been
 /// written one by one, has the processor wait for them.
 struct HostStepTable {
     double t = 0;  ///< [s] at the start

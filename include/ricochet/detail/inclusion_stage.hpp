@@ -159,7 +159,7 @@ struct RICOCHET_ALIGNED StageScratch {
         if (!traits.box) rho.setConstant(sum > 0 ? static_cast<double>(rho.size()) / sum : 1);
     }
 
-    /// What is projected in the law of (w, r): reaction - rho y, or for a set of states
+    /// Argument of the projection in the law of (w, r): reaction - rho y, or for a set of states
     /// y - reaction / rho.
     void law_argument(const State& w, const Reaction& r)
     {

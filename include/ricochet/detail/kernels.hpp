@@ -301,7 +301,7 @@ class KernelOf {
         }
     }
 
-    /// Of the end of a step that was computed with other states.
+    /// Finds the remainder at the end of a step that was computed with other states.
     static void find_remainder([[maybe_unused]] State& step, [[maybe_unused]] double h)
     {
         if constexpr (!is_small<C>) {

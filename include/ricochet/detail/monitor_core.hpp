@@ -25,7 +25,8 @@ enum class Verdict {
 /// A set of events that ends a step, at the same instant for all its members.
 template <class X>
 struct Cut {
-    double s = 0;  ///< [s] offset in the step shown last; 0 where the set follows another at once
+    double s = 0;  ///< [s] offset in the step shown last; 0 where the set follows another at the
+                   ///< same instant
     Instant t;     ///< [s]
     X before{};    ///< x⁻
     X after{};     ///< x⁺

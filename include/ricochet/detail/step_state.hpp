@@ -82,7 +82,7 @@ struct StepState {
     const double* component_atol =
         nullptr;  ///< one for each component, in place of one for all
 
-    /// Of the current step, and of the last step that was repeated to an inner time.
+    /// Stages of the current step, and of the last step that was repeated to an inner time.
     std::array<X, most_kept_stages> stages{};
     struct None {};
     struct Large {
@@ -158,7 +158,7 @@ class LargeStepView {
 public:
     LargeStepView(const DenseParts<X>& parts, double s) noexcept { all_.emplace(parts, s); }
 
-    /// Of a step by Dormand and Prince's method.
+    /// View of a step by Dormand and Prince's method.
     LargeStepView(const StepState<X>& step, double s) noexcept
         : step_(&step), s_(s), weights_(quartic_weights(s / step.h, derivative))
     {

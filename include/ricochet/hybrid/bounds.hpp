@@ -15,7 +15,7 @@
 //
 // `acceleration_bound` holds from here on, for the flow as it is integrated, until the
 // next event of any guard or of time, and in both directions: the speed neither grows nor
-// falls faster. Where a guard is examined over several steps at once the flow is followed
+// falls faster. Where a guard is examined over several steps the flow is followed
 // without a reset, so that it should also hold a little beyond an event surface. Without
 // it, `speed_bound` holds for the whole motion until the next event.
 //

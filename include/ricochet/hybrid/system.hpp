@@ -17,7 +17,7 @@
 // A system with many guards declares `guard_count`, a constant or a member, and each
 // function of a guard takes first which one is meant:
 //
-//     guard(which, t, x)        or guards(t, x, g), all of them at once into a
+//     guard(which, t, x)        or guards(t, x, g), all of them together into a
 //                               std::span<double>, or both
 //     guard_rate(which, t, x, dxdt)    or guard_rates(t, x, dxdt, rates)
 //     reset(which, t, x)        or reset(fired, t, x) for all that fired together

@@ -58,8 +58,8 @@ struct Options {
 
     std::uint64_t max_steps = std::numeric_limits<std::uint64_t>::max();
 
-    /// So many steps in a row have to advance the time by 1e-9 of the span from t_start to
-    /// t_end together, or the run ends as `Outcome::stalled`. 0: any number may stand still.
+    /// Number of consecutive steps that have to advance the time by 1e-9 of the span from t_start
+    /// to t_end together, or the run ends as `Outcome::stalled`. 0: any number may stand still.
     std::uint64_t stall_steps = 1'000'000;
 
     /// Set from another thread or a signal handler, it ends the run after the step in

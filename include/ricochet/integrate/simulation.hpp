@@ -1,7 +1,7 @@
 // A run in progress: smooth steps, events, resets, until the end or a reason to stop.
 //
 //     step from (t, x)              the method, as a departure from the tangent
-//     guards at its end             screened, all at once
+//     guards at its end             screened together
 //     search                        the first set of events in the step
 //     resets                        x⁻ becomes x⁺, the mode may change
 //     arming                        every guard again; guards that a reset carried across fire

@@ -94,8 +94,8 @@ struct CertifyOptions {
     double margin = 0;       ///< of the first level, in units of the guard
     std::size_t levels = 1;  ///< 1 to 32
     double ratio = 2;        ///< between margins; above 1, needs a positive margin
-    /// Of each level, rising, instead of the three above. Empty, and the model a gate of levels:
-    /// those of the gate.
+    /// Margins of each level, rising, instead of the three above. Empty, and the model a gate of
+    /// levels: those of the gate.
     std::vector<double> margins{};
     /// Look for the highest threshold that can be proved, and put it into the model. Otherwise
     /// the stored threshold is proved as it is; further levels are always searched for.

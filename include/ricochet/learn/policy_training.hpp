@@ -51,7 +51,8 @@ struct PolicyProgress {
     std::size_t episodes = 0;  ///< ended so far
     /// Mean return of the episodes that ended since the last report, undiscounted; NaN: none.
     double mean_return = 0;
-    /// Of the last batch; NaN where there is none, or no report was due. So the next two.
+    /// Loss of the last batch; NaN where there is none, or no report was due. The same holds for
+    /// the next two.
     double critic_loss = 0;
     double actor_loss = 0;
     double temperature = 0;  ///< weight of the entropy; 0 for a trainer without

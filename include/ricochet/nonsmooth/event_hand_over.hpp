@@ -11,11 +11,11 @@
 // any more.
 //
 // The guard where a motion may come to rest must be `unilateral`, or of `either` direction and
-// without modes: only then is a motion that presses on its surface an event again at once, and
+// without modes: only then is a motion that presses on its surface an event again immediately, and
 // what follows recognised. A guard that waits for an edge lets that motion pass, and the
 // inclusion is never asked.
 //
-// Inclusions without events of their own are handed to hand_over.hpp at once.
+// Inclusions without events of their own are handed to hand_over.hpp directly.
 #pragma once
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 //     M(q) dv = F(t, q, v) dt + H(q)' dp,    q' = v
 //
 // Impacts are not located: a step ends with the velocities that Newton's law of impact
-// and Coulomb's law of friction allow, for all contacts at once, whether one of them has
+// and Coulomb's law of friction allow, for all contacts together, whether one of them has
 // closed within it or a hundred. The order is 1, and positions may go behind their
 // constraints by a step times their velocity; but nothing can accumulate or be missed.
 //

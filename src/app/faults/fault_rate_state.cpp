@@ -27,7 +27,7 @@ namespace {
 
 constexpr double year = 365.25 * 86400;  // [s]
 
-/// Of the entry, after those of the fault.
+/// Parameters of the entry, after those of the fault.
 enum : std::size_t {
     rate_and_state = weakening_parameters,
     a,

@@ -63,7 +63,7 @@ std::vector<double> shown(const SpringSlider& slider, const SliderState& s)
             std::exp(s.xi) * p.d_rs / p.v_star};
 }
 
-/// What the event loop's options mean nothing to.
+/// Refuses options of the event loop that have no meaning here.
 void refuse_others(const RunRequest& run)
 {
     const auto refuse = [](bool given, std::string_view option) {
@@ -91,7 +91,7 @@ double positive(std::string_view option, const std::optional<double>& given, dou
     return value;
 }
 
-/// As the event loop would have returned it, for its reports.
+/// Run as the event loop would have returned it, for its reports.
 Run<std::vector<double>> plain(const SpringSlider& slider, const SliderRun& run)
 {
     Run<std::vector<double>> out;

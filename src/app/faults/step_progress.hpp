@@ -16,8 +16,8 @@
 
 namespace ricochet::app {
 
-/// Silent for two seconds. Then a line that is redrawn on a terminal; elsewhere a line at once and
-/// further ones at growing intervals, so that a log of an hour has some dozens.
+/// Silent for two seconds. Then a line that is redrawn on a terminal; elsewhere a line immediately
+/// and further ones at growing intervals, so that a log of an hour has some dozens.
 class LongRun {
 public:
     LongRun() = default;

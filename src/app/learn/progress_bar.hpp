@@ -76,7 +76,7 @@ public:
 private:
     static constexpr double redraw_every = 0.05;  // [s]
 
-    /// Of the terminal: a line any longer would wrap and be left behind.
+    /// Width of the terminal: a longer line would wrap and remain.
     static std::size_t columns()
     {
         winsize size{};

@@ -11,7 +11,7 @@
 
 namespace ricochet::app {
 
-/// What `ricochet train` is told to train one.
+/// Request of `ricochet train` for a step policy.
 inline constexpr std::string_view step_policy_name = "step-policy";
 
 struct TrainPolicyRequest {

@@ -125,7 +125,7 @@ std::string text(const learn::GateReport& report)
     return out + fmt::format("{}\n", describe(report.outcome));
 }
 
-/// As `train`, of a gate.
+/// Trains a gate, like `train`.
 int train_gate(const SystemEntry& system, const TrainRequest& request)
 {
     TrainingRequest training = request.training;

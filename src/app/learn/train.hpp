@@ -13,7 +13,7 @@
 
 namespace ricochet::app {
 
-/// What a training is asked for. What is absent has the library's default.
+/// Request for a training. Absent values have the library's defaults.
 struct TrainingRequest {
     std::string kind;                ///< one of the system's
     std::vector<std::string> set{};  ///< name=value

@@ -96,7 +96,7 @@ template <class System, class Stepping>
     return shown(HandOver<System, Stepping>(system, w0, options).take());
 }
 
-/// As `motion.run`. @return `running` if it was cancelled
+/// Runs the motion like `motion.run`. @return `running` if it was cancelled
 template <class Motion, class Observer>
 [[nodiscard]] Outcome run_until_cancelled(const Options& options, Motion& motion,
                                           const Observer& observer)

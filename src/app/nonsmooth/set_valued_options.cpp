@@ -46,7 +46,7 @@ double tolerance(std::string_view option, const std::optional<double>& given, do
     return given.value_or(otherwise);
 }
 
-/// What the policies of a system are asked about.
+/// Inputs of the policies of a system.
 /// @throws BadInput naming the systems that have some.
 const StepLayout& layout_of(const SystemEntry& system)
 {

@@ -8,7 +8,7 @@
 
 namespace ricochet::app {
 
-/// Of a differential inclusion, `SystemEntry::choose_integrator`. False: by events alone, as any
+/// `SystemEntry::choose_integrator` of a differential inclusion. False: by events alone, as any
 /// other system.
 /// @throws BadInput for what does not fit the system or the integrator.
 [[nodiscard]] bool choose_set_valued(const SystemEntry& system, const RunRequest& request,

@@ -52,7 +52,7 @@ TimedRun run(const RunSettings& settings, int repeats)
     return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
-/// Of the default parameters.
+/// Known events for the default parameters.
 std::vector<double> exact_events(const std::vector<double>& /*p*/, double t_end)
 {
     std::vector<double> times;

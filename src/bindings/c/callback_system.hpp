@@ -19,7 +19,7 @@ namespace ricochet::c {
 [[noreturn]] void throw_callback_failed(const char* callback, int code, std::size_t guard,
                                         double t);
 
-/// What a callback has returned.
+/// Result of a callback.
 [[gnu::always_inline]] inline void heed(int code, const char* callback, double t,
                                         std::size_t guard = RC_NO_GUARD)
 {

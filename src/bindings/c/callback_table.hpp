@@ -12,7 +12,7 @@
 
 namespace ricochet::c {
 
-/// What the functions of the table take.
+/// Argument of the functions of the table.
 template <class X>
 class CallbackDoor : public detail::Door<CallbackSystem, X> {
 public:

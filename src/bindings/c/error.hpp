@@ -33,7 +33,7 @@ struct CallbackFailed {
     double t = std::numeric_limits<double>::quiet_NaN();  ///< [s]
 };
 
-/// What `rc_last_error` returns in this thread, as far as it fits its room.
+/// Sets the text that `rc_last_error` returns in this thread, as far as it fits its room.
 void set_message(std::string_view message) noexcept;
 
 /// The status of the exception in flight, with its message set. To be called in a handler.

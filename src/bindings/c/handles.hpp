@@ -15,7 +15,7 @@ enum class Kind : std::uint64_t {
     monitor = 0x6f74696e6f6d6372,     // "rcmonito"
 };
 
-/// What every handle begins with.
+/// First member of every handle.
 struct Handle {
     explicit Handle(Kind kind_) noexcept : kind(kind_) {}
 

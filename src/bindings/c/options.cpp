@@ -74,7 +74,7 @@ template <class T>
     });
 }
 
-/// What is said in a struct of this name.
+/// Reader of the fields of a struct, which messages call by this name.
 class Reader {
 public:
     explicit Reader(const char* name) : struct_(name) {}
@@ -111,7 +111,7 @@ public:
         return finders;
     }
 
-    /// What runs and monitors have in common.
+    /// Options that runs and monitors share.
     template <class T>
     void read_events(const T& from, Options& options) const
     {

@@ -15,8 +15,8 @@
 
 namespace ricochet::c {
 
-/// As `Simulation`, for states of a size known at run time. Whatever its functions throw, the run
-/// stands where its last step was complete.
+/// A run like `Simulation`, for states of a size known at run time. Whatever its functions throw,
+/// the run stands where its last step was complete.
 class AnyRun {
 public:
     AnyRun() = default;

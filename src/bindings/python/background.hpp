@@ -73,7 +73,7 @@ public:
         if (thrown && !raised_) std::rethrow_exception(thrown);
     }
 
-    /// What a signal's handler or the callback has raised.
+    /// Exception that a signal's handler or the callback has raised.
     [[nodiscard]] const std::optional<PythonError>& raised() const noexcept { return raised_; }
 
 private:

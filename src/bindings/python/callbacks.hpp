@@ -38,7 +38,7 @@ using CompiledRate = double (*)(std::uint32_t mode, double t, const double* x, c
 using CompiledReset = std::uint32_t (*)(std::uint32_t mode, double t, double* x, std::size_t n,
                                         void* user);
 
-/// Of every call, further ones included.
+/// Most arguments of a call, further ones included.
 constexpr std::size_t most_arguments = 32;
 
 struct CallbackGuard {

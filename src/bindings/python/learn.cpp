@@ -49,7 +49,7 @@ template <class Options, class T>
     };
 }
 
-/// Of the training within.
+/// Setter of an option of the training within.
 template <class T>
 [[nodiscard]] auto put_within(T TrainingOptions::*member)
 {

@@ -169,7 +169,7 @@ public:
         });
     }
 
-    /// As `ricochet.Cut` takes it.
+    /// Arguments of `ricochet.Cut`.
     [[nodiscard]] py::tuple cut()
     {
         const Turn turn = take_turn();

@@ -13,7 +13,7 @@ namespace ricochet::python {
 
 [[noreturn]] void raise(PyObject* type, const std::string& sentence);
 
-/// What the type of an object is called.
+/// Name of the type of an object.
 [[nodiscard]] std::string type_of(PyObject* object);
 
 /// One number that a callback has returned; true counts as 1, false as -1.

@@ -41,7 +41,7 @@ private:
     PyObject* object_ = nullptr;
 };
 
-/// What a callback has raised, taken from the interpreter.
+/// Exception of a callback, taken from the interpreter.
 class PythonError {
 public:
     PythonError()

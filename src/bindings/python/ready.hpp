@@ -15,7 +15,7 @@ namespace ricochet::python {
 [[nodiscard]] std::shared_ptr<Source> ready_system(std::string_view name,
                                                    std::span<const double> parameters);
 
-/// What is known in closed form of that system, by the name that its function has in C++.
+/// Closed-form results of that system, by the name that their function has in C++.
 /// @throws std::invalid_argument for one that there is not.
 [[nodiscard]] std::vector<double> closed_form(const Source& system, std::string_view what,
                                               std::span<const double> arguments);

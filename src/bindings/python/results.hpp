@@ -41,7 +41,7 @@ struct PySolution {
 /// The events of a record as a structured array, which keeps `owner` alive.
 [[nodiscard]] py::array events_of(const Record& record, const py::handle& owner);
 
-/// What the modes of a system are called: `given`, else the names that the system has, else None.
+/// Names of the modes of a system: `given`, else the names that the system has, else None.
 [[nodiscard]] py::object modes_of(const Source& source, const py::object& given);
 
 /// Raises `error` with the run so far attached to it.

@@ -186,7 +186,7 @@ public:
         const Turn turn(in_use_, "Simulation");
         return loop_->ended();
     }
-    /// What has been computed so far.
+    /// Result so far.
     [[nodiscard]] PyRun so_far()
     {
         const Turn turn(in_use_, "Simulation");

@@ -32,7 +32,7 @@ public:
             look();
     }
     [[nodiscard]] const std::atomic<bool>* cancelled() const noexcept { return &cancelled_; }
-    /// What a handler has raised.
+    /// Exception that a handler has raised.
     [[nodiscard]] const std::optional<PythonError>& raised() const noexcept { return raised_; }
     /// The same, to be raised here; what comes after it continues.
     [[nodiscard]] std::optional<PythonError> take_raised() noexcept
@@ -93,12 +93,12 @@ public:
         return std::nullopt;
     }
 
-    /// What the modes are called, empty where they are numbers.
+    /// Names of the modes, empty where they are numbers.
     [[nodiscard]] virtual std::vector<std::string> mode_names() const = 0;
     [[nodiscard]] virtual std::vector<std::string> guard_names() const = 0;
     [[nodiscard]] virtual Mode start_mode() const noexcept { return 0; }
 
-    /// That networks are trained for, by the names that models have for them.
+    /// Parameters that networks are trained for, by their names in models.
     std::map<std::string, double, std::less<>> parameters;
 };
 
