@@ -19,14 +19,14 @@
 #include <vector>
 
 #include "certificates.hpp"
-#include "ricochet/detail/adam.hpp"
-#include "ricochet/learn/certify.hpp"
-#include "ricochet/detail/random.hpp"
-#include "ricochet/detail/trainable_mlp.hpp"
-#include "ricochet/nn/safetensors.hpp"
 #include "problems/cavern.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
+#include "ricochet/detail/adam.hpp"
+#include "ricochet/detail/random.hpp"
+#include "ricochet/detail/trainable_mlp.hpp"
+#include "ricochet/learn/certify.hpp"
+#include "ricochet/nn/safetensors.hpp"
 
 namespace ricochet::bench {
 namespace {

@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 
 #include "crossover.hpp"
-#include "ricochet/learn/train_gate.hpp"
 #include "problems/cavern.hpp"
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
+#include "ricochet/learn/train_gate.hpp"
 
 namespace ricochet::bench {
 

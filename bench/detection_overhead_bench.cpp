@@ -17,6 +17,9 @@
 #include <vector>
 
 #include "problems.hpp"
+#include "problems/cavern.hpp"
+#include "problems/planar_arm.hpp"
+#include "problems/zones.hpp"
 #include "ricochet/detail/ballistic_line.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
@@ -25,9 +28,6 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "problems/cavern.hpp"
-#include "problems/planar_arm.hpp"
-#include "problems/zones.hpp"
 #include "score.hpp"
 #include "timing.hpp"
 

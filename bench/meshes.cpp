@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
+#include "problems/cave_body.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "problems/cave_body.hpp"
 #include "timing.hpp"
 #ifdef RICOCHET_BENCH_FCL
 #include "peers/fcl.hpp"

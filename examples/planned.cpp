@@ -59,7 +59,10 @@ struct Pegboard {
     }
 
     // What the distance can change: no faster than the ball moves, whose speed grows by gravity.
-    [[nodiscard]] double speed_bound(double, const State& x) const { return std::hypot(x[2], x[3]); }
+    [[nodiscard]] double speed_bound(double, const State& x) const
+    {
+        return std::hypot(x[2], x[3]);
+    }
     [[nodiscard]] double acceleration_bound(double, const State&) const { return gravity; }
 };
 

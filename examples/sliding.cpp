@@ -39,8 +39,7 @@ int main()
 {
     const ricochet::Filippov<BlockOnSpring> block;
     const std::array x0 = {2.0, 0.0};
-    const auto run =
-        ricochet::integrate(block, x0, {.t_end = 12, .mode = block.start_mode(0, x0)});
+    const auto run = ricochet::integrate(block, x0, {.t_end = 12, .mode = block.start_mode(0, x0)});
 
     for (const auto& event : run.events) {
         std::printf("%.9f s at %+.6f m: %s -> %s\n", event.t, event.after[0],

@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "ricochet/faults/spring_slider.hpp"
 #include "ricochet/faults/fault_rate_state.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 
 namespace ricochet::test {
 
@@ -19,8 +19,7 @@ struct FaultAsSlider {
     [[nodiscard]] RateStateRupture run_fault(int order) const
     {
         return simulate(
-            fault,
-            {.t_end = t_end, .step = step, .rtol = std::numeric_limits<double>::infinity()},
+            fault, {.t_end = t_end, .step = step, .rtol = std::numeric_limits<double>::infinity()},
             friction, {.order = order});
     }
 
@@ -37,8 +36,7 @@ struct FaultAsSlider {
             .friction = friction.law,
             .block = {.mass = p.density * p.side, .stiffness = stiffness, .normal_force = sigma},
             .load = SliderLoad(draw, friction.plate_velocity)};
-        return run_slider(slider, {0, 0, v, xi},
-                          {.t_end = t_end, .order = order, .step = step});
+        return run_slider(slider, {0, 0, v, xi}, {.t_end = t_end, .order = order, .step = step});
     }
 };
 

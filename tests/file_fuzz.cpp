@@ -29,15 +29,15 @@
 #include "learn/checkpoint_file.hpp"
 #include "mutator.hpp"
 #include "nn_models.hpp"
+#include "ricochet/detail/checkpoint.hpp"
+#include "ricochet/detail/classifier.hpp"
+#include "ricochet/detail/fault_kernel.hpp"
 #include "ricochet/faults/additive_pair.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/learn/evolution.hpp"
 #include "ricochet/learn/td3.hpp"
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "ricochet/detail/fault_kernel.hpp"
 
 namespace {
 

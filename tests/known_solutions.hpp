@@ -9,10 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detect/ends.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
-#include "ricochet/systems/coulomb_oscillator.hpp"
 #include "problems/detest_f1.hpp"
 #include "problems/detest_f2.hpp"
 #include "problems/detest_f3.hpp"
@@ -21,12 +17,16 @@
 #include "problems/grow_decay.hpp"
 #include "problems/henon_heiles.hpp"
 #include "problems/hidden_pair.hpp"
-#include "ricochet/systems/impact_oscillator.hpp"
 #include "problems/near_tangent.hpp"
+#include "problems/three_body.hpp"
+#include "ricochet/detect/ends.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate/methods.hpp"
+#include "ricochet/systems/coulomb_oscillator.hpp"
+#include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/pendulum.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
-#include "problems/three_body.hpp"
 
 namespace ricochet::test {
 

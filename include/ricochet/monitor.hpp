@@ -58,8 +58,8 @@ concept HostStep = requires(const S& step, double s, std::span<double> x)
     step.interpolate(s, x);  // x(t0 + s)
 };
 
-/// A host that knows the derivative of its interpolant; otherwise it is a difference over 1e-4 h, and
-/// events near tangency are found less finely.
+/// A host that knows the derivative of its interpolant; otherwise it is a difference over 1e-4 h,
+/// and events near tangency are found less finely.
 template <class S>
 concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt)
 {
@@ -78,7 +78,8 @@ concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, st
 /// interpolant of their own. Keeps views of its arguments.
 class HermiteStep {
 public:
-    /// Takes a step from t0 over h [s] from x0 to x1, with the rates at both ends; arrays of n doubles each.
+    /// Takes a step from t0 over h [s] from x0 to x1, with the rates at both ends; arrays of n
+    /// doubles each.
     HermiteStep(const Instant& t0, double h, std::span<const double> x0, std::span<const double> x1,
                 std::span<const double> rate0, std::span<const double> rate1) noexcept
         : t0_(t0), h_(h), x0_(x0), x1_(x1), rate0_(rate0), rate1_(rate1)
@@ -141,7 +142,8 @@ struct MonitorOptions {
 
 /// The events of a hybrid system in the steps of a host.
 ///
-/// A step is the path x(t0 + s), 0 <= s <= h, of the host from (t0, x0) to (t0 + h, x1). `examine` computes
+/// A step is the path x(t0 + s), 0 <= s <= h, of the host from (t0, x0) to (t0 + h, x1). `examine`
+/// computes
 ///
 ///     F, s     = the earliest set of acting guards that leave their side within (0, h], located on
 ///                `restep` where the host has it and else on `interpolate`, and its offset
@@ -149,14 +151,14 @@ struct MonitorOptions {
 ///     F empty: `stands`; the next step begins at (t0 + h, x1)
 ///     else:    x⁻ = x(t0 + s),  x⁺, q⁺ = r_F(q, t0 + s, x⁻);  `cut`, with these in `cut()`
 ///
-/// and `resume`, called with the rate at x⁺, arms every guard there: on its sign, or on its surface on the sign of its
-/// rate. It returns `stands` if the next step begins at x⁺, and another `cut` at the same instant if x⁺ has
-/// carried guards across their surfaces. `rests` says that the state stays as it is up to the next time event, and
-/// `ended` that the run is over.
+/// and `resume`, called with the rate at x⁺, arms every guard there: on its sign, or on its surface
+/// on the sign of its rate. It returns `stands` if the next step begins at x⁺, and another `cut` at
+/// the same instant if x⁺ has carried guards across their surfaces. `rests` says that the state
+/// stays as it is up to the next time event, and `ended` that the run is over.
 ///
-/// Required of the host: t0 and x0 are the end of the last step, or the instant and the state of the last cut, to the bit;
-/// t0 + h does not lie beyond `must_stop_at`; between `cut` and `resume` no step is shown. A call that violates this
-/// throws std::logic_error and changes nothing.
+/// Required of the host: t0 and x0 are the end of the last step, or the instant and the state of
+/// the last cut, to the bit; t0 + h does not lie beyond `must_stop_at`; between `cut` and `resume`
+/// no step is shown. A call that violates this throws std::logic_error and changes nothing.
 ///
 /// The system is one for `Simulation`; its flow is asked for where a guard starts on its surface
 /// without a rate, and where the host does not give the rate after an event.
@@ -191,8 +193,8 @@ public:
     explicit EventMonitor(System&&, const X&, const MonitorOptions& = {}, const Detector& = {},
                           const Locator& = {}) = delete;
 
-    /// Arms all guards at a state that no event has led to: at the start, and after a change that a host
-    /// makes to the state. May return a cut immediately: a guard that is about to be crossed.
+    /// Arms all guards at a state that no event has led to: at the start, and after a change that a
+    /// host makes to the state. May return a cut immediately: a guard that is about to be crossed.
     /// @param dxdt   the rate at x in offsets, n doubles
     /// @param scale  [s] length of the next step, roughly
     /// @throws std::invalid_argument naming a guard that is not finite, or behind a surface that
@@ -246,7 +248,8 @@ public:
         return monitor_->resume(taken(after), mode, checked(dxdt, after.size()), scale);
     }
 
-    /// Tells the monitor that the state has been kept until t [s], at most `must_stop_at`. Returns a cut at a time event.
+    /// Tells the monitor that the state has been kept until t [s], at most `must_stop_at`. Returns
+    /// a cut at a time event.
     [[nodiscard]] Verdict hold(double t) { return monitor_->hold(t); }
 
     [[nodiscard]] const Cut<State>& cut() const noexcept { return monitor_->cut(); }
@@ -259,13 +262,14 @@ public:
     /// The next time event [s], beyond which no step goes; infinite where there is none.
     [[nodiscard]] double must_stop_at() const noexcept { return monitor_->must_stop_at(); }
 
-    /// Time [s] up to which no guard needs a check, by the bounds that the system declares or a gate
+    /// Time [s] up to which no guard needs a check, by the bounds that the system declares or a
+    /// gate
     /// (`Planned`, `Certified`, ...): the host may go there in steps that it does not show, by
     /// `skip_to`. Without bounds it is the current time.
     [[nodiscard]] double quiet_until() const noexcept { return monitor_->quiet_until(); }
 
-    /// Tells the monitor that the host has continued to t, at most `quiet_until` and before the next time event,
-    /// in one step or several; x and its rate are those at t.
+    /// Tells the monitor that the host has continued to t, at most `quiet_until` and before the
+    /// next time event, in one step or several; x and its rate are those at t.
     /// @throws std::logic_error beyond that
     void skip_to(const Instant& t, std::span<const double> x, std::span<const double> dxdt)
     {

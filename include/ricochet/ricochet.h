@@ -20,7 +20,8 @@
  *
  * Threads. One simulation, or monitor, belongs to one thread at a time: a call while another is in
  * progress, from another thread or from a callback, is refused as RC_BUSY; `rc_cancel` is the
- * exception. Different ones may run at the same time, also of one system, if its callbacks allow it.
+ * exception. Different ones may run at the same time, also of one system, if its callbacks allow
+ * it.
  *
  * Handles. A handle that is null, freed or of another kind is refused as RC_BAD_HANDLE. A freed
  * handle is recognised for certain in debug builds of the library, which keep its memory.
@@ -161,20 +162,21 @@ typedef struct rc_callbacks {
     rc_guard_fn guard;             /**< spares the others where one is located */
     rc_guard_rates_fn guard_rates; /**< without rates they are differences along the flow */
     rc_guard_rate_fn guard_rate;
-    rc_reset_fn reset;             /**< null: events change nothing */
-    rc_reset_set_fn reset_set;     /**< in place of `reset` */
-    rc_reset_fn rest;              /**< what becomes of the motion where events accumulate */
-    rc_enabled_in_fn enabled_in;   /**< null: all guards in all modes */
-    rc_enabled_fn enabled;         /**< null: every crossing is an event */
+    rc_reset_fn reset;                    /**< null: events change nothing */
+    rc_reset_set_fn reset_set;            /**< in place of `reset` */
+    rc_reset_fn rest;                     /**< what becomes of the motion where events accumulate */
+    rc_enabled_in_fn enabled_in;          /**< null: all guards in all modes */
+    rc_enabled_fn enabled;                /**< null: every crossing is an event */
     rc_time_event_fn next_time_event;     /**< null: none */
     rc_time_event_fn previous_time_event; /**< for runs backward in time */
     rc_time_reset_fn time_reset;          /**< null: a time event changes nothing */
 
     /* How fast guards can change, for RC_PLANNED; see ricochet/hybrid/bounds.hpp. */
-    rc_bound_fn speed_bound;        /**< path per second, at most this now */
-    rc_bound_fn acceleration_bound; /**< of that speed, per second; null: speed_bound always holds */
-    rc_bound_fn lower_bound;        /**< guard >= this; null: none is known */
-    rc_bound_fn upper_bound;        /**< guard <= this; null: none is known */
+    rc_bound_fn speed_bound; /**< path per second, at most this now */
+    rc_bound_fn
+        acceleration_bound;  /**< of that speed, per second; null: speed_bound always holds */
+    rc_bound_fn lower_bound; /**< guard >= this; null: none is known */
+    rc_bound_fn upper_bound; /**< guard <= this; null: none is known */
 
     rc_parameter_fn parameter; /**< null: the gate's parameters are not compared */
 } rc_callbacks;
@@ -216,14 +218,14 @@ typedef enum rc_locator { RC_NEWTON = 0, RC_BISECTION = 1, RC_TOMS748 = 2 } rc_l
 /** Options of a run. Fill them by rc_options_default, then change what is to be changed; t_end has
  *  no default. */
 typedef struct rc_options {
-    size_t size;        /**< sizeof(rc_options) */
-    double t_start;     /**< [s], 0 */
-    double t_end;       /**< [s]; before t_start: backward in time */
-    rc_mode mode;       /**< at the start, 0 */
-    int32_t method;     /**< an rc_method, RC_DOPRI5 */
-    int32_t fixed_step; /**< 1: steps of the length `step`; 0: error control */
-    int32_t detector;   /**< an rc_detector, RC_EXTREMUM */
-    int32_t locator;    /**< an rc_locator, RC_NEWTON */
+    size_t size;           /**< sizeof(rc_options) */
+    double t_start;        /**< [s], 0 */
+    double t_end;          /**< [s]; before t_start: backward in time */
+    rc_mode mode;          /**< at the start, 0 */
+    int32_t method;        /**< an rc_method, RC_DOPRI5 */
+    int32_t fixed_step;    /**< 1: steps of the length `step`; 0: error control */
+    int32_t detector;      /**< an rc_detector, RC_EXTREMUM */
+    int32_t locator;       /**< an rc_locator, RC_NEWTON */
     int32_t look_inside;   /**< 1: RC_EXTREMUM evaluates the guards once inside each step */
     int32_t stop_at_event; /**< 0; 1: the run ends with its first event */
     int32_t record_events; /**< 1; 0: events are counted, not kept */
@@ -235,9 +237,9 @@ typedef struct rc_options {
     double atol;  /**< 1e-10 */
     double h_min; /**< [s], 0: a few units in the last place of the time */
     double h_max; /**< [s], INFINITY */
-    double event_tolerance; /**< [s] of the bracket of an event, 0: neighbouring doubles */
-    double event_rtol;      /**< added to it per second of |t|, 0 */
-    double event_window;    /**< [s] within which events happen together, 0 */
+    double event_tolerance;     /**< [s] of the bracket of an event, 0: neighbouring doubles */
+    double event_rtol;          /**< added to it per second of |t|, 0 */
+    double event_window;        /**< [s] within which events happen together, 0 */
     const double* sample_times; /**< [s] where the trajectory is wanted, in the order of the run,
                                    copied; null: none */
     size_t sample_count;        /**< 0 */
@@ -363,10 +365,10 @@ typedef struct rc_statistics {
     uint64_t suppressed; /**< repeats of an event inside its own window */
     uint64_t disabled;   /**< crossings that `enabled` said were no events */
     /* Steps without an event, by what is known of them. */
-    uint64_t proved;  /**< a bound or a polynomial excludes a root */
-    uint64_t checked; /**< the ends and the extremum inside were examined */
-    uint64_t gated;   /**< a calibrated gate skipped the check */
-    uint64_t assumed; /**< only the ends were examined */
+    uint64_t proved;    /**< a bound or a polynomial excludes a root */
+    uint64_t checked;   /**< the ends and the extremum inside were examined */
+    uint64_t gated;     /**< a calibrated gate skipped the check */
+    uint64_t assumed;   /**< only the ends were examined */
     size_t guard;       /**< that ended the run, or RC_NO_GUARD */
     size_t other_guard; /**< of two conflicting resets the second, or RC_TIME_EVENT_RESET */
 } rc_statistics;
@@ -385,19 +387,19 @@ typedef enum rc_event_kind {
 
 /** One event. */
 typedef struct rc_event {
-    size_t size;           /**< sizeof(rc_event), filled in by the caller */
-    double t;              /**< [s] */
-    size_t guard;          /**< or RC_NO_GUARD */
-    int32_t kind;          /**< an rc_event_kind */
-    int32_t late;          /**< 1: found at a step after the one that held it */
+    size_t size;  /**< sizeof(rc_event), filled in by the caller */
+    double t;     /**< [s] */
+    size_t guard; /**< or RC_NO_GUARD */
+    int32_t kind; /**< an rc_event_kind */
+    int32_t late; /**< 1: found at a step after the one that held it */
     rc_mode mode_before;
     rc_mode mode_after;
-    const double* before;  /**< n doubles; null if not kept. Until the simulation continues */
-    const double* after;   /**< n doubles, the same as before where nothing is reset */
-    double bracket_lo;     /**< [s] the guard is still on its side here, */
-    double bracket_hi;     /**< [s] and has left it here */
-    double slope;          /**< rate of the guard [1/s]; NaN if not computed */
-    double error;          /**< [s] of location within the step, not of the solution */
+    const double* before; /**< n doubles; null if not kept. Until the simulation continues */
+    const double* after;  /**< n doubles, the same as before where nothing is reset */
+    double bracket_lo;    /**< [s] the guard is still on its side here, */
+    double bracket_hi;    /**< [s] and has left it here */
+    double slope;         /**< rate of the guard [1/s]; NaN if not computed */
+    double error;         /**< [s] of location within the step, not of the solution */
 } rc_event;
 
 /** Number of events recorded so far; 0 for a handle that cannot be used. */
@@ -538,15 +540,15 @@ RC_API rc_status rc_monitor_new(const rc_system* system, const rc_monitor_option
 RC_API rc_status rc_monitor_free(rc_monitor* monitor);
 
 /* The calls below take arrays of `n` finite doubles, where n is the dimension of the system, and
- * copy them. Rates are as in rc_host_step; null for `dxdt`: the system's flow is asked. `scale` [s] is
- * roughly the length of the next step. After RC_INVALID and RC_OUT_OF_TURN nothing has changed,
+ * copy them. Rates are as in rc_host_step; null for `dxdt`: the system's flow is asked. `scale` [s]
+ * is roughly the length of the next step. After RC_INVALID and RC_OUT_OF_TURN nothing has changed,
  * and the right call may follow. After any other failure, such as RC_CALLBACK, what has been found
  * in the current step is half done, and the monitor waits for rc_monitor_start or
  * rc_monitor_restore. */
 
 /** Arms all guards at a state that no event has led to: at the start, and after whatever a host
- *  does to the state by itself. May be a cut immediately. RC_INVALID for a start that is not finite,
- *  or behind a surface that bounds the motion; then a start has to follow. */
+ *  does to the state by itself. May be a cut immediately. RC_INVALID for a start that is not
+ * finite, or behind a surface that bounds the motion; then a start has to follow. */
 RC_API rc_status rc_monitor_start(rc_monitor* monitor, double t, const double* x,
                                   const double* dxdt, size_t n, rc_mode mode, double scale,
                                   rc_verdict* verdict);
@@ -588,8 +590,9 @@ RC_API double rc_monitor_must_stop_at(rc_monitor* monitor);
  *  host may go there in steps that it does not show, by rc_monitor_skip_to. Where nothing is known
  *  it is the current time; NaN before the start, and for a handle that cannot be used. */
 RC_API double rc_monitor_quiet_until(rc_monitor* monitor);
-/** The host has continued to t, at most rc_monitor_quiet_until and before the next time event, in one
- *  step or several; x and its rate, which must be given, are those there. RC_OUT_OF_TURN beyond. */
+/** The host has continued to t, at most rc_monitor_quiet_until and before the next time event, in
+ * one step or several; x and its rate, which must be given, are those there. RC_OUT_OF_TURN beyond.
+ */
 RC_API rc_status rc_monitor_skip_to(rc_monitor* monitor, double t, const double* x,
                                     const double* dxdt, size_t n);
 
@@ -609,9 +612,11 @@ RC_API rc_status rc_monitor_side(rc_monitor* monitor, size_t which, rc_side* sid
 RC_API rc_outcome_code rc_monitor_outcome(rc_monitor* monitor);
 /** The guard that ended the run, or RC_NO_GUARD. */
 RC_API size_t rc_monitor_guard(rc_monitor* monitor);
-/** Describes the last failure of a callback like rc_callback_failure, of this monitor; null: of this thread. */
+/** Describes the last failure of a callback like rc_callback_failure, of this monitor; null: of
+ * this thread. */
 RC_API rc_status rc_monitor_callback_failure(rc_monitor* monitor, rc_callback_error* error);
-/** Fills in the counts like rc_get_statistics; calls of the flow are the host's, and not counted. */
+/** Fills in the counts like rc_get_statistics; calls of the flow are the host's, and not counted.
+ */
 RC_API rc_status rc_monitor_statistics(rc_monitor* monitor, rc_statistics* statistics);
 
 /** Number of events recorded since rc_monitor_clear_events; 0 for a handle that cannot be used. */
@@ -621,11 +626,12 @@ RC_API rc_status rc_monitor_event_at(rc_monitor* monitor, size_t index, rc_event
 /** Forgets the events recorded so far. */
 RC_API rc_status rc_monitor_clear_events(rc_monitor* monitor);
 
-/** Saves the monitor like rc_save, between two steps: all that its future depends on; the host saves its
- *  own state. RC_OUT_OF_TURN before the start, before a cut was resumed, and after
- *  the end. */
+/** Saves the monitor like rc_save, between two steps: all that its future depends on; the host
+ * saves its own state. RC_OUT_OF_TURN before the start, before a cut was resumed, and after the
+ * end. */
 RC_API rc_status rc_monitor_save(rc_monitor* monitor, void* bytes, size_t* size);
-/** Restores a saved state like rc_restore, of the same or of another monitor of the same system with the same options. */
+/** Restores a saved state like rc_restore, of the same or of another monitor of the same system
+ * with the same options. */
 RC_API rc_status rc_monitor_restore(rc_monitor* monitor, const void* bytes, size_t size);
 
 #ifdef __cplusplus

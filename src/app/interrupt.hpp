@@ -1,5 +1,5 @@
-// Requests that end a command early and keep what it has computed: Ctrl-C, a request to terminate, a
-// terminal that goes away, memory that runs short.
+// Requests that end a command early and keep what it has computed: Ctrl-C, a request to terminate,
+// a terminal that goes away, memory that runs short.
 #pragma once
 
 #include <unistd.h>

@@ -1,5 +1,6 @@
 // The command line `ricochet`: `systems`, `simulate`, `ensemble`, `inspect` and `compare`, which
-// need the core only. Everything else is done by further programs, `ricochet-<name>`, that stand beside it.
+// need the core only. Everything else is done by further programs, `ricochet-<name>`, that stand
+// beside it.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -48,9 +49,8 @@ int simulate_here_or_there(const SimulateRequest& request)
 
 int ensemble_here_or_there(const EnsembleRequest& request)
 {
-    const bool there =
-        !request.merge && !request.system.empty() &&
-        find_system(request.system).program == nonsmooth;
+    const bool there = !request.merge && !request.system.empty() &&
+                       find_system(request.system).program == nonsmooth;
     return there ? run_instead(nonsmooth, all_arguments + 1) : run_ensemble(request);
 }
 

@@ -29,7 +29,8 @@ fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates
         if (fs::exists(file, ignored)) return file;
         looked.push_back(file.string());
     }
-    throw BadInput(fmt::format("model '{}' not found; searched for {}", name, joined(looked, ", ")));
+    throw BadInput(
+        fmt::format("model '{}' not found; searched for {}", name, joined(looked, ", ")));
 }
 
 /// Why what `model` computes is not an event of `system`; empty if it may be.

@@ -12,7 +12,7 @@ namespace ricochet::app {
 
 /// An option with a finite number.
 inline void add_number(CLI::App& command, const std::string& option, std::optional<double>& out,
-                const std::string& value, const std::string& help)
+                       const std::string& value, const std::string& help)
 {
     command
         .add_option_function<std::string>(

@@ -228,7 +228,8 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
         "  proved    a bound, or the polynomial of the step (bernstein), excludes it\n"
         "  checked   the guard was evaluated at the ends and the turning points (extremum)\n"
         "  gated     a calibrated network skipped the check, within its miss rate\n"
-        "  assumed   the guard was evaluated at the ends only (ends), or a network predicted no event\n"
+        "  assumed   the guard was evaluated at the ends only (ends), or a network predicted no "
+        "event\n"
         "A late event was found at a step after the one that held it.");
     command.callback([&status, request, handler] { status = handler(*request); });
 }
@@ -247,8 +248,8 @@ void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler)
     command
         .add_option("--vary", request->vary, "an interval that --count draws from; may be repeated")
         ->type_name("name=lowest:highest ...");
-    add_whole_number(command, "--seed", request->seed, 0,
-                     std::numeric_limits<std::uint64_t>::max(), "of random rows, default 1");
+    add_whole_number(command, "--seed", request->seed, 0, std::numeric_limits<std::uint64_t>::max(),
+                     "of random rows, default 1");
     add_text(command, "--out", request->out, "DIR", "where the results are kept; made if needed");
     add_text(command, "--share", request->share, "K/N",
              "run share K of N only; default: by the ranks of Open MPI, PMI or Slurm, or all");

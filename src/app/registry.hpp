@@ -67,7 +67,7 @@ struct HandOverPhase {
 /// A run whatever the system's state type, and how long it took.
 struct TimedRun {
     Run<std::vector<double>> run;
-    double seconds = 0;  ///< of wall time, per run
+    double seconds = 0;                     ///< of wall time, per run
     std::optional<SetValuedSteps> steps{};  ///< where there were any
     std::vector<HandOverPhase> phases{};
 };

@@ -33,10 +33,10 @@ constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
                                           {"bisection", LocatorKind::bisection},
                                           {"toms748", LocatorKind::toms748}}};
 constexpr Names<MethodName, 5> steppers{{{"rk4", MethodName::rk4},
-                                          {"dopri5", MethodName::dopri5},
-                                          {"fehlberg78", MethodName::fehlberg78},
-                                          {"cash-karp54", MethodName::cash_karp54},
-                                          {"euler", MethodName::euler}}};
+                                         {"dopri5", MethodName::dopri5},
+                                         {"fehlberg78", MethodName::fehlberg78},
+                                         {"cash-karp54", MethodName::cash_karp54},
+                                         {"euler", MethodName::euler}}};
 
 template <class Kind, std::size_t n>
 std::string_view name_in(const Names<Kind, n>& names, Kind kind)

@@ -87,11 +87,12 @@ protected:
     /// Puts the guards that fire at the start into the fired set.
     void arm_at_start();
 
-    /// Whether a guard outside the fired set is on its other side at the set by no more than rounding.
+    /// Whether a guard outside the fired set is on its other side at the set by no more than
+    /// rounding.
     [[nodiscard]] bool is_flipped_by_rounding(std::size_t i, Side before);
 
-    /// Change of guard i at the start of the step that rounding of the time and of the state, 8 units in
-    /// the last place of each component, may cause.
+    /// Change of guard i at the start of the step that rounding of the time and of the state, 8
+    /// units in the last place of each component, may cause.
     [[nodiscard]] double rounding_of(std::size_t i);
     [[nodiscard]] double rounding_of(std::size_t i, double t, const X& x);
 
@@ -124,12 +125,14 @@ protected:
     /// the step, too, and a second time where the first leaves doubts.
     [[nodiscard]] bool any_suspicious()
     {
-        if (on_series_ || !bank_.looks() || !options_.look_inside) return bank_.suspicious(step_.h());
+        if (on_series_ || !bank_.looks() || !options_.look_inside)
+            return bank_.suspicious(step_.h());
         look_inside();
         return is_suspicious(error_controlled_ && hardly_moves());
     }
 
-    /// Same after an evaluation inside the step, if there is one; at several more places where the state hardly `moves`.
+    /// Same after an evaluation inside the step, if there is one; at several more places where the
+    /// state hardly `moves`.
     [[nodiscard]] bool is_suspicious(bool hardly_moves);
 
     /// On series no rates are needed until a search asks for them.
@@ -183,9 +186,9 @@ protected:
     /// rejects, and repeats of an event inside its own window.
     void dismiss_members();
 
-    /// Whether a crossing repeats the last event of the guard in the same direction. If the guard has not turned
-    /// back since, it is the same crossing, found again because the reset moved the state by a
-    /// rounding; otherwise it is a new event, and events accumulate.
+    /// Whether a crossing repeats the last event of the guard in the same direction. If the guard
+    /// has not turned back since, it is the same crossing, found again because the reset moved the
+    /// state by a rounding; otherwise it is a new event, and events accumulate.
     [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
     {
         const GuardRecord& record = bank_[i];
@@ -206,7 +209,8 @@ protected:
                       search_.before());
     }
 
-    /// Whether the event changes nothing, and no host asks for such cuts, so that the step can stand.
+    /// Whether the event changes nothing, and no host asks for such cuts, so that the step can
+    /// stand.
     [[nodiscard]] bool changes_nothing();
 
     /// Whether this event of the guard, not yet counted, ends the run.
@@ -314,15 +318,16 @@ protected:
     /// Fires the guards that were carried across their surfaces.
     [[nodiscard]] bool apply_next_set();
 
-    /// Whether the events of a fired guard accumulate here, so that it comes to rest or the run ends.
+    /// Whether the events of a fired guard accumulate here, so that it comes to rest or the run
+    /// ends.
     [[nodiscard]] bool rest_fired();
 
-    /// Keeps the rate at which guard i leaves its surface after its reset. True if the guard will not rise
-    /// above its rounding any more.
+    /// Keeps the rate at which guard i leaves its surface after its reset. True if the guard will
+    /// not rise above its rounding any more.
     [[nodiscard]] bool fades(std::size_t i);
 
-    /// Whether the reset has put guard i farther from its surface, on the side it came from, than an error of
-    /// location explains, so that it need not rise.
+    /// Whether the reset has put guard i farther from its surface, on the side it came from, than
+    /// an error of location explains, so that it need not rise.
     [[nodiscard]] bool is_away(std::size_t i, double rounding);
 
     /// The rate [1/s] of guard i at the start of the step; where it is a difference quotient,
@@ -379,8 +384,8 @@ protected:
     void note_crossings_to_set();
 
     [[nodiscard]] bool counts_at_set(std::size_t i);
-    /// Whether a recorded guard has not left its side at the set, by no more than the rounding of its value
-    /// there.
+    /// Whether a recorded guard has not left its side at the set, by no more than the rounding of
+    /// its value there.
     [[nodiscard]] bool is_rounding_at_set(std::size_t i, const GuardSample& at);
 
     [[nodiscard]] bool is_member(std::size_t i) noexcept
@@ -420,8 +425,9 @@ protected:
 
     static constexpr int most_levels = 100;  ///< of sets at one instant
     static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
-    /// Fraction of the last flight of a guard over which a difference quotient is taken: over this length the rounding
-    /// of its small excursions is magnified less than over the usual 1e-5 of a step.
+    /// Fraction of the last flight of a guard over which a difference quotient is taken: over this
+    /// length the rounding of its small excursions is magnified less than over the usual 1e-5 of a
+    /// step.
     static constexpr double low_part = 0.05;
 
     const RunSetup<X>& setup_;

@@ -30,7 +30,8 @@ inline void EventEngine<X, single>::note_crossings_to_set()
             may_cross && (search_.crosses_with_set(step_, bank_, i, at, resolution_) ||
                           is_rounding_at_set(i, at));
         GuardSample last = at;
-        // The guard is on the side that it comes from until it crosses. The time of the set is a double.
+        // The guard is on the side that it comes from until it crosses. The time of the set is a
+        // double.
         if (with_set) {
             constexpr double epsilon = std::numeric_limits<double>::epsilon();
             const double ulp = epsilon * std::fabs(step_.time(at.s));
@@ -40,8 +41,8 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         if (!record.acting) {
             search_.note_crossings(step_, bank_, i, last, resolution_, calls());
         }
-        // An acting guard that has left its side, but was located behind the set, has left it by rounding
-        // of its value: its own event is still to come.
+        // An acting guard that has left its side, but was located behind the set, has left it by
+        // rounding of its value: its own event is still to come.
         const bool to_come = record.acting && counts(record.side, record.info.crossing);
         if (!to_come && has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
         const Side side = record.side;

@@ -209,8 +209,8 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
         if (bank_[i].fired && bank_[i].turned && bank_[i].intervals.is_low()) {
             rate = bank_[i].departure;
             if (rate == 0) {
-                // The guard is too slow for its rate to be known: its reset has sent it back, and its next
-                // event is on its way down.
+                // The guard is too slow for its rate to be known: its reset has sent it back, and
+                // its next event is on its way down.
                 const Side back = bank_[i].last_side;
                 bank_.set_rate0(i, sign_of(back) * std::numeric_limits<double>::min());
                 return back;

@@ -167,8 +167,8 @@ public:
                 record.next = side_of(end.value);
                 return;
             }
-            // The guard is zero by rounding at many neighbouring offsets, and its rates contradict it, as with
-            // a flow that jumps there: the search continues behind it.
+            // The guard is zero by rounding at many neighbouring offsets, and its rates contradict
+            // it, as with a flow that jumps there: the search continues behind it.
             if (creeping > 8) {
                 const double behind = where.root + reach;
                 reach *= 2;
@@ -286,8 +286,8 @@ private:
         }
     }
 
-    /// Whether an interval with both ends on the surface is a plateau; its middle and a place that no symmetry singles
-    /// out are evaluated.
+    /// Whether an interval with both ends on the surface is a plateau; its middle and a place that
+    /// no symmetry singles out are evaluated.
     [[nodiscard]] static bool is_plateau(Probe& probe, const Watch& watch)
     {
         const double width = watch.end.s - watch.start.s;

@@ -25,9 +25,8 @@ inline void EventSearch<X, single>::locate_alone(const CurrentStep& step, Bank& 
                                                  const EventResolution& resolution,
                                                  std::uint64_t& calls)
 {
-    Hit& hit = *std::find_if(hits_.begin(), hits_.end(), [this](const Hit& candidate) {
-        return candidate.guard == fired_[0];
-    });
+    Hit& hit = *std::find_if(hits_.begin(), hits_.end(),
+                             [this](const Hit& candidate) { return candidate.guard == fired_[0]; });
     const auto guard = bank.view(hit.guard, step.mode(), calls);
     Probe probe(guard, step, space_);
     probe.watch(hit.side);
@@ -92,8 +91,7 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step,
     if (fired_.size() > 1) {
         at_ = 0;
         for (const Hit& hit : hits_) {
-            if (hit.located &&
-                std::find(fired_.begin(), fired_.end(), hit.guard) != fired_.end()) {
+            if (hit.located && std::find(fired_.begin(), fired_.end(), hit.guard) != fired_.end()) {
                 at_ = std::max(at_, hit.where.root);
             }
         }

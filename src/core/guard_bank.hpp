@@ -129,7 +129,8 @@ public:
         run.g0 = g0_[0];
         run.rate0 = rate0_[0];
     }
-    /// Takes over from a quiet run: the guard at the start of the current step, at its end and inside.
+    /// Takes over from a quiet run: the guard at the start of the current step, at its end and
+    /// inside.
     void take_back(const QuietRun& run) noexcept
     {
         if (size() == 0) return;
@@ -185,8 +186,8 @@ public:
         return {.s = h, .value = g1_[i], .rate = known(rate1_[i])};
     }
 
-    /// Event tolerance: |g| up to which a guard with a rate of zero counts as being on its surface, from the
-    /// rounding of its values in the step. The rounding of the state is added where it
+    /// Event tolerance: |g| up to which a guard with a rate of zero counts as being on its surface,
+    /// from the rounding of its values in the step. The rounding of the state is added where it
     /// matters (`StepProbe::rounding`).
     [[nodiscard]] double touch(std::size_t i, double h) const noexcept
     {

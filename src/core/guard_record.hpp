@@ -68,15 +68,16 @@ struct GuardRecord {
     double rated_over = std::numeric_limits<double>::quiet_NaN();
     bool again = false;            ///< it is back inside the window of its last event
     Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
-    bool acting = false;           ///< has a reset or may end the run; else events are only recorded
-    bool deferred = false;           ///< its check is deferred: nothing in the bank is of this step
+    bool acting = false;    ///< has a reset or may end the run; else events are only recorded
+    bool deferred = false;  ///< its check is deferred: nothing in the bank is of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     bool jumped = false;        ///< its last event was a jump
     bool departs = false;       ///< the smooth current phase started at its event, or enabled it
-    double band = 0;            ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
-    bool estimated = false;     ///< the tolerance is the error of location, not a value of the guard
-    double from = 0;            ///< [s] offset in the step up to which it has been examined
+    double band =
+        0;  ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
+    bool estimated = false;  ///< the tolerance is the error of location, not a value of the guard
+    double from = 0;         ///< [s] offset in the step up to which it has been examined
     std::uint64_t events = 0;
     double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
     Side last_side = Side::plateau;                          ///< the side it left then
@@ -88,7 +89,8 @@ struct GuardRecord {
     return side == Side::above ? 1 : side == Side::below ? -1 : 0;
 }
 
-/// Whether checks are deferred. Without bounds or a gate, a detector is the exact one that it wraps.
+/// Whether checks are deferred. Without bounds or a gate, a detector is the exact one that it
+/// wraps.
 template <class X>
 [[nodiscard]] bool puts_off(const DetectorTable<X>& detector, const SystemTable<X>& system)
 {

@@ -130,7 +130,8 @@ public:
         return finish();
     }
 
-    /// Returns the result so far; before the end its outcome is `cancelled`. The simulation is over.
+    /// Returns the result so far; before the end its outcome is `cancelled`. The simulation is
+    /// over.
     [[nodiscard]] Run<X> finish() override;
 
     /// Brings the time, the state and the counts of `run` up to date, and its last samples where
@@ -261,7 +262,8 @@ private:
     [[gnu::noinline]] void copy_to_mark();
     void go_back_to_mark();
 
-    /// Keeps the state before a step that ends at a time event, or is recorded by further evaluations.
+    /// Keeps the state before a step that ends at a time event, or is recorded by further
+    /// evaluations.
     void mark_what_lasts()
     {
         if (mark_ && (time_event_due_ || options_.record_steps || holds_sample())) {
@@ -395,8 +397,8 @@ private:
         return ahead <= h ? 0.9 * ahead : 0.1 * h;
     }
 
-    /// Places an event at the start of the step where the flow cannot be evaluated a step of h further on,
-    /// and a guard reaches its surface no later.
+    /// Places an event at the start of the step where the flow cannot be evaluated a step of h
+    /// further on, and a guard reaches its surface no later.
     [[nodiscard]] bool happen_where_flow_ends(double h);
 
     [[nodiscard]] double smallest_step() const noexcept
@@ -426,8 +428,8 @@ private:
     [[nodiscard]] double shorten_into_domain(bool beyond);
 
     /// The step after an event at `t` is at most twice the flight before it, or the first
-    /// step, wherever the end lies. Events that follow immediately shorten it by no more than error control would
-    /// at each of them.
+    /// step, wherever the end lies. Events that follow immediately shorten it by no more than error
+    /// control would at each of them.
     void limit_next_step(double t) noexcept;
 
     // --- output ---

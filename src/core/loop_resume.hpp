@@ -1,8 +1,8 @@
 // Return to the start of the current step after an exception from a function of the system.
 //
-// Before a step stands it changes only its own length and what it has recorded; where it may hold events,
-// or ends at a time event, it changes nearly everything. Therefore the first two are kept at every step,
-// and the rest only where a search begins.
+// Before a step stands it changes only its own length and what it has recorded; where it may hold
+// events, or ends at a time event, it changes nearly everything. Therefore the first two are kept
+// at every step, and the rest only where a search begins.
 #pragma once
 
 #include "core/loop.hpp"

@@ -144,7 +144,8 @@ template <class X, bool single>
 void Loop<X, single>::limit_to_reach()
 {
     if (!error_controlled_) return;
-    // The length has a lower limit: a step that cannot be taken at that length is rejected by its error.
+    // The length has a lower limit: a step that cannot be taken at that length is rejected by its
+    // error.
     const double reach = std::max(step_.reach(options_.rtol, options_.atol), smallest_step());
     h_next_ = std::min(h_next_, reach);
 }
@@ -229,7 +230,8 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
     mark_everything();
     const Approach approach = time_to_surface();
     const std::size_t i = approach.guard;
-    if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !this->counts_here(i)) return false;
+    if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !this->counts_here(i))
+        return false;
     if (!bank_[i].acting) {
         this->record_jump(i, bank_[i].side);
         return false;

@@ -22,8 +22,8 @@ class MergedResets {
 public:
     explicit MergedResets(const X& like) : after_(like), single_(like) {}
 
-    /// Applies the resets of the guards in `fired`, which all read the state `before`, and the reset of a time
-    /// event if the set happens on time. `bank` knows which guards have a reset.
+    /// Applies the resets of the guards in `fired`, which all read the state `before`, and the
+    /// reset of a time event if the set happens on time. `bank` knows which guards have a reset.
     template <class Bank>
     void apply(const SystemAt<X>& system, const Bank& bank, std::span<const std::size_t> fired,
                bool on_time, Mode mode, double t, const X& before)
@@ -69,7 +69,8 @@ public:
     [[nodiscard]] X& scratch() noexcept { return single_; }
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
 
-    /// Two guards whose resets disagree, or a guard and `time_event_reset`; `no_guard` without a conflict.
+    /// Two guards whose resets disagree, or a guard and `time_event_reset`; `no_guard` without a
+    /// conflict.
     [[nodiscard]] const std::pair<std::size_t, std::size_t>& conflict() const noexcept
     {
         return conflict_;
@@ -97,8 +98,8 @@ private:
         });
     }
 
-    /// Merges a reset that changes the dimension of the state. It writes all components, and is in conflict with
-    /// any other reset that writes, unless they agree.
+    /// Merges a reset that changes the dimension of the state. It writes all components, and is in
+    /// conflict with any other reset that writes, unless they agree.
     void merge_resized(std::size_t writer, const X& before)
     {
         if (same_state(single_, before)) return;

@@ -22,7 +22,8 @@ namespace ricochet::detail {
 [[noreturn]] void throw_beyond_time_event(double event, double end);
 /// @throws std::logic_error: guards have to be examined before.
 [[noreturn]] void throw_not_quiet(double until, double found);
-/// @throws std::invalid_argument for a length, time or scale that is not a positive or finite number.
+/// @throws std::invalid_argument for a length, time or scale that is not a positive or finite
+/// number.
 [[noreturn]] void throw_no_length(std::string_view what, double found);
 
 /// @throws std::invalid_argument

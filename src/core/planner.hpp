@@ -38,8 +38,9 @@ struct LastCheck {
     double sure = 0;   ///< [s] the deadline
     double hoped = 0;  ///< [s] when a check is expected to close the interval; never before `sure`
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< of the distance, from two checks
-    bool verify = false;     ///< the exact detector examines the next step
-    bool unclear = false;   ///< a gate clears nothing, so that the exact detector examines the next step, too
+    bool verify = false;  ///< the exact detector examines the next step
+    bool unclear =
+        false;  ///< a gate clears nothing, so that the exact detector examines the next step, too
     bool refused = false;   ///< a gate had no lower bound when it was last asked
     std::size_t first = 0;  ///< of the tentative steps, the first beyond `sure`
     double later_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] of another check
@@ -129,8 +130,8 @@ public:
         find_limit();
     }
 
-    /// Takes over the current step, which ends at `end`, beyond the deadline of some guards. The last
-    /// of the kept steps is this one.
+    /// Takes over the current step, which ends at `end`, beyond the deadline of some guards. The
+    /// last of the kept steps is this one.
     void overrun(double end)
     {
         while (!deadlines_.empty() && deadlines_[0].deadline < end) {
@@ -214,8 +215,8 @@ public:
         }
     }
 
-    /// Defers the verified guards from the end of a step in which the exact detector has found nothing that
-    /// cuts it short.
+    /// Defers the verified guards from the end of a step in which the exact detector has found
+    /// nothing that cuts it short.
     void settle(const Step<X>& step, Bank& bank)
     {
         const double t = step.time(step.h());
@@ -235,8 +236,8 @@ public:
         find_limit();
     }
 
-    /// Tests one of the deferred guards, in turn, at the end of every 64th step without a check, if bounds are
-    /// checked.
+    /// Tests one of the deferred guards, in turn, at the end of every 64th step without a check, if
+    /// bounds are checked.
     void sample_sleeper(const Step<X>& step, Bank& bank, Statistics& counts)
     {
         if (!bounded_ || !detector_->checks_bounds) return;
@@ -348,7 +349,8 @@ private:
         if (!bounded_) return at;
         const double l = system_->lipschitz(system_.door(), i);
         at.speed = l * system_->speed_bound(system_.door(), i, mode, check.t, *check.x);
-        at.acceleration = l * system_->acceleration_bound(system_.door(), i, mode, check.t, *check.x);
+        at.acceleration =
+            l * system_->acceleration_bound(system_.door(), i, mode, check.t, *check.x);
         if (detector_->checks_bounds && !(at.speed >= 0 && at.acceleration >= 0) && !wrong_) {
             blame(i, check, check, at.speed >= 0 ? at.acceleration : at.speed);
         }
@@ -388,8 +390,9 @@ private:
     {
         const double passed = at.time - check.time;
         if (passed > 0) {
-            check.slope = check.exact == at.exact ? (at.bound.distance - check.bound.distance) / passed
-                                                : std::numeric_limits<double>::quiet_NaN();
+            check.slope = check.exact == at.exact
+                              ? (at.bound.distance - check.bound.distance) / passed
+                              : std::numeric_limits<double>::quiet_NaN();
         }
         check.time = at.time;
         check.value = at.value;
@@ -411,11 +414,12 @@ private:
         // Rounding may leave an interval open that would just close.
         const double hoped = (1 - 1e-12) * detector_->hoped(self_, at.bound, check.slope, reach);
         const double ahead = std::max(hoped, cleared);
-        check.hoped = std::max(check.sure, at.time + (expects_level(check, bank[i].side) ? 0 : ahead));
+        check.hoped =
+            std::max(check.sure, at.time + (expects_level(check, bank[i].side) ? 0 : ahead));
     }
 
-    /// Whether a gate is likely to have a lower bound where the cover of this check ends; any bound suffices there,
-    /// so that the gate is asked immediately.
+    /// Whether a gate is likely to have a lower bound where the cover of this check ends; any bound
+    /// suffices there, so that the gate is asked immediately.
     [[nodiscard]] bool expects_level(const LastCheck& check, Side side) const noexcept
     {
         if (!detector_->level || side != Side::above) return false;
@@ -456,8 +460,8 @@ private:
 
     /// An exact check of the start of tentative step k; past the last, at the end of the current
     /// step.
-    [[nodiscard]] Check check_at(std::size_t i, std::size_t k, const Step<X>& step, const Bank& bank,
-                               Statistics& counts)
+    [[nodiscard]] Check check_at(std::size_t i, std::size_t k, const Step<X>& step,
+                                 const Bank& bank, Statistics& counts)
     {
         Check check = place(k, step);
         check.value = value_at(i, check.time, check.t, *check.x, step.mode(), bank, counts);
@@ -521,7 +525,8 @@ private:
     [[nodiscard]] Check last_check(std::size_t i) const noexcept
     {
         const LastCheck& check = checks_[i];
-        return {.time = check.time, .value = check.value, .exact = check.exact, .bound = check.bound};
+        return {
+            .time = check.time, .value = check.value, .exact = check.exact, .bound = check.bound};
     }
 
     /// Closes the interval of guard i; returns the first step that could not be closed, or `none`.
@@ -539,7 +544,8 @@ private:
 
     void check_change(std::size_t i, const Check& from, const Check& to, const Bank& bank);
 
-    /// Reports a guard that is across its surface although it was covered from one check to the other.
+    /// Reports a guard that is across its surface although it was covered from one check to the
+    /// other.
     void check_covered(std::size_t i, const Check& from, const Check& to, const Bank& bank);
 
     void blame_change(std::size_t i, const Check& from, const Check& to, const Bank& bank);

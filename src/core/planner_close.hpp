@@ -44,7 +44,8 @@ inline std::size_t Planner<X, single>::narrow(std::size_t i, Check& from, std::s
     if (hi - lo == 1) {
         failing_value_ = end.value;
         if (from.exact && from.time == place(lo, step).time) return lo;
-        if (Check start; bound_at(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
+        if (Check start;
+            bound_at(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
             from = end;
             return none;
         }

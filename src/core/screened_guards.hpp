@@ -73,7 +73,8 @@ public:
         marked_ = false;
     }
 
-    /// Evaluates them a second time, at the part `CubicLook::further` of the step where the state is `x`.
+    /// Evaluates them a second time, at the part `CubicLook::further` of the step where the state
+    /// is `x`.
     void sample_further(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
         const double s = CubicLook::further * step.h();
@@ -231,7 +232,8 @@ protected:
         return use(OwnScreen{rules_.suspects});
     }
 
-    /// Number of guards that are screened together: where one of them is suspected, each is examined.
+    /// Number of guards that are screened together: where one of them is suspected, each is
+    /// examined.
     static constexpr std::size_t block = 16;
     [[nodiscard]] bool are_few() const noexcept { return size() < block; }
 

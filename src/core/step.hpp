@@ -1,8 +1,8 @@
 // The step in progress.
 //
 // Steps that advance keep their stages in the state of the step, where the dense output reads
-// them; steps that are repeated to inner times keep theirs elsewhere, so that an evaluation inside the step never
-// changes the step.
+// them; steps that are repeated to inner times keep theirs elsewhere, so that an evaluation inside
+// the step never changes the step.
 #pragma once
 
 #include <algorithm>
@@ -122,8 +122,8 @@ public:
         }
     }
 
-    /// Same as `peek` at the part `Part::u` of the step, for which the weights of the dense output are
-    /// constants.
+    /// Same as `peek` at the part `Part::u` of the step, for which the weights of the dense output
+    /// are constants.
     template <class Part>
     [[gnu::always_inline]] void peek(X& x) const
     {
@@ -441,7 +441,8 @@ private:
         host.restep(host.host, s, x.data(), state_.x0.size());
     }
 
-    /// Over a ten-thousandth of the step the errors of rounding and of curvature of a difference are alike.
+    /// Over a ten-thousandth of the step the errors of rounding and of curvature of a difference
+    /// are alike.
     void rate_on_host(double s, X& dxdt) const
     {
         const HostStepTable& host = *state_.host;

@@ -67,8 +67,7 @@ Finding clear_if(bool known) noexcept
 
 /// Whether a sample cannot be told from zero: by the rounding of the guard's values, or
 /// of the terms that it is made of.
-[[nodiscard]] bool is_on_surface(GuardPath& path, const Watch& watch,
-                                        const GuardSample& sample)
+[[nodiscard]] bool is_on_surface(GuardPath& path, const Watch& watch, const GuardSample& sample)
 {
     const double size = std::fabs(sample.value);
     if (size <= watch.touch) return true;
@@ -88,7 +87,7 @@ Finding clear_if(bool known) noexcept
 /// arrived, and in a wide band its cubic has to tell. If it is still falling, the next
 /// step will see where it turns.
 [[nodiscard, gnu::noinline]] bool turns_back(GuardPath& path, const Watch& watch,
-                                                    const GuardCubic& cubic)
+                                             const GuardCubic& cubic)
 {
     const double sign = watch.side == Side::above ? 1 : -1;
     const double width = path.h();
@@ -103,7 +102,7 @@ Finding clear_if(bool known) noexcept
 
 /// The larger of the slopes between three samples.
 [[nodiscard]] double steepest(const GuardSample& a, const GuardSample& b,
-                                     const GuardSample& c) noexcept
+                              const GuardSample& c) noexcept
 {
     return std::max(std::fabs((b.value - a.value) / (b.s - a.s)),
                     std::fabs((c.value - b.value) / (c.s - b.s)));
@@ -112,15 +111,13 @@ Finding clear_if(bool known) noexcept
 /// Where to look for the turn of the guard times `sign`, which falls at `lo` and rises at
 /// `hi`, as a fraction of the interval: the minimum of the cubic. Where that does not
 /// converge soon there is a kink or a flat place, and the interval is halved.
-[[nodiscard]] double turn(double sign, const GuardSample& lo, const GuardSample& hi,
-                                 int i) noexcept
+[[nodiscard]] double turn(double sign, const GuardSample& lo, const GuardSample& hi, int i) noexcept
 {
     return i < 7 ? GuardCubic(sign, lo, hi).critical(true) : 0.5;
 }
 
 /// The guard leaves its side before `beyond` and is back at the end.
-[[nodiscard]] Finding pair(const GuardPath& path, const Watch& watch,
-                                  const GuardSample& beyond)
+[[nodiscard]] Finding pair(const GuardPath& path, const Watch& watch, const GuardSample& beyond)
 {
     if (counts(watch.side, path.crossing())) {
         return Finding::leaving(watch.side, watch.start, beyond);
@@ -130,8 +127,7 @@ Finding clear_if(bool known) noexcept
 
 /// The guard has left its side at the end, but its cubic says that it may have left
 /// before, come back and left again.
-[[gnu::noinline]] Finding first_of_three(GuardPath& path, Watch watch,
-                                                GuardCubic cubic)
+[[gnu::noinline]] Finding first_of_three(GuardPath& path, Watch watch, GuardCubic cubic)
 {
     const Side side = watch.side;
     const bool leaving_counts = counts(side, path.crossing());
@@ -157,13 +153,11 @@ Finding clear_if(bool known) noexcept
 }
 
 /// Both ends are on the armed side: is the extremum between them, too?
-[[gnu::noinline]] Finding look_for_pair(GuardPath& path, Watch watch,
-                                               GuardCubic cubic)
+[[gnu::noinline]] Finding look_for_pair(GuardPath& path, Watch watch, GuardCubic cubic)
 {
     GuardSample lo = watch.start;
     GuardSample hi = watch.end;
-    if (std::fabs(cubic.v0) <= watch.touch &&
-        turns_now(cubic.v0, cubic.r0, cubic.curvature0())) {
+    if (std::fabs(cubic.v0) <= watch.touch && turns_now(cubic.v0, cubic.r0, cubic.curvature0())) {
         return Finding::clear(Evidence::checked);  // the step before has seen it turn
     }
     if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {
@@ -211,8 +205,8 @@ Finding clear_if(bool known) noexcept
         if (width <= coarse_part * path.h() && !path.is_rated()) {
             fall = std::max(fall, steepest(lo, sample, hi) * width);
         }
-        if (value > watch.touch + 4 * fall && (value > near * watch.scale + 4 * fall ||
-                                               value > path.blur(sample.s) + 4 * fall)) {
+        if (value > watch.touch + 4 * fall &&
+            (value > near * watch.scale + 4 * fall || value > path.blur(sample.s) + 4 * fall)) {
             return Finding::clear(Evidence::checked);
         }
         if (fall <= watch.touch / 64) break;

@@ -8,8 +8,8 @@
 
 namespace ricochet::detail {
 
-void ResolvedParts::resolve(GuardPath& path, std::size_t i, const Watch& watch, double declared_touch,
-             bool everywhere)
+void ResolvedParts::resolve(GuardPath& path, std::size_t i, const Watch& watch,
+                            double declared_touch, bool everywhere)
 {
     const GuardSample& start = watch.start;
     const GuardSample& end = watch.end;
@@ -36,8 +36,8 @@ void ResolvedParts::resolve(GuardPath& path, std::size_t i, const Watch& watch, 
     divide(path, from, end, smallest, 1);
 }
 
-void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const GuardSample& end, double smallest,
-            int depth)
+void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const GuardSample& end,
+                           double smallest, int depth)
 {
     const double width = end.s - start.s;
     const CubicLook look(start.value, start.rate, end.value, end.rate, width);

@@ -269,8 +269,8 @@ NearestFaces Triangles::nearest(const Triangles& body, const Pose& pose,
         const std::uint32_t other = hint.other_face < body.size() ? hint.other_face : 0;
         best.offer(triangles_[face], face, moved(body[other], pose), other);
     }
-    // Going back and forth between the surfaces soon comes near to the nearest pair, or to one that is
-    // hardly further. The search that follows only has to show that.
+    // Going back and forth between the surfaces soon comes near to the nearest pair, or to one that
+    // is hardly further. The search that follows only has to show that.
     Vector3d from = best.found.other_point;
     for (int turn = 0; turn < most_turns; ++turn) {
         const NearestOnTriangle here = nearest(from, best.found.face);

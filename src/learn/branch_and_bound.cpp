@@ -121,8 +121,8 @@ bool one_in_64(const Point& centre, std::size_t n) noexcept
     return hash >> 58U == 0;
 }
 
-/// The guard itself is not asked for, which may be a thousand times as expensive; one box in 64 compares
-/// it with the bound.
+/// The guard itself is not asked for, which may be a thousand times as expensive; one box in 64
+/// compares it with the bound.
 bool Statement::proved_by_least(Box& box) const
 {
     const Point centre = centre_of(box, n_);

@@ -8,9 +8,9 @@
 #include <limits>
 #include <vector>
 
-#include "ricochet/learn/certify.hpp"
 #include "ricochet/detail/bounds.hpp"
 #include "ricochet/detail/classifier.hpp"
+#include "ricochet/learn/certify.hpp"
 
 namespace ricochet::learn {
 

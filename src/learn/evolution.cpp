@@ -375,8 +375,9 @@ private:
         std::uint64_t found = 0;
         reader.get(found);
         if (found != fingerprint_) {
-            refuse_checkpoint(options_.checkpoint,
-                              "is of another search: problem, start, population, spread or seed differ");
+            refuse_checkpoint(
+                options_.checkpoint,
+                "is of another search: problem, start, population, spread or seed differ");
         }
         const std::size_t n = s_.mean.size();
         fields([&reader](auto& member) { reader.get(member); }, s_);

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "../faults/fast_tanh.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/faults/additive_pair.hpp"
 #include "ricochet/faults/histories.hpp"
-#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn::detail {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "ricochet/detail/variational_step.hpp"
 #include "ricochet/detail/random.hpp"
+#include "ricochet/detail/variational_step.hpp"
 
 namespace ricochet::learn {
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "checkpoint_file.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/learn/environment.hpp"
 #include "ricochet/learn/policy_training.hpp"
-#include "ricochet/detail/random.hpp"
 #include "transitions.hpp"
 
 namespace ricochet::learn {

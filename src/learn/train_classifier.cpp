@@ -8,13 +8,11 @@ std::string ClassifierTrial::describe() const
 {
     const double ratio = network_seconds / std::max(exact_seconds, 1e-12);
     const std::string cost =
-        pays()
-            ? fmt::format(
-                  "the network takes {:.2f} of the time of a check of every step", ratio)
-            : fmt::format(
-                  "a check of the end of every step is faster: the network takes {:.2f} "
-                  "times as long",
-                  ratio);
+        pays() ? fmt::format("the network takes {:.2f} of the time of a check of every step", ratio)
+               : fmt::format(
+                     "a check of the end of every step is faster: the network takes {:.2f} "
+                     "times as long",
+                     ratio);
     const std::string verdict = learn::describe(rivals);
     return fmt::format(
         "{}; it asks the guard {} times instead of {}, and misses {} of {} events{}{}", cost,

@@ -6,8 +6,7 @@
 
 namespace ricochet {
 
-Location Bisection::locate(GuardPath& path, GuardSample lo, GuardSample hi,
-                              double tolerance) const
+Location Bisection::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
 {
     const double end = hi.s;
     double size = detail::larger(detail::larger(0, lo.value), hi.value);

@@ -11,8 +11,8 @@
 #include <cmath>
 #include <limits>
 
-#include "ricochet/detect/step_probe.hpp"
 #include "jump.hpp"
+#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet::detail {
 
@@ -62,7 +62,7 @@ struct PowerRoot {
 /// `handed_back` already if the guard turns out to be a straight line there. Interpolation
 /// that does not shrink the bracket is given up for bisection.
 inline void narrow_by_values(GuardPath& path, GuardSample& lo, GuardSample& hi, GuardSample recent,
-                      double tolerance, double handed_back, double& size)
+                             double tolerance, double handed_back, double& size)
 {
     int patience = 8;
     int zeros = 0;

@@ -31,7 +31,8 @@ inline constexpr double jump_part = 1e-3;
 /// narrowed, as long as the guard differs too much at its ends, until the middle shows a
 /// straight line or there is none. `size`: |g| in the step. What rounding of the time and
 /// the state may change is no jump.
-[[nodiscard, gnu::noinline]] inline bool jumps(GuardPath& path, GuardSample lo, GuardSample hi, double size)
+[[nodiscard, gnu::noinline]] inline bool jumps(GuardPath& path, GuardSample lo, GuardSample hi,
+                                               double size)
 {
     while (may_jump(lo, hi, size)) {
         const double middle = lo.s + (hi.s - lo.s) / 2;
@@ -55,8 +56,8 @@ inline constexpr double jump_part = 1e-3;
 
 /// Where the guard jumps. On a pole itself it is not finite, and no state to continue from: the
 /// bracket then reaches a few doubles beyond it, at most to `end`.
-[[nodiscard, gnu::noinline]] inline Location jump_at(GuardPath& path, const GuardSample& lo, GuardSample hi,
-                                              double end)
+[[nodiscard, gnu::noinline]] inline Location jump_at(GuardPath& path, const GuardSample& lo,
+                                                     GuardSample hi, double end)
 {
     double beyond = path.finest(hi.s);
     for (int i = 0; i < 40 && !std::isfinite(hi.value) && hi.s + beyond < end; ++i) {

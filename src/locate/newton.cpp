@@ -12,8 +12,7 @@ namespace ricochet {
 
 namespace detail {
 
-double hermite_root(double v0, double r0, double v1, double r1,
-                                         double sign) noexcept
+double hermite_root(double v0, double r0, double v1, double r1, double sign) noexcept
 {
     // v0 + r0 u + q u^2, the root at which it falls (for sign 1)
     const double q = v1 - v0 - r0;
@@ -40,16 +39,14 @@ double hermite_root(double v0, double r0, double v1, double r1,
 
 namespace {
 
-
 /// Of a bracket, along which the flow may be followed: its square is 9e-16.
 constexpr double straight_part = 3e-8;
 /// Corrections in sequence that are not by half shorter than the one before.
 constexpr int most_linear = 4;
 
 /// A guard that jumps has no slope there, and its root is the place beyond.
-[[gnu::noinline]] void mark_jump(GuardPath& path, const GuardSample& lo,
-                                        const GuardSample& hi, double size, double end,
-                                        Location& where)
+[[gnu::noinline]] void mark_jump(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
+                                 double size, double end, Location& where)
 {
     const double slope = (hi.value - lo.value) / (hi.s - lo.s);
     for (const double rate : {lo.rate, hi.rate}) {
@@ -59,9 +56,8 @@ constexpr int most_linear = 4;
     where = detail::jump_at(path, lo, hi, end);
 }
 
-[[nodiscard]] Location located(GuardPath& path, const GuardSample& lo,
-                                      const GuardSample& hi, const TwoSum& root, double size,
-                                      double end)
+[[nodiscard]] Location located(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
+                               const TwoSum& root, double size, double end)
 {
     const double rounding = std::fabs(hi.value / hi.rate);
     Location where{.lo = lo.s,
@@ -77,19 +73,16 @@ constexpr int most_linear = 4;
 
 /// A root that the noise of the guard hides for as long as `noise` [s]. Along the flow the
 /// guard has left its side at `hi`; that the state there has, too, is seen to.
-[[nodiscard]] Location hidden(GuardPath& path, const GuardSample& lo, GuardSample hi,
-                                     double end, double rate, double noise)
+[[nodiscard]] Location hidden(GuardPath& path, const GuardSample& lo, GuardSample hi, double end,
+                              double rate, double noise)
 {
     const double width = std::max(hi.s - lo.s, noise / 4);
     for (int i = 0; i < 8 && hi.s < end; ++i) {
         if (path.has_left(path.value(hi.s))) break;
         hi.s = std::min(hi.s + width, end);
     }
-    return {.lo = lo.s,
-            .hi = hi.s,
-            .root = hi.s,
-            .slope = rate,
-            .error = std::max(noise, hi.s - lo.s)};
+    return {
+        .lo = lo.s, .hi = hi.s, .root = hi.s, .slope = rate, .error = std::max(noise, hi.s - lo.s)};
 }
 
 /// |g| in the bracket, as far as its ends and their rates tell.
@@ -121,8 +114,8 @@ constexpr int most_linear = 4;
 
 /// Halves a bracket that had to be widened far from where the slope at `sample`, which a
 /// kink may have spoilt, predicted the root.
-void halve_along(GuardPath& path, const GuardSample& sample, double tolerance,
-                        GuardSample& lo, GuardSample& hi)
+void halve_along(GuardPath& path, const GuardSample& sample, double tolerance, GuardSample& lo,
+                 GuardSample& hi)
 {
     const double narrow = std::max(tolerance, 2 * path.finest(hi.s));
     while (hi.s - lo.s > narrow) {
@@ -138,8 +131,8 @@ void halve_along(GuardPath& path, const GuardSample& sample, double tolerance,
 /// if it does not change within the bracket: the prediction was wrong, or the guard is
 /// noise, which hides its root for as long as `noise` [s].
 [[nodiscard]] bool close_in(GuardPath& path, const GuardSample& sample, double correction,
-                                   double tolerance, const detail::NoiseScale& scale,
-                                   GuardSample& lo, GuardSample& hi, double& noise)
+                            double tolerance, const detail::NoiseScale& scale, GuardSample& lo,
+                            GuardSample& hi, double& noise)
 {
     double s = sample.s + correction;
     // Three quarters of the relative epsilon always reach the next double, and
@@ -164,9 +157,8 @@ void halve_along(GuardPath& path, const GuardSample& sample, double tolerance,
             at.value == first.value && scale.resolves(sample.rate * (at.s - first.s));
         if (count == 0 ? scale.may_be(at.value) : repeats && !tried) {
             tried = true;
-            const double residue = scale.may_be(at.value)
-                                       ? at.value
-                                       : detail::tread_height(path, sample, at, scale);
+            const double residue =
+                scale.may_be(at.value) ? at.value : detail::tread_height(path, sample, at, scale);
             noise = detail::close_in_noise(path, sample, s, residue, scale, lo, hi);
             if (noise > 0) return false;
         }
@@ -185,8 +177,7 @@ void halve_along(GuardPath& path, const GuardSample& sample, double tolerance,
 
 }  // namespace
 
-Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi,
-                              double tolerance) const
+Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
 {
     const double reach = straight_part * (hi.s - lo.s);
     double s = first_guess(path, lo, hi);
@@ -233,8 +224,8 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi,
             if (noise > 0) return hidden(path, lo, hi, end, sample.rate, noise);
         } else if (scale.may_be(sample.value) &&
                    std::fabs(last_value) < 16 * std::fabs(sample.value)) {
-            const double noise = detail::close_in_noise(path, sample, s + correction,
-                                                        sample.value, scale, lo, hi);
+            const double noise =
+                detail::close_in_noise(path, sample, s + correction, sample.value, scale, lo, hi);
             if (noise > 0) return hidden(path, lo, hi, end, sample.rate, noise);
         }
         last_value = sample.value;

@@ -41,8 +41,8 @@ struct NoiseScale {
 
 /// By how much the guard changes from `at` to the nearest place where it is another: that of
 /// a staircase, if there is one.
-[[nodiscard]] inline double tread_height(GuardPath& path, const GuardSample& sample, const GuardSample& at,
-                                  const NoiseScale& scale)
+[[nodiscard]] inline double tread_height(GuardPath& path, const GuardSample& sample,
+                                         const GuardSample& at, const NoiseScale& scale)
 {
     double change = 0;
     for (double part = 1e-8; part < 1e-5 && change == 0; part *= 8) {
@@ -67,7 +67,7 @@ struct NoiseScale {
 /// Goes on from a sample in noise, by some times `distance`, to the other side of the surface,
 /// and closes the bracket around the change of side; false if it is not near.
 [[nodiscard]] inline bool reach_across(GuardPath& path, const GuardSample& sample, GuardSample from,
-                                double distance, GuardSample& lo, GuardSample& hi)
+                                       double distance, GuardSample& lo, GuardSample& hi)
 {
     const bool left = path.has_left(from);
     for (int i = 0; i < 4; ++i) {
@@ -84,10 +84,10 @@ struct NoiseScale {
 /// If the guard near `place` is noise of about `residue`: narrows the bracket to a change of
 /// side there, and returns the time [s] over which the noise hides the root; else 0. `sample`
 /// is the last that `value_and_rate` took, the motion straight from there.
-[[nodiscard, gnu::noinline]] inline double close_in_noise(GuardPath& path, const GuardSample& sample,
-                                                   double place, double residue,
-                                                   const NoiseScale& scale, GuardSample& lo,
-                                                   GuardSample& hi)
+[[nodiscard, gnu::noinline]] inline double close_in_noise(GuardPath& path,
+                                                          const GuardSample& sample, double place,
+                                                          double residue, const NoiseScale& scale,
+                                                          GuardSample& lo, GuardSample& hi)
 {
     constexpr int places = 8;
     // Unevenly, so that the steps of a staircase do not look like a line.

@@ -9,8 +9,7 @@
 
 namespace ricochet {
 
-Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi,
-                              double tolerance) const
+Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
 {
     const auto narrow_enough = [&](double a, double b) {
         const double middle = a + (b - a) / 2;

@@ -8,10 +8,10 @@
 #include <stdexcept>
 
 #include "../checks/require.hpp"
-#include "ricochet/detail/splitmix.hpp"
 #include "geometry/distance_grid.hpp"
 #include "geometry/outline.hpp"
 #include "last_answer.hpp"
+#include "ricochet/detail/splitmix.hpp"
 
 namespace ricochet {
 

@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "../checks/require.hpp"
-#include "ricochet/detail/splitmix.hpp"
 #include "geometry/concave_table.hpp"
 #include "problems/opaque.hpp"
+#include "ricochet/detail/splitmix.hpp"
 
 namespace ricochet {
 

@@ -1,4 +1,5 @@
-// The smallest eigenvalue of a matrix that depends on parameters: an expensive guard without geometry.
+// The smallest eigenvalue of a matrix that depends on parameters: an expensive guard without
+// geometry.
 #pragma once
 
 #include <array>

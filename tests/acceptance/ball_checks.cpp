@@ -168,7 +168,8 @@ Measured no_allocation()
     const std::uint64_t before = testing_support::allocations();
     std::vector<double> something(100);
     keep(something);
-    if (testing_support::allocations() == before) return {.pass = false, .text = "the counter does not count"};
+    if (testing_support::allocations() == before)
+        return {.pass = false, .text = "the counter does not count"};
     return {.pass = total == 0, .text = std::move(text)};
 }
 

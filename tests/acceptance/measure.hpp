@@ -17,8 +17,8 @@ struct Measured {
 };
 
 inline constexpr std::array<std::string_view, 13> topics = {
-    "ball",  "core",  "network",  "events", "guards", "nonsmooth",
-    "steps", "fault", "friction", "files",  "c",     "hosts",  "taylor"};
+    "ball",  "core",     "network", "events", "guards", "nonsmooth", "steps",
+    "fault", "friction", "files",   "c",      "hosts",  "taylor"};
 
 struct Check {
     std::string_view topic;  ///< one of `topics`

@@ -7,10 +7,10 @@
 #include <string>
 
 #include "measure.hpp"
+#include "problems/least_eigenvalue.hpp"
 #include "ricochet/detect/certified.hpp"
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "problems/least_eigenvalue.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

@@ -11,9 +11,9 @@
 #include "rate_state_identities.hpp"
 #include "ricochet/detail/along_history.hpp"
 #include "ricochet/detail/baselines.hpp"
-#include "ricochet/faults/spring_slider.hpp"
 #include "ricochet/detail/friction_study.hpp"
 #include "ricochet/detail/identify_friction.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 #include "ricochet/learn/train_friction.hpp"
 #include "theta_reference.hpp"
 #include "timing.hpp"
@@ -587,9 +587,9 @@ Measured time_friction()
         const double ns = scaled(time.median, t[0]) * 1e9;
         out.pass = out.pass && ns <= limits[i];
         texts.push_back(fmt::format("{:.0f}", ns));
-        out.details.push_back(
-            fmt::format("{:<24} {:7.1f} ns scaled, raw {:.1f} (p10 {:.1f}, p90 {:.1f}), at most {}",
-                        names[i], ns, time.median * 1e9, time.p10 * 1e9, time.p90 * 1e9, limits[i]));
+        out.details.push_back(fmt::format(
+            "{:<24} {:7.1f} ns scaled, raw {:.1f} (p10 {:.1f}, p90 {:.1f}), at most {}", names[i],
+            ns, time.median * 1e9, time.p10 * 1e9, time.p90 * 1e9, limits[i]));
     }
     out.text = fmt::format("{} ns (scaled)", fmt::join(texts, " / "));
     return out;

@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/learn/train_gate.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
+#include "ricochet/learn/train_gate.hpp"
 
 namespace ricochet::bench {
 
@@ -65,8 +65,8 @@ GateTraining arm_training(std::size_t events)
     training.validation_events = 10'000;
     training.iterations = 6000;
     training.fresh_events = events;
-    // Contacts of four to seven steps, two of 30 000, are as good as invisible from afar: margins of
-    // 0.25 and of 3 clear steps before them.
+    // Contacts of four to seven steps, two of 30 000, are as good as invisible from afar: margins
+    // of 0.25 and of 3 clear steps before them.
     training.logit_margin = 10;
     return training;
 }

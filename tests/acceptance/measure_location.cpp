@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "measure.hpp"
-#include "ricochet/locate/newton.hpp"
 #include "problems/cave_body.hpp"
 #include "problems/cavern.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
+#include "ricochet/locate/newton.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

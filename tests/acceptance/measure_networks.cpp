@@ -1,5 +1,5 @@
-// Networks attached to scenes with expensive guards: whatever they say, the same events; and with the
-// meter on, the same time.
+// Networks attached to scenes with expensive guards: whatever they say, the same events; and with
+// the meter on, the same time.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// What is done to every scene with an expensive guard: networks of any weights are attached, and the
-// events and times compared with those of runs without.
+// What is done to every scene with an expensive guard: networks of any weights are attached, and
+// the events and times compared with those of runs without.
 #pragma once
 
 #include <algorithm>

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "ricochet/detail/step_environment.hpp"
-#include "ricochet/learn/tqc.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
+#include "ricochet/learn/tqc.hpp"
 
 namespace ricochet::bench {
 

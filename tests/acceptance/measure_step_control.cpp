@@ -13,10 +13,10 @@
 #include <string>
 #include <thread>
 
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet::bench {

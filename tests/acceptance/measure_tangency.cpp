@@ -14,11 +14,11 @@
 #include <vector>
 
 #include "measure.hpp"
+#include "problems/near_tangent.hpp"
+#include "ricochet/detail/random.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/detail/random.hpp"
-#include "problems/near_tangent.hpp"
 
 namespace ricochet::bench {
 

@@ -15,10 +15,10 @@
 
 #include "measure.hpp"
 #include "problems.hpp"
+#include "ricochet/detail/assessment.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/detail/assessment.hpp"
 #include "ricochet/learn/bouncing_ball.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "score.hpp"

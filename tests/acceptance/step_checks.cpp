@@ -1,8 +1,8 @@
 // What the strike-slip fault and the trainers must show.
 #include "measure_fault.hpp"
 #include "measure_policies.hpp"
-#include "measure_trainers.hpp"
 #include "measure_step_control.hpp"
+#include "measure_trainers.hpp"
 
 namespace ricochet::bench {
 
@@ -52,7 +52,8 @@ std::vector<Check> step_checks()
          .run = table_of_meshes},
         {.topic = "steps",
          .id = "tqc-time",
-         .sentence = "20 000 steps of TQC with the networks of the source, 9 observations, 1 action",
+         .sentence =
+             "20 000 steps of TQC with the networks of the source, 9 observations, 1 action",
          .target = "<= 90 s on two cores",
          .run = time_of_tqc},
         {.topic = "steps",

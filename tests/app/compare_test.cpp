@@ -75,8 +75,7 @@ TEST_F(App, CompareSaysWhatTheNetworkCostsAndWritesTheTimes)
 
 TEST_F(App, CompareTakesParameters)
 {
-    const nlohmann::json table =
-        json({"compare", "bouncing-ball", "--json", "--set", "height=12"});
+    const nlohmann::json table = json({"compare", "bouncing-ball", "--json", "--set", "height=12"});
     EXPECT_NEAR(table["reference"][0].get<double>(), std::sqrt(2 * 12 / 9.81), 1e-15);
     EXPECT_TRUE(table["published"].empty());  // of the defaults
     for (const nlohmann::json& method : table["methods"]) {

@@ -12,7 +12,8 @@ namespace {
 int status_of(const std::string& program, const std::string& arguments)
 {
     const fs::path file = fs::path(RICOCHET_APP).parent_path() / program;
-    const int status = std::system(("'" + file.string() + "' " + arguments + " >/dev/null 2>&1").c_str());
+    const int status =
+        std::system(("'" + file.string() + "' " + arguments + " >/dev/null 2>&1").c_str());
     return WEXITSTATUS(status);
 }
 
@@ -34,18 +35,19 @@ TEST_F(App, AProgramThatIsNotThereIsNamed)
 {
     const fs::path alone = work() / "ricochet";
     fs::copy_file(RICOCHET_APP, alone);
-    for (const char* const words : {"train bouncing-ball --out x", "certify x", "simulate fault",
-                                     "simulate spring-slider", "simulate stick-slip",
-                                     "compare sliding-mode", "compare step-control"}) {
-        const std::string command =
-            "'" + alone.string() + "' " + words + " >/dev/null 2>'" + (work() / "err").string() + "'";
+    for (const char* const words :
+         {"train bouncing-ball --out x", "certify x", "simulate fault", "simulate spring-slider",
+          "simulate stick-slip", "compare sliding-mode", "compare step-control"}) {
+        const std::string command = "'" + alone.string() + "' " + words + " >/dev/null 2>'" +
+                                    (work() / "err").string() + "'";
         const int status = std::system(command.c_str());
         EXPECT_EQ(WEXITSTATUS(status), 1) << words;
         const std::string err = content(work() / "err");
         EXPECT_NE(err.find("cannot be run"), std::string::npos) << err;
         EXPECT_NE(err.find("target ricochet_"), std::string::npos) << err;
     }
-    EXPECT_EQ(std::system(("'" + alone.string() + "' simulate bouncing-ball >/dev/null").c_str()), 0);
+    EXPECT_EQ(std::system(("'" + alone.string() + "' simulate bouncing-ball >/dev/null").c_str()),
+              0);
 }
 
 }  // namespace

@@ -109,9 +109,9 @@ TEST_F(App, TrainStepPolicyReplacesNothingButFiles)
 {
     ASSERT_EQ(::mkfifo((work() / "pipe").c_str(), 0600), 0);
     expect_refused({"train", "step-policy", "sliding-mode", "--out", "pipe"}, {"--out", "pipe"});
-    expect_refused({"train", "step-policy", "sliding-mode", "--out", "a.safetensors",
-                    "--checkpoint", "pipe"},
-                   {"--checkpoint", "pipe"});
+    expect_refused(
+        {"train", "step-policy", "sliding-mode", "--out", "a.safetensors", "--checkpoint", "pipe"},
+        {"--checkpoint", "pipe"});
     expect_refused({"train", "step-policy", "sliding-mode", "--out", "a", "--checkpoint", "a"},
                    {"two files"});
     expect_refused({"simulate", "fault", "--kernel", "pipe"}, {"pipe", "something else"});
@@ -205,8 +205,8 @@ TEST_F(App, TrainStepPolicyByReinforcement)
         EXPECT_EQ(actor["parameters"]["alpha"], 1);
         EXPECT_FALSE(std::filesystem::exists(work() / "actor.safetensors.checkpoint"));
     }
-    const Words simulate{"simulate", "sliding-mode", "--integrator", "bathe", "--controller",
-                         "learned", "--model", "actor.safetensors"};
+    const Words simulate{"simulate",     "sliding-mode", "--integrator", "bathe",
+                         "--controller", "learned",      "--model",      "actor.safetensors"};
     expect_refused(simulate, {"step-policy", "step-actor"});
     const auto train = [](std::vector<std::string> more) {
         Words all{"train", "step-policy", "sliding-mode", "--out", "b.safetensors"};

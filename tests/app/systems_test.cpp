@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "app.hpp"
-#include "ricochet/integrate/integrate.hpp"
 #include "problems/detest_f1.hpp"
 #include "problems/detest_f4.hpp"
+#include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
 

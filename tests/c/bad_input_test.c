@@ -89,9 +89,9 @@ static void refuses_options_that_are_none(void)
     double sample = 30;
     CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
 
-#define CHECK_OPTION(change, text)                                                          \
-    options = options_until(20.5);                                                          \
-    change;                                                                                 \
+#define CHECK_OPTION(change, text)                                                               \
+    options = options_until(20.5);                                                               \
+    change;                                                                                      \
     CHECK_REFUSED(RC_INVALID, rc_simulation_new(system, start, 2, &options, &simulation), text); \
     CHECK(simulation == NULL)
 
@@ -204,8 +204,7 @@ static void refuses_structs_of_other_versions(void)
     larger.options = options;
     larger.more = 0;
     larger.options.size = sizeof larger;
-    CHECK_REFUSED(RC_WRONG_SIZE,
-                  rc_simulation_new(system, start, 2, &larger.options, &simulation),
+    CHECK_REFUSED(RC_WRONG_SIZE, rc_simulation_new(system, start, 2, &larger.options, &simulation),
                   "older than the program");
     CHECK_STATUS(RC_WRONG_SIZE, rc_options_default(&options, sizeof options + 8));
     CHECK_STATUS(RC_WRONG_SIZE, rc_options_default(&options, 3));
@@ -295,8 +294,8 @@ static void refuses_handles_that_are_none(void)
     CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
     CHECK_REFUSED(RC_BAD_HANDLE, rc_run((rc_simulation*)system), "no such handle");
     CHECK_STATUS(RC_OK, rc_simulation_new(system, start, 2, &options, &simulation));
-    CHECK_STATUS(RC_BAD_HANDLE, rc_simulation_new((rc_system*)simulation, start, 2, &options,
-                                                  &none));
+    CHECK_STATUS(RC_BAD_HANDLE,
+                 rc_simulation_new((rc_system*)simulation, start, 2, &options, &none));
     rc_system_free((rc_system*)simulation); /* not one: nothing is freed */
     CHECK_STATUS(RC_OK, rc_run(simulation));
     rc_simulation_free(simulation);

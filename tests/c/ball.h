@@ -4,7 +4,8 @@
 
 #include "check.h"
 
-static inline int ball_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+static inline int ball_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt,
+                            size_t n)
 {
     (void)user, (void)mode, (void)t, (void)n;
     dxdt[0] = x[1];
@@ -12,8 +13,8 @@ static inline int ball_flow(void* user, rc_mode mode, double t, const double* x,
     return 0;
 }
 
-static inline int ball_guard(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
-                      double* g)
+static inline int ball_guard(void* user, size_t which, rc_mode mode, double t, const double* x,
+                             size_t n, double* g)
 {
     (void)user, (void)which, (void)mode, (void)t, (void)n;
     *g = x[0];

@@ -21,10 +21,10 @@ enum {
 };
 
 struct world {
-    size_t calls;      /* so far */
-    size_t fails_at;   /* the call that fails, once; 0: none */
-    int moves;         /* after that, another simulation continues from a snapshot */
-    int moded;         /* impacts of the first ball change the mode */
+    size_t calls;    /* so far */
+    size_t fails_at; /* the call that fails, once; 0: none */
+    int moves;       /* after that, another simulation continues from a snapshot */
+    int moded;       /* impacts of the first ball change the mode */
     size_t seen[calls_of];
 };
 
@@ -172,7 +172,7 @@ struct setting {
     const char* name;
     size_t dimension, guards;
     int method, fixed, detector;
-    int together;   /* guards, rates and resets from one call each */
+    int together; /* guards, rates and resets from one call each */
     int timed, moded, records, by_advance;
     double t_end;
 };
@@ -262,8 +262,8 @@ static struct result run(const struct setting* of, struct world* world, size_t* 
                 events_before = rc_event_count(simulation);
                 CHECK_STATUS(RC_OK, rc_save(simulation, bytes, &size));
                 CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
-                CHECK_STATUS(RC_OK, rc_simulation_new(system, start, of->dimension, &options,
-                                                      &simulation));
+                CHECK_STATUS(
+                    RC_OK, rc_simulation_new(system, start, of->dimension, &options, &simulation));
                 CHECK_STATUS(RC_OK, rc_restore(simulation, bytes, size));
             }
         } else {

@@ -27,8 +27,8 @@ static void runs_a_program_of_the_first_release(void)
     CHECK_STATUS(RC_OK, rc_options_default((rc_options*)&options, sizeof options));
     CHECK(options.size == sizeof options && options.rtol == 1e-8 && isnan(options.t_end));
     options.t_end = 20.5;
-    CHECK_STATUS(RC_OK, rc_simulation_new(system, start, 2, (const rc_options*)&options,
-                                          &simulation));
+    CHECK_STATUS(RC_OK,
+                 rc_simulation_new(system, start, 2, (const rc_options*)&options, &simulation));
     CHECK_STATUS(RC_OK, rc_run(simulation));
     event.size = sizeof event;
     CHECK_STATUS(RC_OK, rc_event_at(simulation, 4, (rc_event*)&event));

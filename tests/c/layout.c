@@ -5,8 +5,7 @@
 #include "ricochet/ricochet.h"
 
 #define SIZE(type) printf("%s %lu\n", #type, (unsigned long)sizeof(type))
-#define AT(type, field) \
-    printf("%s.%s %lu\n", #type, #field, (unsigned long)offsetof(type, field))
+#define AT(type, field) printf("%s.%s %lu\n", #type, #field, (unsigned long)offsetof(type, field))
 #define IS(constant) printf("%s %ld\n", #constant, (long)constant)
 
 int main(void)

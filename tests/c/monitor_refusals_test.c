@@ -24,11 +24,11 @@ static void refuses_monitors_that_are_none(void)
     rc_monitor* monitor;
     CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
 
-#define CHECK_OPTION(change, text)                                                   \
-    CHECK_STATUS(RC_OK, rc_monitor_options_default(&options, sizeof options));       \
-    change;                                                                          \
-    monitor = (rc_monitor*)&options;                                                 \
-    CHECK_REFUSED(RC_INVALID, rc_monitor_new(system, &options, &monitor), text);     \
+#define CHECK_OPTION(change, text)                                               \
+    CHECK_STATUS(RC_OK, rc_monitor_options_default(&options, sizeof options));   \
+    change;                                                                      \
+    monitor = (rc_monitor*)&options;                                             \
+    CHECK_REFUSED(RC_INVALID, rc_monitor_new(system, &options, &monitor), text); \
     CHECK(monitor == NULL)
 
     CHECK_OPTION(options.event_tolerance = -1, "event_tolerance");
@@ -159,10 +159,10 @@ static void refuses_steps_that_are_none(void)
     } larger;
     CHECK(host_start(&host, monitor, &callbacks, 0, start, 0.1) == RC_STANDS);
 
-#define CHECK_STEP(status, change, text)                                           \
-    step = host_step(&host, 0.1);                                                  \
-    change;                                                                        \
-    CHECK_REFUSED(status, rc_monitor_examine(monitor, &step, &verdict), text);     \
+#define CHECK_STEP(status, change, text)                                       \
+    step = host_step(&host, 0.1);                                              \
+    change;                                                                    \
+    CHECK_REFUSED(status, rc_monitor_examine(monitor, &step, &verdict), text); \
     CHECK(verdict == RC_NO_VERDICT && rc_monitor_time(monitor, NULL) == 0)
 
     CHECK_STEP(RC_INVALID, step.n = 1, "n = 1");

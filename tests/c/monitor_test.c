@@ -544,9 +544,31 @@ static void keep(struct place* place, const struct failing* world, rc_monitor* m
 static void run_failing(const rc_callbacks* callbacks, struct failing* world, struct met* met,
                         size_t* failures)
 {
-    static const rc_callbacks plain_fall = {sizeof plain_fall, 2, 0, 0, NULL, NULL, NULL, ball_flow,
-                                            NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL,
-                                            NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    static const rc_callbacks plain_fall = {sizeof plain_fall,
+                                            2,
+                                            0,
+                                            0,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            ball_flow,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL,
+                                            NULL};
     static struct place place;
     rc_monitor* monitor = monitor_of(callbacks, NULL);
     rc_verdict verdict;
@@ -649,8 +671,8 @@ static void takes_structs_of_fewer_fields(void)
     rc_verdict verdict;
     rc_cut cut;
     memset(&options, 0xff, sizeof options);
-    CHECK_STATUS(RC_OK, rc_monitor_options_default(&options,
-                                                   offsetof(rc_monitor_options, event_window)));
+    CHECK_STATUS(RC_OK,
+                 rc_monitor_options_default(&options, offsetof(rc_monitor_options, event_window)));
     CHECK(options.event_tolerance == 0 && isnan(options.event_window)); /* not written to */
     monitor = monitor_of(&callbacks, &options);
     CHECK(host_start(&host, monitor, &callbacks, 0, start, 2) == RC_STANDS);

@@ -12,7 +12,7 @@ struct host {
     const rc_callbacks* system; /* of which it calls the flow */
     rc_mode mode;
     double t;
-    double x[most_components], rate[most_components];  /* where it is */
+    double x[most_components], rate[most_components];   /* where it is */
     double x1[most_components], rate1[most_components]; /* the end of the current step */
     double h;
     int restep_error; /* that its restep returns; 0: none */
@@ -156,8 +156,8 @@ static inline rc_verdict host_start(struct host* host, rc_monitor* monitor,
     memset(host, 0, sizeof *host);
     host->system = system;
     host_restart(host, t, x, 0);
-    CHECK_STATUS(RC_OK, rc_monitor_start(monitor, t, x, host->rate, system->dimension, 0, h,
-                                         &verdict));
+    CHECK_STATUS(RC_OK,
+                 rc_monitor_start(monitor, t, x, host->rate, system->dimension, 0, h, &verdict));
     return verdict;
 }
 

@@ -14,11 +14,11 @@
 
 #include "clustered_systems.hpp"
 #include "host_step.hpp"
+#include "problems/hidden_pair.hpp"
+#include "problems/near_tangent.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "problems/hidden_pair.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
-#include "problems/near_tangent.hpp"
 
 namespace ricochet {
 namespace {

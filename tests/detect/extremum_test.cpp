@@ -36,8 +36,7 @@ TEST(Extremum, APairOfCrossingsIsFoundWhateverTheSizeOfTheGuard)
         const HostStep misses(
             1.0, [=](double s) { return size * ((s - 0.45) * (s - 0.45) + 0.02); },
             [=](double s) { return size * 2 * (s - 0.45); });
-        EXPECT_FALSE(look(Extremum{}, misses, Side::above, Crossing::falling).hit)
-            << "1e" << power;
+        EXPECT_FALSE(look(Extremum{}, misses, Side::above, Crossing::falling).hit) << "1e" << power;
     }
 }
 

@@ -553,7 +553,8 @@ TEST(Planned, BoundsThatAreNoneCoverNothing)
             hostile.speed = bad;
             hostile.acceleration = room.gravity;
             hostile.below = below;
-            auto run = expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01}, false);
+            auto run =
+                expect_planned_same<Fixed>(hostile, start, {.t_end = 3, .step = 0.01}, false);
             EXPECT_EQ(run.statistics.evidence.proved, 0u);
             hostile.speed = 10;
             hostile.acceleration = bad;

@@ -78,7 +78,10 @@ TEST(ResolvedGuards, NoDipOfAnEighthOfAStepIsMissedWhereTheStateStandsStill)
     }
 }
 
-double decaying_wave(double t, double decay) { return std::exp(-decay * t) * std::sin(3 * t + 1); }
+double decaying_wave(double t, double decay)
+{
+    return std::exp(-decay * t) * std::sin(3 * t + 1);
+}
 
 TEST(ResolvedGuards, AGuardThatDecaysWithinAStepKeepsItsCrossings)
 {
@@ -119,12 +122,30 @@ struct EndsAt {
     [[nodiscard]] double guard(double t, const X1& x) const { return sign * (x[0] - surface(t)); }
     [[nodiscard]] GuardInfo guard_info() const { return {.resets = false}; }
 };
-double towards_one(double, double x) { return 1 + std::acos(x); }
-double one(double) { return 1; }
-double below(double, double x) { return -1 - std::sqrt(x + 3.7); }
-double minus(double) { return -3.7; }
-double drifting(double t, double x) { return -1 - std::sqrt(x - 0.1 * t); }
-double drift(double t) { return 0.1 * t; }
+double towards_one(double, double x)
+{
+    return 1 + std::acos(x);
+}
+double one(double)
+{
+    return 1;
+}
+double below(double, double x)
+{
+    return -1 - std::sqrt(x + 3.7);
+}
+double minus(double)
+{
+    return -3.7;
+}
+double drifting(double t, double x)
+{
+    return -1 - std::sqrt(x - 0.1 * t);
+}
+double drift(double t)
+{
+    return 0.1 * t;
+}
 
 TEST(ResolvedGuards, AFlowThatEndsAtASurfaceAwayFromZeroHasItsEvent)
 {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "ricochet/detail/identify_friction.hpp"
 #include "ricochet/faults/histories.hpp"
 #include "ricochet/faults/potentials.hpp"
-#include "ricochet/detail/identify_friction.hpp"
 #include "theta_reference.hpp"
 
 namespace ricochet {

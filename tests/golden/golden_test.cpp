@@ -54,8 +54,9 @@ std::uint64_t mathematical_library()
     Hash hash;
     for (int i = 1; i < 2000; ++i) {
         const double x = 0.0137 * i;
-        for (const double y : {std::sin(x), std::cos(x), std::exp(-x), std::log(x), std::pow(x, 0.2),
-                               std::tanh(x), std::atan2(x, 3.0), std::hypot(x, 1.7)}) {
+        for (const double y :
+             {std::sin(x), std::cos(x), std::exp(-x), std::log(x), std::pow(x, 0.2), std::tanh(x),
+              std::atan2(x, 3.0), std::hypot(x, 1.7)}) {
             hash.add(y);
         }
     }
@@ -93,8 +94,9 @@ std::string line_of(const SystemEntry& system, const RunRequest& request)
         hash.add(event.error);
     }
     const Statistics& s = run.statistics;
-    return out + fmt::format(" {:016x} events={} steps={} rejected={} flow={} guard={}", hash.value(),
-                             run.events.size(), s.steps, s.rejected, s.flow_calls, s.guard_calls);
+    return out + fmt::format(" {:016x} events={} steps={} rejected={} flow={} guard={}",
+                             hash.value(), run.events.size(), s.steps, s.rejected, s.flow_calls,
+                             s.guard_calls);
 }
 
 std::vector<RunRequest> requests(const SystemEntry& system)
@@ -121,7 +123,8 @@ std::vector<RunRequest> requests(const SystemEntry& system)
     for (const std::string_view stepper : {"dopri5", "fehlberg78", "cash-karp54"}) {
         for (const std::string_view detector : detectors) add(stepper, detector, "newton");
     }
-    for (const std::string_view locator : {"bisection", "toms748"}) add("dopri5", "extremum", locator);
+    for (const std::string_view locator : {"bisection", "toms748"})
+        add("dopri5", "extremum", locator);
     request.step = system.comparison_step > 0 ? system.comparison_step
                                               : (system.t_end - system.t_start) / 2000;
     for (const std::string_view stepper : {"rk4", "euler", "dopri5"}) {
@@ -133,7 +136,8 @@ std::vector<RunRequest> requests(const SystemEntry& system)
 std::vector<std::string> all_lines()
 {
     complete_set_valued_systems();
-    std::vector<std::string> out{fmt::format("mathematical library {:016x}", mathematical_library())};
+    std::vector<std::string> out{
+        fmt::format("mathematical library {:016x}", mathematical_library())};
     for (const SystemEntry& system : systems()) {
         if (system.run == nullptr) continue;
         for (const RunRequest& request : requests(system)) out.push_back(line_of(system, request));

@@ -6,6 +6,11 @@
 #include <cmath>
 
 #include "allocations.hpp"
+#include "problems/cave_body.hpp"
+#include "problems/cavern.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
+#include "problems/zones.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/detect/planned.hpp"
@@ -14,11 +19,6 @@
 #include "ricochet/locate/toms748.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "problems/cave_body.hpp"
-#include "problems/cavern.hpp"
-#include "problems/least_eigenvalue.hpp"
-#include "problems/planar_arm.hpp"
-#include "problems/zones.hpp"
 
 namespace ricochet {
 namespace {

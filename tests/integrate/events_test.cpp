@@ -12,11 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "problems/near_tangent.hpp"
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "problems/near_tangent.hpp"
 
 namespace ricochet {
 namespace {

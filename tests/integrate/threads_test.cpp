@@ -9,21 +9,21 @@
 #include <thread>
 #include <vector>
 
-#include "ricochet/detect/certified.hpp"
+#include "problems/cavern.hpp"
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
+#include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/features.hpp"
+#include "ricochet/detect/certified.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/detect/verified.hpp"
 #include "ricochet/faults/additive_pair.hpp"
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
-#include "problems/cavern.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
-#include "problems/least_eigenvalue.hpp"
-#include "problems/planar_arm.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet {

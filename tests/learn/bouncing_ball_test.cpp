@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
+#include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 

@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
+#include "ricochet/detail/bounds.hpp"
 #include "ricochet/detail/gate.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/detail/bounds.hpp"
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/safetensors.hpp"
 

@@ -15,8 +15,8 @@
 #include <nlohmann/json.hpp>
 
 #include "ricochet/detail/checkpoint.hpp"
-#include "ricochet/detail/random.hpp"
 #include "ricochet/detail/classifier.hpp"
+#include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 namespace {

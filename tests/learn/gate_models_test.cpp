@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
+#include "problems/least_eigenvalue.hpp"
+#include "problems/planar_arm.hpp"
 #include "ricochet/detect/calibrated.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/nn/safetensors.hpp"
-#include "problems/least_eigenvalue.hpp"
-#include "problems/planar_arm.hpp"
 
 namespace ricochet {
 namespace {

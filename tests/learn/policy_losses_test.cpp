@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "gradient_check.hpp"
 #include "learn/td3_losses.hpp"
 #include "learn/tqc_losses.hpp"
-#include "gradient_check.hpp"
 
 namespace ricochet::learn {
 namespace {

@@ -7,9 +7,9 @@
 #include <limits>
 #include <vector>
 
+#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 namespace ricochet::learn {

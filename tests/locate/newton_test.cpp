@@ -1,5 +1,5 @@
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/locate/newton.hpp"
+#include "ricochet/detect/ends.hpp"
 
 #include <array>
 #include <cmath>

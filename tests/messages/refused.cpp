@@ -17,8 +17,7 @@ struct Falling {
 
 /// Names of their own purpose.
 struct Allowed : Falling {
-    struct Rest {
-    };
+    struct Rest {};
     double gard = 1, lower = 0;
     std::array<double, 3> gurds{};
     int resets = 0;
@@ -40,17 +39,29 @@ struct System : Falling {
     bool unilatral = true;
 // CASE 2: found a member `gaurd_rate`, which nothing calls; rename it to `guard_rate`
 #elif CASE == 2
-    double gaurd_rate(double, const X&, const X& dxdt) const { return dxdt[0]; }
+    double gaurd_rate(double, const X&, const X& dxdt) const
+    {
+        return dxdt[0];
+    }
 // CASE 3: found a member `Reset`, which nothing calls; rename it to `reset`
 #elif CASE == 3
-    void Reset(double, X& x) const { x[1] = -x[1]; }
+    void Reset(double, X& x) const
+    {
+        x[1] = -x[1];
+    }
 // CASE 4: found a member `nextTimeEvent`, which nothing calls; rename it to `next_time_event`
 #elif CASE == 4
-    double nextTimeEvent(double t) const { return t + 1; }
+    double nextTimeEvent(double t) const
+    {
+        return t + 1;
+    }
 // CASE 5: found a reset that cannot be used: it is private
 #elif CASE == 5
 private:
-    void reset(double, X& x) const { x[1] = -x[1]; }
+    void reset(double, X& x) const
+    {
+        x[1] = -x[1];
+    }
 // CASE 6: found a member `Guard_rate`, which nothing calls; rename it to `guard_rate`
 #elif CASE == 6
 private:
@@ -68,16 +79,28 @@ private:
     }
 // CASE 8: found a guard_rate that is not const
 #elif CASE == 8
-    double guard_rate(double, const X&, const X& dxdt) { return dxdt[0]; }
+    double guard_rate(double, const X&, const X& dxdt)
+    {
+        return dxdt[0];
+    }
 // CASE 9: found a reset that takes std::size_t first, in a system without guard_count
 #elif CASE == 9
-    Mode reset(std::size_t, double, X&) const { return 0; }
+    Mode reset(std::size_t, double, X&) const
+    {
+        return 0;
+    }
 // CASE 10: found a unilateral whose parameters or result do not fit
 #elif CASE == 10
-    bool unilateral() const { return true; }
+    bool unilateral() const
+    {
+        return true;
+    }
 // CASE 11: found a member `sped_bound`, which nothing calls; rename it to `speed_bound`
 #elif CASE == 11
-    double sped_bound(double, const X& x) const { return x[1]; }
+    double sped_bound(double, const X& x) const
+    {
+        return x[1];
+    }
 #endif
 };
 

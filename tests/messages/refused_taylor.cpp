@@ -40,7 +40,10 @@ struct Rubbing {
 // CASE 8: found a system without a default constructor for Taylor
 struct Falling {
 #if CASE == 5
-    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    void flow(double, const X& x, X& dxdt) const
+    {
+        dxdt = {x[1], -9.81};
+    }
 #elif CASE == 6
     template <class V>
     constexpr void flow(double t, const V& x, V& dxdt) const

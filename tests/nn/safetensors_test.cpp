@@ -582,9 +582,10 @@ TEST(Safetensors, RefusesAnotherVersionKindOrActivation)
 {
     EXPECT_EQ(refusal_with_metadata("ricochet", "2"),
               "m.safetensors: metadata \"ricochet\": expected format version \"1\", found \"2\"");
-    EXPECT_EQ(refusal_with_metadata("kind", "poet"),
-              "m.safetensors: metadata \"kind\": expected \"event-classifier\", "
-              "\"gate-horizon\", \"gate-level\", \"step-policy\" or \"step-actor\", found \"poet\"");
+    EXPECT_EQ(
+        refusal_with_metadata("kind", "poet"),
+        "m.safetensors: metadata \"kind\": expected \"event-classifier\", "
+        "\"gate-horizon\", \"gate-level\", \"step-policy\" or \"step-actor\", found \"poet\"");
     EXPECT_EQ(refusal_with_metadata("activation", "gelu"),
               "m.safetensors: metadata \"activation\": expected \"relu\" or \"tanh\", "
               "found \"gelu\"");

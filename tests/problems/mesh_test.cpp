@@ -9,8 +9,8 @@
 
 #include "geometry/mesh.hpp"
 #include "geometry/triangles.hpp"
-#include "ricochet/detail/random.hpp"
 #include "problems/cave_body.hpp"
+#include "ricochet/detail/random.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet::geometry {

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
 #include "problems/cavern.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
 #include "problems/zones.hpp"
+#include "ricochet/integrate/integrate.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet {

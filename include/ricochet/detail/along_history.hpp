@@ -8,8 +8,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "ricochet/faults/histories.hpp"
 #include "ricochet/detail/variational_step.hpp"
+#include "ricochet/faults/histories.hpp"
 
 namespace ricochet {
 

@@ -24,8 +24,8 @@
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
-#include "ricochet/hybrid/system.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
+#include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
 
@@ -417,8 +417,7 @@ private:
         }
         if (doubtful == 0) return checked(mode_of(next));
         if (doubtful > 1) return several;
-        const bool up =
-            r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
+        const bool up = r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
         return bend(next, which, up, size, t, w);
     }
 

@@ -19,12 +19,12 @@ namespace ricochet::detail {
 
 /// The guard at the ends of an interval, as a cubic over u in [0, 1].
 struct CubicLook {
-    /// Part of an interval at which the guard is evaluated: the golden section, which no period of a guard with
-    /// a simple ratio to the step hides behind, and a second place for cases of doubt.
+    /// Part of an interval at which the guard is evaluated: the golden section, which no period of
+    /// a guard with a simple ratio to the step hides behind, and a second place for cases of doubt.
     static constexpr double inside = 0.381966;
     static constexpr double further = 0.723607;
-    /// Further parts of a step at which the guard is evaluated if the state stands still in it, so that
-    /// nothing has limited its length: no more than an eighth of it goes unseen.
+    /// Further parts of a step at which the guard is evaluated if the state stands still in it, so
+    /// that nothing has limited its length: no more than an eighth of it goes unseen.
     static constexpr std::array<double, 8> places = {0.0902, 0.2016,  0.3069, 0.4934,
                                                      0.6123, further, 0.8278, 0.9271};
 

@@ -14,8 +14,8 @@
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/filippov_rates.hpp"
-#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/detail/scratch.hpp"
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet {
 

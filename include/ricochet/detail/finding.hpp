@@ -3,8 +3,8 @@
 // What a detector says of a step.
 #pragma once
 
-#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/detail/guard_view.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/statistics.hpp"
 
 namespace ricochet {
@@ -27,12 +27,10 @@ enum class Screening : std::uint8_t {
 };
 
 template <class Detector>
-inline constexpr Screening screening_of = []
-{
+inline constexpr Screening screening_of = [] {
     if constexpr (requires { Detector::screening; }) return Detector::screening;
     return Screening::own;
-}
-();
+}();
 
 /// The guard over a step or the rest of one: the side on which it is armed, and its
 /// samples at both ends. A detector fills in `side_after`.

@@ -19,8 +19,8 @@
 #include <concepts>
 #include <limits>
 
-#include "ricochet/faults/laws.hpp"
 #include "ricochet/detail/wright_omega.hpp"
+#include "ricochet/faults/laws.hpp"
 
 namespace ricochet {
 

@@ -47,8 +47,11 @@ struct GateRecipe {
 
 /// A system with features of its own.
 template <class System, class X>
-concept FeaturesOwned = requires(const System& system, double t, const X& x, double* out) {
-    { system.feature_count } -> std::convertible_to<std::size_t>;
+concept FeaturesOwned = requires(const System& system, double t, const X& x, double* out)
+{
+    {
+        system.feature_count
+        } -> std::convertible_to<std::size_t>;
     system.features(t, x, out);
 };
 

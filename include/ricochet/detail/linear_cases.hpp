@@ -21,8 +21,8 @@
 
 namespace ricochet {
 
-/// Branch of its graph on which a pair lies. For a set of reactions `inside` is sticking and a bound
-/// is sliding; for a set of states `inside` is free and a bound is contact.
+/// Branch of its graph on which a pair lies. For a set of reactions `inside` is sticking and a
+/// bound is sliding; for a set of states `inside` is free and a bound is contact.
 enum class Branch : signed char { lower = -1, inside = 0, upper = 1 };
 
 /// The most unknowns that are solved by cases: 3^4 linear systems at worst.
@@ -39,9 +39,9 @@ struct RICOCHET_ALIGNED LinearInequality {
     static constexpr double no_influence = 1e-100;
 
     Confines confines = Confines::reaction;
-    Matrix w;               ///< W
+    Matrix w;  ///< W
     Vector y0;
-    Vector lower, upper;    ///< of K
+    Vector lower, upper;  ///< of K
 
     /// The first component whose interval is empty or has a bound that is not a number; -1 if
     /// none has.
@@ -82,8 +82,7 @@ struct RICOCHET_ALIGNED LinearInequality {
 
     [[nodiscard]] bool held(Branch branch) const noexcept
     {
-        return confines == Confines::reaction ? branch == Branch::inside
-                                              : branch != Branch::inside;
+        return confines == Confines::reaction ? branch == Branch::inside : branch != Branch::inside;
     }
 
     /// The smallest of the amounts by which the pairs stay on their branches, in units of
@@ -179,8 +178,7 @@ private:
     }
 
     /// On their branches up to the rounding of the products.
-    [[nodiscard]] bool fits(const Branches& branches, const Vector& reaction,
-                            const Vector& y) const
+    [[nodiscard]] bool fits(const Branches& branches, const Vector& reaction, const Vector& y) const
     {
         for (Eigen::Index i = 0; i < y.size(); ++i) {
             if (leaves(i, branches[i], reaction, y)) return false;

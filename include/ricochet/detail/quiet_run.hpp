@@ -3,8 +3,8 @@
 // Steps in a row in which nothing happens.
 //
 // Of a small state with at most one guard the loop enters a function of the system's own, with
-// flow and guard inlined, or one of the library's that calls them by pointer, which continues until a step needs a check, or the end is near. Bits and
-// counts are those of the loop.
+// flow and guard inlined, or one of the library's that calls them by pointer, which continues until
+// a step needs a check, or the end is near. Bits and counts are those of the loop.
 #pragma once
 
 #include <atomic>

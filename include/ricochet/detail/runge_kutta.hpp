@@ -52,12 +52,9 @@ struct CashKarp54Tableau {
          {-11.0 / 54, 5.0 / 2, -70.0 / 27, 35.0 / 27},
          {1631.0 / 55296, 175.0 / 512, 575.0 / 13824, 44275.0 / 110592, 253.0 / 4096}}};
     static constexpr Row b = {37.0 / 378, 0, 250.0 / 621, 125.0 / 594, 0, 512.0 / 1771};
-    static constexpr Row error = {b[0] - 2825.0 / 27648,
-                                  0,
-                                  b[2] - 18575.0 / 48384,
-                                  b[3] - 13525.0 / 55296,
-                                  -277.0 / 14336,
-                                  b[5] - 1.0 / 4};
+    static constexpr Row error = {b[0] - 2825.0 / 27648,  0,
+                                  b[2] - 18575.0 / 48384, b[3] - 13525.0 / 55296,
+                                  -277.0 / 14336,         b[5] - 1.0 / 4};
 };
 
 struct Dopri5Tableau {
@@ -131,9 +128,9 @@ struct Fehlberg78Tableau {
          {3.0 / 205, 0, 0, 0, 0, -6.0 / 41, -3.0 / 205, -3.0 / 41, 3.0 / 41, 6.0 / 41},
          {-1777.0 / 4100, 0, 0, -341.0 / 164, 4496.0 / 1025, -289.0 / 82, 2193.0 / 4100, 51.0 / 82,
           33.0 / 164, 12.0 / 41, 0, 1}}};
-    static constexpr Row b = {0,         0,         0, 0,          0,         34.0 / 105, 9.0 / 35,
-                              9.0 / 35,  9.0 / 280, 9.0 / 280, 0,  41.0 / 840, 41.0 / 840};
-    static constexpr Row error = {-41.0 / 840, 0, 0, 0, 0,           0,          0,
+    static constexpr Row b = {0,        0,         0,         0, 0,          34.0 / 105, 9.0 / 35,
+                              9.0 / 35, 9.0 / 280, 9.0 / 280, 0, 41.0 / 840, 41.0 / 840};
+    static constexpr Row error = {-41.0 / 840, 0, 0, 0,           0,          0,         0,
                                   0,           0, 0, -41.0 / 840, 41.0 / 840, 41.0 / 840};
 };
 
@@ -148,20 +145,16 @@ public:
     /// Whether the tableau has an embedded error estimate.
     static constexpr bool estimates_error = requires { Tableau::error; };
     /// Whether the estimate uses the rate at the end of the step (first same as last).
-    static constexpr bool fsal = []
-    {
+    static constexpr bool fsal = [] {
         if constexpr (requires { Tableau::error; }) {
             return Tableau::error.size() > Tableau::stages;
         }
         return false;
-    }
-    ();
-    static constexpr int error_order_value = []
-    {
+    }();
+    static constexpr int error_order_value = [] {
         if constexpr (requires { Tableau::error_order; }) return Tableau::error_order;
         return 0;
-    }
-    ();
+    }();
     static constexpr bool has_dense_output = requires { Tableau::dense(0.5); };
 
     /// w(h) from the departures' own flow, `flow(w, w_rate, offset)`. Where the method is
@@ -188,8 +181,7 @@ public:
 
     /// w(s) on the dense output of the step of length h; `rate` is its departures' rate at the
     /// end.
-    static void dense(double s, double h, const X* k, const X& rate,
-                      X& w) requires has_dense_output
+    static void dense(double s, double h, const X* k, const X& rate, X& w) requires has_dense_output
     {
         auto weights = Tableau::dense(s / h);
         for (double& weight : weights) weight *= h;
@@ -198,8 +190,8 @@ public:
 
     /// Weights of the rates in w at the part `Part::u` of a step of length h.
     template <class Part>
-    [[nodiscard, gnu::always_inline]] static constexpr auto weights(double h) noexcept
-        requires has_dense_output
+    [[nodiscard, gnu::always_inline]] static constexpr auto weights(double h) noexcept requires
+        has_dense_output
     {
         constexpr auto unit = Tableau::dense(Part::u);
         auto weights = unit;
@@ -212,11 +204,12 @@ public:
     [[nodiscard, gnu::always_inline]] static double dense(const Array& weights, const X* k,
                                                           const X& rate, Index c)
     {
-        return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-            return (... +
-                    (weights[used<Weights>.at[I]] * stage<used<Weights>.at[I]>(k, rate)[c])) +
+        return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
+        {
+            return (... + (weights[used<Weights>.at[I]] * stage<used<Weights>.at[I]>(k, rate)[c])) +
                    weights[Tableau::stages] * rate[c];
-        }(std::make_index_sequence<used<Weights>.count>{});
+        }
+        (std::make_index_sequence<used<Weights>.count>{});
     }
 
     template <std::size_t i>
@@ -239,8 +232,7 @@ public:
 
     /// The stages from the second on that a row uses.
     template <class Row>
-    static constexpr auto used = []
-    {
+    static constexpr auto used = [] {
         struct {
             std::array<std::size_t, Row::coefficients.size()> at{};
             std::size_t count = 0;
@@ -249,8 +241,7 @@ public:
             if (Row::coefficients[j] != 0) found.at[found.count++] = j;
         }
         return found;
-    }
-    ();
+    }();
 
     template <class Row>
     static constexpr std::size_t terms = used<Row>.count;
@@ -269,10 +260,12 @@ public:
     template <class Row, class Array, class Rate>
     [[nodiscard, gnu::always_inline]] static auto sum_of(const Array& weights, const Rate& rate)
     {
-        return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-            return (... + (weights[I] *
-                           rate(std::integral_constant<std::size_t, used<Row>.at[I]>{})));
-        }(std::make_index_sequence<used<Row>.count>{});
+        return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
+        {
+            return (... +
+                    (weights[I] * rate(std::integral_constant<std::size_t, used<Row>.at[I]>{})));
+        }
+        (std::make_index_sequence<used<Row>.count>{});
     }
 
     /// The same of the rates in `k`, and of `rate` at the end, for one component; 0 of no rates.
@@ -284,9 +277,9 @@ public:
         if constexpr (used<Row>.count == 0) {
             return 0;
         } else {
-            return sum_of<Row>(weights, [&](auto j) __attribute__((always_inline)) {
-                return stage<j>(k, rate)[c];
-            });
+            return sum_of<Row>(
+                weights, [&](auto j)
+                             __attribute__((always_inline)) { return stage<j>(k, rate)[c]; });
         }
     }
 
@@ -323,9 +316,9 @@ private:
     {
         const auto weights = weights_of<Row>(h);
         for_each_component(
-            w, [&](auto c) __attribute__((always_inline)) { w[c] = sum<Row>(weights, k, rate, c); });
+            w, [&](auto c)
+                   __attribute__((always_inline)) { w[c] = sum<Row>(weights, k, rate, c); });
     }
-
 
     template <std::size_t j>
     [[nodiscard]] static const X& stage([[maybe_unused]] const X* k,

@@ -19,9 +19,12 @@
 namespace ricochet {
 
 template <class Problem, class Vector>
-concept NewtonProblem = requires(Problem& problem, const Vector& x, Vector& out) {
+concept NewtonProblem = requires(Problem& problem, const Vector& x, Vector& out)
+{
     problem.residual(x, out);
-    { problem.direction(x, out, out) } -> std::convertible_to<bool>;
+    {
+        problem.direction(x, out, out)
+        } -> std::convertible_to<bool>;
 };
 
 struct NewtonOptions {

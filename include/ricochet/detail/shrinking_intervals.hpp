@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/detail/instant.hpp"
+#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet::detail {
 

@@ -19,9 +19,10 @@ template <int N, int M>
 [[nodiscard]] StageReport without_law(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
                                       const BranchesOf<M>& branches)
 {
-    const double scale = std::max({(stage.c * (scratch.m.mass() * scratch.trial)).template lpNorm<Eigen::Infinity>(),
-                                   stage.q.template lpNorm<Eigen::Infinity>(),
-                                   stage.kappa * scratch.f_trial.template lpNorm<Eigen::Infinity>()});
+    const double scale =
+        std::max({(stage.c * (scratch.m.mass() * scratch.trial)).template lpNorm<Eigen::Infinity>(),
+                  stage.q.template lpNorm<Eigen::Infinity>(),
+                  stage.kappa * scratch.f_trial.template lpNorm<Eigen::Infinity>()});
     double worst = scratch.defect.template lpNorm<Eigen::Infinity>();
     if (scratch.traits.of_reactions()) {
         scratch.inclusion.bounds(stage.t, scratch.trial, scratch.lower, scratch.upper);
@@ -65,9 +66,8 @@ template <int N, int M>
         inequality.w = factor.delassus;
         inequality.y0.noalias() = m.observe() * scratch.w0;
         inequality.y0 -= scratch.s;
-        const bool found =
-            frozen ? inequality.solve_on(branches, scratch.reaction, scratch.y)
-                   : inequality.solve(scratch.reaction, scratch.y, branches);
+        const bool found = frozen ? inequality.solve_on(branches, scratch.reaction, scratch.y)
+                                  : inequality.solve(scratch.reaction, scratch.y, branches);
         if (!found) return {.iterations = iteration, .set = 0};
         scratch.trial.noalias() = factor.influence * scratch.reaction;
         scratch.trial += scratch.w0;

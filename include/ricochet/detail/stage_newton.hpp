@@ -3,8 +3,8 @@
 // Stages by the semismooth Newton method, for sets of any shape.
 #pragma once
 
-#include "ricochet/detail/semismooth_newton.hpp"
 #include "ricochet/detail/inclusion_stage.hpp"
+#include "ricochet/detail/semismooth_newton.hpp"
 
 namespace ricochet::detail {
 
@@ -18,8 +18,7 @@ namespace ricochet::detail {
 template <int N, int M>
 class RICOCHET_ALIGNED StageNewton {
 public:
-    static constexpr int size =
-        N == Eigen::Dynamic || M == Eigen::Dynamic ? Eigen::Dynamic : N + M;
+    static constexpr int size = N == Eigen::Dynamic || M == Eigen::Dynamic ? Eigen::Dynamic : N + M;
     using State = typename AnyMatrices<N, M>::State;
     using Reaction = typename AnyMatrices<N, M>::Reaction;
     using Vector = Eigen::Matrix<double, size, 1>;
@@ -55,12 +54,11 @@ public:
         x_.head(w.size()) = w;
         x_.tail(reaction.size()) = reaction;
         // Slightly below, since this scale is that of the start.
-        const NewtonReport newton = semismooth_newton(
-            *this, x_,
-            {.tolerance = options.tolerance / 4,
-             .max_iterations = options.max_iterations,
-             .line_search = options.line_search},
-            scratch_);
+        const NewtonReport newton = semismooth_newton(*this, x_,
+                                                      {.tolerance = options.tolerance / 4,
+                                                       .max_iterations = options.max_iterations,
+                                                       .line_search = options.line_search},
+                                                      scratch_);
         w = x_.head(w.size());
         reaction = x_.tail(reaction.size());
         m.smooth(stage.t, w, scratch.f);

@@ -79,8 +79,7 @@ struct StepState {
     X w, w_rate1;  ///< at the end; the rate only where the method gives it
     X x1, rate1;
     X error, at;
-    const double* component_atol =
-        nullptr;  ///< one for each component, in place of one for all
+    const double* component_atol = nullptr;  ///< one for each component, in place of one for all
 
     /// Stages of the current step, and of the last step that was repeated to an inner time.
     std::array<X, most_kept_stages> stages{};
@@ -125,14 +124,14 @@ struct StepKernel {
     /// Takes a step of length h: `w`, `x1`, `rate1`, and `stages` where they have an interpolant.
     /// False: the end or the flow there is not finite.
     bool (*take)(void* door, StepState<X>& step, double h) = nullptr;
-    /// Takes a step like `take`. Returns its largest estimated error over atol + rtol max(|x0|, |x1|); NaN if
-    /// anything is not finite. Null without an estimate.
+    /// Takes a step like `take`. Returns its largest estimated error over atol + rtol max(|x0|,
+    /// |x1|); NaN if anything is not finite. Null without an estimate.
     double (*attempt)(void* door, StepState<X>& step, double h, double rtol, double atol) = nullptr;
     /// The departure after a step of length s, with its rate where the method gives it; the current
     /// step stays as it is.
     void (*depart)(void* door, StepState<X>& step, double s, X& w, X& rate) = nullptr;
-    /// The length of the step from here that meets the tolerance; then `attempt` at no more than that
-    /// returns 0. Null where a length is known to be right only afterwards.
+    /// The length of the step from here that meets the tolerance; then `attempt` at no more than
+    /// that returns 0. Null where a length is known to be right only afterwards.
     double (*reach)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
     /// w(s) on an interpolant of the method's own, or null.
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;

@@ -53,8 +53,8 @@ struct SystemTable {
     /// One guard, at a state or a view of the step's polynomial.
     double (*guard)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     double (*guard_on)(Door, std::size_t which, Mode, double t, const View& x) = nullptr;
-    /// Rate of a guard with x' = dxdt: in closed form, else the central difference over 1e-5 `scale`, at
-    /// the price of `calls_of_rate` evaluations of the guard.
+    /// Rate of a guard with x' = dxdt: in closed form, else the central difference over 1e-5
+    /// `scale`, at the price of `calls_of_rate` evaluations of the guard.
     double (*rate)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
                    const X& dxdt, double scale) = nullptr;
     double (*rate_on)(Door, std::size_t which, Mode, bool backward, double t, const View& x,

@@ -15,8 +15,8 @@
 #include <concepts>
 #include <cstddef>
 
-#include "ricochet/detail/incremental.hpp"
 #include "ricochet/detail/friction_stage.hpp"
+#include "ricochet/detail/incremental.hpp"
 
 namespace ricochet {
 

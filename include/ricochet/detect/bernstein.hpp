@@ -19,8 +19,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
+#include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/step.hpp"
 #include "ricochet/hybrid/system.hpp"
 

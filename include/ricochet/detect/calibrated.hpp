@@ -24,8 +24,8 @@
 #include <cstddef>
 #include <utility>
 
-#include "ricochet/detect/extremum.hpp"
 #include "ricochet/detail/gate.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 
 namespace ricochet {

@@ -18,9 +18,9 @@
 #include <optional>
 #include <string_view>
 
-#include "ricochet/detect/ends.hpp"
-#include "ricochet/detail/features.hpp"
 #include "ricochet/detail/classifier.hpp"
+#include "ricochet/detail/features.hpp"
+#include "ricochet/detect/ends.hpp"
 
 namespace ricochet {
 

@@ -24,10 +24,10 @@
 #include <utility>
 
 #include "ricochet/detail/around.hpp"
+#include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/detect/cover.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/bounds.hpp"
-#include "ricochet/detail/debug_checks.hpp"
 
 namespace ricochet {
 
@@ -70,8 +70,9 @@ public:
 
 /// Detector that defers the checks of `Exact` as long as declared bounds exclude a crossing.
 ///
-/// With d = |g| at the last check of a guard, v its speed bound there (path per second times its Lipschitz constant) and A its
-/// acceleration bound, both enlarged by the margin, the guard is covered for the time tau with
+/// With d = |g| at the last check of a guard, v its speed bound there (path per second times its
+/// Lipschitz constant) and A its acceleration bound, both enlarged by the margin, the guard is
+/// covered for the time tau with
 ///
 ///     v tau + A tau² / 2 = d             from one value
 ///     path(tau) = d0 + d1                from the values d0, d1 at both ends of an interval
@@ -85,9 +86,9 @@ public:
 ///         else:    halve it at the kept starts; the first single step that is not covered is
 ///                  taken again, and examined by `Exact`
 ///
-/// The two-valued cover holds because a guard that reaches its surface has to come back from it. The events are those of `Exact` at every step, bit for bit,
-/// as long as the bounds are true; a bound that is found to be wrong ends the run as
-/// `Outcome::wrong_bound`.
+/// The two-valued cover holds because a guard that reaches its surface has to come back from it.
+/// The events are those of `Exact` at every step, bit for bit, as long as the bounds are true; a
+/// bound that is found to be wrong ends the run as `Outcome::wrong_bound`.
 template <class Exact = Extremum>
 class Planned : public detail::PutsOff<Exact> {
 public:

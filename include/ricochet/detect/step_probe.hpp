@@ -60,8 +60,8 @@ struct PathProperties {
     bool is_polynomial = false;  ///< the step has a polynomial, which continues beyond its end
 };
 
-/// A guard on a step as a function of the offset s in [0, h]: the only view that a detector or a locator has
-/// of a motion. Evaluations may cost a step of the method.
+/// A guard on a step as a function of the offset s in [0, h]: the only view that a detector or a
+/// locator has of a motion. Evaluations may cost a step of the method.
 class GuardPath {
 public:
     GuardPath(const GuardPath&) = delete;
@@ -120,11 +120,11 @@ public:
     virtual void settle(double correction) = 0;
     /// The rate of the guard at a sample where it is not known yet.
     virtual void complete(GuardSample& sample) = 0;
-    /// Change of the guard at offset s for 8 units in the last place of the time and of each component
-    /// of the state, from its slopes.
+    /// Change of the guard at offset s for 8 units in the last place of the time and of each
+    /// component of the state, from its slopes.
     [[nodiscard]] virtual double rounding(double s) = 0;
-    /// Change of the guard at offset s for 64 units in the last place of the time and of each component
-    /// of the state, from values, so that it holds at a kink, too.
+    /// Change of the guard at offset s for 64 units in the last place of the time and of each
+    /// component of the state, from values, so that it holds at a kink, too.
     [[nodiscard]] virtual double blur(double s) = 0;
     /// Degree of the guard in the offset on the step's polynomial; 0: not known.
     [[nodiscard]] virtual int degree() const = 0;
@@ -432,7 +432,7 @@ private:
 /// `watch.side` and sampled at the start; its sample at the end is filled in.
 template <class Detector, class Guard, class Step>
 [[nodiscard]] Finding examine_step(const Detector& detector, const Guard& guard, const Step& step,
-                              Watch& watch)
+                                   Watch& watch)
 {
     const double h = step.h();
     watch.end = {.s = h, .value = guard.value(step.time(h), step.x1())};

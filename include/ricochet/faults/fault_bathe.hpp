@@ -17,10 +17,10 @@
 #include <functional>
 #include <memory>
 
-#include "ricochet/nonsmooth/step_controllers.hpp"
-#include "ricochet/nonsmooth/set_valued_motion.hpp"
-#include "ricochet/nonsmooth/step_policy.hpp"
 #include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
+#include "ricochet/nonsmooth/step_policy.hpp"
 
 namespace ricochet {
 
@@ -69,8 +69,8 @@ struct BatheOptions {
     std::function<void(const BatheStep&)> observer{};
 };
 
-/// Inputs of a step policy for the fault: of the fields at the end of an attempt, nondimensional, the
-/// logarithm of the root mean square velocity, the rate of growth of its square (half of it, as
+/// Inputs of a step policy for the fault: of the fields at the end of an attempt, nondimensional,
+/// the logarithm of the root mean square velocity, the rate of growth of its square (half of it, as
 /// asinh) and the logarithm of the time in which it would vanish at that rate, the mean of
 /// exp(-path), the fraction of elements that slip, and the logarithm of the mean drop of strength.
 [[nodiscard]] const StepLayout& fault_step_layout() noexcept;

@@ -30,8 +30,8 @@ struct RuptureOptions {
     /// Error of a step allowed, relative to the present velocity and slip of the whole field;
     /// infinity: constant steps.
     double rtol = 1e-4;
-    /// Error of the polynomial that stands for sqrt(K), relative on its whole spectrum; 0: 1e-4, and
-    /// (n / 100)^2 of it from n = 100 down to 10.
+    /// Error of the polynomial that stands for sqrt(K), relative on its whole spectrum; 0: 1e-4,
+    /// and (n / 100)^2 of it from n = 100 down to 10.
     double polynomial_bound = 0;
     std::vector<double> snapshot_times{};  ///< [s] ascending
     std::uint64_t max_steps = 1'000'000;
@@ -72,8 +72,8 @@ struct Rupture {
     double mean_slip = 0;      ///< path, mean over the square [m]
     double peak_velocity = 0;  ///< of the mean velocity [m/s]
     double peak_time = 0;      ///< [s]
-    /// Time from which the mean velocity stays below 1e-3 of its peak [s]; of a single element, when it
-    /// stops. NaN if it does not.
+    /// Time from which the mean velocity stays below 1e-3 of its peak [s]; of a single element,
+    /// when it stops. NaN if it does not.
     double arrest_time = std::numeric_limits<double>::quiet_NaN();
     /// When the last element stopped [s]. NaN if one still moves, or could.
     double rest_time = std::numeric_limits<double>::quiet_NaN();

@@ -46,8 +46,8 @@
 #include "ricochet/detail/filippov_decision.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
 #include "ricochet/detail/filippov_rates.hpp"
-#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/detail/scratch.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
@@ -100,7 +100,7 @@ class Filippov : public detail::FilippovState<Fields> {
 
 public:
     static constexpr bool unchecked_names = true;  // time events only where the fields have them
-    static constexpr bool forward_only = true;  ///< runs backward in time are refused
+    static constexpr bool forward_only = true;     ///< runs backward in time are refused
     static constexpr std::size_t surface_count = Fields::surface_count;
     static constexpr std::size_t guards_per_surface = 4;
     static constexpr std::size_t guard_count = guards_per_surface * surface_count;

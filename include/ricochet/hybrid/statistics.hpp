@@ -44,11 +44,12 @@ struct Statistics {
     std::uint64_t false_alarms = 0;      ///< a network predicted an event and there was none
     std::uint64_t missed_events = 0;     ///< events in a step that a network had cleared
     std::uint64_t late_events = 0;       ///< missed events that only a later step found
-    std::uint64_t checks_put_off = 0;    ///< steps whose exact check a network or a plan deferred for good
-    std::uint64_t outside_domain = 0;    ///< states outside the box of a gate: checked exactly
-    std::uint64_t bound_calls = 0;       ///< evaluations of `lower_bound`, `upper_bound`
-    std::uint64_t rollbacks = 0;         ///< intervals taken back to a step that was not closed
-    std::uint64_t repeated_steps = 0;    ///< steps taken again for that
+    std::uint64_t checks_put_off =
+        0;  ///< steps whose exact check a network or a plan deferred for good
+    std::uint64_t outside_domain = 0;  ///< states outside the box of a gate: checked exactly
+    std::uint64_t bound_calls = 0;     ///< evaluations of `lower_bound`, `upper_bound`
+    std::uint64_t rollbacks = 0;       ///< intervals taken back to a step that was not closed
+    std::uint64_t repeated_steps = 0;  ///< steps taken again for that
     std::uint64_t events = 0;
     std::uint64_t suppressed = 0;  ///< repeats of an event inside its own window
     std::uint64_t disabled = 0;    ///< crossings that `enabled` rejected

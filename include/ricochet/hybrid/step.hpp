@@ -16,14 +16,29 @@ namespace ricochet {
 /// A step from `start()` to `start()` + h of a one-step method. `restep` is the
 /// method's own map from the start of the step, `interpolate` its dense output.
 template <class S, class X>
-concept MethodStep = requires(const S& step, double s, X& x, X& dxdt, const X& at) {
-    { step.time(s) } -> std::convertible_to<double>;  // t at offset s
-    { step.h() } -> std::convertible_to<double>;
-    { step.x0() } -> std::convertible_to<const X&>;
-    { step.x1() } -> std::convertible_to<const X&>;
-    { step.rate0() } -> std::convertible_to<const X&>;
-    { step.rate1() } -> std::convertible_to<const X&>;
-    { step.order() } -> std::convertible_to<int>;
+concept MethodStep = requires(const S& step, double s, X& x, X& dxdt, const X& at)
+{
+    {
+        step.time(s)
+        } -> std::convertible_to<double>;  // t at offset s
+    {
+        step.h()
+        } -> std::convertible_to<double>;
+    {
+        step.x0()
+        } -> std::convertible_to<const X&>;
+    {
+        step.x1()
+        } -> std::convertible_to<const X&>;
+    {
+        step.rate0()
+        } -> std::convertible_to<const X&>;
+    {
+        step.rate1()
+        } -> std::convertible_to<const X&>;
+    {
+        step.order()
+        } -> std::convertible_to<int>;
     step.interpolate(s, x);
     step.restep(s, x);
     step.restep(s, x, dxdt);  // and the flow at the end of it
@@ -32,8 +47,11 @@ concept MethodStep = requires(const S& step, double s, X& x, X& dxdt, const X& a
 
 /// A step whose dense output is a polynomial that can be had a component at a time.
 template <class S, class X>
-concept DenseStep = MethodStep<S, X> && requires(const S& step) {
-    { step.dense() } -> std::convertible_to<DenseParts<X>>;
+concept DenseStep = MethodStep<S, X> && requires(const S& step)
+{
+    {
+        step.dense()
+        } -> std::convertible_to<DenseParts<X>>;
 };
 
 }  // namespace ricochet

@@ -66,7 +66,8 @@ template <class System, class X>
 
 }  // namespace detail
 
-/// Refuses at compile time a system that cannot be integrated, with a sentence instead of a list of concepts.
+/// Refuses at compile time a system that cannot be integrated, with a sentence instead of a list of
+/// concepts.
 template <class System, class X = typename System::State, class... Choices>
 requires NotIntegrable<System, X> Run<X> integrate(const System&, const X&, const Options&,
                                                    const Choices&...)

@@ -14,9 +14,9 @@ struct explicit_error_stepper_fsal_tag;
 
 namespace ricochet {
 
-/// Method made of a complete stepper type, odeint's (see `ricochet/odeint.hpp`) or the user's own, for its
-/// one state type, with odeint's `do_step`. It must be a one-step method: a multistep method has a memory that an event
-/// makes stale.
+/// Method made of a complete stepper type, odeint's (see `ricochet/odeint.hpp`) or the user's own,
+/// for its one state type, with odeint's `do_step`. It must be a one-step method: a multistep
+/// method has a memory that an event makes stale.
 template <class GivenStepper>
 struct ThisStepper {
     template <class State>
@@ -43,8 +43,8 @@ struct CashKarp54 {
     using Stepper = detail::RungeKutta<detail::CashKarp54Tableau, State>;
 };
 
-/// Dormand and Prince's method of order 5, with an error estimate, an interpolant of order 4 and the rate
-/// at the end of the step at no cost: the default.
+/// Dormand and Prince's method of order 5, with an error estimate, an interpolant of order 4 and
+/// the rate at the end of the step at no cost: the default.
 struct Dopri5 {
     template <class State>
     using Stepper = detail::RungeKutta<detail::Dopri5Tableau, State>;
@@ -62,7 +62,8 @@ struct Fehlberg78 {
 /// The methods that `MethodByName` can be.
 enum class MethodName : std::uint8_t { euler, rk4, cash_karp54, dopri5, fehlberg78 };
 
-/// A method chosen at run time, with the same bits: for programs that offer all of them. The flow is called through a pointer, which costs small states a few nanoseconds a call.
+/// A method chosen at run time, with the same bits: for programs that offer all of them. The flow
+/// is called through a pointer, which costs small states a few nanoseconds a call.
 struct MethodByName {
     MethodName name = MethodName::dopri5;
 };
@@ -89,7 +90,10 @@ namespace odeint = boost::numeric::odeint;
 
 /// A method of ours, which departs from the tangent by itself.
 template <class Stepper>
-concept Departing = requires { Stepper::estimates_error; };
+concept Departing = requires
+{
+    Stepper::estimates_error;
+};
 
 template <class Stepper, class... Tags>
 inline constexpr bool has_category = (std::is_same_v<typename Stepper::stepper_category, Tags> ||

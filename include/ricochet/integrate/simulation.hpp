@@ -229,10 +229,11 @@ template <class X>
 
 /// A run that the caller drives, from (t_start, x0) to t_end.
 ///
-/// With the mode q, the method's map Phi(h; q, t, x), guards g_i that are armed on a side each, and resets r_i,
-/// one `step` is
+/// With the mode q, the method's map Phi(h; q, t, x), guards g_i that are armed on a side each, and
+/// resets r_i, one `step` is
 ///
-///     h        = the length that error control or `Options::step` asks for, at most up to t_end and
+///     h        = the length that error control or `Options::step` asks for, at most up to t_end
+///     and
 ///                to the next time event; shorter until the error of Phi(h; q, t, x) is accepted
 ///     F, s     = the earliest set of acting guards that leave their side within (0, h], and its
 ///                offset; nothing and h if there is none
@@ -247,9 +248,10 @@ template <class X>
 ///         x⁻, q    = x⁺, q⁺
 ///     x        = x⁻
 ///
-/// so that steps are half-open, (t, t + h]: a zero at the end of a step belongs to it, a zero at its start to
-/// the step before. A guard acts if it has a reset or may end the run. The set F does not depend on the order
-/// in which guards are declared. Events are those of one call of `integrate`, however the run is driven.
+/// so that steps are half-open, (t, t + h]: a zero at the end of a step belongs to it, a zero at
+/// its start to the step before. A guard acts if it has a reset or may end the run. The set F does
+/// not depend on the order in which guards are declared. Events are those of one call of
+/// `integrate`, however the run is driven.
 ///
 /// Exceptions from the functions of the system pass through unchanged. The simulation is then
 /// at the end of its last complete step with its events (`take`: at most as far back as its last

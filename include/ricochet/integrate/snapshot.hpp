@@ -17,7 +17,8 @@
 
 namespace ricochet {
 
-/// A property, as text, in which a run must agree with the run that was saved in order to continue it:
+/// A property, as text, in which a run must agree with the run that was saved in order to continue
+/// it:
 /// {"method", "FixedStep<Euler>"}, {"rtol", "1e-08"}.
 struct RunProperty {
     std::string name;
@@ -26,8 +27,8 @@ struct RunProperty {
     [[nodiscard]] bool operator==(const RunProperty&) const = default;
 };
 
-/// State of a simulation, as `Simulation::save` returns it: real numbers and other values, in the order in which
-/// the simulation lists them.
+/// State of a simulation, as `Simulation::save` returns it: real numbers and other values, in the
+/// order in which the simulation lists them.
 struct Snapshot {
     std::vector<RunProperty> run;  ///< the run that it belongs to
     std::vector<double> numbers;

@@ -113,17 +113,17 @@ public:
         for (std::size_t i = pieces_.size(); i < from.pieces_.size(); ++i) {
             const auto& piece = from.pieces_[i];
             pieces_.push_back({.t = piece.t,
-                                  .length = piece.length,
-                                  .h = piece.h,
-                                  .backward = piece.backward,
-                                  .mode = piece.mode,
-                                  .nodes = piece.nodes,
-                                  .x0 = convert(piece.x0),
-                                  .remainder = convert(piece.remainder),
-                                  .rate0 = convert(piece.rate0),
-                                  .w = all(piece.w),
-                                  .slope = all(piece.slope),
-                                  .series = piece.series});
+                               .length = piece.length,
+                               .h = piece.h,
+                               .backward = piece.backward,
+                               .mode = piece.mode,
+                               .nodes = piece.nodes,
+                               .x0 = convert(piece.x0),
+                               .remainder = convert(piece.remainder),
+                               .rate0 = convert(piece.rate0),
+                               .w = all(piece.w),
+                               .slope = all(piece.slope),
+                               .series = piece.series});
         }
     }
 

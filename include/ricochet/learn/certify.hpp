@@ -80,8 +80,8 @@ concept LeastGuard = SlackedGuard<System, X> && requires(const System& system, c
 
 namespace ricochet::learn {
 
-/// The guard that a model is to be proved against, as functions of its raw features. They are called from
-/// several threads at a time.
+/// The guard that a model is to be proved against, as functions of its raw features. They are
+/// called from several threads at a time.
 struct GuardProblem {
     std::function<double(const double* x)> guard;
     std::function<double(const double* half_widths)> slack;  ///< see `SlackedGuard`

@@ -74,8 +74,8 @@ struct Rival {
     std::uint64_t events = 0;  ///< that it found
 };
 
-/// One sentence that names the fastest rival and the cost of the last one, the network; empty without rivals.
-/// The first rival is `Extremum` at every step.
+/// One sentence that names the fastest rival and the cost of the last one, the network; empty
+/// without rivals. The first rival is `Extremum` at every step.
 [[nodiscard]] std::string describe(const std::vector<Rival>& rivals);
 
 /// Draws a bar, or returns false to stop the training; the best so far is kept.

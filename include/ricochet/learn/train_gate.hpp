@@ -8,9 +8,9 @@
 //         system, learn::from_box<State>(lower, upper), FixedStep<Rk4>{}, {}, training);
 //     integrate(system, x0, options, FixedStep<Rk4>{}, Calibrated(Gate(gate.model)));
 //
-// Runs with the exact detector give the states; a system whose guard is expensive is best trained on
-// while its guard is cheap, as where a waiting time is a parameter. The same seed gives the
-// same gate, to the bit on one machine.
+// Runs with the exact detector give the states; a system whose guard is expensive is best trained
+// on while its guard is cheap, as where a waiting time is a parameter. The same seed gives the same
+// gate, to the bit on one machine.
 #pragma once
 
 #include <string_view>

@@ -19,8 +19,7 @@ namespace detail {
 /// where it leaves the side of `sign` (1: above, -1: below). Newton's method starts
 /// from the root of the parabola through v0, r0 and v1, which for a guard that bends
 /// one way is already near; a start on the surface is not taken for the root.
-[[nodiscard]] double hermite_root(double v0, double r0, double v1, double r1,
-                                  double sign) noexcept;
+[[nodiscard]] double hermite_root(double v0, double r0, double v1, double r1, double sign) noexcept;
 
 }  // namespace detail
 

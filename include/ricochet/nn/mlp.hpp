@@ -16,7 +16,8 @@
 
 namespace ricochet {
 
-/// Instruction set that a kernel is compiled for. Processors other than x86-64 have the baseline only.
+/// Instruction set that a kernel is compiled for. Processors other than x86-64 have the baseline
+/// only.
 enum class InstructionSet {
     baseline,   ///< whatever the library is compiled for, e.g. SSE2
     x86_64_v3,  ///< AVX2

@@ -80,7 +80,7 @@ struct Model {
     std::uint64_t seed = 0;
     std::vector<DenseLayer> layers;
     SelfTest self_test;
-    std::string certificate;  ///< empty: none
+    std::string certificate;          ///< empty: none
     std::vector<GateLevel> levels{};  ///< of a gate
     Calibration calibration{};        ///< of a gate
 };

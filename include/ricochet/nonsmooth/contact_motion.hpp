@@ -270,8 +270,9 @@ AnyContactRun<N> AnyContactMotion<N>::take()
 
 }  // namespace detail
 
-/// Motion of a mechanical system with contacts: flights between impacts by events, closed contacts by time stepping.
-/// `HandOverOptions` are those of the event-driven phases, with `set_valued.step` as the step of time stepping.
+/// Motion of a mechanical system with contacts: flights between impacts by events, closed contacts
+/// by time stepping. `HandOverOptions` are those of the event-driven phases, with `set_valued.step`
+/// as the step of time stepping.
 template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
 class ContactMotion {
     static constexpr int N = System::coordinates;

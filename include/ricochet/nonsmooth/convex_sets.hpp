@@ -28,17 +28,25 @@
 namespace ricochet {
 
 template <class Set>
-concept ConvexSet = requires(const Set& set, std::span<const double> z, std::span<double> out) {
-    { set.dimension() } -> std::convertible_to<std::size_t>;
+concept ConvexSet = requires(const Set& set, std::span<const double> z, std::span<double> out)
+{
+    {
+        set.dimension()
+        } -> std::convertible_to<std::size_t>;
     set.project(z, out);
     set.derivative(z, out);
 };
 
 /// A product of intervals, whose bounds are known.
 template <class Set>
-concept BoxSet = ConvexSet<Set> && requires(const Set& set, std::size_t i) {
-    { set.lower(i) } -> std::convertible_to<double>;
-    { set.upper(i) } -> std::convertible_to<double>;
+concept BoxSet = ConvexSet<Set> && requires(const Set& set, std::size_t i)
+{
+    {
+        set.lower(i)
+        } -> std::convertible_to<double>;
+    {
+        set.upper(i)
+        } -> std::convertible_to<double>;
 };
 
 namespace detail {
@@ -202,8 +210,7 @@ public:
         const double factor = !outside ? 1 : length > 0 ? radius_ / length : 0;
         for (std::size_t i = 0; i < N; ++i) {
             for (std::size_t j = 0; j < N; ++j) {
-                const double along =
-                    outside && length > 0 ? (z[i] / length) * (z[j] / length) : 0;
+                const double along = outside && length > 0 ? (z[i] / length) * (z[j] / length) : 0;
                 d[i * N + j] = factor * ((i == j ? 1.0 : 0.0) - along);
             }
         }
@@ -212,7 +219,8 @@ public:
     [[nodiscard]] constexpr std::string_view fault() const noexcept
     {
         if (radius_ >= 0) return "";
-        return radius_ < 0 ? "is empty: its radius is negative" : "has a radius that is not a number";
+        return radius_ < 0 ? "is empty: its radius is negative"
+                           : "has a radius that is not a number";
     }
 
 private:
@@ -349,8 +357,7 @@ public:
         });
     }
 
-    [[nodiscard]] constexpr double lower(std::size_t i) const noexcept
-        requires(BoxSet<Sets> && ...)
+    [[nodiscard]] constexpr double lower(std::size_t i) const noexcept requires(BoxSet<Sets>&&...)
     {
         double bound = 0;
         for_each([&](const auto& set, std::size_t first, std::size_t n) {
@@ -359,8 +366,7 @@ public:
         return bound;
     }
 
-    [[nodiscard]] constexpr double upper(std::size_t i) const noexcept
-        requires(BoxSet<Sets> && ...)
+    [[nodiscard]] constexpr double upper(std::size_t i) const noexcept requires(BoxSet<Sets>&&...)
     {
         double bound = 0;
         for_each([&](const auto& set, std::size_t first, std::size_t n) {
@@ -403,7 +409,9 @@ template <ConvexSet Set>
 [[nodiscard]] std::string_view fault_of(const Set& set) noexcept
 {
     if constexpr (requires {
-                      { set.fault() } -> std::convertible_to<std::string_view>;
+                      {
+                          set.fault()
+                          } -> std::convertible_to<std::string_view>;
                   }) {
         return set.fault();
     } else {

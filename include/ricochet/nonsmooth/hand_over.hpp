@@ -7,8 +7,8 @@
 //                    determine, switching that accumulates; and sets that have no such
 //                    branches at all. Bathe's steps, until the branches are plain again
 //
-// The reaction with which a phase starts is the minimal selection. A system that declares no inclusion
-// includes nothing of this.
+// The reaction with which a phase starts is the minimal selection. A system that declares no
+// inclusion includes nothing of this.
 #pragma once
 
 #include <type_traits>

@@ -56,10 +56,16 @@ enum class Confines {
 };
 
 template <class System>
-requires requires { System::state_size; }
+requires requires
+{
+    System::state_size;
+}
 inline constexpr int state_size = System::state_size;
 template <class System>
-requires requires { System::reaction_size; }
+requires requires
+{
+    System::reaction_size;
+}
 inline constexpr int reaction_size = System::reaction_size;
 
 template <class System>
@@ -70,13 +76,18 @@ template <class System>
 using SquareOf = Eigen::Matrix<double, state_size<System>, state_size<System>>;
 
 template <class System>
-concept Inclusion = requires(const System& system, double t, const StateOf<System>& w, StateOf<System>& f) {
+concept Inclusion = requires(const System& system, double t, const StateOf<System>& w,
+                             StateOf<System>& f)
+{
     system.smooth(t, w, f);
-    { system.reaction_set(t, w) } -> ConvexSet;
+    {
+        system.reaction_set(t, w)
+        } -> ConvexSet;
 };
 
 template <class System>
-using SetOf = decltype(std::declval<const System&>().reaction_set(0.0, std::declval<const StateOf<System>&>()));
+using SetOf = decltype(std::declval<const System&>().reaction_set(
+    0.0, std::declval<const StateOf<System>&>()));
 
 namespace detail {
 

@@ -420,7 +420,8 @@ private:
         last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
     }
 
-    /// Sets y to exactly zero for reaction `which`, and for the reactions whose y is zero up to rounding.
+    /// Sets y to exactly zero for reaction `which`, and for the reactions whose y is zero up to
+    /// rounding.
     void zero_observed(Eigen::Index which)
     {
         if (!traits().of_reactions()) return;

@@ -18,8 +18,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/nn/mlp.hpp"
 #include "ricochet/detail/step_layout.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 namespace ricochet {
 

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
 #include "ricochet/detail/directions.hpp"
 #include "ricochet/detail/undefined.hpp"
 #include "ricochet/detail/variational.hpp"
+#include "ricochet/integrate/integrate.hpp"
 
 namespace ricochet {
 

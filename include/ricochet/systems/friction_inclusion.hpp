@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "ricochet/detail/linear_cases.hpp"
 #include "ricochet/detail/friction_oscillator.hpp"
+#include "ricochet/detail/linear_cases.hpp"
 
 namespace ricochet {
 

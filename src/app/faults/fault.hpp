@@ -49,7 +49,6 @@ void refuse_rate_and_state(const std::vector<std::string>& set, const SystemEntr
 [[nodiscard]] int simulate_rate_state_fault(const SystemEntry& system,
                                             const SimulateRequest& request,
                                             const std::vector<double>& values);
-[[nodiscard]] int simulate_spring_slider(const SystemEntry& system,
-                                         const SimulateRequest& request);
+[[nodiscard]] int simulate_spring_slider(const SystemEntry& system, const SimulateRequest& request);
 
 }  // namespace ricochet::app

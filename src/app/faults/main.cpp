@@ -27,7 +27,6 @@ int simulate_one(const SimulateRequest& request)
 int main(int count, char** arguments)
 {
     using namespace ricochet::app;
-    return run_program(
-        [](CLI::App& app, int& status) { add_simulate(app, status, simulate_one); }, count,
-        arguments);
+    return run_program([](CLI::App& app, int& status) { add_simulate(app, status, simulate_one); },
+                       count, arguments);
 }

@@ -97,8 +97,8 @@ const std::vector<Known>& known()
 
 std::vector<std::string_view> gate_kinds(std::string_view system)
 {
-    const bool found =
-        std::any_of(known().begin(), known().end(), [&](const Known& k) { return k.name == system; });
+    const bool found = std::any_of(known().begin(), known().end(),
+                                   [&](const Known& k) { return k.name == system; });
     return found ? std::vector<std::string_view>{"gate", "gate-adaptive"}
                  : std::vector<std::string_view>{};
 }

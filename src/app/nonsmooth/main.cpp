@@ -1,4 +1,5 @@
-// `ricochet-nonsmooth`: `simulate`, `ensemble` and `compare` of differential inclusions and contacts.
+// `ricochet-nonsmooth`: `simulate`, `ensemble` and `compare` of differential inclusions and
+// contacts.
 #include <fmt/format.h>
 
 #include "../input.hpp"

@@ -184,7 +184,8 @@ template <class... Steppers, class System>
             out = run_by_steps(system, from, settings);
         } else if (settings.stepper == MethodName::fehlberg78) {
             if constexpr (sizeof...(Steppers) > 0) {
-                out = run_by_hand_over<System, ErrorControlled<Steppers>...>(system, from, settings);
+                out =
+                    run_by_hand_over<System, ErrorControlled<Steppers>...>(system, from, settings);
             } else {
                 throw BadInput("--stepper of this system can only be dopri5");
             }

@@ -19,8 +19,9 @@ namespace ricochet::python {
 
 /// One piece of work in a thread of its own, and what Python has to say of it.
 ///
-/// Every 20 ms the caller's thread checks for signals and shows the latest progress. Where a handler
-/// or the callback raises an exception, or the callback returns False, the work is asked to stop.
+/// Every 20 ms the caller's thread checks for signals and shows the latest progress. Where a
+/// handler or the callback raises an exception, or the callback returns False, the work is asked to
+/// stop.
 template <class Progress>
 class Background {
 public:

@@ -340,10 +340,11 @@ void bind_monitor(py::module_& module)
         .def_property_readonly("must_stop_at", &PyMonitor::must_stop_at,
                                "The next time event, beyond which no step goes; infinite where "
                                "there is none.")
-        .def_property_readonly("quiet_until", &PyMonitor::quiet_until,
-                               "The time up to which no guard needs a check, by the bounds that the "
-                               "system declares: the host may go there by `skip_to`. Where nothing "
-                               "is known it is the current time.")
+        .def_property_readonly(
+            "quiet_until", &PyMonitor::quiet_until,
+            "The time up to which no guard needs a check, by the bounds that the "
+            "system declares: the host may go there by `skip_to`. Where nothing "
+            "is known it is the current time.")
         .def_property_readonly("run", &PyMonitor::so_far, "What has been found so far, as a Run.")
         .def_property_readonly(
             "events",

@@ -260,9 +260,9 @@ void bind_runs(py::module_& module)
         .def("run_to_end", &PySimulation::run_to_end, "Advances to the end, and returns the Run.")
         .def("finish", &PySimulation::finish, "Ends the run here, and returns what was computed.")
         .def("save", &PySimulation::save, "All that the future depends on, as a Snapshot.")
-        .def(
-            "restore", &PySimulation::restore,
-            "Continues where the snapshot of a run of the same system was taken, with the same bits.")
+        .def("restore", &PySimulation::restore,
+             "Continues where the snapshot of a run of the same system was taken, with the same "
+             "bits.")
         .def_property_readonly("t", &PySimulation::t, "The time.")
         .def_property_readonly("x", &PySimulation::x, "The state, which may be kept.")
         .def_property_readonly("mode", &PySimulation::mode, "The mode.")

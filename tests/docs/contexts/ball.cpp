@@ -7,12 +7,12 @@ using X = std::array<double, 2>;
 
 namespace {
 [[maybe_unused]] void observe(double, const X&) {}
-}
+}  // namespace
 
 int main()
 {
     const BouncingBall ball;
     const X x0{10, 0};
     (void)x0;
-BLOCK
+    BLOCK
 }

@@ -5,12 +5,12 @@ using namespace ricochet;
 
 namespace {
 void use(double, double) {}
-}
+}  // namespace
 
 // Compiled and not run: it is years of motion.
 [[maybe_unused]] static void page()
 {
-BLOCK
+    BLOCK
 }
 
 int main() {}

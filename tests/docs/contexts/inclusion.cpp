@@ -7,5 +7,5 @@ using namespace ricochet;
 
 int main()
 {
-BLOCK
+    BLOCK
 }

@@ -12,8 +12,11 @@ using namespace ricochet::learn;
 using namespace ricochet::detail;
 
 namespace {
-double work_and_error_of_runs_with(std::span<const double> x) { return x[0] * x[0]; }
+double work_and_error_of_runs_with(std::span<const double> x)
+{
+    return x[0] * x[0];
 }
+}  // namespace
 
 // Compiled and not run: they are trainings.
 [[maybe_unused]] static void page()
@@ -21,8 +24,7 @@ double work_and_error_of_runs_with(std::span<const double> x) { return x[0] * x[
     const std::vector<double> x0{1, 2};
     double x = 0;
     int steps = 0;
-BLOCK
-    (void)x, (void)steps;
+    BLOCK(void) x, (void)steps;
 }
 
 int main() {}

@@ -3,9 +3,7 @@
 #include <cmath>
 
 namespace {
-struct Scope
-BLOCK
-;
+struct Scope BLOCK;
 }
 
 int main()

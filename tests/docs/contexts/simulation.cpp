@@ -12,7 +12,7 @@ int main()
     Simulation simulation(ball, x0, {.t_end = 5});
     Simulation other(ball, x0, {.t_end = 5});
     simulation.advance();
-BLOCK
+    BLOCK
     while (simulation.advance()) {
     }
     while (other.advance()) {
