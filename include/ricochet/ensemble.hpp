@@ -26,7 +26,7 @@
 
 namespace ricochet {
 
-/// Which row of an ensemble a run belongs to.
+/// Place of a run in an ensemble.
 struct EnsembleRow {
     std::size_t index = 0;   ///< in the table, from 0
     std::uint64_t seed = 0;  ///< the `row_seed` of this row

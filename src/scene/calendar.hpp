@@ -12,6 +12,11 @@ class Calendar {
 public:
     explicit Calendar(std::size_t bodies) : place_(bodies, none) {}
 
+    void clear()
+    {
+        for (const Entry& entry : heap_) place_[entry.body] = none;
+        heap_.clear();
+    }
     [[nodiscard]] bool empty() const noexcept { return heap_.empty(); }
     [[nodiscard]] std::uint32_t first() const noexcept { return heap_[0].body; }
     [[nodiscard]] const Instant& first_time() const noexcept { return heap_[0].t; }

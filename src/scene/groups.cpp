@@ -195,6 +195,12 @@ std::vector<Reach> reaches(const World& world)
 std::vector<std::vector<std::uint32_t>> groups_of(const World& world)
 {
     if (world.bodies.empty()) return {};
+    if (world.faces.size() > world.wall_count) {
+        // Terrain lies in the cells of a group: one group for all.
+        std::vector<std::uint32_t> all(world.bodies.size());
+        std::iota(all.begin(), all.end(), 0U);
+        return {all};
+    }
     std::vector<Reach> boxes = reaches(world);
     std::vector<std::uint32_t> order(world.bodies.size());
     std::iota(order.begin(), order.end(), 0U);

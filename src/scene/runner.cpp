@@ -9,26 +9,36 @@
 
 namespace ricochet::detail {
 
-Runner::Runner(World& world, std::vector<std::uint32_t> bodies, double t_end)
+Runner::Runner(World& world, double t_end)
     : world_(world),
-      members_(std::move(bodies)),
       t_end_{t_end, 0},
       calendar_(world.bodies.size() + world.islands->count()),
       pending_(world.bodies.size()),
       slots_(world.bodies.size(), none),
       impacts_(world),
-      series_(world.bodies.size()),
-      now_{world.options.t_start, 0}
+      series_(world.bodies.size())
 {
+}
+
+void Runner::begin(std::vector<std::uint32_t> bodies)
+{
+    members_ = std::move(bodies);
+    islands_.clear();
     for (const std::uint32_t i : members_) {
-        if (world.bodies[i].island != none) islands_.push_back(world.bodies[i].island);
+        if (world_.bodies[i].island != none) islands_.push_back(world_.bodies[i].island);
     }
     std::ranges::sort(islands_);
     const auto repeated = std::ranges::unique(islands_);
     islands_.erase(repeated.begin(), repeated.end());
+    calendar_.clear();
+    now_ = {world_.options.t_start, 0};
+    fruitless_ = 0;
+    next_sample_ = 0;
+    result_ = {};
 }
 
-/// Cells as large as two of the largest discs, or as leave about one body in each.
+/// Cells as large as two of the largest discs, or as leave some 0.4 bodies in each: by trial, 1.2
+/// times as fast at a fraction of 0.3 as one body in each.
 void Runner::place_all()
 {
     celled_ = members_.size() > 1 || world_.faces.size() > world_.wall_count;
@@ -49,7 +59,7 @@ void Runner::place_all()
     const double height = high[1] - low[1] + 2 * radius;
     // Steps are asked where they are only now and then, and may lie a tenth outside their cell.
     const double slack = islands_.empty() ? 1.0001 : 1.3;
-    double side = std::max(2 * radius * slack, std::sqrt(width * height / count));
+    double side = std::max(2 * radius * slack, 0.65 * std::sqrt(width * height / count));
     if (!(side > 0)) side = std::max({width, height, 1.0});
     const auto buckets = [&](double extent) {
         const double wanted = std::clamp(extent / side, 4.0, 4 * std::sqrt(count) + 1e3);
@@ -90,8 +100,9 @@ void Runner::place_faces()
     }
 }
 
-GroupResult Runner::run(Samples& samples)
+GroupResult Runner::run(std::vector<std::uint32_t> bodies_of_group, Samples& samples)
 {
+    begin(std::move(bodies_of_group));
     place_all();
     settle_at_start();
     for (const std::uint32_t island : islands_) step_island(island);
@@ -176,15 +187,15 @@ void Runner::consider_walls(std::uint32_t i)
     const Body& body = world_.bodies[i];
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) {
         const Face& wall = world_.faces[f];
+        const double rate = dot(body.v, wall.normal);
+        const double bend = dot(body.a, wall.normal);
+        if (!body.quartic && rate >= 0 && bend >= 0) continue;
         const double gap = dot(body.p - wall.at, wall.normal) - body.radius;
         const double rounding = World::rounding(body.p, body.radius) + World::rounding(wall.at, 0);
         if (body.quartic || gap <= rounding) {
             consider(i, meet_face(world_, i, f), true, f);
             continue;
         }
-        const double rate = dot(body.v, wall.normal);
-        const double bend = dot(body.a, wall.normal);
-        if (rate >= 0 && bend >= 0) continue;
         consider(i, {.from = body.t, .after = falls_after(gap, rate, bend, 0)}, true, f);
     }
 }

@@ -34,13 +34,14 @@ using Samples = std::vector<std::vector<BodyState>>;
 
 class Runner {
 public:
-    Runner(World& world, std::vector<std::uint32_t> bodies, double t_end);
+    Runner(World& world, double t_end);
 
     /// @param samples  a row for each of the options' sample times, whose bodies of this group are
     ///                 filled in as far as the group comes
-    GroupResult run(Samples& samples);
+    GroupResult run(std::vector<std::uint32_t> bodies, Samples& samples);
 
 private:
+    void begin(std::vector<std::uint32_t> bodies);
     struct Pending {
         enum class Kind : std::uint8_t { nothing, pair, face, presses, presses_face, stop, edge };
         Instant t = no_instant;
@@ -74,6 +75,7 @@ private:
     void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);
     std::uint32_t slot_of(std::uint32_t body);
     void apply();
+    void bounce(std::uint32_t i);
     bool collapses(std::uint32_t i);
     void restart_island(std::uint32_t island);
     void settle(std::uint32_t i, std::uint32_t was);

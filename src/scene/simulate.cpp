@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "checks/require.hpp"
 #include "scene/groups.hpp"
@@ -45,14 +46,18 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
     const auto groups = groups_of(world);
     run.samples.assign(world.options.sample_times.size(),
                        std::vector<BodyState>(world.bodies.size()));
+    Runner runner(world, t_end);
     for (const auto& group : groups) {
-        Runner runner(world, group, t_end);
-        GroupResult result = runner.run(run.samples);
+        GroupResult result = runner.run(group, run.samples);
         world.statistics.groups += group.size() > 1;
         world.statistics.alone += group.size() == 1;
         for (SceneEvent& event : result.events) event.number += world.statistics.events;
         world.statistics.events += result.event_count;
-        run.events.insert(run.events.end(), result.events.begin(), result.events.end());
+        if (run.events.empty()) {
+            run.events = std::move(result.events);
+        } else {
+            run.events.insert(run.events.end(), result.events.begin(), result.events.end());
+        }
         if (result.failure && (!failure || before(result.failure->t, failure->t))) {
             failure = std::move(result.failure);
         }
@@ -88,19 +93,29 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, double t_end
     return run;
 }
 
-/// Events of all groups in the order of time; events of one group at one time keep their order.
+/// Events of all groups in the order of time; those of one group at one time keep theirs.
 void sort_events(SceneRun& run)
 {
-    std::ranges::stable_sort(run.events, [](const SceneEvent& a, const SceneEvent& b) {
-        return a.t != b.t ? a.t < b.t : a.number < b.number;
-    });
+    struct Key {
+        double t;
+        std::size_t index;
+    };
+    std::vector<Key> keys(run.events.size());
+    for (std::size_t k = 0; k < keys.size(); ++k) keys[k] = {run.events[k].t, k};
+    const auto precedes = [](const Key& a, const Key& b) {
+        return a.t != b.t ? a.t < b.t : a.index < b.index;
+    };
+    if (!std::ranges::is_sorted(keys, precedes)) std::ranges::sort(keys, precedes);
+    std::vector<SceneEvent> sorted;
+    sorted.reserve(keys.size());
     std::uint64_t last = ~0ULL;
     std::uint64_t number = ~0ULL;
-    for (SceneEvent& event : run.events) {
-        if (event.number != last) ++number;
-        last = event.number;
-        event.number = number;
+    for (const Key& key : keys) {
+        sorted.push_back(run.events[key.index]);
+        number += sorted.back().number != last;
+        last = std::exchange(sorted.back().number, number);
     }
+    run.events = std::move(sorted);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ std::vector<Check> all_checks()
           bench::event_checks(), bench::resolution_checks(), bench::guard_checks(),
           bench::nonsmooth_checks(), bench::inclusion_checks(), bench::step_checks(),
           bench::fault_checks(), bench::friction_checks(), bench::file_checks(),
-          bench::host_checks(), bench::taylor_checks(),
+          bench::host_checks(), bench::taylor_checks(), bench::scene_checks(),
 #ifdef RICOCHET_C
           bench::c_checks()
 #endif

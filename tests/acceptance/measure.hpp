@@ -16,9 +16,9 @@ struct Measured {
     std::vector<std::string> details{};  ///< printed below it
 };
 
-inline constexpr std::array<std::string_view, 13> topics = {
+inline constexpr std::array<std::string_view, 14> topics = {
     "ball",  "core",     "network", "events", "guards", "nonsmooth", "steps",
-    "fault", "friction", "files",   "c",      "hosts",  "taylor"};
+    "fault", "friction", "files",   "c",      "hosts",  "taylor",    "scenes"};
 
 struct Check {
     std::string_view topic;  ///< one of `topics`
@@ -64,6 +64,9 @@ struct Check {
 
 /// Events where guards accumulate, decay, or move faster than the state.
 [[nodiscard]] std::vector<Check> resolution_checks();
+
+/// Many bodies with a clock each.
+[[nodiscard]] std::vector<Check> scene_checks();
 
 /// Saved runs, potential files, runs that cannot continue.
 [[nodiscard]] std::vector<Check> file_checks();

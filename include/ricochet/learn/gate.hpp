@@ -79,6 +79,7 @@ template <class X>
     return out;
 }
 
+/// Gates of horizons [s], or of levels of the guard.
 enum class GateKind { horizon, level };
 
 /// "gate-horizon" or "gate-level", as a model spells it.

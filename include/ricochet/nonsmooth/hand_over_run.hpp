@@ -28,14 +28,17 @@ enum class PhaseCause {
     released,       ///< event-driven again: every branch is plain
 };
 
+/// The name of a cause, as in its declaration.
 [[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
 
+/// Start of a phase of a hand-over, until the next one or the end of the run.
 struct Phase {
     double from = 0;  ///< [s]
     bool set_valued = false;
     PhaseCause cause = PhaseCause::start;
 };
 
+/// Options of a hand-over: times, tolerances of both kinds of phases, and what ends the run.
 struct HandOverOptions {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();
@@ -62,6 +65,7 @@ struct HandOverOptions {
     const std::atomic<bool>* cancelled = nullptr;
 };
 
+/// Work of a hand-over, by the kind of phase.
 struct HandOverStatistics {
     Statistics event_driven;
     SetValuedStatistics set_valued;

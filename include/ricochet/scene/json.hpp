@@ -10,13 +10,14 @@
 
 namespace ricochet {
 
-/// What is wrong with a scene's text, in one sentence that begins with its name and line:
+/// Thrown for a scene's text that is refused; one sentence that begins with its name and line:
 /// "bin.json:12: expected a number for "radius", found "big"".
 class SceneFileError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
+/// A scene and the options of its run, as a file has them.
 struct SceneFile {
     Scene scene;
     SceneOptions options;  ///< from "run"; t_end is NaN where it is not given

@@ -18,15 +18,17 @@ namespace ricochet {
 /// (x, y)
 using Vector2 = std::array<double, 2>;
 
-/// Handles that a scene gives out, valid for that scene.
+/// Handle of a material. Handles are given out by a scene, and valid for that scene.
 struct MaterialId {
     std::uint32_t index = 0;
     friend bool operator==(MaterialId, MaterialId) = default;
 };
+/// Handle of a disc or a point.
 struct BodyId {
     std::uint32_t index = 0;
     friend bool operator==(BodyId, BodyId) = default;
 };
+/// Handle of a wall or of terrain.
 struct SurfaceId {
     std::uint32_t index = 0;
     friend bool operator==(SurfaceId, SurfaceId) = default;
@@ -40,6 +42,7 @@ struct Material {
     double friction = 0;     ///< Coulomb's coefficient
 };
 
+/// A disc without spin.
 struct Disc {
     std::string name{};  ///< may be empty: then it is called by its number
     Vector2 at{};        ///< [m] centre
@@ -84,8 +87,10 @@ struct Spring {
     double damping = 0;    ///< [N s/m]
 };
 
+/// Description of a scene: bodies, the surfaces and springs between them, and materials.
 class Scene {
 public:
+    /// Settings of a whole scene.
     struct Settings {
         Vector2 gravity{};          ///< [m/s^2]
         double memory_limit = 4e9;  ///< [bytes] a scene that would need more in a run is refused
@@ -109,8 +114,8 @@ public:
     /// Refuses `bodies` more bodies where they would need more memory than is allowed.
     void require_room(double bodies) const;
 
-    /// What needs all parts: bodies that overlap at the start (which, and by how much), or lie
-    /// behind walls or across terrain that came after them. `simulate` and `explain` ask.
+    /// Refuses bodies that overlap at the start (which, and by how much), or lie behind walls or
+    /// across terrain that came after them. Called by `simulate` and `explain`.
     /// @throws std::invalid_argument
     void check() const;
 
@@ -130,7 +135,7 @@ public:
     };
     [[nodiscard]] std::span<const Surface> surfaces() const noexcept { return surfaces_; }
 
-    /// As given, or "body 3" and "surface 3".
+    /// The name as given, or "body 3" and "surface 3".
     [[nodiscard]] std::string name_of(BodyId body) const;
     [[nodiscard]] std::string name_of(SurfaceId surface) const;
     /// The body of this name. @throws std::invalid_argument with the nearest name that is known.

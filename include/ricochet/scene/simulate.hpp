@@ -14,12 +14,13 @@
 
 namespace ricochet {
 
-/// What happens where several contacts of one cluster are struck at one instant.
+/// Rule for several contacts of one cluster that are struck at one instant.
 enum class ImpactLaw {
     waves,     ///< those that approach fastest, ties together; again until none approaches
     together,  ///< Newton's law for all contacts at once
 };
 
+/// Options of a run of a scene.
 struct SceneOptions {
     double t_start = 0;                                       ///< [s]
     double t_end = std::numeric_limits<double>::quiet_NaN();  ///< [s] above t_start
@@ -48,6 +49,7 @@ struct Partner {
 /// One contact that was struck, or one body that came to rest on a surface. Contacts of one
 /// cluster have the same `number` and time, and stand in the order of their waves.
 struct SceneEvent {
+    /// Kinds of events.
     enum class Kind : std::uint8_t {
         impact,
         held,     ///< impacts on the surface have accumulated: it slides on it, or is at rest
@@ -63,12 +65,14 @@ struct SceneEvent {
     std::array<Vector2, 2> after{};
 };
 
+/// State of a body at one time.
 struct BodyState {
     Vector2 at{};         ///< [m]
     Vector2 velocity{};   ///< [m/s]
     bool asleep = false;  ///< at rest, and stays so until it is struck
 };
 
+/// Work of a run.
 struct SceneStatistics {
     std::uint64_t impacts = 0;      ///< contacts struck
     std::uint64_t events = 0;       ///< impacts of one cluster counted once
@@ -84,7 +88,7 @@ struct SceneStatistics {
     std::uint64_t groups = 0;  ///< of bodies that could meet
 };
 
-/// What a run returns. Nothing that was computed is lost, whatever the outcome.
+/// Result of a run. Nothing that was computed is lost, whatever the outcome.
 struct SceneRun {
     Outcome outcome = Outcome::reached_end;
     std::string message;  ///< empty at the end, else what ended the run, in a sentence
@@ -97,6 +101,7 @@ struct SceneRun {
     SceneStatistics statistics;
 };
 
+/// Simulates the scene from `t_start` to `t_end`.
 /// @throws std::invalid_argument where the scene or an option is not as it must be.
 [[nodiscard]] SceneRun simulate(const Scene& scene, const SceneOptions& options);
 
