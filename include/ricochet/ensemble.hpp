@@ -90,15 +90,19 @@ struct RowsRun {
 
 }  // namespace detail
 
+/// Tables with rows `table[i]`, i < `table.size()`.
+template <class Table>
+concept RowTable = requires(const Table& table)
+{
+    table.size();
+    table[0];
+};
+
 /// Calls `run(table[i], EnsembleRow)`, or `run(table[i])`, for every row i of `table`.
 ///
 /// An exception that a row throws is kept in `failures`; the other rows are run all the same.
 /// @throws std::invalid_argument for options out of range.
-template <class Table, class Run>
-requires requires(const Table& table)
-{
-    table.size(), table[0];
-}
+template <RowTable Table, class Run>
 [[nodiscard]] auto ensemble(const Table& table, const Run& run, const EnsembleOptions& options = {})
 {
     const auto at = [&](const EnsembleRow& row) {
