@@ -7,7 +7,7 @@ using namespace ricochet;
 
 int main()
 {
-// clang-format off
+    // clang-format off
 BLOCK
-// clang-format on
+    // clang-format on
 }
