@@ -229,7 +229,9 @@ void Runner::predict(std::uint32_t i)
     pending.t = pending.crossing = no_instant;
     pending.kind = Pending::Kind::nothing;
     const Body& body = world_.bodies[i];
-    if (!body.asleep) {
+    if (body.asleep) {
+        if (celled_) offer(i);
+    } else {
         consider_own(i);
         consider_walls(i);
         if (celled_) {
@@ -245,6 +247,22 @@ void Runner::predict(std::uint32_t i)
         }
     }
     put_in_calendar(i);
+}
+
+/// A sleeper has no entry in the calendar: those that are awake around it may meet it now.
+void Runner::offer(std::uint32_t i)
+{
+    const auto& cell = pending_[i].cell;
+    for (int x = -1; x <= 1; ++x) {
+        for (int y = -1; y <= 1; ++y) {
+            std::uint32_t j = cells_.head(cells_.bucket_of(cell.x + x, cell.y + y));
+            for (; j != none; j = world_.bodies[j].next) {
+                if (j == i || world_.bodies[j].asleep) continue;
+                consider(j, meet(world_, j, i), false, i);
+                put_in_calendar(j);
+            }
+        }
+    }
 }
 
 void Runner::put_in_calendar(std::uint32_t i)

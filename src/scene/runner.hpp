@@ -63,6 +63,7 @@ private:
     void consider_bucket(std::uint32_t i, std::uint32_t bucket);
     void consider_faces(std::uint32_t i);
     void consider_own(std::uint32_t i);
+    void offer(std::uint32_t i);
     void predict_crossing(std::uint32_t i);
     void put_in_calendar(std::uint32_t i);
     void move_to_cell(std::uint32_t i);

@@ -36,8 +36,8 @@ bool Runner::across(const Contact& contact) const
     return (first || second) && !known_to_group(contact.a, contact.surface, contact.b);
 }
 
-/// Bodies that meet a group and would leave it, by restitution, at no more than `most` [m/s]. They
-/// approach at more than `least`.
+/// Bodies that meet a group, those of it included, and approach it at more than `least` and less
+/// than `most` [m/s].
 std::vector<std::uint32_t> Runner::joining(double least, double most) const
 {
     std::vector<std::uint32_t> bodies;
@@ -46,7 +46,7 @@ std::vector<std::uint32_t> Runner::joining(double least, double most) const
         const Vector2& a = cluster_.before[contact.slot_a];
         const Vector2 v = contact.surface ? a : a - cluster_.before[contact.slot_b];
         const double approach = -dot(v, contact.normal);
-        if (approach <= least || contact.restitution * approach >= most) continue;
+        if (approach <= least || approach >= most) continue;
         bodies.push_back(contact.a);
         if (!contact.surface) bodies.push_back(contact.b);
     }

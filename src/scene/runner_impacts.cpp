@@ -16,6 +16,8 @@ constexpr std::uint32_t crowded = 64;
 
 /// Predicted impacts in a row that change nothing.
 constexpr std::uint32_t most_fruitless = 1000;
+/// The same, before the cluster is joined to a group in lasting contact.
+constexpr std::uint32_t fruitless_to_join = 8;
 
 /// Of the coordinates: gaps that the steps of groups in contact leave.
 constexpr double loose = 1e-10;
@@ -167,7 +169,7 @@ void Runner::resolve_cluster(std::uint32_t i)
             }
         }
     }
-    // A rebound shorter than a step of the group that is struck is spent.
+    // Whose flight to and fro would be shorter than a step of the group that is struck joins it.
     const double slow = 0.5 * norm(world_.gravity) * world_.options.contact_step;
     if (const auto bodies = joining(0, slow); !bodies.empty()) return hand_over(bodies, "");
     bool spend = false;
@@ -186,7 +188,12 @@ void Runner::resolve_cluster(std::uint32_t i)
         if (const auto bodies = joining(-never, never); !bodies.empty()) {
             return hand_over(bodies, "");
         }
-        if (++fruitless_ > most_fruitless) {
+        ++fruitless_;
+        if (contacts_.available() && fruitless_ > fruitless_to_join) {
+            fruitless_ = 0;
+            return hand_over(std::vector(cluster_.bodies), "");
+        }
+        if (fruitless_ > most_fruitless) {
             return fail(Outcome::endless_cascade, {i},
                         fmt::format("impacts of {} repeat without effect", called(i)));
         }
