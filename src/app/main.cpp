@@ -22,6 +22,7 @@ namespace ricochet::app {
 namespace {
 
 constexpr std::string_view nonsmooth = "nonsmooth";
+constexpr std::string_view scene = "scene";
 
 char** all_arguments = nullptr;  ///< of main, for the programs that take its place
 
@@ -34,7 +35,8 @@ int run_instead(std::string_view name, char** arguments)
     std::string file = (here.parent_path() / program).string();
     arguments[-1] = file.data();
     execv(file.c_str(), arguments - 1);
-    const std::string_view kind = name == nonsmooth ? "_app" : "";  // ricochet_nonsmooth: a library
+    // ricochet_nonsmooth and ricochet_scene are libraries.
+    const std::string_view kind = name == nonsmooth || name == scene ? "_app" : "";
     throw std::runtime_error(
         fmt::format("'{}' cannot be run: {}; it is built by the target ricochet_{}{}", file,
                     std::strerror(errno), name, kind));
@@ -82,11 +84,33 @@ void add_commands(CLI::App& app, int& status)
     add_inspect(app, status, inspect);
     add_program(app, programs[1].name, programs[1].meaning);
     add_compare(app, status, compare_here_or_there);
+    add_program(app, "explain", "Say how a scene would be run: ricochet explain SCENE.json");
+}
+
+/// Whether the command is about a scene in a file: `simulate SCENE.json` and `explain`.
+bool is_of_scene(int count, char** arguments)
+{
+    if (count < 2) return false;
+    const std::string_view command = arguments[1];
+    if (command == "explain") return true;
+    if (command != "simulate") return false;
+    // The file may come after options, and what an option takes may be a file, too.
+    for (int k = 2; k < count; ++k) {
+        const std::string_view before = arguments[k - 1];
+        const std::string_view argument = arguments[k];
+        const bool value = before.starts_with("--") && before != "--json";
+        if (!value && !argument.starts_with('-') && argument.ends_with(".json")) return true;
+    }
+    return false;
 }
 
 int run(int count, char** arguments)
 {
     all_arguments = arguments;
+    if (is_of_scene(count, arguments)) {
+        return run_program([&](CLI::App&, int&) { run_instead(scene, arguments + 1); }, count,
+                           arguments);
+    }
     for (const Program& program : programs) {
         if (count < 2 || arguments[1] != program.name) continue;
         return run_program([&](CLI::App&, int&) { run_instead(program.name, arguments + 2); },

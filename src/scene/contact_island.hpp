@@ -27,94 +27,15 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "scene/contact_law.hpp"
+#include "scene/contact_setup.hpp"
 
 namespace ricochet::detail {
-
-struct IslandBody {
-    std::uint32_t id = 0;        ///< the scene's; islands of the same bodies have the same bits
-                                 ///< whatever the ids
-    std::array<double, 2> at{};  ///< [m] centre
-    std::array<double, 2> velocity{};  ///< [m/s]
-    double mass = 1;                   ///< [kg]
-    double radius = 0;                 ///< [m]
-    double drag = 0;                   ///< [kg/s]
-    std::uint32_t material = 0;
-    std::uint32_t patience = 1;  ///< steps without contact after which it is handed back
-};
-
-/// How a wall moves: without turning.
-struct WallMotion {
-    std::function<std::array<double, 2>(double t)> displacement;  ///< [m]
-    /// Until when the wall stands still that does so at t; t where it moves.
-    std::function<double(double t)> still_until;
-};
-
-/// A line that bodies are on one side of, or a segment that is met from both, its ends included.
-struct IslandWall {
-    std::uint32_t id = 0;
-    bool is_segment = false;
-    std::array<double, 2> point{};   ///< [m] of the line, or where the segment begins
-    std::array<double, 2> normal{};  ///< of the line, of length 1
-    std::array<double, 2> end{};     ///< [m] of the segment
-    std::uint32_t material = 0;
-    const WallMotion* motion = nullptr;  ///< outlives the island
-};
-
-struct IslandSpring {
-    std::uint32_t first = 0, second = 0;  ///< ids of bodies
-    double rest = 0, stiffness = 0, damping = 0;
-};
-
-/// Where two materials meet.
-struct ContactCoefficients {
-    double restitution = 0;
-    double friction = 0;
-};
-
-struct IslandSetup {
-    std::vector<IslandBody> bodies{};
-    std::vector<IslandWall> walls{};
-    std::vector<IslandSpring> springs{};
-    std::array<double, 2> gravity{};
-    std::function<ContactCoefficients(std::uint32_t, std::uint32_t)> coefficients{};
-};
-
-struct IslandOptions {
-    double step = 1e-3;             ///< [s]
-    double tolerance = 1e-10;       ///< of the contact law, as a fraction
-    double sleep_speed = 0;         ///< [m/s] islands slower than this for `sleep_after` sleep
-    double sleep_after = 0.5;       ///< [s]
-    bool estimate_error = false;    ///< takes every step of `advance` by halves, too
-    double largest_overlap = 1e-6;  ///< of a start, as a fraction of the coordinates
-};
-
-/// A gap no larger than this fraction of the coordinates is closed.
-inline constexpr double closed_gap = 1e-12;
-
-enum class IslandOutcome {
-    reached,        ///< the time that was asked for
-    asleep,         ///< at rest until struck or woken: its time is the one asked for
-    released,       ///< nothing has been in contact for `patience` steps: to be handed back
-    impact,         ///< two of `arrivals` meet at a speed from which they would rebound
-    not_converged,  ///< the contact law was not solved, see `failure`
-    non_finite,
-};
-
-/// A contact of the last step.
-struct IslandContact {
-    std::uint32_t first = 0;  ///< id of the body that the normal pushes
-    bool with_wall = false;
-    std::uint32_t second = 0;  ///< id of the other body or wall
-    std::array<double, 2> normal{};
-    double gap = 0;                   ///< [m] where the step began
-    std::array<double, 2> impulse{};  ///< [N s] normal and tangential
-};
 
 struct IslandStatistics {
     std::uint64_t steps = 0;
@@ -141,15 +62,6 @@ struct StrikeReport {
     double energy_before = 0, energy_after = 0;  ///< [J] kinetic
 };
 
-/// Patience of a body that is handed over at `t` and was handed back at `released_at`: twice as
-/// long where that was within ten steps, so that nothing goes back and forth for long.
-[[nodiscard]] constexpr std::uint32_t next_patience(std::uint32_t patience, double released_at,
-                                                    double t, double step) noexcept
-{
-    const bool at_once = t - released_at < 10 * step;
-    return !at_once ? 1 : patience < (1U << 20) ? 2 * patience : patience;
-}
-
 class ContactIsland {
 public:
     /// Bodies and walls are put into an order that depends on where they are, not on ids. What lies
@@ -170,6 +82,8 @@ public:
         double length = 0;  ///< [s]
     };
     Plan plan(double until);
+    /// [s] Length of the step in hand, of which an arrival may cut a part off.
+    [[nodiscard]] double planned_step() const noexcept { return planned_; }
     /// The planned motion: at + s chord.
     [[nodiscard]] std::array<double, 2> chord(std::uint32_t id) const;
     /// Goes to s, no farther than the length of the plan.
@@ -258,6 +172,7 @@ private:
     IslandOptions options_;
     std::array<double, 2> gravity_{};
     std::function<ContactCoefficients(std::uint32_t, std::uint32_t)> coefficients_;
+    std::unordered_map<std::uint32_t, int> places_;  ///< of ids
     std::vector<IslandBody> bodies_;  ///< in order of place; their state is in q_ and v_
     std::vector<IslandWall> walls_;
     struct Link {

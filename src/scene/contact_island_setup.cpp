@@ -77,6 +77,9 @@ void ContactIsland::sort_members(IslandSetup setup)
     walls_ = std::move(setup.walls);
     std::ranges::stable_sort(bodies_, {}, [](const IslandBody& b) { return key(b); });
     std::ranges::stable_sort(walls_, {}, [](const IslandWall& w) { return key(w); });
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        places_.emplace(bodies_[i].id, static_cast<int>(i));
+    }
     for (const IslandSpring& s : setup.springs) {
         const auto [first, second] = std::minmax({place_of(s.first), place_of(s.second)});
         if (first == second) refuse(fmt::format("a spring joins body {} to itself", s.first));
@@ -110,9 +113,9 @@ ContactIsland::ContactIsland(IslandSetup setup, const IslandOptions& options, do
 
 int ContactIsland::place_of(std::uint32_t id) const
 {
-    const auto found = std::ranges::find(bodies_, id, &IslandBody::id);
-    if (found == bodies_.end()) refuse(fmt::format("there is no body {}", id));
-    return static_cast<int>(found - bodies_.begin());
+    const auto found = places_.find(id);
+    if (found == places_.end()) refuse(fmt::format("there is no body {}", id));
+    return found->second;
 }
 
 /// Of the coordinates, by which rounding is measured [m].

@@ -289,4 +289,41 @@ bool Islands::restart(std::uint32_t which, const Instant& t,
     return true;
 }
 
+void Islands::suspend(std::uint32_t which)
+{
+    for (const std::uint32_t i : islands_[which].members) world_.bodies[i].quartic = false;
+    seen_ = nullptr;
+}
+
+bool Islands::resume(std::uint32_t which, const Instant& t,
+                     const std::vector<std::array<Vector2, 2>>& states)
+{
+    Island& island = islands_[which];
+    for (std::size_t m = 0; m < states.size(); ++m) {
+        const auto& [p, v] = states[m];
+        const std::array<double, 4> x{p[0], p[1], v[0], v[1]};
+        std::ranges::copy(x, island.x.begin() + static_cast<std::ptrdiff_t>(4 * m));
+    }
+    std::ranges::fill(island.remainder, 0.0);
+    island.start = t;
+    seen_ = nullptr;
+    flow(island, island.x, island.rate);
+    if (!island.begun) island.next = first_step(island);
+    island.begun = true;
+    if (!attempt(which)) return false;
+    record(island);
+    return true;
+}
+
+std::vector<Islands::Join> Islands::springs(std::uint32_t which) const
+{
+    const Island& island = islands_[which];
+    std::vector<Join> springs;
+    for (const Link& link : island.links) {
+        springs.push_back({island.members[link.a], island.members[link.b], link.rest,
+                           link.stiffness, link.damping});
+    }
+    return springs;
+}
+
 }  // namespace ricochet::detail

@@ -1,7 +1,9 @@
 // Bodies joined by springs, or slowed by drag: each island advances by its own steps of dopri5.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "scene/world.hpp"
@@ -34,6 +36,20 @@ public:
     /// there, and its length is kept for the next one.
     bool restart(std::uint32_t island, const Instant& t,
                  const std::vector<std::pair<std::uint32_t, Vector2>>& velocities);
+
+    /// Its members advance otherwise from now on, as part of a group in lasting contact.
+    void suspend(std::uint32_t island);
+    /// An island that was suspended goes on from t with these positions and velocities, in the
+    /// order of its members.
+    bool resume(std::uint32_t island, const Instant& t,
+                const std::vector<std::array<Vector2, 2>>& states);
+
+    struct Join {
+        std::uint32_t a = 0, b = 0;  ///< bodies
+        double rest = 0, stiffness = 0, damping = 0;
+    };
+    /// Springs of an island.
+    [[nodiscard]] std::vector<Join> springs(std::uint32_t island) const;
 
 private:
     using State = std::vector<double>;

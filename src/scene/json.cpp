@@ -322,13 +322,14 @@ private:
 
     static void run(const Part& part, SceneOptions& options)
     {
-        part.only({"t_start", "t_end", "rtol", "atol", "impacts", "elastic_within", "sample_times",
-                   "max_events"});
+        part.only({"t_start", "t_end", "rtol", "atol", "impacts", "elastic_within", "contact_step",
+                   "sample_times", "max_events"});
         part.number("t_start", options.t_start);
         part.number("t_end", options.t_end);
         part.number("rtol", options.rtol);
         part.number("atol", options.atol);
         part.number("elastic_within", options.elastic_within);
+        part.number("contact_step", options.contact_step);
         if (part.has("max_events")) {
             const json& most = part.at("max_events");
             if (!most.is_number_unsigned()) part.expected("a whole number", "max_events", most);

@@ -100,6 +100,7 @@ Vector2 World::velocity(std::uint32_t i, const Instant& t) const
 {
     const Body& b = bodies[i];
     if (b.quartic) return islands->velocity(i, t);
+    if (b.contact != none) return drifts[i].v + seconds(b.t, t) * drifts[i].rate;
     return speed(b, seconds(b.t, t));
 }
 

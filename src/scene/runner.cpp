@@ -12,10 +12,12 @@ namespace ricochet::detail {
 Runner::Runner(World& world, double t_end)
     : world_(world),
       t_end_{t_end, 0},
-      calendar_(world.bodies.size() + world.islands->count()),
+      calendar_(world.bodies.size() + world.islands->count() +
+                (world.options.contacts ? world.bodies.size() : 0)),
       pending_(world.bodies.size()),
       slots_(world.bodies.size(), none),
       impacts_(world),
+      contacts_(world),
       series_(world.bodies.size())
 {
 }
@@ -116,7 +118,8 @@ GroupResult Runner::run(std::vector<std::uint32_t> bodies_of_group, Samples& sam
         if (before(now_, t)) now_ = t;
         const std::uint32_t who = calendar_.first();
         if (who >= bodies) {
-            step_island(who - bodies);
+            const auto groups = entry_of_group(0);
+            who < groups ? step_island(who - bodies) : step_group(who - groups);
         } else if (before(pending_[who].crossing, pending_[who].t)) {
             cross(who);
         } else {
@@ -185,6 +188,7 @@ void Runner::consider(std::uint32_t i, const Meeting& meeting, bool surface, std
 void Runner::consider_walls(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
+    if (body.contact != none) return;  // its group meets them
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) {
         const Face& wall = world_.faces[f];
         const double rate = dot(body.v, wall.normal);
@@ -203,7 +207,10 @@ void Runner::consider_walls(std::uint32_t i)
 void Runner::consider_bucket(std::uint32_t i, std::uint32_t bucket)
 {
     for (std::uint32_t j = cells_.head(bucket); j != none; j = world_.bodies[j].next) {
-        if (j != i) consider(i, meet(world_, i, j), false, j);
+        if (j == i) continue;
+        const std::uint32_t group = world_.bodies[i].contact;
+        if (group != none && group == world_.bodies[j].contact) continue;
+        consider(i, meet(world_, i, j), false, j);
     }
 }
 
@@ -211,6 +218,7 @@ void Runner::consider_faces(std::uint32_t i)
 {
     if (!cells_.any_faces()) return;
     for (const std::uint32_t f : cells_.faces(world_.bodies[i].bucket)) {
+        if (known_to_group(i, true, f)) continue;
         consider(i, meet_face(world_, i, f), true, f);
     }
 }
@@ -221,7 +229,9 @@ void Runner::predict(std::uint32_t i)
     pending.t = pending.crossing = no_instant;
     pending.kind = Pending::Kind::nothing;
     const Body& body = world_.bodies[i];
-    if (!body.asleep) {
+    if (body.asleep) {
+        if (celled_) offer(i);
+    } else {
         consider_own(i);
         consider_walls(i);
         if (celled_) {
@@ -237,6 +247,22 @@ void Runner::predict(std::uint32_t i)
         }
     }
     put_in_calendar(i);
+}
+
+/// A sleeper has no entry in the calendar: those that are awake around it may meet it now.
+void Runner::offer(std::uint32_t i)
+{
+    const auto& cell = pending_[i].cell;
+    for (int x = -1; x <= 1; ++x) {
+        for (int y = -1; y <= 1; ++y) {
+            std::uint32_t j = cells_.head(cells_.bucket_of(cell.x + x, cell.y + y));
+            for (; j != none; j = world_.bodies[j].next) {
+                if (j == i || world_.bodies[j].asleep) continue;
+                consider(j, meet(world_, j, i), false, i);
+                put_in_calendar(j);
+            }
+        }
+    }
 }
 
 void Runner::put_in_calendar(std::uint32_t i)
@@ -334,10 +360,9 @@ void Runner::happen(std::uint32_t i)
         case Kind::edge: return leave_edge(i);
         case Kind::face: return impact(i);
         case Kind::presses_face:
-            return fail(
-                Outcome::zeno, {i},
-                fmt::format("{} presses on {}: lasting contact there is not followed", called(i),
-                            world_.scene.name_of(SurfaceId{world_.faces[pending.other].surface})));
+            return press(i, fmt::format("{} presses on {}", called(i),
+                                        world_.scene.name_of(
+                                            SurfaceId{world_.faces[pending.other].surface})));
         case Kind::pair:
         case Kind::presses: break;
     }
@@ -347,9 +372,7 @@ void Runner::happen(std::uint32_t i)
     }
     if (pending.kind == Kind::pair) return impact(i);
     const auto [first, second] = std::minmax(i, pending.other);
-    fail(Outcome::zeno, {first, second},
-         fmt::format("{} and {} press on each other: lasting contact of bodies is not followed",
-                     called(first), called(second)));
+    press(i, fmt::format("{} and {} press on each other", called(first), called(second)));
 }
 
 }  // namespace ricochet::detail

@@ -8,6 +8,7 @@
 
 #include "scene/calendar.hpp"
 #include "scene/cells.hpp"
+#include "scene/contacts.hpp"
 #include "scene/impacts.hpp"
 #include "scene/islands.hpp"
 #include "scene/world.hpp"
@@ -62,6 +63,7 @@ private:
     void consider_bucket(std::uint32_t i, std::uint32_t bucket);
     void consider_faces(std::uint32_t i);
     void consider_own(std::uint32_t i);
+    void offer(std::uint32_t i);
     void predict_crossing(std::uint32_t i);
     void put_in_calendar(std::uint32_t i);
     void move_to_cell(std::uint32_t i);
@@ -69,6 +71,27 @@ private:
     void step_island(std::uint32_t island);
     void happen(std::uint32_t i);
     void impact(std::uint32_t i);
+    void resolve_cluster(std::uint32_t i);
+    void press(std::uint32_t i, const std::string& sentence);
+    void hand_over(const std::vector<std::uint32_t>& bodies, const std::string& sentence);
+    [[nodiscard]] std::vector<std::uint32_t> faces_near(
+        const std::vector<std::uint32_t>& members) const;
+    [[nodiscard]] std::vector<std::uint32_t> joining(double least, double most) const;
+    [[nodiscard]] bool across(const Contact& contact) const;
+    [[nodiscard]] bool known_to_group(std::uint32_t i, bool surface, std::uint32_t other) const;
+    void note_group(SceneEvent::Kind kind, std::uint32_t i);
+    void step_group(std::uint32_t group);
+    void plan_group(std::uint32_t group);
+    void arrive(std::uint32_t group);
+    void restart_group(std::uint32_t group);
+    bool divide(std::uint32_t group);
+    void release(std::uint32_t group);
+    void set_free(const std::vector<std::uint32_t>& bodies);
+    [[nodiscard]] bool may_leave(std::uint32_t group, std::uint32_t i) const;
+    [[nodiscard]] std::uint32_t entry_of_group(std::uint32_t group) const
+    {
+        return static_cast<std::uint32_t>(world_.bodies.size() + world_.islands->count()) + group;
+    }
     void gather(std::uint32_t i, const Pending& seed);
     void gather_faces(std::uint32_t slot, std::uint32_t sure);
     void gather_pairs(std::uint32_t slot, std::uint32_t sure);
@@ -100,9 +123,16 @@ private:
     std::vector<std::uint32_t> slots_;
     std::vector<std::uint32_t> islands_;
     Impacts impacts_;
+    Contacts contacts_;
+    struct Patience {
+        std::uint32_t steps = 1;
+        Instant released{-never, 0};
+    };
+    std::vector<Patience> patience_;  ///< of bodies, where there has been lasting contact
     Cluster cluster_;
     std::vector<std::uint32_t> changed_;
     std::vector<std::uint32_t> slots_of_islands_;
+    std::vector<std::uint32_t> groups_struck_;
     std::vector<std::pair<std::uint32_t, Vector2>> velocities_;
     struct Series {
         Instant since{};

@@ -16,6 +16,11 @@ constexpr std::uint32_t crowded = 64;
 
 /// Predicted impacts in a row that change nothing.
 constexpr std::uint32_t most_fruitless = 1000;
+/// The same, before the cluster is joined to a group in lasting contact.
+constexpr std::uint32_t fruitless_to_join = 8;
+
+/// Of the coordinates: gaps that the steps of groups in contact leave.
+constexpr double loose = 1e-10;
 
 }  // namespace
 
@@ -36,7 +41,8 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
     slot_of(i);
     for (std::uint32_t slot = 0; slot < cluster_.bodies.size(); ++slot) {
         const bool first = slot == 0;
-        const bool pair = seed.kind == Pending::Kind::pair;
+        const bool pair =
+            seed.kind == Pending::Kind::pair || seed.kind == Pending::Kind::presses;
         gather_faces(slot, first && !pair ? seed.other : none);
         if (celled_) gather_pairs(slot, first && pair ? seed.other : none);
     }
@@ -58,8 +64,9 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
             return;
         }
         const FaceGap at = face_gap(face, body, p, v);
-        const double tolerance = World::rounding(p, body.radius) + World::rounding(face.at, 0) +
-                                 2 * resolution(now_) * std::fabs(dot(v, at.normal));
+        double tolerance = World::rounding(p, body.radius) + World::rounding(face.at, 0) +
+                           2 * resolution(now_) * std::fabs(dot(v, at.normal));
+        if (known_to_group(i, true, f)) tolerance += loose * (body.radius + norm(p));
         if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) return;
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = at.normal;
@@ -118,8 +125,9 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     const Vector2 normal{apart[0] / distance, apart[1] / distance};
     const Vector2 va = cluster_.before[slot];
     const Vector2 vb = world_.velocity(j, now_);
-    const double tolerance = World::rounding(pa, reach) + World::rounding(pb, reach) +
-                             2 * resolution(now_) * std::fabs(dot(va - vb, normal));
+    double tolerance = World::rounding(pa, reach) + World::rounding(pb, reach) +
+                       2 * resolution(now_) * std::fabs(dot(va - vb, normal));
+    if (known_to_group(i, false, j)) tolerance += loose * (reach + norm(pa));
     if (!sure && !(distance - reach <= tolerance)) return;
     Contact contact{.a = i, .b = j, .surface = false, .slot_a = slot};
     contact.slot_b = slot_of(j);
@@ -143,6 +151,12 @@ bool Runner::collapses(std::uint32_t i)
 void Runner::impact(std::uint32_t i)
 {
     gather(i, pending_[i]);
+    resolve_cluster(i);
+}
+
+/// The impacts of the cluster that was gathered around i.
+void Runner::resolve_cluster(std::uint32_t i)
+{
     const double within = world_.options.elastic_within;
     if (within > 0) {
         for (Contact& contact : cluster_.contacts) {
@@ -155,6 +169,9 @@ void Runner::impact(std::uint32_t i)
             }
         }
     }
+    // Whose flight to and fro would be shorter than a step of the group that is struck joins it.
+    const double slow = 0.5 * norm(world_.gravity) * world_.options.contact_step;
+    if (const auto bodies = joining(0, slow); !bodies.empty()) return hand_over(bodies, "");
     bool spend = false;
     if (within == 0) {
         for (const std::uint32_t body : cluster_.bodies) spend = collapses(body) || spend;
@@ -168,7 +185,15 @@ void Runner::impact(std::uint32_t i)
     apply();
     if (changed_.empty()) {
         ++world_.statistics.stale;
-        if (++fruitless_ > most_fruitless) {
+        if (const auto bodies = joining(-never, never); !bodies.empty()) {
+            return hand_over(bodies, "");
+        }
+        ++fruitless_;
+        if (contacts_.available() && fruitless_ > fruitless_to_join) {
+            fruitless_ = 0;
+            return hand_over(std::vector(cluster_.bodies), "");
+        }
+        if (fruitless_ > most_fruitless) {
             return fail(Outcome::endless_cascade, {i},
                         fmt::format("impacts of {} repeat without effect", called(i)));
         }
@@ -187,6 +212,7 @@ void Runner::apply()
     changed_.clear();
     std::vector<std::uint32_t>& islands = slots_of_islands_;
     islands.clear();
+    groups_struck_.clear();
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         if (cluster_.after[k] == cluster_.before[k]) continue;
         const std::uint32_t i = cluster_.bodies[k];
@@ -196,6 +222,12 @@ void Runner::apply()
         if (!is_finite(cluster_.after[k])) {
             return fail(Outcome::non_finite, {i},
                         fmt::format("the velocity of {} is not finite", called(i)));
+        }
+        if (body.contact != none) {
+            if (std::ranges::find(groups_struck_, body.contact) == groups_struck_.end()) {
+                groups_struck_.push_back(body.contact);
+            }
+            continue;
         }
         if (body.island != none) {
             if (std::ranges::find(islands, body.island) == islands.end()) {
@@ -215,9 +247,10 @@ void Runner::apply()
         if (on_surface) settle(i, held);
     }
     for (const std::uint32_t island : islands) restart_island(island);
+    for (const std::uint32_t group : groups_struck_) restart_group(group);
     if (result_.failure) return;
     for (const std::uint32_t i : changed_) {
-        if (world_.bodies[i].island != none) continue;
+        if (world_.bodies[i].island != none || world_.bodies[i].contact != none) continue;
         if (members_.size() == 1) bounce(i);
         predict(i);
     }
@@ -289,7 +322,8 @@ void Runner::restart_island(std::uint32_t island)
     velocities_.clear();
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         const std::uint32_t i = cluster_.bodies[k];
-        if (world_.bodies[i].island == island) velocities_.emplace_back(i, cluster_.after[k]);
+        const Body& body = world_.bodies[i];
+        if (body.island == island && body.contact == none) velocities_.emplace_back(i, cluster_.after[k]);
     }
     Islands& islands = *world_.islands;
     const bool taken = islands.restart(island, now_, velocities_);

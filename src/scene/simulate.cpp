@@ -26,6 +26,7 @@ void validate(const SceneOptions& o)
     require_positive(who, "rtol", o.rtol);
     require_positive(who, "atol", o.atol);
     require_not_negative(who, "elastic_within", o.elastic_within);
+    require_positive(who, "contact_step", o.contact_step);
     require(o.max_events > 0, who, "max_events", "be positive", 0);
     double last = o.t_start;
     for (const double t : o.sample_times) {

@@ -50,6 +50,7 @@ struct alignas(64) Body {
     std::uint32_t material = 0;
     std::uint32_t island = none;  ///< of those that advance by steps
     std::uint32_t held = none;    ///< face on which it slides
+    std::uint32_t contact = none;  ///< group in lasting contact: a is 0, v the step's chord
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4
 };
@@ -89,6 +90,10 @@ struct World {
     std::vector<Face> faces;  ///< walls first
     std::uint32_t wall_count = 0;
     std::unique_ptr<Islands> islands;
+    struct Drift {
+        Vector2 v{}, rate{};  ///< where the step of its group began
+    };
+    std::vector<Drift> drifts;  ///< of bodies in lasting contact, where there have been any
     SceneStatistics statistics;
 
     /// By its record; by the method's own map where it advances by steps.

@@ -199,7 +199,8 @@ TEST(Scene, LastingContactOfDiscsEndsTheRunAndNamesThem)
     EXPECT_EQ(run.outcome, Outcome::zeno);
     EXPECT_EQ(run.involved, (std::vector<std::uint32_t>{0, 1}));
     EXPECT_EQ(run.message,
-              "lower and upper press on each other: lasting contact of bodies is not followed");
+              "lower and upper press on each other: lasting contact is not followed without "
+              "SceneOptions::contacts");
     EXPECT_EQ(run.t, 0);
 }
 

@@ -20,6 +20,9 @@ enum class ImpactLaw {
     together,  ///< Newton's law for all contacts at once
 };
 
+/// Maker of groups of bodies in lasting contact (scene/contact.hpp).
+class SceneContacts;
+
 /// Options of a run of a scene.
 struct SceneOptions {
     double t_start = 0;                                       ///< [s]
@@ -32,6 +35,11 @@ struct SceneOptions {
     /// last one less than this ago (S. Luding and S. McNamara, How to handle the inelastic collapse
     /// of a dissipative hard-sphere gas with the TC model, Granular Matter 1, 1998).
     double elastic_within = 0;
+
+    /// `scene_contacts()` of `ricochet::scene_contact`. Without it a run ends with `Outcome::zeno`
+    /// where bodies stay in contact with each other.
+    const SceneContacts* contacts = nullptr;
+    double contact_step = 1e-3;  ///< [s] of groups in lasting contact, whose order is 1
 
     bool record_events = true;           ///< off: events are counted, not kept
     std::vector<double> sample_times{};  ///< [s] ascending; they change no bit of the motion
@@ -46,7 +54,7 @@ struct Partner {
     friend bool operator==(const Partner&, const Partner&) = default;
 };
 
-/// One contact that was struck, or one body that came to rest on a surface. Contacts of one
+/// One contact that was struck, or what became of one body in contact. Contacts of one
 /// cluster have the same `number` and time, and stand in the order of their waves.
 struct SceneEvent {
     /// Kinds of events.
@@ -54,6 +62,9 @@ struct SceneEvent {
         impact,
         held,     ///< impacts on the surface have accumulated: it slides on it, or is at rest
         stopped,  ///< friction has stopped what slid
+        joined,   ///< lasting contact: it goes on by steps, in a group; `other` is the body itself
+        released,  ///< it has left its group, or its group contact
+        slept,     ///< its group has come to rest
     };
     double t = 0;  ///< [s]
     std::uint64_t number = 0;
@@ -84,6 +95,8 @@ struct SceneStatistics {
     std::uint64_t steps = 0;        ///< of islands with springs or drag
     std::uint64_t rejected = 0;
     std::uint64_t flow_calls = 0;
+    std::uint64_t joins = 0;          ///< hand-overs of bodies to groups in lasting contact
+    std::uint64_t contact_steps = 0;  ///< of such groups
     std::uint64_t alone = 0;   ///< bodies that could meet none, and had no calendar
     std::uint64_t groups = 0;  ///< of bodies that could meet
 };

@@ -1,0 +1,16 @@
+// Lasting contact of the bodies of a scene: stacks, sleepers that lean on each other, chains over
+// an edge. It needs the contact solver, and is a library of its own, `ricochet::scene_contact`.
+#pragma once
+
+#include "ricochet/scene/simulate.hpp"
+
+namespace ricochet {
+
+/// Groups of bodies in lasting contact advance by Moreau's steps of `SceneOptions::contact_step`:
+///
+///     simulate(scene, {.t_end = 10, .contacts = scene_contacts()})
+///
+/// Never null; valid as long as the program runs.
+[[nodiscard]] const SceneContacts* scene_contacts() noexcept;
+
+}  // namespace ricochet

@@ -1,0 +1,42 @@
+// `simulate` and `explain` of a scene in a file.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "../report.hpp"
+#include "ricochet/scene/json.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace ricochet::app {
+
+/// What was typed after `simulate` or `explain`. What is absent is as the file says.
+struct SceneRequest {
+    std::string file;
+    std::optional<double> t_start{}, t_end{}, rtol{}, atol{}, contact_step{};
+    std::optional<std::uint64_t> max_events{};
+    std::optional<std::size_t> samples{};
+    bool json = false;
+    std::optional<std::string> csv{}, plot{}, animate{};
+};
+
+/// The scene of the request, its options set.
+/// @throws BadInput for a file or an option that is not as it must be
+[[nodiscard]] SceneFile requested_scene(const SceneRequest& request);
+
+/// @return the exit status
+int simulate_scene(const SceneRequest& request);
+int explain_scene(const SceneRequest& request);
+
+[[nodiscard]] std::string scene_text(const SceneFile& file, const SceneRun& run);
+/// @param samples  whether the sampled states are part of it
+[[nodiscard]] std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples);
+/// A line for each body at each sample.
+[[nodiscard]] std::string scene_csv(const SceneFile& file, const SceneRun& run);
+
+}  // namespace ricochet::app

@@ -1,0 +1,240 @@
+#include "scene_pictures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <string_view>
+#include <vector>
+
+#include "../plot.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+constexpr double longest_side = 900;  ///< [px]
+
+struct Frame {
+    Vector2 low{}, high{};
+    [[nodiscard]] double width() const { return high[0] - low[0]; }
+    [[nodiscard]] double height() const { return high[1] - low[1]; }
+};
+
+/// Around all that is seen of bodies and terrain, with a margin.
+Frame frame_of(const SceneFile& file, const SceneRun& run)
+{
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    Frame frame{{infinite, infinite}, {-infinite, -infinite}};
+    const auto include = [&](const Vector2& p, double radius) {
+        for (std::size_t c = 0; c < 2; ++c) {
+            frame.low[c] = std::min(frame.low[c], p[c] - radius);
+            frame.high[c] = std::max(frame.high[c], p[c] + radius);
+        }
+    };
+    const auto bodies = file.scene.bodies();
+    const auto include_all = [&](const std::vector<BodyState>& states) {
+        for (std::size_t i = 0; i < states.size(); ++i) include(states[i].at, bodies[i].radius);
+    };
+    for (const auto& states : run.samples) include_all(states);
+    include_all(run.bodies);
+    for (const Scene::Surface& surface : file.scene.surfaces()) {
+        if (surface.is_wall) continue;
+        for (const Vector2& p : surface.points) include(p, 0);
+    }
+    if (!(frame.low[0] <= frame.high[0])) frame = {{-1, -1}, {1, 1}};
+    const double margin = 0.04 * std::max({frame.width(), frame.height(), 1e-9});
+    for (std::size_t c = 0; c < 2; ++c) {
+        frame.low[c] -= margin;
+        frame.high[c] += margin;
+    }
+    return frame;
+}
+
+/// A surface as a chain of points; of a wall what the frame shows of it.
+std::vector<Vector2> line_of(const Scene::Surface& surface, const Frame& frame)
+{
+    if (!surface.is_wall) return surface.points;
+    const Vector2 along{-surface.normal[1], surface.normal[0]};
+    const Vector2& from = surface.points[0];
+    double first = -std::numeric_limits<double>::infinity();
+    double last = std::numeric_limits<double>::infinity();
+    for (std::size_t c = 0; c < 2; ++c) {
+        if (along[c] == 0) {
+            if (from[c] < frame.low[c] || from[c] > frame.high[c]) return {};
+            continue;
+        }
+        const auto [low, high] = std::minmax(
+            {(frame.low[c] - from[c]) / along[c], (frame.high[c] - from[c]) / along[c]});
+        first = std::max(first, low);
+        last = std::min(last, high);
+    }
+    if (!(first < last)) return {};
+    return {{from[0] + first * along[0], from[1] + first * along[1]},
+            {from[0] + last * along[0], from[1] + last * along[1]}};
+}
+
+/// Where a body was struck, between the samples around that time.
+std::string struck(const SceneRun& run)
+{
+    std::string out;
+    for (const SceneEvent& event : run.events) {
+        if (event.kind != SceneEvent::Kind::impact) continue;
+        const auto next =
+            std::ranges::upper_bound(run.sample_times, event.t) - run.sample_times.begin();
+        const auto k = static_cast<std::size_t>(next);
+        if (k == 0 || k >= run.sample_times.size()) continue;
+        const double part = (event.t - run.sample_times[k - 1]) /
+                            (run.sample_times[k] - run.sample_times[k - 1]);
+        const Vector2& a = run.samples[k - 1][event.body].at;
+        const Vector2& b = run.samples[k][event.body].at;
+        out += fmt::format("{:.6g} {:.6g}\n", a[0] + part * (b[0] - a[0]),
+                           a[1] + part * (b[1] - a[1]));
+    }
+    return out;
+}
+
+/// Positions of one body in pixels, and the samples at which they cannot be told from others.
+struct Track {
+    std::vector<std::array<double, 2>> at;
+    std::vector<std::size_t> kept;
+};
+
+/// Keeps what lies more than half a pixel from the straight motion between what is kept.
+void keep_between(Track& track, const std::vector<double>& times, std::size_t first,
+                  std::size_t last)
+{
+    std::size_t worst = first;
+    double largest = 0.5;
+    for (std::size_t k = first + 1; k < last; ++k) {
+        const double part = (times[k] - times[first]) / (times[last] - times[first]);
+        double apart = 0;
+        for (std::size_t c = 0; c < 2; ++c) {
+            const double line = track.at[first][c] + part * (track.at[last][c] - track.at[first][c]);
+            apart = std::max(apart, std::fabs(track.at[k][c] - line));
+        }
+        if (apart > largest) {
+            largest = apart;
+            worst = k;
+        }
+    }
+    if (worst == first) {
+        track.kept.push_back(last);
+        return;
+    }
+    keep_between(track, times, first, worst);
+    keep_between(track, times, worst, last);
+}
+
+void animate(fmt::memory_buffer& out, std::string_view attribute, const Track& track,
+             std::size_t coordinate, const std::vector<double>& times)
+{
+    const auto to = std::back_inserter(out);
+    const double start = times.front();
+    const double length = times.back() - start;
+    fmt::format_to(to, "<animate attributeName=\"{}\" dur=\"{:.4g}s\" repeatCount=\"indefinite\" keyTimes=\"",
+                   attribute, length);
+    for (const std::size_t k : track.kept) {
+        const bool last = k + 1 == times.size();
+        fmt::format_to(to, "{}{:.5g}", k == 0 ? "" : ";", last ? 1 : (times[k] - start) / length);
+    }
+    fmt::format_to(to, "\" values=\"");
+    for (const std::size_t k : track.kept) {
+        fmt::format_to(to, "{}{:.1f}", k == 0 ? "" : ";", track.at[k][coordinate]);
+    }
+    fmt::format_to(to, "\"/>");
+}
+
+}  // namespace
+
+void plot_scene(const SceneFile& file, const SceneRun& run, const std::filesystem::path& picture)
+{
+    const Frame frame = frame_of(file, run);
+    std::string ways;
+    std::string discs;
+    std::string surfaces;
+    const auto bodies = file.scene.bodies();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        for (const auto& states : run.samples) {
+            ways += fmt::format("{:.6g} {:.6g}\n", states[i].at[0], states[i].at[1]);
+        }
+        ways += '\n';
+        const double shown = std::max(bodies[i].radius, 0.004 * frame.width());
+        discs += fmt::format("{:.6g} {:.6g} {:.6g}\n", run.bodies[i].at[0], run.bodies[i].at[1],
+                             shown);
+    }
+    for (const Scene::Surface& surface : file.scene.surfaces()) {
+        for (const Vector2& p : line_of(surface, frame)) {
+            surfaces += fmt::format("{:.6g} {:.6g}\n", p[0], p[1]);
+        }
+        surfaces += '\n';
+    }
+    const double scale = longest_side / std::max(frame.width(), frame.height());
+    std::string script = plot_head(picture, static_cast<int>(180 + scale * frame.width()),
+                                   static_cast<int>(140 + scale * frame.height()));
+    script += fmt::format(
+        "set size ratio -1\nset xrange [{}:{}]\nset yrange [{}:{}]\n"
+        "set xlabel 'x [m]'\nset ylabel 'y [m]'\nset key off\n"
+        "set style fill transparent solid 0.35 border rgb '#404040'\n",
+        frame.low[0], frame.high[0], frame.low[1], frame.high[1]);
+    const std::string marks = struck(run);
+    script += "plot 'ways' with lines linecolor rgb '#8fb8d6' linewidth 1";
+    if (!discs.empty()) script += ", 'discs' with circles linecolor rgb '#0072b2'";
+    if (surfaces.find_first_not_of('\n') != std::string::npos) {
+        script += ", 'surfaces' with lines linecolor rgb '#404040' linewidth 3";
+    }
+    if (!marks.empty()) script += ", 'struck' with points linestyle 12 pointsize 0.3";
+    draw({{"ways", ways}, {"discs", discs}, {"surfaces", surfaces}, {"struck", marks}},
+         script + "\n", picture);
+}
+
+std::string animated_scene(const SceneFile& file, const SceneRun& run)
+{
+    const Frame frame = frame_of(file, run);
+    const double scale = longest_side / std::max(frame.width(), frame.height());
+    const auto pixel = [&](const Vector2& p) {
+        return std::array{scale * (p[0] - frame.low[0]), scale * (frame.high[1] - p[1])};
+    };
+    fmt::memory_buffer out;
+    const auto to = std::back_inserter(out);
+    fmt::format_to(to,
+                   "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\">\n"
+                   "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+                   "<g fill=\"none\" stroke=\"#404040\" stroke-width=\"3\">\n",
+                   scale * frame.width(), scale * frame.height());
+    for (const Scene::Surface& surface : file.scene.surfaces()) {
+        const auto points = line_of(surface, frame);
+        if (points.empty()) continue;
+        fmt::format_to(to, "<polyline points=\"");
+        for (const Vector2& p : points) {
+            fmt::format_to(to, "{:.1f},{:.1f} ", pixel(p)[0], pixel(p)[1]);
+        }
+        fmt::format_to(to, "\"/>\n");
+    }
+    fmt::format_to(to, "</g>\n<g stroke=\"#404040\" fill-opacity=\"0.7\">\n");
+    constexpr std::array colours{"#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"};
+    for (std::size_t i = 0; i < run.bodies.size(); ++i) {
+        Track track;
+        for (const auto& states : run.samples) track.at.push_back(pixel(states[i].at));
+        if (track.at.empty()) track.at.push_back(pixel(run.bodies[i].at));
+        track.kept.push_back(0);
+        if (track.at.size() > 1) keep_between(track, run.sample_times, 0, track.at.size() - 1);
+        fmt::format_to(to, "<circle r=\"{:.1f}\" cx=\"{:.1f}\" cy=\"{:.1f}\" fill=\"{}\"",
+                       std::max(2.0, scale * file.scene.bodies()[i].radius), track.at[0][0],
+                       track.at[0][1], colours[i % colours.size()]);
+        const auto& from = track.at.front();
+        const bool still = track.kept.size() <= 2 && from == track.at.back();
+        fmt::format_to(to, "{}", still ? "/>\n" : ">");
+        if (still) continue;
+        animate(out, "cx", track, 0, run.sample_times);
+        animate(out, "cy", track, 1, run.sample_times);
+        fmt::format_to(to, "</circle>\n");
+    }
+    fmt::format_to(to, "</g>\n</svg>\n");
+    return fmt::to_string(out);
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,154 @@
+// What a run of a scene came to: as text, JSON and comma-separated values.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+#include <string_view>
+
+#include "../json_text.hpp"
+#include "scene_command.hpp"
+
+namespace ricochet::app {
+
+namespace {
+
+constexpr std::size_t most_lines = 40;
+
+std::string_view name(SceneEvent::Kind kind)
+{
+    switch (kind) {
+        case SceneEvent::Kind::impact: return "impact";
+        case SceneEvent::Kind::held: return "held";
+        case SceneEvent::Kind::stopped: return "stopped";
+        case SceneEvent::Kind::joined: return "joined";
+        case SceneEvent::Kind::released: return "released";
+        case SceneEvent::Kind::slept: return "slept";
+    }
+    return "";
+}
+
+bool has_other(const SceneEvent& event)
+{
+    return event.other.is_surface || event.other.index != event.body;
+}
+
+std::string other_of(const Scene& scene, const SceneEvent& event)
+{
+    if (!has_other(event)) return "";
+    return event.other.is_surface ? scene.name_of(SurfaceId{event.other.index})
+                                  : scene.name_of(BodyId{event.other.index});
+}
+
+Json state_of(const Scene& scene, std::uint32_t i, const BodyState& state)
+{
+    return {{"name", scene.name_of(BodyId{i})},
+            {"at", state.at},
+            {"velocity", state.velocity},
+            {"asleep", state.asleep}};
+}
+
+Json states_of(const Scene& scene, const std::vector<BodyState>& states)
+{
+    Json all = Json::array();
+    for (std::uint32_t i = 0; i < states.size(); ++i) all.push_back(state_of(scene, i, states[i]));
+    return all;
+}
+
+Json event_of(const Scene& scene, const SceneEvent& event)
+{
+    Json out{{"t", event.t},
+             {"number", event.number},
+             {"kind", name(event.kind)},
+             {"body", scene.name_of(BodyId{event.body})}};
+    if (!has_other(event)) return out;
+    out["other"] = other_of(scene, event);
+    out["impulse"] = event.impulse;
+    out["before"] = event.before[0];
+    out["after"] = event.after[0];
+    if (!event.other.is_surface) {
+        out["other_before"] = event.before[1];
+        out["other_after"] = event.after[1];
+    }
+    return out;
+}
+
+}  // namespace
+
+std::string scene_text(const SceneFile& file, const SceneRun& run)
+{
+    fmt::memory_buffer out;
+    const auto to = std::back_inserter(out);
+    const std::size_t lines = std::min(run.events.size(), most_lines);
+    for (std::size_t k = 0; k < lines; ++k) {
+        const SceneEvent& event = run.events[k];
+        const std::string other = other_of(file.scene, event);
+        fmt::format_to(to, "{:<22} {:<9} {}{}{}\n", event.t, name(event.kind),
+                       file.scene.name_of(BodyId{event.body}), other.empty() ? "" : ", ", other);
+    }
+    if (run.events.size() > lines) {
+        fmt::format_to(to, "and {} more; --json has all\n", run.events.size() - lines);
+    }
+    const auto asleep = std::ranges::count_if(run.bodies, &BodyState::asleep);
+    const SceneStatistics& s = run.statistics;
+    fmt::format_to(to, "{} at t = {} s{}{}\n", ricochet::name(run.outcome), run.t,
+                   run.message.empty() ? "" : ": ", run.message);
+    fmt::format_to(to, "asleep      {} of {} bodies\n", asleep, run.bodies.size());
+    fmt::format_to(to, "events      {}, {} contacts struck, {} collapses\n", s.events, s.impacts,
+                   s.collapses);
+    fmt::format_to(to, "steps       {} of springs and drag, {} of lasting contact\n", s.steps,
+                   s.contact_steps);
+    fmt::format_to(to, "energy      {} J\n", energy(file.scene, run.bodies));
+    return fmt::to_string(out);
+}
+
+std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples)
+{
+    const Scene& scene = file.scene;
+    Json out{{"outcome", ricochet::name(run.outcome)}, {"message", run.message}, {"t", run.t}};
+    if (run.outcome == Outcome::cancelled) out["incomplete"] = true;
+    out["involved"] = Json::array();
+    for (const std::uint32_t i : run.involved) out["involved"].push_back(scene.name_of(BodyId{i}));
+    out["energy"] = energy(scene, run.bodies);
+    out["bodies"] = states_of(scene, run.bodies);
+    out["events"] = Json::array();
+    for (const SceneEvent& event : run.events) out["events"].push_back(event_of(scene, event));
+    if (samples) {
+        out["samples"] = Json::array();
+        for (std::size_t k = 0; k < run.samples.size(); ++k) {
+            out["samples"].push_back(
+                {{"t", run.sample_times[k]}, {"bodies", states_of(scene, run.samples[k])}});
+        }
+    }
+    const SceneStatistics& s = run.statistics;
+    out["statistics"] = {{"events", s.events},
+                         {"impacts", s.impacts},
+                         {"waves", s.waves},
+                         {"collapses", s.collapses},
+                         {"predictions", s.predictions},
+                         {"steps", s.steps},
+                         {"contact_steps", s.contact_steps},
+                         {"joins", s.joins},
+                         {"alone", s.alone},
+                         {"groups", s.groups}};
+    return json_text(out);
+}
+
+std::string scene_csv(const SceneFile& file, const SceneRun& run)
+{
+    fmt::memory_buffer out;
+    const auto to = std::back_inserter(out);
+    fmt::format_to(to, "t,body,x,y,vx,vy,asleep\n");
+    for (std::size_t k = 0; k < run.samples.size(); ++k) {
+        for (std::uint32_t i = 0; i < run.samples[k].size(); ++i) {
+            const BodyState& b = run.samples[k][i];
+            fmt::format_to(to, "{},{},{},{},{},{},{}\n", run.sample_times[k],
+                           file.scene.name_of(BodyId{i}), b.at[0], b.at[1], b.velocity[0],
+                           b.velocity[1], static_cast<int>(b.asleep));
+        }
+    }
+    if (run.outcome == Outcome::cancelled) fmt::format_to(to, "{}", incomplete_line());
+    return fmt::to_string(out);
+}
+
+}  // namespace ricochet::app

@@ -1,0 +1,64 @@
+// Groups in lasting contact for the loop of a scene.
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "ricochet/scene/contact.hpp"
+#include "scene/contact_island.hpp"
+#include "scene/lasting.hpp"
+
+namespace ricochet {
+
+namespace {
+
+using namespace detail;
+
+class Group final : public LastingContact {
+public:
+    Group(IslandSetup setup, const IslandOptions& options) : island_(std::move(setup), options, 0)
+    {
+    }
+
+    Plan plan(double longest) override
+    {
+        const auto [outcome, length] = island_.plan(island_.t() + longest);
+        return {outcome, length, island_.planned_step()};
+    }
+    void commit(double s) override { island_.commit(s); }
+    std::array<double, 2> chord(std::uint32_t id) const override { return island_.chord(id); }
+    IslandBody body(std::uint32_t id) const override { return island_.body(id); }
+    void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity) override
+    {
+        island_.set_velocity(id, velocity);
+    }
+    std::vector<std::vector<std::uint32_t>> groups() const override { return island_.groups(); }
+    std::vector<IslandContact> contacts() const override { return island_.contacts(); }
+    std::vector<IslandContact> arrivals() const override { return island_.arrivals(); }
+    std::string failure() const override
+    {
+        return fmt::format("the contact law was left with a residual of {:.3g}",
+                           island_.failure().residual);
+    }
+
+private:
+    ContactIsland island_;
+};
+
+class Maker final : public SceneContacts {
+public:
+    std::unique_ptr<LastingContact> make(IslandSetup setup,
+                                         const IslandOptions& options) const override
+    {
+        return std::make_unique<Group>(std::move(setup), options);
+    }
+};
+
+}  // namespace
+
+const SceneContacts* scene_contacts() noexcept
+{
+    static const Maker maker;
+    return &maker;
+}
+
+}  // namespace ricochet

@@ -1,0 +1,187 @@
+#include "scene/contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/islands.hpp"
+
+namespace ricochet::detail {
+
+std::vector<std::uint32_t> Contacts::closure(const std::vector<std::uint32_t>& bodies) const
+{
+    std::vector<std::uint32_t> all;
+    const auto add = [&](const std::vector<std::uint32_t>& some) {
+        all.insert(all.end(), some.begin(), some.end());
+    };
+    for (const std::uint32_t i : bodies) {
+        const Body& body = world_.bodies[i];
+        // Those that springs join are in one group.
+        if (body.contact != none) {
+            add(groups_[body.contact]->members);
+        } else if (body.island != none) {
+            add(world_.islands->members(body.island));
+        } else {
+            all.push_back(i);
+        }
+    }
+    std::ranges::sort(all);
+    const auto repeated = std::ranges::unique(all);
+    all.erase(repeated.begin(), repeated.end());
+    return all;
+}
+
+/// Bodies where their records are now.
+IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
+                               const std::vector<std::uint32_t>& faces) const
+{
+    IslandSetup setup{.gravity = world_.gravity};
+    std::vector<std::uint32_t> islands;
+    for (const std::uint32_t i : members) {
+        const Body& body = world_.bodies[i];
+        const Disc& disc = world_.scene.bodies()[i];
+        setup.bodies.push_back({.id = i,
+                                .at = body.p,
+                                .velocity = world_.drifts[i].v,
+                                .mass = disc.mass,
+                                .radius = disc.radius,
+                                .drag = disc.drag,
+                                .material = body.material});
+        if (body.island != none) islands.push_back(body.island);
+    }
+    std::ranges::sort(islands);
+    const auto repeated = std::ranges::unique(islands);
+    islands.erase(repeated.begin(), repeated.end());
+    for (const std::uint32_t island : islands) {
+        for (const auto& [a, b, rest, stiffness, damping] : world_.islands->springs(island)) {
+            setup.springs.push_back({a, b, rest, stiffness, damping});
+        }
+    }
+    for (const std::uint32_t f : faces) {
+        const Face& face = world_.faces[f];
+        if (face.kind == Face::Kind::vertex) continue;  // segments have their ends
+        IslandWall wall{.id = f, .point = face.at, .normal = face.normal};
+        wall.material = face.material;
+        if (face.kind == Face::Kind::segment) {
+            wall.is_segment = true;
+            wall.end = face.at - face.length * turned(face.normal);
+        }
+        setup.walls.push_back(wall);
+    }
+    setup.coefficients = [this](std::uint32_t a, std::uint32_t b) {
+        return ContactCoefficients{world_.restitution(a, b), world_.friction(a, b)};
+    };
+    return setup;
+}
+
+std::uint32_t Contacts::join(std::vector<std::uint32_t> members, std::vector<std::uint32_t> faces,
+                             const std::vector<std::uint32_t>& patience, const Instant& now)
+{
+    world_.drifts.resize(world_.bodies.size());
+    std::vector<std::array<Vector2, 2>> states;
+    for (const std::uint32_t i : members) {
+        const std::uint32_t group = world_.bodies[i].contact;
+        if (group != none) commit(group, now);
+        states.push_back({world_.position(i, now), world_.velocity(i, now)});
+    }
+    for (std::size_t k = 0; k < members.size(); ++k) {
+        const std::uint32_t i = members[k];
+        Body& body = world_.bodies[i];
+        if (body.contact != none) groups_[std::exchange(body.contact, none)].reset();
+        if (body.quartic) world_.islands->suspend(body.island);
+        body.p = states[k][0];
+        body.v = body.a = {};
+        body.t = now;
+        body.held = none;
+        body.asleep = false;
+        ++body.version;
+        world_.drifts[i] = {states[k][1], {}};
+    }
+    IslandSetup setup = setup_of(members, faces);
+    for (std::size_t k = 0; k < members.size(); ++k) setup.bodies[k].patience = patience[k];
+    auto group = std::make_unique<Group>();
+    group->motion =
+        world_.options.contacts->make(std::move(setup), {.step = world_.options.contact_step});
+    group->members = std::move(members);
+    group->faces = std::move(faces);
+    group->start = group->end = now;
+    const auto free = std::ranges::find_if(groups_, [](const auto& g) { return !g; });
+    const auto number = static_cast<std::uint32_t>(free - groups_.begin());
+    for (const std::uint32_t i : group->members) world_.bodies[i].contact = number;
+    if (free == groups_.end()) {
+        groups_.push_back(std::move(group));
+    } else {
+        *free = std::move(group);
+    }
+    ++world_.statistics.joins;
+    return number;
+}
+
+IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Instant& t_end)
+{
+    Group& group = *groups_[which];
+    const double left = seconds(now, t_end);
+    const auto [outcome, length, step] =
+        group.motion->plan(std::min(world_.options.contact_step, left));
+    group.outcome = outcome;
+    group.length = length;
+    group.planned = true;
+    group.start = now;
+    group.end = length == left ? t_end : now.after(length);
+    const bool asleep = outcome == IslandOutcome::asleep;
+    const bool moves =
+        step > 0 && (outcome == IslandOutcome::reached || outcome == IslandOutcome::impact);
+    for (const std::uint32_t i : group.members) {
+        const IslandBody state = group.motion->body(i);
+        Body& body = world_.bodies[i];
+        body.p = state.at;
+        body.v = moves ? group.motion->chord(i) : Vector2{};
+        body.a = {};
+        body.t = now;
+        body.asleep = asleep;
+        ++body.version;
+        const Vector2 v = state.velocity;
+        world_.drifts[i] = {v, moves ? (1 / step) * (body.v - v) : Vector2{}};
+    }
+    return outcome;
+}
+
+void Contacts::commit(std::uint32_t which, const Instant& now)
+{
+    Group& group = *groups_[which];
+    if (!std::exchange(group.planned, false)) return;
+    const bool asleep = group.outcome == IslandOutcome::asleep;
+    const bool whole = group.end.value == now.value && group.end.remainder == now.remainder;
+    const double s = whole ? group.length : seconds(group.start, now);
+    if (!asleep) group.motion->commit(s);
+    world_.statistics.contact_steps += !asleep && s > 0;
+    group.start = group.end = now;
+    for (const std::uint32_t i : group.members) {
+        const IslandBody state = group.motion->body(i);
+        Body& body = world_.bodies[i];
+        body.p = state.at;
+        body.v = {};
+        body.t = now;
+        world_.drifts[i] = {state.velocity, {}};
+    }
+}
+
+void Contacts::dissolve(std::uint32_t which, const Instant& now)
+{
+    commit(which, now);
+    for (const std::uint32_t i : groups_[which]->members) {
+        Body& body = world_.bodies[i];
+        body.v = world_.drifts[i].v;
+        body.a = world_.gravity;
+        body.asleep = false;
+        body.contact = none;
+        ++body.version;
+    }
+    groups_[which].reset();
+}
+
+bool Contacts::knows(std::uint32_t group, std::uint32_t face) const
+{
+    return std::ranges::binary_search(groups_[group]->faces, face);
+}
+
+}  // namespace ricochet::detail

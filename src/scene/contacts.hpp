@@ -1,0 +1,68 @@
+// Bodies in lasting contact: groups that advance by steps of their own.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "scene/lasting.hpp"
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+/// Groups in lasting contact. In a step of its group a body moves on a straight line, which its
+/// record says; its velocity changes along it (`World::drifts`).
+class Contacts {
+public:
+    explicit Contacts(World& world) : world_(world) {}
+
+    [[nodiscard]] bool available() const noexcept { return world_.options.contacts != nullptr; }
+
+    /// These bodies and whatever is joined with them, by a group or by springs, in ascending order.
+    [[nodiscard]] std::vector<std::uint32_t> closure(const std::vector<std::uint32_t>& bodies) const;
+
+    /// A group of `members`, a closure, which meets `faces`; the groups that they were in are gone.
+    /// Returns its number. @throws std::invalid_argument where bodies overlap
+    std::uint32_t join(std::vector<std::uint32_t> members, std::vector<std::uint32_t> faces,
+                       const std::vector<std::uint32_t>& patience, const Instant& now);
+
+    /// The next step; its members get new records.
+    IslandOutcome plan(std::uint32_t group, const Instant& now, const Instant& t_end);
+    /// Goes to `now` in the step that was planned; the group waits for another plan.
+    void commit(std::uint32_t group, const Instant& now);
+    void set_velocity(std::uint32_t group, std::uint32_t body, const Vector2& v)
+    {
+        groups_[group]->motion->set_velocity(body, v);
+    }
+    /// A group is no more: its members fly on from their records.
+    void dissolve(std::uint32_t group, const Instant& now);
+
+    struct Group {
+        std::unique_ptr<LastingContact> motion;
+        std::vector<std::uint32_t> members;
+        std::vector<std::uint32_t> faces;  ///< those it meets itself
+        Instant start{}, end{};
+        double length = 0;  ///< [s] from start to end
+        IslandOutcome outcome = IslandOutcome::reached;
+        bool planned = false;
+        std::uint32_t apart = 0;  ///< steps in which it has been several groups
+    };
+    [[nodiscard]] bool exists(std::uint32_t group) const
+    {
+        return group < groups_.size() && groups_[group];
+    }
+    [[nodiscard]] Group& operator[](std::uint32_t group) { return *groups_[group]; }
+    [[nodiscard]] bool knows(std::uint32_t group, std::uint32_t face) const;
+
+private:
+    [[nodiscard]] IslandSetup setup_of(const std::vector<std::uint32_t>& members,
+                                       const std::vector<std::uint32_t>& faces) const;
+
+    World& world_;
+    std::vector<std::unique_ptr<Group>> groups_;
+};
+
+}  // namespace ricochet::detail

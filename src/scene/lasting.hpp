@@ -1,0 +1,63 @@
+// Lasting contact as the loop sees it: what makes and advances such groups is a library of its own,
+// of which the loop knows these two interfaces alone.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scene/contact_setup.hpp"
+
+namespace ricochet::detail {
+
+/// A group of bodies in lasting contact.
+class LastingContact {
+public:
+    LastingContact() = default;
+    virtual ~LastingContact() = default;
+    LastingContact(const LastingContact&) = delete;
+    LastingContact& operator=(const LastingContact&) = delete;
+
+    /// The next step, no longer than `longest`. Nothing has moved yet.
+    struct Plan {
+        IslandOutcome outcome = IslandOutcome::reached;
+        double length = 0;  ///< [s] until it ends, or an arrival ends it
+        double step = 0;    ///< [s] in which velocities go over into those of the chords
+    };
+    virtual Plan plan(double longest) = 0;
+    /// Goes s seconds on into the step that was planned.
+    virtual void commit(double s) = 0;
+    /// Velocity [m/s] of the straight line on which a body goes in the step that was planned.
+    [[nodiscard]] virtual std::array<double, 2> chord(std::uint32_t id) const = 0;
+    [[nodiscard]] virtual IslandBody body(std::uint32_t id) const = 0;
+    virtual void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity) = 0;
+    /// Bodies that contacts that push, or springs, connect.
+    [[nodiscard]] virtual std::vector<std::vector<std::uint32_t>> groups() const = 0;
+    /// Contacts that pushed in the last step.
+    [[nodiscard]] virtual std::vector<IslandContact> contacts() const = 0;
+    /// What meets at the end of a step whose outcome is `impact`.
+    [[nodiscard]] virtual std::vector<IslandContact> arrivals() const = 0;
+    /// Why a step was not solved, in a clause.
+    [[nodiscard]] virtual std::string failure() const = 0;
+};
+
+}  // namespace ricochet::detail
+
+namespace ricochet {
+
+/// Maker of groups in lasting contact.
+class SceneContacts {
+public:
+    SceneContacts() = default;
+    virtual ~SceneContacts() = default;
+    SceneContacts(const SceneContacts&) = delete;
+    SceneContacts& operator=(const SceneContacts&) = delete;
+
+    /// @throws std::invalid_argument for bodies that overlap
+    [[nodiscard]] virtual std::unique_ptr<detail::LastingContact> make(
+        detail::IslandSetup setup, const detail::IslandOptions& options) const = 0;
+};
+
+}  // namespace ricochet

@@ -1,0 +1,313 @@
+// Bodies that stay in contact with each other: joined to groups, and set free again.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "scene/runner.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+/// Steps in which a group has been several before it is divided.
+constexpr std::uint32_t patience_to_divide = 3;
+
+}  // namespace
+
+/// Whether the group of a body meets this face or body itself.
+bool Runner::known_to_group(std::uint32_t i, bool surface, std::uint32_t other) const
+{
+    const std::uint32_t group = world_.bodies[i].contact;
+    if (group == none) return false;
+    if (!surface) return world_.bodies[other].contact == group;
+    // In the middle of a segment a point has no normal.
+    if (world_.bodies[i].radius == 0 && world_.faces[other].kind != Face::Kind::wall) return false;
+    return contacts_.knows(group, other);
+}
+
+/// Whether a contact is that of a group with what is not of it.
+bool Runner::across(const Contact& contact) const
+{
+    const bool first = world_.bodies[contact.a].contact != none;
+    const bool second = !contact.surface && world_.bodies[contact.b].contact != none;
+    return (first || second) && !known_to_group(contact.a, contact.surface, contact.b);
+}
+
+/// Bodies that meet a group, those of it included, and approach it at more than `least` and less
+/// than `most` [m/s].
+std::vector<std::uint32_t> Runner::joining(double least, double most) const
+{
+    std::vector<std::uint32_t> bodies;
+    for (const Contact& contact : cluster_.contacts) {
+        if (!across(contact)) continue;
+        const Vector2& a = cluster_.before[contact.slot_a];
+        const Vector2 v = contact.surface ? a : a - cluster_.before[contact.slot_b];
+        const double approach = -dot(v, contact.normal);
+        if (approach <= least || approach >= most) continue;
+        bodies.push_back(contact.a);
+        if (!contact.surface) bodies.push_back(contact.b);
+    }
+    return bodies;
+}
+
+std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& members) const
+{
+    std::vector<std::uint32_t> faces;
+    for (std::uint32_t f = 0; f < world_.wall_count; ++f) faces.push_back(f);
+    if (!celled_ || !cells_.any_faces()) return faces;
+    for (const std::uint32_t i : members) {
+        const auto& cell = pending_[i].cell;
+        for (int x = -1; x <= 1; ++x) {
+            for (int y = -1; y <= 1; ++y) {
+                const auto& near = cells_.faces(cells_.bucket_of(cell.x + x, cell.y + y));
+                faces.insert(faces.end(), near.begin(), near.end());
+            }
+        }
+    }
+    std::ranges::sort(faces);
+    const auto repeated = std::ranges::unique(faces);
+    faces.erase(repeated.begin(), repeated.end());
+    return faces;
+}
+
+/// A body is pressed onto another one, or onto a surface; whatever touches it joins it.
+void Runner::press(std::uint32_t i, const std::string& sentence)
+{
+    gather(i, pending_[i]);
+    std::vector<std::uint32_t> bodies = cluster_.bodies;
+    if (!contacts_.available()) {
+        bodies = {i};
+        const Pending& pending = pending_[i];
+        if (pending.kind == Pending::Kind::presses) bodies.push_back(pending.other);
+        std::ranges::sort(bodies);
+    }
+    hand_over(bodies, sentence);
+}
+
+void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::string& sentence)
+{
+    if (!contacts_.available()) {
+        return fail(Outcome::zeno, bodies,
+                    fmt::format("{}: lasting contact is not followed without "
+                                "SceneOptions::contacts",
+                                sentence));
+    }
+    patience_.resize(world_.bodies.size());
+    std::vector<std::uint32_t> members = contacts_.closure(bodies);
+    std::vector<std::uint32_t> patience;
+    std::vector<std::uint32_t> joined;
+    for (const std::uint32_t i : members) {
+        const Body& body = world_.bodies[i];
+        if (body.contact == none) {
+            joined.push_back(i);
+            Patience& own = patience_[i];
+            own.steps = next_patience(own.steps, -seconds(own.released, now_), 0,
+                                      world_.options.contact_step);
+            if (body.island != none) {
+                calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + body.island,
+                              no_instant);
+            }
+        } else {
+            calendar_.set(entry_of_group(body.contact), no_instant);
+        }
+        patience.push_back(patience_[i].steps);
+    }
+    std::vector<std::uint32_t> faces = faces_near(members);
+    const bool segments = faces.size() > world_.wall_count;
+    for (const std::uint32_t i : members) {
+        if (segments && world_.bodies[i].radius == 0) {
+            return fail(Outcome::zeno, {i},
+                        fmt::format("{} is a point in lasting contact near terrain, which discs "
+                                    "alone can have",
+                                    called(i)));
+        }
+    }
+    try {
+        const std::uint32_t group =
+            contacts_.join(std::move(members), std::move(faces), patience, now_);
+        for (const std::uint32_t i : joined) note_group(SceneEvent::Kind::joined, i);
+        plan_group(group);
+    } catch (const std::invalid_argument& error) {
+        fail(Outcome::zeno, bodies, error.what());
+    }
+}
+
+void Runner::note_group(SceneEvent::Kind kind, std::uint32_t i)
+{
+    if (!world_.options.record_events) return;
+    SceneEvent event{.t = now_.value, .number = result_.event_count, .kind = kind, .body = i};
+    event.other = {false, i};
+    event.before[0] = event.after[0] = world_.velocity(i, now_);
+    event.before[1] = event.after[1] = event.after[0];
+    result_.events.push_back(event);
+}
+
+/// The next step of a group, and what its members meet in it.
+void Runner::plan_group(std::uint32_t number)
+{
+    const bool slept = world_.bodies[contacts_[number].members[0]].asleep;
+    const IslandOutcome outcome = contacts_.plan(number, now_, t_end_);
+    const Contacts::Group& group = contacts_[number];
+    switch (outcome) {
+        case IslandOutcome::released: return release(number);
+        case IslandOutcome::not_converged:
+        case IslandOutcome::non_finite:
+            return fail(outcome == IslandOutcome::non_finite ? Outcome::non_finite
+                                                             : Outcome::not_converged,
+                        group.members,
+                        fmt::format("the group of {} in lasting contact could not go on: {}",
+                                    called(group.members[0]), group.motion->failure()));
+        case IslandOutcome::asleep:
+            calendar_.set(entry_of_group(number), no_instant);
+            if (!slept) {
+                for (const std::uint32_t i : group.members) {
+                    note_group(SceneEvent::Kind::slept, i);
+                }
+                ++result_.event_count;
+            }
+            break;
+        case IslandOutcome::reached:
+        case IslandOutcome::impact:
+            calendar_.set(entry_of_group(number), before(group.end, t_end_) ? group.end : no_instant);
+            break;
+    }
+    for (const std::uint32_t i : group.members) {
+        if (celled_) move_to_cell(i);
+        predict(i);
+    }
+}
+
+void Runner::step_group(std::uint32_t number)
+{
+    const bool arrival = contacts_[number].outcome == IslandOutcome::impact;
+    contacts_.commit(number, now_);
+    if (arrival) return arrive(number);
+    if (!divide(number)) plan_group(number);
+}
+
+/// Members meet at a speed from which they rebound: an impact like any other.
+void Runner::arrive(std::uint32_t number)
+{
+    const std::uint32_t first = contacts_[number].motion->arrivals().at(0).first;
+    gather(first, Pending{});
+    resolve_cluster(first);
+    if (result_.failure || !contacts_.exists(number) || contacts_[number].planned) return;
+    plan_group(number);
+}
+
+/// After an impact.
+void Runner::restart_group(std::uint32_t number)
+{
+    contacts_.commit(number, now_);
+    for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
+        const std::uint32_t i = cluster_.bodies[k];
+        if (world_.bodies[i].contact != number || cluster_.after[k] == cluster_.before[k]) continue;
+        contacts_.set_velocity(number, i, cluster_.after[k]);
+        world_.bodies[i].asleep = false;
+    }
+    for (const std::uint32_t i : contacts_[number].members) world_.bodies[i].asleep = false;
+    plan_group(number);
+}
+
+/// Whether a body that no other one of its group touches can go on without it: in flight, on a wall
+/// or on the inside of a segment.
+bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
+{
+    const Body& body = world_.bodies[i];
+    if (body.island != none) return false;
+    for (const std::uint32_t f : faces_near({i})) {
+        const Face& face = world_.faces[f];
+        if (face.kind != Face::Kind::vertex) continue;
+        const double gap = norm(body.p - face.at) - body.radius;
+        if (gap > 1e-9 * (body.radius + norm(body.p))) continue;
+        return false;
+    }
+    return contacts_.exists(number);
+}
+
+/// A group that has fallen apart, and stayed so for some steps, is several from now on.
+bool Runner::divide(std::uint32_t number)
+{
+    Contacts::Group& group = contacts_[number];
+    auto parts = group.motion->groups();
+    const bool alone = parts.size() == 1 && parts[0].size() == 1;
+    if (parts.size() == 1 && !(alone && may_leave(number, parts[0][0]))) {
+        group.apart = 0;
+        return false;
+    }
+    std::uint32_t patience = patience_to_divide;
+    for (const std::uint32_t i : group.members) {
+        patience = std::max(patience, patience_[i].steps);
+    }
+    if (++group.apart < patience) return false;
+    std::vector<std::uint32_t> leaving;
+    std::vector<std::vector<std::uint32_t>> staying;
+    for (auto& part : parts) {
+        if (part.size() == 1 && may_leave(number, part[0])) {
+            leaving.push_back(part[0]);
+        } else {
+            std::ranges::sort(part);
+            staying.push_back(std::move(part));
+        }
+    }
+    calendar_.set(entry_of_group(number), no_instant);
+    contacts_.dissolve(number, now_);
+    for (const auto& part : staying) {
+        std::vector<std::uint32_t> steps;
+        for (const std::uint32_t i : part) steps.push_back(patience_[i].steps);
+        const std::uint32_t next = contacts_.join(part, faces_near(part), steps, now_);
+        plan_group(next);
+    }
+    set_free(leaving);
+    return true;
+}
+
+/// Nothing of the group has been in contact for as long as its patience asks for.
+void Runner::release(std::uint32_t number)
+{
+    const std::vector<std::uint32_t> members = contacts_[number].members;
+    calendar_.set(entry_of_group(number), no_instant);
+    contacts_.dissolve(number, now_);
+    set_free(members);
+}
+
+void Runner::set_free(const std::vector<std::uint32_t>& bodies)
+{
+    std::vector<std::uint32_t> islands;
+    for (const std::uint32_t i : bodies) {
+        patience_[i].released = now_;
+        series_[i] = {};
+        note_group(SceneEvent::Kind::released, i);
+        const Body& body = world_.bodies[i];
+        if (body.island == none) {
+            settle(i, none);
+        } else if (std::ranges::find(islands, body.island) == islands.end()) {
+            islands.push_back(body.island);
+        }
+    }
+    Islands& own = *world_.islands;
+    for (const std::uint32_t island : islands) {
+        std::vector<std::array<Vector2, 2>> states;
+        for (const std::uint32_t i : own.members(island)) {
+            states.push_back({world_.bodies[i].p, world_.bodies[i].v});
+        }
+        if (!own.resume(island, now_, states)) {
+            return fail(Outcome::step_underflow, own.members(island),
+                        fmt::format("the step of the island of {} fell below what the time "
+                                    "resolves",
+                                    called(own.members(island)[0])));
+        }
+        const Instant& end = own.end(island);
+        calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + island,
+                      before(end, t_end_) ? end : no_instant);
+    }
+    for (const std::uint32_t i : bodies) {
+        if (celled_) move_to_cell(i);
+        predict(i);
+    }
+}
+
+}  // namespace ricochet::detail
