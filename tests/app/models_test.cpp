@@ -106,7 +106,8 @@ TEST_F(App, InspectShowsModelsForSystemsAndRecipesNotKnownHere)
 
 TEST_F(App, ModelsForSomethingElseAreRefused)
 {
-    expect_refused(simulate({"--model", "missing.safetensors"}), {"missing.safetensors", "searched"});
+    expect_refused(simulate({"--model", "missing.safetensors"}),
+                   {"missing.safetensors", "searched"});
     expect_refused({"inspect", "missing"}, {"missing", "searched"});
     expect_refused({"inspect"}, {"MODEL"});
 
