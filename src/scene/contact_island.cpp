@@ -193,7 +193,7 @@ bool ContactIsland::exclude_arrivals(double h)
     return excluded_.size() > before;
 }
 
-/// A contact s after the start of the step in hand.
+/// A contact s after the start of the current step.
 ContactIsland::Touch ContactIsland::on_chord(const Touch& touch, double s) const
 {
     const auto at = [&](int body) {
@@ -358,7 +358,7 @@ void ContactIsland::commit(double s)
     planned_ = 0;
 }
 
-/// The largest change of velocity by forces alone in the step in hand.
+/// The largest change of velocity by forces alone in the current step.
 double ContactIsland::free_speed() const
 {
     double largest = 0;

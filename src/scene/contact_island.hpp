@@ -82,7 +82,7 @@ public:
         double length = 0;  ///< [s]
     };
     Plan plan(double until);
-    /// [s] Length of the step in hand, of which an arrival may cut a part off.
+    /// [s] Length of the current step, of which an arrival may cut a part off.
     [[nodiscard]] double planned_step() const noexcept { return planned_; }
     /// The planned motion: at + s chord.
     [[nodiscard]] std::array<double, 2> chord(std::uint32_t id) const;
@@ -190,7 +190,7 @@ private:
     LawProblem problem_;
     std::vector<Touch> touches_, excluded_;
     Eigen::VectorXd impulses_, v_next_;
-    double planned_ = 0;        ///< [s] length of the step in hand
+    double planned_ = 0;        ///< [s] length of the current step
     double planned_until_ = 0;  ///< where it ends, or what ends it before
     std::vector<Touch> warm_;
     Eigen::VectorXd warm_impulses_;

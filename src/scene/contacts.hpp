@@ -22,7 +22,8 @@ public:
     [[nodiscard]] bool available() const noexcept { return world_.options.contacts != nullptr; }
 
     /// These bodies and whatever is joined with them, by a group or by springs, in ascending order.
-    [[nodiscard]] std::vector<std::uint32_t> closure(const std::vector<std::uint32_t>& bodies) const;
+    [[nodiscard]] std::vector<std::uint32_t> closure(
+        const std::vector<std::uint32_t>& bodies) const;
 
     /// A group of `members`, a closure, which meets `faces`; the groups that they were in are gone.
     /// Returns its number. @throws std::invalid_argument where bodies overlap

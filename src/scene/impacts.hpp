@@ -17,7 +17,7 @@ struct Contact {
     Vector2 at{};  ///< by which contacts are ordered, whatever the labels
     double restitution = 1;
     double friction = 0;
-    double impulse = 0;  ///< of the solve in hand, normal and tangential
+    double impulse = 0;  ///< of the current solution, normal and tangential
     double tangential = 0;
     double target = 0;  ///< [m/s] separation that is asked for
     double mass = 0;    ///< effective
@@ -62,7 +62,7 @@ private:
     void emit(const Cluster& cluster, double t, std::vector<SceneEvent>* events);
 
     World& world_;
-    std::vector<std::uint32_t> struck_;  ///< contacts of the wave in hand
+    std::vector<std::uint32_t> struck_;  ///< contacts of the current wave
     std::vector<Vector2> before_wave_;
 };
 

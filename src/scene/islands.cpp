@@ -190,7 +190,7 @@ bool Islands::attempt(std::uint32_t which)
     }
 }
 
-/// Quartics through the middle and the end of the step in hand.
+/// Quartics through the middle and the end of the current step.
 void Islands::record(Island& island)
 {
     const double h = island.h;

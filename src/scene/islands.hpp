@@ -24,7 +24,7 @@ public:
     }
     [[nodiscard]] const Instant& end(std::uint32_t island) const { return islands_[island].end; }
 
-    /// On the method's own map: the step in hand, taken again with another length.
+    /// On the method's own map: the current step, taken again with another length.
     [[nodiscard]] Vector2 position(std::uint32_t body, const Instant& t) const;
     [[nodiscard]] Vector2 velocity(std::uint32_t body, const Instant& t) const;
 
@@ -32,7 +32,7 @@ public:
     /// enough, or nothing finite comes out.
     bool advance(std::uint32_t island);
 
-    /// An island goes on from t with changed velocities of some members: the step in hand is cut
+    /// An island goes on from t with changed velocities of some members: the current step is cut
     /// there, and its length is kept for the next one.
     bool restart(std::uint32_t island, const Instant& t,
                  const std::vector<std::pair<std::uint32_t, Vector2>>& velocities);
@@ -62,10 +62,10 @@ private:
         std::vector<Link> links;
         std::vector<double> drag, inverse_mass;
         Instant start{}, end{};
-        double h = 0;     ///< of the step in hand
+        double h = 0;     ///< of the current step
         double next = 0;  ///< length that the error allows
         bool begun = false;
-        State x, remainder, rate;              ///< at the start of the step in hand
+        State x, remainder, rate;              ///< at the start of the current step
         State x_end, remainder_end, rate_end;  ///< at its end
     };
 

@@ -360,9 +360,10 @@ void Runner::happen(std::uint32_t i)
         case Kind::edge: return leave_edge(i);
         case Kind::face: return impact(i);
         case Kind::presses_face:
-            return press(i, fmt::format("{} presses on {}", called(i),
-                                        world_.scene.name_of(
-                                            SurfaceId{world_.faces[pending.other].surface})));
+            return press(
+                i,
+                fmt::format("{} presses on {}", called(i),
+                            world_.scene.name_of(SurfaceId{world_.faces[pending.other].surface})));
         case Kind::pair:
         case Kind::presses: break;
     }

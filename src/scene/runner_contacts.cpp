@@ -155,11 +155,11 @@ void Runner::plan_group(std::uint32_t number)
         case IslandOutcome::released: return release(number);
         case IslandOutcome::not_converged:
         case IslandOutcome::non_finite:
-            return fail(outcome == IslandOutcome::non_finite ? Outcome::non_finite
-                                                             : Outcome::not_converged,
-                        group.members,
-                        fmt::format("the group of {} in lasting contact could not go on: {}",
-                                    called(group.members[0]), group.motion->failure()));
+            return fail(
+                outcome == IslandOutcome::non_finite ? Outcome::non_finite : Outcome::not_converged,
+                group.members,
+                fmt::format("the group of {} in lasting contact could not go on: {}",
+                            called(group.members[0]), group.motion->failure()));
         case IslandOutcome::asleep:
             calendar_.set(entry_of_group(number), no_instant);
             if (!slept) {
@@ -171,7 +171,8 @@ void Runner::plan_group(std::uint32_t number)
             break;
         case IslandOutcome::reached:
         case IslandOutcome::impact:
-            calendar_.set(entry_of_group(number), before(group.end, t_end_) ? group.end : no_instant);
+            calendar_.set(entry_of_group(number),
+                          before(group.end, t_end_) ? group.end : no_instant);
             break;
     }
     for (const std::uint32_t i : group.members) {

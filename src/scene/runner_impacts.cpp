@@ -41,8 +41,7 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
     slot_of(i);
     for (std::uint32_t slot = 0; slot < cluster_.bodies.size(); ++slot) {
         const bool first = slot == 0;
-        const bool pair =
-            seed.kind == Pending::Kind::pair || seed.kind == Pending::Kind::presses;
+        const bool pair = seed.kind == Pending::Kind::pair || seed.kind == Pending::Kind::presses;
         gather_faces(slot, first && !pair ? seed.other : none);
         if (celled_) gather_pairs(slot, first && pair ? seed.other : none);
     }
@@ -169,7 +168,7 @@ void Runner::resolve_cluster(std::uint32_t i)
             }
         }
     }
-    // Whose flight to and fro would be shorter than a step of the group that is struck joins it.
+    // Whose flight back and forth would be shorter than a step of the group that is struck joins it.
     const double slow = 0.5 * norm(world_.gravity) * world_.options.contact_step;
     if (const auto bodies = joining(0, slow); !bodies.empty()) return hand_over(bodies, "");
     bool spend = false;
@@ -330,7 +329,8 @@ void Runner::restart_island(std::uint32_t island)
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         const std::uint32_t i = cluster_.bodies[k];
         const Body& body = world_.bodies[i];
-        if (body.island == island && body.contact == none) velocities_.emplace_back(i, cluster_.after[k]);
+        if (body.island == island && body.contact == none)
+            velocities_.emplace_back(i, cluster_.after[k]);
     }
     Islands& islands = *world_.islands;
     const bool taken = islands.restart(island, now_, velocities_);

@@ -48,8 +48,8 @@ struct alignas(64) Body {
     std::uint32_t next = none, previous = none;  ///< in the cell
     std::uint32_t bucket = none;
     std::uint32_t material = 0;
-    std::uint32_t island = none;  ///< of those that advance by steps
-    std::uint32_t held = none;    ///< face on which it slides
+    std::uint32_t island = none;   ///< of those that advance by steps
+    std::uint32_t held = none;     ///< face on which it slides
     std::uint32_t contact = none;  ///< group in lasting contact: a is 0, v the step's chord
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4

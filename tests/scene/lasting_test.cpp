@@ -50,8 +50,8 @@ double largest_overlap(const Scene& scene, const std::vector<BodyState>& states)
         for (std::size_t j = 0; j < i; ++j) {
             const Vector2& a = states[i].at;
             const Vector2& b = states[j].at;
-            largest = std::max(largest, r + scene.bodies()[j].radius -
-                                            std::hypot(a[0] - b[0], a[1] - b[1]));
+            largest = std::max(largest,
+                               r + scene.bodies()[j].radius - std::hypot(a[0] - b[0], a[1] - b[1]));
         }
     }
     return largest;
@@ -112,8 +112,8 @@ TEST(LastingContact, AStruckSleeperWakesAndSleepsAgain)
     scene.disc({.at = {0.1, 0.1}, .radius = 0.1, .material = clay});
     scene.disc({.at = {0, 0.1 + 0.1 * std::sqrt(3.0)}, .radius = 0.1, .material = clay});
     scene.disc({.at = {0.04, 2}, .radius = 0.1, .material = clay});
-    const SceneRun run = simulate(
-        scene, {.t_end = 10, .contacts = scene_contacts(), .sample_times = {0.5, 9}});
+    const SceneRun run =
+        simulate(scene, {.t_end = 10, .contacts = scene_contacts(), .sample_times = {0.5, 9}});
     ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
     for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(run.samples[0][i].asleep);
     // It falls from 2 to about 0.47: sqrt(2 1.53 / g) = 0.56 s.
@@ -156,8 +156,8 @@ TEST(LastingContact, ADiscIsPushedDownAnInclineByAnother)
     const auto on_plane = [&](double along) { return Vector2{along * c + s, -along * s + c}; };
     scene.disc({.at = on_plane(2), .material = rough});
     scene.disc({.at = on_plane(-1e-9), .material = smooth});
-    const SceneRun run = simulate(
-        scene, {.t_end = 1, .contacts = scene_contacts(), .contact_step = 1e-4});
+    const SceneRun run =
+        simulate(scene, {.t_end = 1, .contacts = scene_contacts(), .contact_step = 1e-4});
     ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
     const double rate = g * (s - 0.2 * c);
     for (const std::size_t i : {0U, 1U}) {
@@ -178,8 +178,7 @@ TEST(LastingContact, AChainOfSpringsSlidesOverAnEdge)
     for (int i = 0; i < 10; ++i) {
         const double along = -1.25 + 0.2 * i;
         const Vector2 at = along < 0.05 ? Vector2{along, 0.05} : Vector2{0.05, 0.1 - along};
-        const BodyId next =
-            scene.disc({.at = at, .radius = 0.05, .mass = 0.1, .material = rope});
+        const BodyId next = scene.disc({.at = at, .radius = 0.05, .mass = 0.1, .material = rope});
         if (i > 0) {
             scene.spring({.between = {last, next}, .rest = 0.2, .stiffness = 200, .damping = 0.2});
         }
@@ -203,8 +202,8 @@ TEST(LastingContact, AChainOfSpringsSlidesOverAnEdge)
 TEST(LastingContact, AGasThatCollapsesComesToItsEnd)
 {
     const Scene scene = test::gas({.count = 30, .fraction = 0.5, .restitution = 0.3});
-    const SceneRun run = simulate(
-        scene, {.t_end = 5, .contacts = scene_contacts(), .record_events = false});
+    const SceneRun run =
+        simulate(scene, {.t_end = 5, .contacts = scene_contacts(), .record_events = false});
     ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
     EXPECT_LE(test::overlap(scene, run.bodies), 1e-12);
 }

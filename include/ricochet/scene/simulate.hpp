@@ -60,9 +60,9 @@ struct SceneEvent {
     /// Kinds of events.
     enum class Kind : std::uint8_t {
         impact,
-        held,     ///< impacts on the surface have accumulated: it slides on it, or is at rest
-        stopped,  ///< friction has stopped what slid
-        joined,   ///< lasting contact: it goes on by steps, in a group; `other` is the body itself
+        held,      ///< impacts on the surface have accumulated: it slides on it, or is at rest
+        stopped,   ///< friction has stopped what slid
+        joined,    ///< lasting contact: it goes on by steps, in a group; `other` is the body itself
         released,  ///< it has left its group, or its group contact
         slept,     ///< its group has come to rest
     };
@@ -97,8 +97,8 @@ struct SceneStatistics {
     std::uint64_t flow_calls = 0;
     std::uint64_t joins = 0;          ///< hand-overs of bodies to groups in lasting contact
     std::uint64_t contact_steps = 0;  ///< of such groups
-    std::uint64_t alone = 0;   ///< bodies that could meet none, and had no calendar
-    std::uint64_t groups = 0;  ///< of bodies that could meet
+    std::uint64_t alone = 0;          ///< bodies that could meet none, and had no calendar
+    std::uint64_t groups = 0;         ///< of bodies that could meet
 };
 
 /// Result of a run. Nothing that was computed is lost, whatever the outcome.

@@ -87,8 +87,8 @@ std::string struck(const SceneRun& run)
             std::ranges::upper_bound(run.sample_times, event.t) - run.sample_times.begin();
         const auto k = static_cast<std::size_t>(next);
         if (k == 0 || k >= run.sample_times.size()) continue;
-        const double part = (event.t - run.sample_times[k - 1]) /
-                            (run.sample_times[k] - run.sample_times[k - 1]);
+        const double part =
+            (event.t - run.sample_times[k - 1]) / (run.sample_times[k] - run.sample_times[k - 1]);
         const Vector2& a = run.samples[k - 1][event.body].at;
         const Vector2& b = run.samples[k][event.body].at;
         out += fmt::format("{:.6g} {:.6g}\n", a[0] + part * (b[0] - a[0]),
@@ -113,7 +113,8 @@ void keep_between(Track& track, const std::vector<double>& times, std::size_t fi
         const double part = (times[k] - times[first]) / (times[last] - times[first]);
         double apart = 0;
         for (std::size_t c = 0; c < 2; ++c) {
-            const double line = track.at[first][c] + part * (track.at[last][c] - track.at[first][c]);
+            const double line =
+                track.at[first][c] + part * (track.at[last][c] - track.at[first][c]);
             apart = std::max(apart, std::fabs(track.at[k][c] - line));
         }
         if (apart > largest) {
@@ -135,8 +136,9 @@ void animate(fmt::memory_buffer& out, std::string_view attribute, const Track& t
     const auto to = std::back_inserter(out);
     const double start = times.front();
     const double length = times.back() - start;
-    fmt::format_to(to, "<animate attributeName=\"{}\" dur=\"{:.4g}s\" repeatCount=\"indefinite\" keyTimes=\"",
-                   attribute, length);
+    fmt::format_to(
+        to, "<animate attributeName=\"{}\" dur=\"{:.4g}s\" repeatCount=\"indefinite\" keyTimes=\"",
+        attribute, length);
     for (const std::size_t k : track.kept) {
         const bool last = k + 1 == times.size();
         fmt::format_to(to, "{}{:.5g}", k == 0 ? "" : ";", last ? 1 : (times[k] - start) / length);
@@ -163,8 +165,8 @@ void plot_scene(const SceneFile& file, const SceneRun& run, const std::filesyste
         }
         ways += '\n';
         const double shown = std::max(bodies[i].radius, 0.004 * frame.width());
-        discs += fmt::format("{:.6g} {:.6g} {:.6g}\n", run.bodies[i].at[0], run.bodies[i].at[1],
-                             shown);
+        discs +=
+            fmt::format("{:.6g} {:.6g} {:.6g}\n", run.bodies[i].at[0], run.bodies[i].at[1], shown);
     }
     for (const Scene::Surface& surface : file.scene.surfaces()) {
         for (const Vector2& p : line_of(surface, frame)) {
