@@ -154,8 +154,11 @@ def draw(report, directory, root):
     drawn = []
     for name, caption, panels in figures(report):
         file = directory / f"{name}.svg"
-        run = subprocess.run([program, file], input=json.dumps({"title": "", "panels": panels}),
-                             text=True, capture_output=True)
+        try:
+            run = subprocess.run([program, file], input=json.dumps({"title": "", "panels": panels}),
+                                 text=True, capture_output=True)
+        except OSError as error:
+            return drawn, str(error)
         if run.returncode != 0:
             return drawn, run.stderr.strip()
         drawn.append((name, caption))
@@ -186,6 +189,10 @@ def at_equal_error(report):
                 ratios[peer] = minimum(theirs) / minimum(ours) if theirs else None
             out.append((problem["title"], bound, ours, ratios))
     return out
+
+
+LEAD = ("How many times as long as the fastest setting of ricochet the fastest setting of each peer takes, "
+        "both within the same error. A dash: no setting of the peer is that right.")
 
 
 def equal_error_table(report):
@@ -221,6 +228,27 @@ def cell_table(rows):
                     duration(minimum(row)), duration(median(row)), duration(p90(row)), why(row),
                     f"`{row['command']}`"])
     return header, out
+
+
+THINGS = {"flow": "the flow alone", "floor": "a guard and a reset: the ball",
+          "modes": "the ball with two modes", "recording": "the ball, every step kept, 200 samples",
+          "planning": "the ball with a bound, Planned", "network": "the ball, Verified<Network>",
+          "taylor": "the ball, Taylor", "sensitivities": "the ball and its derivatives",
+          "friction": "a friction oscillator, set-valued"}
+
+
+def pays_table(report):
+    header = ["a program of", "time of a run", "events", "allocations in a run", "code",
+              "functions of ricochet"]
+    rows = []
+    for row in report["pays"]:
+        if "failed" in row:
+            rows.append([THINGS[row["thing"]], row["failed"], "-", "-", "-", "-"])
+            continue
+        rows.append([THINGS[row["thing"]], duration(row["seconds"]), str(row["events"]),
+                     str(row["allocations"]), f"{row['text'] / 1024:.0f} KiB",
+                     str(row["symbols"])])
+    return header, rows
 
 
 def spread(samples):
@@ -286,6 +314,11 @@ EXPLANATION = (
     "that are driven from C++, and is used as its manual says.")
 
 
+PAYS = (
+    "One program for each thing that a scene may use, linked to the static libraries. The engine of "
+    "events is compiled once and comes whole; further libraries come where they are used.")
+
+
 def markdown_table(header, rows):
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
@@ -330,11 +363,11 @@ def write(report, older, directory, root):
     drawn, undrawn = draw(report, directory, root)
     said = remarks(report, older) + ([f"No figures: {undrawn}."] if undrawn else [])
     table = equal_error_table(report)
-    lead = ("How many times as long as the fastest setting of ricochet the fastest setting of each "
-            "peer takes, both within the same error. A dash: no setting of the peer is that right.")
-
     text = ["# Run time against error, beside the peers", heading(report), EXPLANATION, *said,
-            "## At equal error", lead, markdown_table(*table), "## Figures"]
+            "## At equal error", LEAD, markdown_table(*table)]
+    if report["pays"]:
+        text += ["## What a scene pays for", PAYS, markdown_table(*pays_table(report))]
+    text += ["## Figures"]
     text += [f"![{caption}]({name}.svg)" for name, caption in drawn]
     text += ["## Every cell"]
     for title, cells in sections(report):
@@ -349,7 +382,11 @@ def write(report, older, directory, root):
             "<title>ricochet: run time against error</title>", f"<style>{STYLE}</style></head>",
             "<body><h1>Run time against error, beside the peers</h1>",
             *map(paragraph, [heading(report), EXPLANATION, *said]),
-            "<h2>At equal error</h2>", paragraph(lead), html_table(*table), "<h2>Figures</h2>"]
+            "<h2>At equal error</h2>", paragraph(LEAD), html_table(*table)]
+    if report["pays"]:
+        page += ["<h2>What a scene pays for</h2>", paragraph(PAYS),
+                 html_table(*pays_table(report))]
+    page.append("<h2>Figures</h2>")
     for name, caption in drawn:
         escaped = html.escape(caption)
         page.append(f'<figure><img src="{name}.svg" alt="{escaped}">'

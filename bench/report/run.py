@@ -20,6 +20,7 @@ import time
 from pathlib import Path
 
 import page
+from keep import keep
 from score import score, scored_as_wrong
 
 HERE = Path(__file__).resolve().parent
@@ -236,6 +237,28 @@ def run_problem(problem, cells, options, clock, directory):
     return rows + new
 
 
+def pays():
+    """What the programs of pays.cpp say, and their sizes; those that are not there are left out."""
+    out = []
+    for thing in ("flow", "floor", "modes", "recording", "planning", "network", "taylor",
+                  "sensitivities", "friction"):
+        program = ROOT / f"build/release/bin/ricochet_pays_{thing}"
+        if not program.exists():
+            continue
+        try:
+            said = subprocess.run([program], capture_output=True, text=True, timeout=PATIENCE)
+            size = subprocess.run(["size", program], capture_output=True, text=True)
+            symbols = subprocess.run(["nm", "-C", "--defined-only", program], capture_output=True,
+                                     text=True)
+            ours = sum(" ricochet::" in line for line in symbols.stdout.splitlines())
+            out.append(json.loads(said.stdout) | {
+                "thing": thing, "text": int(size.stdout.splitlines()[1].split()[0]),
+                "symbols": ours})
+        except (ValueError, IndexError, OSError, subprocess.TimeoutExpired) as error:
+            out.append({"thing": thing, "failed": str(error)})
+    return out
+
+
 def machine():
     model = ""
     try:
@@ -265,6 +288,7 @@ def arguments():
     parser.add_argument("--core", type=int, default=None, help="core to pin to; default: the last")
     parser.add_argument("--fresh", action="store_true", help="do not go on with an older report")
     parser.add_argument("--compare", type=Path, help="a report.json of the same commit")
+    parser.add_argument("--keep", action="store_true", help="renew docs/benchmarks.md with it")
     parser.add_argument("--out", type=Path, default=ROOT / "build/bench/report")
     options = parser.parse_args()
     allowed = sorted(os.sched_getaffinity(0))
@@ -296,14 +320,17 @@ def main():
         with spread_file.open("a") as file:
             file.writelines(f"{seconds}\n" for seconds in clock.yardstick)
         clock.yardstick = []
-    yardstick = [float(line) for line in spread_file.read_text().split()]
+    yardstick = ([float(line) for line in spread_file.read_text().split()]
+                 if spread_file.exists() else [])
     report = {"machine": machine(), "versions": versions, "absent": absent, "rows": rows,
-              "yardstick": yardstick, "seconds": time.monotonic() - began,
+              "yardstick": yardstick, "pays": pays(), "seconds": time.monotonic() - began,
               "problems": {name: {"title": problem["title"], "events": len(problem["times"]),
                                   "t_end": problem["t_end"]}
                            for name, problem in problems.items()}}
     older = json.loads(options.compare.read_text()) if options.compare else None
     page.write(report, older, options.out, ROOT)
+    if options.keep:
+        keep(report, options.out, ROOT)
     print(f"{options.out / 'index.html'}, {options.out / 'report.md'}: {len(rows)} cells, "
           f"{report['seconds']:.0f} s")
     return 0

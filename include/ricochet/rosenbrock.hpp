@@ -170,7 +170,7 @@ struct RosenbrockRoom {
                        std::vector<std::size_t>>
         rows{};
 
-    // The step in hand: its interpolant as a power series, and its length.
+    // The current step: its interpolant as a power series, and its length.
     std::conditional_t<(fixed_size<C>() > 0), std::array<double, 4 * fixed_size<C>()>,
                        std::vector<double>>
         series{};
@@ -384,7 +384,7 @@ class KernelOf<System, X, Rosenbrock4> {
         for_each_component(to, [&](auto i) { to[i] += factor * what[i]; });
     }
 
-    /// The step in hand; false where it is not finite.
+    /// The current step; false where it is not finite.
     static bool go(void* door, State& state, double h)
     {
         D& of = at(door);

@@ -461,7 +461,7 @@ class KernelOf<System, X, Taylor> {
         }
     }
 
-    /// Whether the guard has no event in the step in hand, of which `run.g1` is the end.
+    /// Whether the guard has no event in the current step, of which `run.g1` is the end.
     [[gnu::always_inline]] static bool is_clear(const TaylorStep<n, m>& step, const State& state,
                                                 const QuietRun& run)
     {

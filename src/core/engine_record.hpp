@@ -18,7 +18,7 @@ inline void EventEngine<X, single>::note_crossings(double s)
 template <class X, bool single>
 inline void EventEngine<X, single>::note_crossings_to_set()
 {
-    if (search_.members().size() == bank_.size()) return;
+    if (search_.fired().size() == bank_.size()) return;
     bank_.complete_rates(step_, calls());
     for (const std::size_t i : bank_.suspects()) {
         GuardRecord& record = bank_[i];

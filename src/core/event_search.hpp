@@ -308,8 +308,8 @@ private:
         return heed(bank, i, watch, next_in_parts(probe, watch, bank, i));
     }
 
-    /// What the power series of the guard says of a stretch. Where that is not sure, or other than
-    /// its values at the ends, the detector is asked.
+    /// What the power series of the guard says of an interval. Where that is not sure, or other
+    /// than its values at the ends, the detector is asked.
     [[nodiscard]] Finding next_on_series(Probe& probe, Watch& watch, const Bank& bank,
                                          std::size_t i);
 

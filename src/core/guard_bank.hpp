@@ -159,7 +159,7 @@ public:
         this->suspect_all();
     }
 
-    /// The guards are power series over the step in hand.
+    /// The guards are power series over the current step.
     void see_series(const Step<X>& step)
     {
         this->see(step.guard_series(), step.time(0) == armed_at_);
@@ -409,7 +409,7 @@ private:
         return rules_.uses_rates ? rate : std::numeric_limits<double>::quiet_NaN();
     }
 
-    bool rates_left_out_ = false;  ///< at the end of the step in hand
+    bool rates_left_out_ = false;  ///< at the end of the current step
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     Doubles sizes_{};
 };

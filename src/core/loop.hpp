@@ -281,9 +281,10 @@ private:
     }
 
     /// Takes steps until one needs a check, and deals with it. False: there is none. An exception
-    /// leads back to the start of the quiet run or of the current step after it.
+    /// leads back to the start of the quiet run.
     bool run_quietly();
-    [[gnu::noinline]] void end_quiet_run_resumably(const QuietRun& quiet);
+    [[gnu::noinline]] bool run_quietly_resumably();
+    [[gnu::always_inline]] bool run_quietly_from_here();
     [[gnu::always_inline]] void end_quiet_run(const QuietRun& quiet);
 
     /// Whether the limits of the options allow further steps; determines when it is asked next.

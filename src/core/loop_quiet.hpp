@@ -8,6 +8,12 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline bool Loop<X, single>::run_quietly()
 {
+    return mark_ ? run_quietly_resumably() : run_quietly_from_here();
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::run_quietly_from_here()
+{
     const bool time_event_first = timed_ && step_.until(time_event_) <= step_.until(options_.t_end);
     QuietRun quiet{.end = time_event_first ? time_event_ : options_.t_end,
                    .rtol = options_.rtol,
@@ -34,11 +40,7 @@ inline bool Loop<X, single>::run_quietly()
     counts.guard_calls += quiet.guard_calls;
     if (bank_.size() > 0) this->add_evidence(this->evidence_of_clear(), quiet.steps);
     if (quiet.why == QuietEnd::due) return false;
-    if (mark_) {
-        end_quiet_run_resumably(quiet);
-    } else {
-        end_quiet_run(quiet);
-    }
+    end_quiet_run(quiet);
     return true;
 }
 

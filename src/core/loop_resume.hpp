@@ -22,12 +22,12 @@ void Loop<X, single>::advance_resumably(const Advance& how)
 }
 
 template <class X, bool single>
-void Loop<X, single>::end_quiet_run_resumably(const QuietRun& quiet)
+bool Loop<X, single>::run_quietly_resumably()
 {
     mark_step();
-    if (error_controlled_) mark_->h_next = step_.h();
+    mark_everything();
     try {
-        end_quiet_run(quiet);
+        return run_quietly_from_here();
     } catch (...) {
         go_back_to_mark();
         throw;

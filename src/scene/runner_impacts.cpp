@@ -168,7 +168,8 @@ void Runner::resolve_cluster(std::uint32_t i)
             }
         }
     }
-    // Whose flight back and forth would be shorter than a step of the group that is struck joins it.
+    // A body whose flight back and forth would be shorter than a step of the group that it meets
+    // joins that group.
     const double slow = 0.5 * norm(world_.gravity) * world_.options.contact_step;
     if (const auto bodies = joining(0, slow); !bodies.empty()) return hand_over(bodies, "");
     bool spend = false;

@@ -106,8 +106,9 @@ TEST_F(App, InspectShowsModelsForSystemsAndRecipesNotKnownHere)
 
 TEST_F(App, ModelsForSomethingElseAreRefused)
 {
-    expect_refused(simulate({"--model", "missing.safetensors"}), {"missing.safetensors", "looked"});
-    expect_refused({"inspect", "missing"}, {"missing", "looked"});
+    expect_refused(simulate({"--model", "missing.safetensors"}),
+                   {"missing.safetensors", "searched"});
+    expect_refused({"inspect", "missing"}, {"missing", "searched"});
     expect_refused({"inspect"}, {"MODEL"});
 
     const auto refuse = [&](const Model& model, const Words& pieces) {

@@ -234,7 +234,7 @@ TEST_F(KernelFile, ThatDoesNotFitIsRefused)
     m.setConstant(-1);
     EXPECT_TRUE(contains(refusal_of(m, 2), "positive definite"));
     m(2, 2) = std::nan("");
-    EXPECT_TRUE(contains(refusal_of(m, 2), "no numbers"));
+    EXPECT_TRUE(contains(refusal_of(m, 2), "not numbers"));
     EXPECT_TRUE(contains(refusal_of(Eigen::MatrixXd::Zero(2, 3), 1), "square"));
 }
 

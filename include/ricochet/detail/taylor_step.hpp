@@ -92,7 +92,7 @@ template <std::size_t n, class X>
     return h;
 }
 
-/// The coefficients of the step in hand, and what they were computed from.
+/// The coefficients of the current step, and what they were computed from.
 template <std::size_t n, std::size_t m>
 struct TaylorStep {
     alignas(16) std::array<double, (most_taylor_order + 1) * n> coefficients{};

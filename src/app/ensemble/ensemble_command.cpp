@@ -124,7 +124,8 @@ public:
     /// Runs what is missing.
     void run(unsigned threads)
     {
-        std::vector<std::unique_ptr<std::string>> results(missing_.size());  // of blocks in hand
+        std::vector<std::unique_ptr<std::string>> results(
+            missing_.size());  // of the current blocks
         // Chunks of rows are blocks: only the last of the table may be shorter, and it is the last
         // of its share.
         const std::size_t rows =

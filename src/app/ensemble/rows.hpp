@@ -104,7 +104,8 @@ struct ShareContent {
 /// 1e-10 here"; empty if there is none.
 [[nodiscard]] std::string difference(const Json& there, const Json& here);
 
-/// The file of the share that this process runs; nobody else's as long as this lives.
+/// The file of the share that this process runs, locked against other processes while this object
+/// lives.
 class ShareFile {
 public:
     /// Goes on with the file that there is, or creates it.

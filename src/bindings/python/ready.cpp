@@ -31,11 +31,9 @@ struct Watched : System {
     template <class... Arguments>
     requires requires(const System& system, const Arguments&... arguments)
     {
-        {
-            system.guard(arguments...)
-            } -> std::convertible_to<double>;
+        system.guard(arguments...);
     }
-    [[nodiscard]] double guard(const Arguments&... arguments) const noexcept
+    [[nodiscard]] auto guard(const Arguments&... arguments) const noexcept
     {
         watch_->tick();
         return System::guard(arguments...);

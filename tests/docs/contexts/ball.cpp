@@ -14,5 +14,7 @@ int main()
     const BouncingBall ball;
     const X x0{10, 0};
     (void)x0;
-    BLOCK
+    // clang-format off
+BLOCK
+    // clang-format on
 }

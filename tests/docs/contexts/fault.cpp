@@ -10,7 +10,9 @@ void use(double, double) {}
 // Compiled and not run: it is years of motion.
 [[maybe_unused]] static void page()
 {
-    BLOCK
+    // clang-format off
+BLOCK
+    // clang-format on
 }
 
 int main() {}

@@ -7,5 +7,7 @@ using namespace ricochet;
 
 int main()
 {
-    BLOCK
+    // clang-format off
+BLOCK
+    // clang-format on
 }

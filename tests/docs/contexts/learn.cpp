@@ -24,7 +24,11 @@ double work_and_error_of_runs_with(std::span<const double> x)
     const std::vector<double> x0{1, 2};
     double x = 0;
     int steps = 0;
-    BLOCK(void) x, (void)steps;
+    // clang-format off
+BLOCK
+    // clang-format on
+    static_cast<void>(x);
+    static_cast<void>(steps);
 }
 
 int main() {}

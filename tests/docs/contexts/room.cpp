@@ -3,8 +3,12 @@
 #include <cmath>
 
 namespace {
-struct Scope BLOCK;
-}
+struct Scope
+    // clang-format off
+BLOCK
+;
+// clang-format on
+}  // namespace
 
 int main()
 {

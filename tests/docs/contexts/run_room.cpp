@@ -25,5 +25,7 @@ int main()
 {
     const Room room;
     const Room::State x0{0, 0, 1, 0};
-    BLOCK
+    // clang-format off
+BLOCK
+    // clang-format on
 }

@@ -12,7 +12,9 @@ int main()
     Simulation simulation(ball, x0, {.t_end = 5});
     Simulation other(ball, x0, {.t_end = 5});
     simulation.advance();
-    BLOCK
+    // clang-format off
+BLOCK
+    // clang-format on
     while (simulation.advance()) {
     }
     while (other.advance()) {

@@ -1,0 +1,26 @@
+"""Keeps a report in docs/benchmarks.md: its table at equal error, and its figures beside it."""
+import shutil
+
+import page
+
+BEGIN = "<!-- by scripts/bench --keep -->"
+
+
+def keep(report, directory, root):
+    """Replaces what follows the mark in docs/benchmarks.md, and the figures docs/benchmarks-*.svg."""
+    file = root / "docs/benchmarks.md"
+    head = file.read_text().split(BEGIN)[0]
+    for old in (root / "docs").glob("benchmarks-*.svg"):
+        old.unlink()
+    text = [BEGIN, "## The report", page.heading(report), *page.remarks(report, None),
+            "### At equal error", page.LEAD, page.markdown_table(*page.equal_error_table(report))]
+    if report["pays"]:
+        text += ["### What a scene pays for", page.PAYS,
+                 page.markdown_table(*page.pays_table(report))]
+    text.append("### Figures")
+    for name, caption, _ in page.figures(report):
+        figure = directory / f"{name}.svg"
+        if figure.exists():
+            shutil.copy(figure, root / f"docs/benchmarks-{name}.svg")
+            text.append(f"![{caption}](benchmarks-{name}.svg)")
+    file.write_text(head + "\n\n".join(text) + "\n")

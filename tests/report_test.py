@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""What scripts/bench does with answers and with peers that misbehave; no peer is needed."""
+import json
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "bench/report"))
+sys.dont_write_bytecode = True
+
+import page  # noqa: E402
+import run  # noqa: E402
+from score import score, scored_as_wrong  # noqa: E402
+
+EVENTS = {"times": [1.0, 2.0, 3.0], "guards": [0, 0, 1], "samples": []}
+
+
+def answer(times, guards, finished=True):
+    return {"finished": finished, "times": times, "guards": guards, "samples": []}
+
+
+class Scores(unittest.TestCase):
+    def test_a_right_answer_has_the_largest_error_of_its_times(self):
+        row = score(answer([1.0, 2.0 + 1e-9, 3.0], [0, 0, 1]), EVENTS)
+        self.assertEqual((row["missed"], row["invented"]), (0, 0))
+        self.assertAlmostEqual(row["error"], 1e-9, delta=1e-15)
+        self.assertFalse(scored_as_wrong(row))
+
+    def test_events_that_are_missed_or_invented_are_counted(self):
+        row = score(answer([1.0, 2.9, 3.0], [0, 0, 1]), EVENTS)
+        self.assertEqual((row["missed"], row["invented"]), (1, 1))
+        row = score(answer([1.0, 2.0], [0, 0]), EVENTS)
+        self.assertEqual((row["missed"], row["invented"]), (1, 0))
+        self.assertTrue(scored_as_wrong(row))
+
+    def test_an_event_of_another_guard_is_no_event_of_this_one(self):
+        row = score(answer([1.0, 2.0, 3.0], [0, 0, 0]), EVENTS)
+        self.assertEqual((row["missed"], row["invented"]), (1, 1))
+
+    def test_times_that_are_no_numbers_are_wrong(self):
+        row = score(answer([1.0, float("nan"), 3.0], [0, 0, 1]), EVENTS)
+        self.assertTrue(scored_as_wrong(row))
+
+    def test_states_are_compared_by_their_relative_norm(self):
+        problem = {"samples": [[1.0], [1.0], [1.0]], "times": [], "guards": []}
+        given = {"finished": True, "samples": [[1.0], [1.1], [1.0]]}
+        self.assertAlmostEqual(score(given, problem)["error"], 0.1 / 2 ** 0.5)
+        given["samples"].pop()
+        self.assertTrue(scored_as_wrong(score(given, problem)))
+
+
+class Peers(unittest.TestCase):
+    """Each stands for a peer that does not do what it should."""
+
+    def ask(self, program, patience=10):
+        worker = run.Worker([sys.executable, "-c", program], None)
+        try:
+            return worker.ask("solve", patience)
+        finally:
+            worker.close()
+
+    def test_an_answer_comes_through(self):
+        self.assertEqual(self.ask("input(); print('{\"seconds\": 1}', flush=True); input()"),
+                         {"seconds": 1})
+
+    def test_a_crash_is_named(self):
+        with self.assertRaisesRegex(run.PeerFailed, "signal 6"):
+            self.ask("import os; os.abort()")
+
+    def test_an_exception_is_quoted(self):
+        with self.assertRaisesRegex(run.PeerFailed, "status 1: .*no such solver"):
+            self.ask("input(); raise SystemExit('no such solver')")
+
+    def test_nonsense_is_quoted(self):
+        with self.assertRaisesRegex(run.PeerFailed, "nonsense"):
+            self.ask("input(); print('42 is the answer', flush=True); input()")
+
+    def test_silence_ends(self):
+        with self.assertRaisesRegex(run.PeerFailed, "no answer within"):
+            self.ask("import time; time.sleep(60)", 0.5)
+
+    def test_what_a_peer_failed_with_is_its_row(self):
+        cell = {"name": "p/x/y", "problem": "p", "peer": "x", "how": "y", "value": 0,
+                "command": [sys.executable, "-c", "import os; os.abort()"]}
+        row, worker = run.solve(cell, EVENTS, None)
+        self.assertIsNone(worker)
+        self.assertIn("signal 6", row["failed"])
+        self.assertEqual(page.why(row), row["failed"])
+
+
+def report(times, yardstick):
+    rows = [{"name": name, "problem": "p", "peer": peer, "how": "h", "value": 1e-8, "missed": 0,
+             "invented": 0, "error": 1e-9, "finished": True, "note": "", "command": "again",
+             "steps": None, "flow_calls": 1, "guard_calls": 2, "samples": [time, 1.1 * time]}
+            for name, peer, time in times]
+    return {"rows": rows, "yardstick": yardstick, "absent": {"SciPy": "absent"}, "pays": [],
+            "problems": {"p": {"title": "P", "events": 3, "t_end": 1}},
+            "machine": {"commit": "c", "date": "d", "processor": "m", "cores": 1, "compiler": "g"},
+            "versions": {"ricochet": "1", "GSL": "2"}}
+
+
+class Reports(unittest.TestCase):
+    def test_noise_and_absence_are_said(self):
+        said = " ".join(page.remarks(report([], [1e-9] * 5 + [2e-9] * 5), None))
+        self.assertIn("too noisy", said)
+        self.assertIn("SciPy is not in this report", said)
+        self.assertNotIn("too noisy", " ".join(page.remarks(report([], [1e-9] * 10), None)))
+
+    def test_a_machine_of_another_speed_does_not_change_ratios(self):
+        one = report([("a", "ricochet", 1.0), ("b", "GSL", 4.0)], [1e-9])
+        slower = report([("a", "ricochet", 2.0), ("b", "GSL", 8.0)], [2e-9])
+        self.assertLess(page.agreement(one, slower)[0][0], 1e-12)
+        other = report([("a", "ricochet", 1.0), ("b", "GSL", 8.0)], [1e-9])
+        self.assertGreater(page.agreement(one, other)[0][0], page.AGREEMENT)
+
+    def test_the_pages_have_every_row_and_its_command(self):
+        with tempfile.TemporaryDirectory() as directory:
+            out = Path(directory)
+            given = report([("a", "ricochet", 1.0), ("b", "GSL", 4.0)], [1e-9])
+            page.write(given, None, out, out)  # no program draws: the report says so
+            markdown = (out / "report.md").read_text()
+            html = (out / "index.html").read_text()
+            self.assertEqual(json.loads((out / "report.json").read_text())["rows"], given["rows"])
+        for text in (markdown, html):
+            self.assertIn("again", text)
+            self.assertIn("No figures", text)
+        self.assertIn("| P | 1e-08 | 1 s | h | 4 |", markdown)
+        self.assertIn("width=device-width", html)
+
+
+if __name__ == "__main__":
+    unittest.main()
