@@ -181,7 +181,9 @@ bool ContactIsland::exclude_arrivals(double h)
                    warm_impulses_[2 * static_cast<Eigen::Index>(&w - warm_.data())] > 0;
         });
         if (lasts || !(approach > 0)) continue;
-        const double press = -relative_normal(c, kick) / h;
+        // Under gravity whatever is as slow as a step of free fall is pressed together soon.
+        const double press =
+            std::max(-relative_normal(c, kick) / h, std::hypot(gravity_[0], gravity_[1]));
         if (2 * c.law.restitution * approach < press * h) {
             ++statistics_.spent;
         } else {

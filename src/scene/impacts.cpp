@@ -15,6 +15,9 @@ constexpr double tie = 1e-12;
 /// Waves for each contact after which a cluster is taken for one that collapses.
 constexpr std::size_t patience = 100;
 
+/// The same where there is lasting contact, whose next step takes what is left without restitution.
+constexpr std::size_t lasting_patience = 4;
+
 /// Sweeps alone, for few contacts; before the exact solution of more; where that is too large.
 constexpr std::size_t few = 4;
 constexpr std::size_t most_exact = 600;
@@ -212,7 +215,7 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
     }
 }
 
-void Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events)
+bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events)
 {
     if (cluster.contacts.size() > 1) {
         std::ranges::sort(cluster.contacts, {}, &Contact::at);
@@ -222,13 +225,15 @@ void Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
         if (!contact.surface) inverse += world_.bodies[contact.b].inverse_mass;
         contact.mass = 1 / inverse;
     }
-    const std::size_t most = patience * cluster.contacts.size();
+    const std::size_t each = cluster.lasting ? lasting_patience : patience;
+    const std::size_t most = each * cluster.contacts.size();
     for (std::size_t waves = 0; !spend; ++waves) {
         if (waves == most) spend = true;
-        if (!wave(cluster)) return;
+        if (!wave(cluster)) return false;
         emit(cluster, t, events);
-        if (cluster.contacts.size() == 1) return;
+        if (cluster.contacts.size() == 1) return false;
     }
+    if (cluster.lasting) return true;
     ++world_.statistics.collapses;
     struck_.clear();
     for (std::uint32_t k = 0; k < cluster.contacts.size(); ++k) {
@@ -238,6 +243,7 @@ void Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
     before_wave_ = cluster.after;
     solve(cluster);
     emit(cluster, t, events);
+    return false;
 }
 
 }  // namespace ricochet::detail

@@ -168,8 +168,8 @@ void Runner::resolve_cluster(std::uint32_t i)
             }
         }
     }
-    // Whose flight back and forth would be shorter than a step of the group that is struck joins
-    // it.
+    // A body whose flight back and forth would be shorter than a step of the group that it meets
+    // joins that group.
     const double slow = 0.5 * norm(world_.gravity) * world_.options.contact_step;
     if (const auto bodies = joining(0, slow); !bodies.empty()) return hand_over(bodies, "");
     bool spend = false;
@@ -178,11 +178,18 @@ void Runner::resolve_cluster(std::uint32_t i)
     }
     std::vector<SceneEvent>* events = world_.options.record_events ? &result_.events : nullptr;
     const std::size_t known = result_.events.size();
-    impacts_.resolve(cluster_, now_.value, spend, events);
+    cluster_.lasting = std::ranges::any_of(
+        cluster_.bodies, [&](std::uint32_t body) { return world_.bodies[body].contact != none; });
+    const bool left = impacts_.resolve(cluster_, now_.value, spend, events);
     for (std::size_t k = known; k < result_.events.size(); ++k) {
         result_.events[k].number = result_.event_count;
     }
     apply();
+    if (left && !result_.failure) {
+        ++result_.event_count;
+        ++world_.statistics.collapses;
+        return hand_over(std::vector(cluster_.bodies), "");
+    }
     if (changed_.empty()) {
         ++world_.statistics.stale;
         if (const auto bodies = joining(-never, never); !bodies.empty()) {

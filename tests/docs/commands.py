@@ -37,7 +37,8 @@ def commands():
 def main(program, long):
     failures, run = [], 0
     with tempfile.TemporaryDirectory() as work:
-        os.symlink(ROOT / "models", Path(work) / "models")
+        for name in ("models", "examples"):
+            os.symlink(ROOT / name, Path(work) / name)
         for page, command in commands():
             command = re.sub(r"^build/release/bin/(?=ricochet\b)", "", command)
             if command.startswith("printf "):  # makes a file for the next command
