@@ -28,6 +28,7 @@ struct Cluster {
     std::vector<Vector2> before;  ///< velocities
     std::vector<Vector2> after;
     std::vector<Contact> contacts;
+    bool lasting = false;  ///< whether one of the bodies is in lasting contact
 
     void clear()
     {
@@ -45,8 +46,9 @@ public:
     explicit Impacts(World& world) : world_(world) {}
 
     /// Newton's law by waves, or for all at once. A cluster that does not come to an end has its
-    /// restitution spent, as `spend` has from the start.
-    void resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events);
+    /// restitution spent, as `spend` has from the start; one with lasting contact is left sooner,
+    /// with what still approaches. Returns whether it has been left.
+    bool resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events);
 
 private:
     [[nodiscard]] double approach(const Cluster& cluster, const Contact& contact) const;
