@@ -49,12 +49,17 @@ def number(x, unit=1.0):
     return f"{x / unit:.3g}"
 
 
+def three(x):
+    """Three digits, without an exponent where the number is large."""
+    return f"{x:.3g}" if abs(x) < 999.5 else f"{x:.0f}"
+
+
 def duration(seconds):
     if seconds != seconds:
         return "-"
     for unit, size in (("s", 1), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
+        if seconds >= 0.9995 * size:
+            return f"{three(seconds / size)} {unit}"
     return f"{seconds / 1e-9:.3g} ns"
 
 
@@ -201,7 +206,7 @@ def equal_error_table(report):
     rows = []
     for title, bound, ours, ratios in at_equal_error(report):
         rows.append([title, f"{bound:g}", duration(minimum(ours)), ours["how"]] +
-                    [f"{ratios[peer]:.3g}" if ratios.get(peer) else "-" for peer in peers])
+                    [three(ratios[peer]) if ratios.get(peer) else "-" for peer in peers])
     return header, rows
 
 
@@ -339,6 +344,7 @@ def html_table(header, rows):
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 0 auto; padding: 0 1rem;
        color: #222; background: #fff; overflow-wrap: break-word; }
+figure { margin: 1rem 0; }
 img { max-width: 100%; height: auto; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 0.8rem; white-space: nowrap; }
@@ -389,7 +395,7 @@ def write(report, older, directory, root):
     page.append("<h2>Figures</h2>")
     for name, caption in drawn:
         escaped = html.escape(caption)
-        page.append(f'<figure><img src="{name}.svg" alt="{escaped}">'
+        page.append(f'<figure><a href="{name}.svg"><img src="{name}.svg" alt="{escaped}"></a>'
                     f"<figcaption>{escaped}</figcaption></figure>")
     page.append("<h2>Every cell</h2>")
     for title, cells in sections(report):

@@ -1,5 +1,6 @@
 """The protocol of ricochet_report, for peers in Python."""
 import json
+import os
 import sys
 import time
 
@@ -38,15 +39,18 @@ def main(versions, cells):
         print(f"no cell '{words[1]}'; see `list`", file=sys.stderr)
         return 2
     solve = chosen[0]
+    # What libraries print themselves, as LSODA does, is no answer.
+    protocol = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
     if words[0] == "run":
-        print(json.dumps(solve()))
+        print(json.dumps(solve()), file=protocol)
         best = min(seconds(solve, 1) for _ in range(3))
-        print(f"shortest run of {words[1]}: {best * 1e6:.4g} us of processor time")
+        print(f"shortest run of {words[1]}: {best * 1e6:.4g} us of processor time", file=protocol)
         return 0
     for line in sys.stdin:
         verb = line.split()
         if verb and verb[0] == "time":
-            print(json.dumps({"seconds": seconds(solve, int(verb[1]))}), flush=True)
+            print(json.dumps({"seconds": seconds(solve, int(verb[1]))}), file=protocol, flush=True)
         else:
-            print(json.dumps(solve()), flush=True)
+            print(json.dumps(solve()), file=protocol, flush=True)
     return 0

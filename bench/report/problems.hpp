@@ -163,9 +163,10 @@ struct NearTangentPairs {
     Task<NearTangentPairs> task{
         .system = {.depth = depth}, .x0 = {std::cos(phase), -std::sin(phase)}, .t_end = 20};
     const double width = 2 * std::asin(std::sqrt(depth / 2));
-    for (int n = 1; 2 * std::numbers::pi * n - phase + width < task.t_end; ++n) {
+    for (int n = 1; 2 * std::numbers::pi * n - phase - width < task.t_end; ++n) {
         for (const double s : {-width, width}) {
-            task.events.push_back({2 * std::numbers::pi * n - phase + s, 0});
+            const double t = 2 * std::numbers::pi * n - phase + s;
+            if (t < task.t_end) task.events.push_back({t, 0});
         }
     }
     return task;

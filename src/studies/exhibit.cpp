@@ -232,7 +232,7 @@ void draw(const Exhibit& exhibit, const std::string& title, const std::filesyste
     const std::size_t down = (count + across - 1) / across;
     std::size_t curves = 0;
     for (const Panel& panel : exhibit.panels) curves = std::max(curves, panel.curves.size());
-    const std::size_t key = curves > 6 ? 22 * (curves - 6) : 0;  // it grows by lines
+    const std::size_t key = curves > 6 ? 26 * (curves - 2) : 0;  // a line each
     std::string out =
         plot_head(file, static_cast<int>(620 * across), static_cast<int>(60 + (420 + key) * down));
     out += fmt::format(
