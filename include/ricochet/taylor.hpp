@@ -468,6 +468,7 @@ class KernelOf<System, X, Taylor> {
         if (!(run.sign * run.g1 > 0) || (!run.departs && run.sign * run.g0 < 0)) return false;
         const bool from_surface = run.departs || run.sign * run.g0 <= 0;
         const SeriesTerms terms{step.guards.data(), step.order, m};
+        if (!series_converges(terms, 0, state.h, run.g0, run.g1)) return false;
         return series_clears(terms, 0, run.sign, state.h, 0, from_surface) ||
                series_clears_closely(terms, 0, run.sign, state.h, 0, from_surface);
     }

@@ -125,7 +125,7 @@ protected:
     /// the step, too, and a second time where the first leaves doubts.
     [[nodiscard]] bool any_suspicious()
     {
-        if (on_series_ || !bank_.looks() || !options_.look_inside)
+        if (bank_.on_series() || !bank_.looks() || !options_.look_inside)
             return bank_.suspicious(step_.h());
         look_inside();
         return is_suspicious(error_controlled_ && hardly_moves());
@@ -141,6 +141,7 @@ protected:
         if (!on_series_) return bank_.sample_end(step_, calls());
         bank_.sample_values_at_end(step_, calls());
         bank_.see_series(step_);
+        if (!bank_.on_series()) bank_.complete_rates(step_, calls());
     }
 
     void look_inside();
@@ -153,7 +154,7 @@ protected:
 
     [[nodiscard]] Evidence evidence_of_clear() const noexcept
     {
-        return on_series_ ? Evidence::proved : finders_.detector.evidence;
+        return bank_.on_series() ? Evidence::proved : finders_.detector.evidence;
     }
 
     void pass_on_clear() noexcept

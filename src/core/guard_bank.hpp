@@ -159,10 +159,11 @@ public:
         this->suspect_all();
     }
 
-    /// The guards are power series over the current step.
+    /// The guards are power series over the current step, if all of these have converged.
     void see_series(const Step<X>& step)
     {
         this->see(step.guard_series(), step.time(0) == armed_at_);
+        if (!this->series_converge(step.h())) this->see({}, false);
     }
 
     /// Part of the step that has not been examined for guard i; `end` is the sample at its end.

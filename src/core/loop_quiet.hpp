@@ -38,7 +38,9 @@ inline bool Loop<X, single>::run_quietly_from_here()
     counts.steps += quiet.steps;
     counts.rejected += quiet.rejected;
     counts.guard_calls += quiet.guard_calls;
-    if (bank_.size() > 0) this->add_evidence(this->evidence_of_clear(), quiet.steps);
+    if (bank_.size() > 0)
+        this->add_evidence(this->on_series_ ? Evidence::proved : finders_.detector.evidence,
+                           quiet.steps);
     if (quiet.why == QuietEnd::due) return false;
     end_quiet_run(quiet);
     return true;
@@ -54,6 +56,11 @@ inline void Loop<X, single>::end_quiet_run(const QuietRun& quiet)
                                ? retry(h, h, quiet.repeated ? 1 : rule_.largest, quiet.error)
                                : take_fixed_step(h, true);
         if (!taken || (guarded_ && handle_events())) {
+            calm_steps_ = 0;
+            return;
+        }
+    } else if (this->on_series_ && !bank_.on_series()) {
+        if (handle_events()) {
             calm_steps_ = 0;
             return;
         }

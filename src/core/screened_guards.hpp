@@ -52,6 +52,15 @@ public:
         starts_phase_ = starts;
         forget_screening();
     }
+    /// Whether every series has converged at h, the length of the step.
+    [[nodiscard]] bool series_converge(double h) const noexcept
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (has_series(i) && !series_converges(series_, i, h, g0_[i], g1_[i])) return false;
+        }
+        return true;
+    }
+    [[nodiscard]] bool on_series() const noexcept { return series_.coefficients; }
     [[nodiscard]] bool has_series(std::size_t i) const noexcept
     {
         return series_.coefficients && !records_[i].info.boolean;

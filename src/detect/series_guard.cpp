@@ -76,7 +76,8 @@ public:
         // Each coefficient is a sum of `degree` terms that are together no larger than the size,
         // with powers of as many roundings.
         size_ = size;
-        error_ = tail + 4 * degree_ * std::numeric_limits<double>::epsilon() * size;
+        error_ = tail + 4 * last_terms(terms, i, h_) +
+                 4 * degree_ * std::numeric_limits<double>::epsilon() * size;
     }
 
     /// Replaces the coefficients on [0, 1] by those on [0, u], or [u, 1].

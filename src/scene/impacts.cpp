@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "scene/gauss.hpp"
 
@@ -131,6 +133,41 @@ void Impacts::solve(Cluster& cluster) const
     sweep(cluster, 0.5 * epsilon * fastest, most_sweeps);
 }
 
+double Impacts::kinetic_energy(const Cluster& cluster) const
+{
+    double twice = 0;
+    for (std::size_t i = 0; i < cluster.bodies.size(); ++i) {
+        twice +=
+            dot(cluster.after[i], cluster.after[i]) / world_.bodies[cluster.bodies[i]].inverse_mass;
+    }
+    return 0.5 * twice;
+}
+
+/// Newton's restitution and Coulomb's friction at several contacts may gain energy together. Then
+/// restitution is spent, and where the sweeps still gain, friction is left out.
+void Impacts::solve_without_gain(Cluster& cluster) const
+{
+    const std::vector<Vector2> start = cluster.after;
+    const double most = kinetic_energy(cluster) * (1 + 1e-12);
+    solve(cluster);
+    std::vector<std::pair<double, double>> laws;
+    for (const bool with_friction : {true, false}) {
+        if (kinetic_energy(cluster) <= most) break;
+        cluster.after = start;
+        for (const std::uint32_t k : struck_) {
+            Contact& contact = cluster.contacts[k];
+            if (with_friction) laws.emplace_back(contact.restitution, contact.friction);
+            contact.restitution = 0;
+            if (!with_friction) contact.friction = 0;
+        }
+        solve(cluster);
+    }
+    for (std::size_t i = 0; i < laws.size(); ++i) {
+        Contact& contact = cluster.contacts[struck_[i]];
+        std::tie(contact.restitution, contact.friction) = laws[i];
+    }
+}
+
 /// One contact after another, until no velocity changes by more than `smallest`.
 void Impacts::sweep(Cluster& cluster, double smallest, int most) const
 {
@@ -179,7 +216,7 @@ bool Impacts::wave(Cluster& cluster)
     if (struck_.size() == 1) {
         strike(cluster, cluster.contacts[struck_[0]]);
     } else {
-        solve(cluster);
+        solve_without_gain(cluster);
     }
     return true;
 }

@@ -56,6 +56,8 @@ private:
     void push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
     void strike(Cluster& cluster, Contact& contact) const;
     void solve(Cluster& cluster) const;
+    void solve_without_gain(Cluster& cluster) const;
+    [[nodiscard]] double kinetic_energy(const Cluster& cluster) const;
     bool solve_exactly(Cluster& cluster) const;
     void sweep(Cluster& cluster, double smallest, int most) const;
     bool wave(Cluster& cluster);

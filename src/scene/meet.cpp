@@ -257,7 +257,7 @@ Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
             return {.from = b.t, .after = 0, .presses = true};
         }
     }
-    meeting.after = path.degree == 1 ? straight(now, path.c[1])
+    meeting.after = path.degree == 1 ? straight(now, apart.c[0], apart.c[1], b.radius)
                                      : falls_within(squared(apart, now), 2 * path.degree,
                                                     path.until, now.tolerance);
     if (steps && meeting.after > 0 && std::isfinite(meeting.after)) {

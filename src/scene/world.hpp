@@ -167,12 +167,15 @@ struct Squares {
     return {(distance - reach) * (distance + reach), dot(dp, dv), 2 * reach * rounding};
 }
 
-/// Two straight flights, or two of the same acceleration.
-[[nodiscard]] inline double straight(const Squares& now, const Vector2& dv) noexcept
+/// Two straight flights, or two of the same acceleration. The discriminant is that of the reach and
+/// of how far the paths pass each other, so that a small reach is not lost in a long way.
+[[nodiscard]] inline double straight(const Squares& now, const Vector2& dp, const Vector2& dv,
+                                     double reach) noexcept
 {
     if (now.rate >= 0) return never;
     if (now.at_once <= 0) return 0;
-    const double square = now.rate * now.rate - dot(dv, dv) * now.at_once;
+    const double passing = dp[0] * dv[1] - dp[1] * dv[0];
+    const double square = dot(dv, dv) * (reach * reach) - passing * passing;
     if (square < 0) return never;
     return now.at_once / (std::sqrt(square) - now.rate);
 }
@@ -200,13 +203,13 @@ struct Squares {
     const double square = dot(dp, dp) - reach * reach;
     if (square > 1e-6 * reach * reach) {
         // Far from touching the sum of squares keeps its digits.
-        return {.from = from, .after = straight({square, rate, 0}, dv)};
+        return {.from = from, .after = straight({square, rate, 0}, dp, dv, reach)};
     }
     const Squares now = squares(dp, dv, reach, 0);
     if (now.at_once <= 4 * reach * World::rounding(pa, reach) && -rate <= noise(va, vb) * reach) {
         return {};
     }
-    return {.from = from, .after = straight(now, dv)};
+    return {.from = from, .after = straight(now, dp, dv, reach)};
 }
 [[nodiscard]] Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t face);
 

@@ -187,6 +187,51 @@ TEST(SeriesGuard, RootsAreLocatedAndAreTheFirst)
     EXPECT_GT(found, 9'000);
 }
 
+/// Harmonic motion; what varies is the guard, many times in a step of the motion.
+struct Harmonic {
+    using State = std::array<double, 2>;
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+};
+struct FastClock : Harmonic {
+    template <class S>
+    constexpr S guard(const S& t, const std::array<S, 2>& /*x*/) const
+    {
+        using std::sin;
+        return sin(10.0 * t);
+    }
+};
+struct Corrugated : Harmonic {
+    template <class S>
+    constexpr S guard(const S& /*t*/, const std::array<S, 2>& x) const
+    {
+        using std::sin;
+        return sin(40.0 * x[0]) + 0.5;
+    }
+};
+
+TEST(SeriesGuard, ASeriesThatHasNotConvergedIsNoEvidence)
+{
+    const auto clock = integrate(FastClock{}, Harmonic::State{1, 0},
+                                 {.t_start = 0.01, .t_end = 100}, ErrorControlled<Taylor>{});
+    ASSERT_EQ(clock.events.size(), 159u);
+    // sin falls through zero where 10 t is an odd multiple of pi.
+    for (std::size_t k = 0; k < clock.events.size(); ++k) {
+        const double exact = (2.0 * static_cast<double>(k) + 1) * std::numbers::pi / 10;
+        EXPECT_NEAR(clock.events[k].t, exact, 4e-14 * (1 + exact));
+    }
+    for (const double tolerance : {1e-6, 1e-10, 1e-14}) {
+        const Options options{.t_end = 20, .rtol = tolerance, .atol = tolerance};
+        const auto ours =
+            integrate(Corrugated{}, Harmonic::State{2, 0.3}, options, ErrorControlled<Taylor>{});
+        EXPECT_EQ(ours.events.size(), 158u) << tolerance;
+    }
+}
+
 TEST(SeriesGuard, StepsThatTheSeriesClearsAreProved)
 {
     const auto run = integrate(Grazing{-1}, Grazing::State{1, 0}, {.t_end = 100, .rtol = 1e-12},

@@ -32,6 +32,29 @@ struct SeriesStretch {
     double hi = 0;  ///< [s]
 };
 
+/// Sizes of the last two terms of guard i at h together: what its series leaves out is judged by
+/// them.
+[[nodiscard, gnu::always_inline]] inline double last_terms(const SeriesTerms& terms, std::size_t i,
+                                                           double h) noexcept
+{
+    const double* const top =
+        terms.coefficients + i + static_cast<std::size_t>(terms.order) * terms.stride;
+    const double h2 = h * h;
+    const double h4 = h2 * h2;
+    double power = h4 / h;
+    for (int k = 8; k <= terms.order; k += 4) power *= h4;
+    return power * (std::fabs(top[0]) * h + std::fabs(*(top - terms.stride)));
+}
+
+/// Whether the series of guard i, with the values g0 and g1 at its ends, has converged at h. One
+/// that has not is no evidence: the step is that of the flow, and a guard may vary faster.
+[[nodiscard, gnu::always_inline]] inline bool series_converges(const SeriesTerms& terms,
+                                                               std::size_t i, double h, double g0,
+                                                               double g1) noexcept
+{
+    return last_terms(terms, i, h) <= 0x1p-20 * std::max(std::fabs(g0), std::fabs(g1));
+}
+
 /// Whether guard i, times `sign`, stays above `touch` in (0, h], proved but for what its series
 /// leaves out. `from_surface`: it starts on its surface, and this root is divided out.
 [[nodiscard, gnu::always_inline]] inline bool series_clears(const SeriesTerms& terms, std::size_t i,
@@ -55,7 +78,7 @@ struct SeriesStretch {
     const double q3 = sign * g[3 * n] * (h * h2);
     // Some 50 roundings of at most the sum of all sizes.
     const double size = ((std::fabs(q0) + std::fabs(q1)) + (std::fabs(q2) + std::fabs(q3))) + tail;
-    const double less = tail + 0x1p-47 * size;
+    const double less = (tail + 4 * last_terms(terms, i, h)) + 0x1p-47 * size;
     if (from_surface) {
         if (std::fabs(q0) > touch + 0x1p-44 * size) return false;
         const double middle = q1 + 0.5 * q2;
