@@ -62,24 +62,7 @@ private:
 void add_arkode(Cells& cells)
 {
     cells.add_version("ARKODE", sundials_version());
-    for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
-        using S = decltype(make().front().system);
-        for (const double tolerance : tolerances) {
-            cells.add({name, "ARKODE", "DP5, root finding", tolerance, [make, tolerance] {
-                           std::vector<std::shared_ptr<Solver<S>>> solvers;
-                           for (auto& task : make()) {
-                               solvers.push_back(std::make_shared<Solver<S>>(task, tolerance));
-                           }
-                           return [solvers] {
-                               Answer answer{.finished = true, .flow_calls = 0, .guard_calls = 0};
-                               for (std::size_t k = 0; k < solvers.size(); ++k) {
-                                   answer.finished &= solvers[k]->run(answer, guards_of_a_run * k);
-                               }
-                               return answer;
-                           };
-                       }});
-        }
-    });
+    add_solver_cells<Solver>(cells, "ARKODE", "DP5, root finding");
 }
 
 }  // namespace ricochet::report

@@ -98,4 +98,28 @@ bool drive(Seen<S>& system, const Task<S>& task, N_Vector state, Answer& answer,
     return finished;
 }
 
+/// Adds the cells of every problem by a solver `Solver<S>` made of a task and a tolerance.
+template <template <class> class Solver>
+void add_solver_cells(Cells& cells, const std::string& peer, const std::string& setting)
+{
+    for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
+        using S = decltype(make().front().system);
+        for (const double tolerance : tolerances) {
+            cells.add({name, peer, setting, tolerance, [make, tolerance] {
+                           std::vector<std::shared_ptr<Solver<S>>> solvers;
+                           for (auto& task : make()) {
+                               solvers.push_back(std::make_shared<Solver<S>>(task, tolerance));
+                           }
+                           return [solvers] {
+                               Answer answer{.finished = true, .flow_calls = 0, .guard_calls = 0};
+                               for (std::size_t k = 0; k < solvers.size(); ++k) {
+                                   answer.finished &= solvers[k]->run(answer, guards_of_a_run * k);
+                               }
+                               return answer;
+                           };
+                       }});
+        }
+    });
+}
+
 }  // namespace ricochet::report

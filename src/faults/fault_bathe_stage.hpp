@@ -86,7 +86,8 @@ private:
         return stage.friction * fault_.strength(i, path);
     }
 
-    /// Who slips which way, by the proximal map at v; who sticks is stopped. Whether one was.
+    /// Direction in which each element slips, by the proximal map at v; elements that stick are
+    /// stopped. Returns whether any was.
     bool classify(const StageOfFault& stage, VectorXd& v)
     {
         bool stopped = false;

@@ -1,4 +1,4 @@
-// Who is next: a heap of four children a node, with one entry for each body that is awake.
+// Next body to act: a heap of four children a node, with one entry for each body that is awake.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The loop: who is next, what it meets, what it crosses.
+// The loop of a scene: the next body to act, what it meets, what it crosses.
 #include "scene/runner.hpp"
 
 #include <fmt/format.h>

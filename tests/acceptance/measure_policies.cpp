@@ -23,7 +23,7 @@ StepWorld world_of(const StepWorldOptions& options, int elements = 1)
     return learn::step_world(StrikeSlipFault({.elements = elements}), 30, options);
 }
 
-/// How runs are assessed: until rest, without an estimate that nobody asked for.
+/// Assessment of runs: until rest, without an error estimate.
 StepWorldOptions judged(StepWorldOptions options)
 {
     options.until_rest = true;

@@ -361,7 +361,7 @@ private:
     void go_by_steps(PhaseCause cause)
     {
         if (branching_) {
-            // Who is back at once stays longer.
+            // A phase that is left at once is entered for a longer time the next time.
             const double lasted = run_.phases.empty() ? std::numeric_limits<double>::infinity()
                                                       : run_.state.t - run_.phases.back().from;
             const bool at_once = lasted < 10 * options_.set_valued.step;
