@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 namespace ricochet::learn {
 
 namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::string lost(const Rival& rival, const Rival& exact)
 {
@@ -15,6 +18,32 @@ std::string lost(const Rival& rival, const Rival& exact)
 }
 
 }  // namespace
+
+TrainingEstimate detail::RunCost::for_events(std::uint64_t wanted,
+                                             std::uint64_t most) const noexcept
+{
+    const auto n = static_cast<double>(std::max<std::uint64_t>(steps, 1));
+    const double per_event = events > 0 ? n / static_cast<double>(events) : infinity;
+    const double needed =
+        std::min(per_event * static_cast<double>(wanted), static_cast<double>(most));
+    return {
+        .guard_calls = static_cast<std::uint64_t>(needed / n * static_cast<double>(guard_calls)),
+        .seconds = needed / n * seconds,
+        .events = wanted,
+        .seen = events};
+}
+
+std::string describe(const TrainingEstimate& estimate)
+{
+    const std::string cost =
+        fmt::format("{:.2g} guard calls, {:.2g} s", static_cast<double>(estimate.guard_calls),
+                    estimate.seconds);
+    if (estimate.seen == 0) {
+        return fmt::format("no event in the first runs; up to {} if there is none", cost);
+    }
+    return fmt::format("about {} for the runs with {} events, and the training itself", cost,
+                       estimate.events);
+}
 
 std::string describe(const std::vector<Rival>& rivals)
 {

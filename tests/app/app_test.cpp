@@ -9,7 +9,7 @@
 
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::app_test {
 namespace {
 
 // --- systems ---
@@ -401,4 +401,4 @@ TEST_F(App, HelpHasAnExampleForEveryCommand)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::app_test

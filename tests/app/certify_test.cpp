@@ -10,7 +10,7 @@
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
-namespace ricochet {
+namespace ricochet::certify_test {
 namespace {
 
 class Certify : public App {
@@ -194,4 +194,4 @@ TEST_F(Certify, ProvesAModelOfTheArm)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::certify_test

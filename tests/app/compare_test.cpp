@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-namespace ricochet {
+namespace ricochet::compare_test {
 namespace {
 
 TEST_F(App, CompareFindsAllImpactsByEveryDetector)
@@ -104,4 +104,4 @@ TEST_F(App, CompareRefusesParametersOfWhichNothingIsKnown)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::compare_test

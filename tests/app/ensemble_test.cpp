@@ -12,7 +12,7 @@
 
 #include "app.hpp"
 
-namespace ricochet {
+namespace ricochet::ensemble_test {
 namespace {
 
 const Words random_balls{"--vary", "height=1:10", "--vary", "restitution=0.7:0.9", "--t-end", "3"};
@@ -406,4 +406,4 @@ TEST_F(EnsembleApp, ProcessesOfMpiexecTakeSharesOfTheirOwn)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::ensemble_test

@@ -2,7 +2,7 @@
 
 #include "app.hpp"
 
-namespace ricochet {
+namespace ricochet::fault_test {
 namespace {
 
 const std::string kernels = std::string(RICOCHET_TEST_FIXTURES) + "/fault_kernels/";
@@ -146,4 +146,4 @@ TEST_F(App, SimulateFaultRefusesFrictionOfTheOtherKind)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::fault_test

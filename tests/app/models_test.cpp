@@ -11,7 +11,7 @@
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
-namespace ricochet {
+namespace ricochet::models_test {
 namespace {
 
 Model any_step_model()
@@ -297,4 +297,4 @@ TEST_F(App, MissesAndFalseAlarmsOfAWrongNetworkAreCounted)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::models_test

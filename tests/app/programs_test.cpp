@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-namespace ricochet {
+namespace ricochet::programs_test {
 namespace {
 
 /// A program by itself, in the directory of `ricochet`.
@@ -51,4 +51,4 @@ TEST_F(App, AProgramThatIsNotThereIsNamed)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::programs_test

@@ -3,7 +3,7 @@
 
 #include "app.hpp"
 
-namespace ricochet {
+namespace ricochet::rate_and_state_test {
 namespace {
 
 TEST_F(App, SimulateSpringSliderShowsStickSlip)
@@ -64,4 +64,4 @@ TEST_F(App, RefusesWhatTheSpringSliderIsNot)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::rate_and_state_test

@@ -9,7 +9,7 @@
 
 #include "app.hpp"
 
-namespace ricochet {
+namespace ricochet::robustness_test {
 namespace {
 
 constexpr const char* kernel = RICOCHET_TEST_FIXTURES "/fault_kernels/fault-kernel-1x1-3km.npy";
@@ -377,4 +377,4 @@ TEST_F(Robust, EventsAreKeptWhenMemoryRunsShort)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::robustness_test

@@ -6,7 +6,7 @@
 
 #include "app.hpp"
 
-namespace ricochet {
+namespace ricochet::scene_app_test {
 namespace {
 
 const std::string scenes = RICOCHET_SCENES;
@@ -117,4 +117,4 @@ TEST_F(SceneApp, AnInterruptKeepsWhatThereIs)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::scene_app_test

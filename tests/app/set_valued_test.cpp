@@ -5,7 +5,7 @@
 
 #include "app.hpp"
 
-namespace ricochet {
+namespace ricochet::set_valued_test {
 namespace {
 
 constexpr double reaching_time = 0.093315472931294579027;
@@ -150,4 +150,4 @@ TEST_F(App, RefusesWhatInclusionsHaveNot)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::set_valued_test

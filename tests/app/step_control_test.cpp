@@ -4,7 +4,7 @@
 
 #include "app.hpp"
 
-namespace ricochet {
+namespace ricochet::step_control_test {
 namespace {
 
 TEST_F(App, SimulateFaultByLearnedSteps)
@@ -222,4 +222,4 @@ TEST_F(App, TrainStepPolicyByReinforcement)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::step_control_test

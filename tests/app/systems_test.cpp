@@ -12,7 +12,7 @@
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
 
-namespace ricochet {
+namespace ricochet::systems_test {
 namespace {
 
 const Words with_guards{"pendulum",           "henon-heiles", "three-body", "hidden-pair",
@@ -305,4 +305,4 @@ TEST_F(App, SystemsWithModesAndTimeEventsAreDrawn)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::systems_test

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-namespace ricochet {
+namespace ricochet::train_test {
 namespace {
 
 const Words small_training{"train",    "bouncing-ball", "--out",   "ball.safetensors",
@@ -226,4 +226,4 @@ TEST_F(App, GateTrainingOnStatesWithoutEventsIsRefused)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::train_test

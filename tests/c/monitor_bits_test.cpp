@@ -14,7 +14,7 @@
 #include "ricochet/monitor.hpp"
 #include "rk4_host.hpp"
 
-namespace ricochet {
+namespace ricochet::monitor_bits_test {
 namespace {
 
 // --- systems ---
@@ -440,7 +440,7 @@ std::size_t compare(const char* name, System system, const typename System::X& x
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::monitor_bits_test
 
 int main()
 {

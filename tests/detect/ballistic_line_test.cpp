@@ -5,7 +5,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::ballistic_line_test {
 namespace {
 
 template <class Stepping>
@@ -31,4 +31,4 @@ TEST(BallisticLine, PredictsTheBallWithoutAMistake)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::ballistic_line_test

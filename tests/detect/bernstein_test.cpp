@@ -20,7 +20,7 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 
-namespace ricochet {
+namespace ricochet::bernstein_test {
 namespace {
 
 using std::numbers::pi;
@@ -779,4 +779,4 @@ TEST(Bernstein, NotANumberAtTheEndOfAStepEndsTheRun)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::bernstein_test

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace ricochet {
+namespace ricochet::cover_test {
 namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -130,4 +130,4 @@ TEST(Cover, TheForecastIsWhereTwoValuesJustCloseTheStretch)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::cover_test

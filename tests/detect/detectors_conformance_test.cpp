@@ -7,7 +7,7 @@
 #include "ricochet/detect/network.hpp"
 #include "ricochet/detect/verified.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::detectors_conformance_test {
 namespace {
 
 Network network()
@@ -48,4 +48,4 @@ INSTANTIATE_TEST_SUITE_P(All, DetectorSuite, testing::ValuesIn(all()),
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::detectors_conformance_test

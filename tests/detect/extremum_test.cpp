@@ -6,7 +6,7 @@
 
 #include "host_step.hpp"
 
-namespace ricochet {
+namespace ricochet::extremum_test {
 namespace {
 
 using test::HostStep;
@@ -41,4 +41,4 @@ TEST(Extremum, APairOfCrossingsIsFoundWhateverTheSizeOfTheGuard)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::extremum_test

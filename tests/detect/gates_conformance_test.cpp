@@ -10,7 +10,7 @@
 #include "ricochet/detect/verified.hpp"
 #include "ricochet/learn/certify.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::gates_conformance_test {
 namespace {
 
 /// |x| below 0.9, 0.8 and 0.6 is proved to mean a guard above 0.1, 0.2 and 0.4.
@@ -161,4 +161,4 @@ TEST(CertifiedGate, NeverClearsMoreThanIsProved)
 }
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::gates_conformance_test

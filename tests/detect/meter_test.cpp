@@ -18,7 +18,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/learn/certify.hpp"
 
-namespace ricochet {
+namespace ricochet::meter_test {
 namespace {
 
 using Fixed = FixedStep<Rk4>;
@@ -398,4 +398,4 @@ TEST(Certified, RefusesAModelWithoutAValidCertificateOrForSomethingElse)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::meter_test

@@ -11,7 +11,7 @@
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::network_test {
 namespace {
 
 Model paper_model()
@@ -240,4 +240,4 @@ TEST(Network, FeaturesThatDoNotFitTheStateAreRefused)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::network_test

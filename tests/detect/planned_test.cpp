@@ -19,7 +19,7 @@
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::planned_test {
 namespace {
 
 using X = std::array<double, 4>;  // position [m], velocity [m/s]
@@ -990,4 +990,4 @@ TEST(PlannedBounds, ThoseOfABooleanGuardAreNotAsked)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::planned_test

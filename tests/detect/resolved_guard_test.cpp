@@ -11,7 +11,7 @@
 #include "ricochet/detect/ends.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::resolved_guard_test {
 namespace {
 
 using test::Draining;
@@ -274,4 +274,4 @@ TEST(ResolvedGuards, AGuardThatIsNotFiniteEndsTheRunWhateverItsSign)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::resolved_guard_test

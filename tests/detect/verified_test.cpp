@@ -12,7 +12,7 @@
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::verified_test {
 namespace {
 
 using X = std::array<double, 2>;
@@ -128,4 +128,4 @@ TEST(Verified, WithoutABoundNoCheckIsPutOff)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::verified_test

@@ -17,7 +17,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::ensemble_test {
 namespace {
 
 struct Drop {
@@ -196,4 +196,4 @@ TEST(Ensemble, RefusesMoreThreadsThanItCanHave)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::ensemble_test

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace ricochet::detail {
+namespace ricochet::detail::workers_test {
 namespace {
 
 TEST(Workers, DoEveryPartOnce)
@@ -43,4 +43,4 @@ TEST(Workers, PassOnWhatAPartThrowsAndGoOnWithTheNextTask)
 }
 
 }  // namespace
-}  // namespace ricochet::detail
+}  // namespace ricochet::detail::workers_test

@@ -6,7 +6,7 @@
 
 #include "fault_energy.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::fault_energy_test {
 namespace {
 
 constexpr double constant_steps = std::numeric_limits<double>::infinity();
@@ -89,4 +89,4 @@ TEST(FaultEnergy, RateAndStateFrictionKeepsTheBalance)
 }
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::fault_energy_test

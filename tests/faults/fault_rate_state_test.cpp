@@ -13,7 +13,7 @@
 #include "ricochet/faults/fault_rate_state.hpp"
 #include "ricochet/faults/spring_slider.hpp"
 
-namespace ricochet {
+namespace ricochet::fault_rate_state_test {
 namespace {
 
 constexpr double constant_steps = std::numeric_limits<double>::infinity();
@@ -512,4 +512,4 @@ TEST(FaultRateState, RefusesWhatHasNoMeaning)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::fault_rate_state_test

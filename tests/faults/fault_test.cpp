@@ -16,7 +16,7 @@
 #include "ricochet/faults/fault_rupture.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 
-namespace ricochet {
+namespace ricochet::fault_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -479,4 +479,4 @@ TEST(FaultBathe, RefusesWrongOptions)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::fault_test

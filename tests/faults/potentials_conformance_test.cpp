@@ -8,7 +8,7 @@
 #include "ricochet/detail/affine_law.hpp"
 #include "ricochet/faults/additive_pair.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::potentials_conformance_test {
 namespace {
 
 /// Where w is of the order of V, and every term of the asinh form counts.
@@ -128,4 +128,4 @@ INSTANTIATE_TEST_SUITE_P(All, PotentialSuite, testing::ValuesIn(all()),
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::potentials_conformance_test

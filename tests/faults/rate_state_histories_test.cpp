@@ -13,7 +13,7 @@
 #include "ricochet/faults/potentials.hpp"
 #include "theta_reference.hpp"
 
-namespace ricochet {
+namespace ricochet::rate_state_histories_test {
 namespace {
 
 std::string refusal(const FrictionHistory& history)
@@ -141,4 +141,4 @@ TEST(IdentifyAgeingLaw, IsWithinItsErrorOfNoisyHistories)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::rate_state_histories_test

@@ -11,7 +11,7 @@
 #include "ricochet/detail/affine_law.hpp"
 #include "ricochet/detail/wright_omega.hpp"
 
-namespace ricochet {
+namespace ricochet::rate_state_laws_test {
 namespace {
 
 using test::Quad;
@@ -235,4 +235,4 @@ TEST(WrightOmega, IsWithinTwoUlpEverywhere)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::rate_state_laws_test

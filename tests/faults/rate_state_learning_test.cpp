@@ -14,7 +14,7 @@
 #include "ricochet/detail/friction_study.hpp"
 #include "ricochet/learn/train_friction.hpp"
 
-namespace ricochet {
+namespace ricochet::rate_state_learning_test {
 namespace {
 
 AdditivePair::Parameters in_domain(AdditivePair::Parameters p)
@@ -353,4 +353,4 @@ TEST(StoredPair, IsTheAgeingLawToFiveMillionths)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::rate_state_learning_test

@@ -8,7 +8,7 @@
 
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::rate_state_slider_test {
 namespace {
 
 constexpr double threshold = 2e-4;  // [m/s]
@@ -62,4 +62,4 @@ TEST(RateStateSlider, RefusesWhatItIsNotFor)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::rate_state_slider_test

@@ -11,7 +11,7 @@
 #include "ricochet/detail/incremental.hpp"
 #include "ricochet/faults/spring_slider.hpp"
 
-namespace ricochet {
+namespace ricochet::rate_state_step_test {
 namespace {
 
 constexpr double normal_force = 9.81;
@@ -297,4 +297,4 @@ TEST(SpringSlider, RefusesWhatMakesNoSense)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::rate_state_step_test

@@ -24,7 +24,7 @@
 #include "nonsmooth/complete.hpp"
 #include "registry.hpp"
 
-namespace ricochet::app {
+namespace ricochet::app::golden_test {
 namespace {
 
 /// FNV-1a of 64 bits.
@@ -179,4 +179,4 @@ TEST(Golden, RunsHaveTheirBits)
 }
 
 }  // namespace
-}  // namespace ricochet::app
+}  // namespace ricochet::app::golden_test

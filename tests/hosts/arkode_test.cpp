@@ -4,7 +4,7 @@
 #include "hosts/host_cases.hpp"
 #include "hosts/sundials_setup.hpp"
 
-namespace ricochet::hosts_test {
+namespace ricochet::hosts_test::arkode_test {
 
 namespace {
 
@@ -86,4 +86,4 @@ INSTANTIATE_TYPED_TEST_SUITE_P(Arkode, InHost, Methods);
 
 }  // namespace
 
-}  // namespace ricochet::hosts_test
+}  // namespace ricochet::hosts_test::arkode_test

@@ -7,7 +7,7 @@
 
 #include "hosts/engine_cases.hpp"
 
-namespace ricochet::hosts_test {
+namespace ricochet::hosts_test::bullet_test {
 
 namespace {
 
@@ -54,4 +54,4 @@ INSTANTIATE_TYPED_TEST_SUITE_P(Bullet, InEngine, BulletWorld);
 
 }  // namespace
 
-}  // namespace ricochet::hosts_test
+}  // namespace ricochet::hosts_test::bullet_test

@@ -2,7 +2,7 @@
 #include "hosts/host_cases.hpp"
 #include "hosts/sundials_setup.hpp"
 
-namespace ricochet::hosts_test {
+namespace ricochet::hosts_test::cvode_test {
 
 namespace {
 
@@ -59,4 +59,4 @@ TEST(CvodeHost, ACutThatChangesNothingLeavesTheIntegratorAsItIs)
 
 }  // namespace
 
-}  // namespace ricochet::hosts_test
+}  // namespace ricochet::hosts_test::cvode_test

@@ -3,7 +3,7 @@
 
 #include "hosts/host_cases.hpp"
 
-namespace ricochet::hosts_test {
+namespace ricochet::hosts_test::gsl_test {
 
 namespace {
 
@@ -91,4 +91,4 @@ TEST(Gsl, RefusesAMultistepMethod)
 
 }  // namespace
 
-}  // namespace ricochet::hosts_test
+}  // namespace ricochet::hosts_test::gsl_test

@@ -5,7 +5,7 @@
 
 #include "hosts/engine_cases.hpp"
 
-namespace ricochet::hosts_test {
+namespace ricochet::hosts_test::ode_test {
 
 namespace {
 
@@ -43,4 +43,4 @@ INSTANTIATE_TYPED_TEST_SUITE_P(Ode, InEngine, OdeWorld);
 
 }  // namespace
 
-}  // namespace ricochet::hosts_test
+}  // namespace ricochet::hosts_test::ode_test

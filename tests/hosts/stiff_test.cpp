@@ -8,7 +8,7 @@
 #include "hosts/host_systems.hpp"
 #include "hosts/sundials_setup.hpp"
 
-namespace ricochet::hosts_test {
+namespace ricochet::hosts_test::stiff_test {
 
 namespace {
 
@@ -64,4 +64,4 @@ TEST(StiffHosts, TheBuckConverterSwitches)
 
 }  // namespace
 
-}  // namespace ricochet::hosts_test
+}  // namespace ricochet::hosts_test::stiff_test

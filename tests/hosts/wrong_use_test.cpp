@@ -8,7 +8,7 @@
 #include "hosts/host_systems.hpp"
 #include "hosts/sundials_setup.hpp"
 
-namespace ricochet::hosts_test {
+namespace ricochet::hosts_test::wrong_use_test {
 
 namespace {
 
@@ -126,4 +126,4 @@ TEST(WrongUse, AFailingIntegratorIsNamed)
 
 }  // namespace
 
-}  // namespace ricochet::hosts_test
+}  // namespace ricochet::hosts_test::wrong_use_test

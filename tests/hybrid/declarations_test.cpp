@@ -18,7 +18,7 @@
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::declarations_test {
 namespace {
 
 using detail::Declaration;
@@ -512,4 +512,4 @@ TEST(Declarations, ExceptionsCallAGuardByItsName)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::declarations_test

@@ -25,7 +25,7 @@
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
 
-namespace ricochet {
+namespace ricochet::dual_test {
 
 namespace {
 
@@ -318,4 +318,4 @@ TEST(Degree, OneThatIsDeclaredHolds)
 
 }  // namespace
 
-}  // namespace ricochet
+}  // namespace ricochet::dual_test

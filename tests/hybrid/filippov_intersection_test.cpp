@@ -15,7 +15,7 @@
 #include "allocations.hpp"
 #include "filippov_runs.hpp"
 
-namespace ricochet {
+namespace ricochet::filippov_intersection_test {
 namespace {
 
 using test::run_from;
@@ -846,4 +846,4 @@ TEST(Filippov, TwoThreadsMayShareASystem)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::filippov_intersection_test

@@ -18,7 +18,7 @@
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/locate/toms748.hpp"
 
-namespace ricochet {
+namespace ricochet::filippov_test {
 namespace {
 
 using test::run_from;
@@ -664,4 +664,4 @@ TEST(Filippov, OnASurfaceThatIsEverywhereTheMeanOfTheFieldsActs)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::filippov_test

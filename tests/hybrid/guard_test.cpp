@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace ricochet {
+namespace ricochet::guard_test {
 namespace {
 
 TEST(Guard, AFallingCrossingTriggersOnlyFromAbove)
@@ -55,4 +55,4 @@ TEST(Guard, OppositeOfAPlateauIsAPlateau)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::guard_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace ricochet {
+namespace ricochet::instant_test {
 namespace {
 
 TEST(Instant, TwoSumKeepsWhatTheAdditionRoundsOff)
@@ -44,4 +44,4 @@ TEST(Instant, TimeUntilCountsTheRemainder)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::instant_test

@@ -11,7 +11,7 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "walled_oscillator.hpp"
 
-namespace ricochet {
+namespace ricochet::state_types_test {
 namespace {
 
 using test::WalledOscillator;
@@ -81,4 +81,4 @@ TYPED_TEST(StateTypes, TheBallBouncesThirteenTimes)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::state_types_test

@@ -10,7 +10,7 @@
 #include "accumulating_systems.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::accumulation_test {
 namespace {
 
 using test::BallOnFloor;
@@ -345,4 +345,4 @@ TEST(Accumulation, OfBallsThatBounceTogetherIsThatOfEach)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::accumulation_test

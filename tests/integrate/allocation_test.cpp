@@ -20,7 +20,7 @@
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::allocation_test {
 namespace {
 
 TEST(Allocation, TheCounterCounts)
@@ -114,4 +114,4 @@ TEST(Allocation, DearGuardsNeedNone)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::allocation_test

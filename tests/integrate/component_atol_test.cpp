@@ -14,7 +14,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/simulation.hpp"
 
-namespace ricochet {
+namespace ricochet::component_atol_test {
 namespace {
 
 constexpr double ordinary = 1e-10;
@@ -185,4 +185,4 @@ TEST(ComponentAtol, BelongsToTheRunThatASnapshotIsOf)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::component_atol_test

@@ -5,7 +5,7 @@
 
 #include "ricochet/nonsmooth/step_policy.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::controllers_conformance_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -131,4 +131,4 @@ INSTANTIATE_TEST_SUITE_P(All, ControllerSuite, testing::ValuesIn(all()),
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::controllers_conformance_test

@@ -9,7 +9,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "walled_oscillator.hpp"
 
-namespace ricochet {
+namespace ricochet::convergence_test {
 namespace {
 
 using test::WalledOscillator;
@@ -101,4 +101,4 @@ TEST(Convergence, ErrorFollowsToleranceWithFehlberg78)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::convergence_test

@@ -16,7 +16,7 @@
 #include "ricochet/hybrid/filippov.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::events_hard_test {
 namespace {
 
 using X1 = std::array<double, 1>;
@@ -685,4 +685,4 @@ TEST(HardEvents, ARateThatContradictsASurfaceOfRoundingIsNotFollowedForEver)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::events_hard_test

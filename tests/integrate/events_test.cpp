@@ -18,7 +18,7 @@
 #include "ricochet/locate/bisection.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::events_test {
 namespace {
 
 using X1 = std::array<double, 1>;
@@ -1003,4 +1003,4 @@ TEST(Events, AFastTrainOfEventsIsNotTakenForAnAccumulation)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::events_test

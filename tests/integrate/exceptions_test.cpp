@@ -8,7 +8,7 @@
 
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet {
+namespace ricochet::exceptions_test {
 namespace {
 
 struct Interrupted {
@@ -141,4 +141,4 @@ TEST(Exceptions, AWholeRunLetsAnExceptionPassUnchanged)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::exceptions_test

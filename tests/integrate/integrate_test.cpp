@@ -14,7 +14,7 @@
 #include "ricochet/locate/toms748.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::integrate_test {
 namespace {
 
 using X = std::array<double, 2>;
@@ -558,4 +558,4 @@ TEST(Integrate, TheStateTypeFollowsTheStart)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::integrate_test

@@ -20,7 +20,7 @@
 #include "ricochet/systems/thermostat.hpp"
 #include "rk4_host.hpp"
 
-namespace ricochet {
+namespace ricochet::monitor_test {
 namespace {
 
 using test::drive;
@@ -816,4 +816,4 @@ TEST(Monitor, NothingIsAllocatedFromStepToStep)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::monitor_test

@@ -17,7 +17,7 @@
 #include "step_of.hpp"
 #include "walled_oscillator.hpp"
 
-namespace ricochet {
+namespace ricochet::odeint_test {
 namespace {
 
 namespace odeint = boost::numeric::odeint;
@@ -151,4 +151,4 @@ TEST(Odeint, AUsersOwnStepperNeedsOnlyTheStepInPlace)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::odeint_test

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace ricochet {
+namespace ricochet::options_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -74,4 +74,4 @@ TEST(Options, ASampleTimeBeyondTheEndIsCalledThat)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::options_test

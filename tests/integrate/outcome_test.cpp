@@ -11,7 +11,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "saved_systems.hpp"
 
-namespace ricochet {
+namespace ricochet::outcome_test {
 namespace {
 
 using test::Losing;
@@ -85,4 +85,4 @@ TEST(Stalled, ARunWhoseTimeStandsStillEnds)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::outcome_test

@@ -4,7 +4,7 @@
 
 #include "property_check.hpp"
 
-namespace ricochet {
+namespace ricochet::property_full_test {
 namespace {
 
 TEST(RandomSystems, AHundredThousandOfThemLoseAndInventNothing)
@@ -19,4 +19,4 @@ TEST(RandomSystems, AHundredThousandOfThemLoseAndInventNothing)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::property_full_test

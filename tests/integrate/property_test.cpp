@@ -16,7 +16,7 @@
 #include "property_check.hpp"
 #include "random_systems.hpp"
 
-namespace ricochet {
+namespace ricochet::property_test {
 namespace {
 
 using test::ExactMotion;
@@ -162,4 +162,4 @@ TEST_F(ARun, WhoseTraceNamesOtherGuardsIsNotTheSame)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::property_test

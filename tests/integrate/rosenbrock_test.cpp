@@ -16,7 +16,7 @@
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/pendulum.hpp"
 
-namespace ricochet {
+namespace ricochet::rosenbrock_test {
 
 namespace {
 
@@ -271,4 +271,4 @@ TEST(Rosenbrock, StatesOfAllTypesHaveTheSameBits)
 
 }  // namespace
 
-}  // namespace ricochet
+}  // namespace ricochet::rosenbrock_test

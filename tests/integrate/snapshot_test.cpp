@@ -18,7 +18,7 @@
 #include "ricochet/locate/toms748.hpp"
 #include "saved_systems.hpp"
 
-namespace ricochet {
+namespace ricochet::snapshot_test {
 namespace {
 
 using test::Ball;
@@ -169,4 +169,4 @@ TEST(Snapshot, SampleTimesAreThoseOfTheRunThatGoesOn)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::snapshot_test

@@ -8,7 +8,7 @@
 #include "ricochet/hybrid/step.hpp"
 #include "walled_oscillator.hpp"
 
-namespace ricochet {
+namespace ricochet::step_test {
 namespace {
 
 using X = std::array<double, 2>;
@@ -100,4 +100,4 @@ TEST(Step, RoundingDoesNotGrowWithTheNumberOfSteps)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::step_test

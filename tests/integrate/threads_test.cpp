@@ -26,7 +26,7 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
-namespace ricochet {
+namespace ricochet::threads_test {
 namespace {
 
 const std::string models = RICOCHET_MODELS "/";
@@ -167,4 +167,4 @@ TEST(Threads, LoadOneFileTogether)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::threads_test

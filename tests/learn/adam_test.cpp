@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ricochet::learn {
+namespace ricochet::learn::adam_test {
 namespace {
 
 TEST(Adam, FirstStepHasTheLengthOfTheRateWhateverTheGradient)
@@ -70,4 +70,4 @@ TEST(Adam, RefusesOptionsOutsideTheirRange)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::adam_test

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ricochet::learn {
+namespace ricochet::learn::assessment_test {
 namespace {
 
 /// logit = x.
@@ -73,4 +73,4 @@ TEST(Assessment, MissBoundIsThreeOverNWithoutMissesAndClopperPearsonWith)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::assessment_test

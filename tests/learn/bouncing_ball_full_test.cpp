@@ -3,7 +3,7 @@
 
 #include "ricochet/learn/bouncing_ball.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::bouncing_ball_full_test {
 namespace {
 
 TEST(BallTrainingInFull, FixedStepIsRightOnItsWholeTestSetAndMissesNoFreshEvent)
@@ -32,4 +32,4 @@ TEST(BallTrainingInFull, AnyStepMissesNoFreshEventFromAnySeedAndTakesLessThanAMi
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::bouncing_ball_full_test

@@ -14,7 +14,7 @@
 #include "ricochet/nn/safetensors.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::bouncing_ball_test {
 namespace {
 
 using State = BouncingBall::State;
@@ -304,4 +304,4 @@ TEST(StoredAnyStep, FindsEveryImpactAtEveryStep)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::bouncing_ball_test

@@ -21,7 +21,7 @@
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
-namespace ricochet {
+namespace ricochet::certify_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -827,4 +827,4 @@ TEST(Certify, RefusesWhatDoesNotFit)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::certify_test

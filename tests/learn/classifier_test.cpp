@@ -18,7 +18,7 @@
 #include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/random.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::classifier_test {
 namespace {
 
 /// Points of a square; inside a disc of radius 1 they are events. A ring of a
@@ -308,4 +308,4 @@ TEST(Train, ReportIsJson)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::classifier_test

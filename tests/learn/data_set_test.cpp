@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ricochet::learn {
+namespace ricochet::learn::data_set_test {
 namespace {
 
 /// Each state is its own number; every third is an event.
@@ -91,4 +91,4 @@ TEST(DataSet, JoinKeepsEveryState)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::data_set_test

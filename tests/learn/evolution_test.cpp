@@ -16,7 +16,7 @@
 
 #include "learn/checkpoint_file.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::evolution_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -231,4 +231,4 @@ TEST(Evolution, RefusesAWrongSetUp)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::evolution_test

@@ -11,7 +11,7 @@
 #include "ricochet/detail/random.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::features_test {
 namespace {
 
 using State = std::array<double, 2>;
@@ -141,4 +141,4 @@ TEST(Features, SystemWithoutCurvatureOffersTheStateOnly)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::features_test

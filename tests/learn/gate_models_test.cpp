@@ -19,7 +19,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
-namespace ricochet {
+namespace ricochet::gate_models_test {
 namespace {
 
 using Fixed = FixedStep<Rk4>;
@@ -389,4 +389,4 @@ TEST(Foreseen, KeepsTheEventsOfAnEigenvalueWithAnyWeights)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::gate_models_test

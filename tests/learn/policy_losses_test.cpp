@@ -12,7 +12,7 @@
 #include "learn/td3_losses.hpp"
 #include "learn/tqc_losses.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::policy_losses_test {
 namespace {
 
 using nlohmann::json;
@@ -279,4 +279,4 @@ TEST(PolicyLosses, StepsOfAdamAreThoseOfPyTorch)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::policy_losses_test

@@ -20,7 +20,7 @@
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::policy_training_test {
 namespace {
 
 /// A trainer with small networks.
@@ -422,4 +422,4 @@ TEST(PolicyTraining, RefusesOptionsOfATrainerOutOfRange)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::policy_training_test

@@ -14,7 +14,7 @@
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::step_environment_test {
 namespace {
 
 struct Episode {
@@ -254,4 +254,4 @@ TEST(StepWorld, RefusesOptionsThatCannotBe)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::step_environment_test

@@ -12,7 +12,7 @@
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::step_training_test {
 namespace {
 
 LearnedStep rule_of(const StepLayout& layout, const std::vector<double>& weights = {})
@@ -172,4 +172,4 @@ TEST(StepFamily, ProblemsFollowFromTheirSeed)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::step_training_test

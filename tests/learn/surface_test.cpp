@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ricochet::learn {
+namespace ricochet::learn::surface_test {
 namespace {
 
 constexpr double gravity = 9.81;
@@ -156,4 +156,4 @@ TEST(Surface, RefusesWhatCannotBeSampled)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::surface_test

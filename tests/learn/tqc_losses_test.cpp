@@ -11,7 +11,7 @@
 #include "gradient_check.hpp"
 #include "ricochet/nn/mlp.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::tqc_losses_test {
 namespace {
 
 /// Networks of random parameters, and a batch of nine transitions in parts of four.
@@ -304,4 +304,4 @@ INSTANTIATE_TEST_SUITE_P(Sets, DenseKernelsOf,
                                          InstructionSet::x86_64_v4));
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::tqc_losses_test

@@ -9,7 +9,7 @@
 
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::train_classifier_test {
 namespace {
 
 using X = std::array<double, 2>;
@@ -124,4 +124,4 @@ TEST(TrainClassifier, RefusesWhatCannotBeTrained)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::train_classifier_test

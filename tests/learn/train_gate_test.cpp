@@ -17,7 +17,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/nn/safetensors.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::train_gate_test {
 namespace {
 
 using Fixed = FixedStep<Rk4>;
@@ -218,6 +218,33 @@ TEST(TrainGate, StopsWhenItIsToldAndKeepsTheBest)
     EXPECT_EQ(trained.report.iterations, 400U);
     EXPECT_EQ(trained.model.calibration.events, 0U);
     EXPECT_NO_THROW(gates::Gate gate(trained.model));
+}
+
+TEST(TrainGate, SaysFirstWhatItsRunsWillCost)
+{
+    GateTraining training = quick();
+    training.iterations = 100;
+    training.evaluate_every = 50;
+    std::size_t reports = 0;
+    std::optional<TrainingEstimate> estimate;
+    const TrainedGate trained =
+        train_gate(Table{}, on_the_table(), Fixed{}, {}, training, [&](const Progress& progress) {
+            EXPECT_EQ(progress.estimate.has_value(), reports == 0);
+            if (progress.estimate) estimate = progress.estimate;
+            return ++reports > 0;
+        });
+    ASSERT_TRUE(estimate);
+    EXPECT_EQ(estimate->events, 300U + 150 + 300 + 2 * 300);
+    EXPECT_GE(estimate->seen, 20U);
+    // Of 20 events against 300: the calls an event vary by 2 / sqrt(20) of their mean.
+    const GateTrial& trial = trained.report.trial;
+    const auto each = static_cast<double>(trial.exact_calls) / static_cast<double>(trial.events);
+    const auto guessed =
+        static_cast<double>(estimate->guard_calls) / static_cast<double>(estimate->events);
+    EXPECT_NEAR(guessed, each, 0.5 * each);
+    EXPECT_EQ(describe(*estimate).find("about "), 0U) << describe(*estimate);
+    EXPECT_EQ(describe({.guard_calls = 4, .seconds = 1}),
+              "no event in the first runs; up to 4 guard calls, 1 s if there is none");
 }
 
 TEST(TrainGate, StopsAtOnceWhileStatesAreSampled)
@@ -423,4 +450,4 @@ TEST(TrainGate, RefusesOptionsThatMakeNoSense)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::train_gate_test

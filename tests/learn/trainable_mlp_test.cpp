@@ -8,7 +8,7 @@
 
 #include "ricochet/detail/classifier.hpp"
 
-namespace ricochet::learn {
+namespace ricochet::learn::trainable_mlp_test {
 namespace {
 
 struct Batch {
@@ -142,4 +142,4 @@ TEST(Random, IsUniform)
 }
 
 }  // namespace
-}  // namespace ricochet::learn
+}  // namespace ricochet::learn::trainable_mlp_test

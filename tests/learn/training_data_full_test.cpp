@@ -1,7 +1,7 @@
 // The one training set that takes seconds to make.
 #include "learn/training_data.hpp"
 
-namespace ricochet::studies {
+namespace ricochet::studies::training_data_full_test {
 namespace {
 
 TEST(ImpactOscillatorGate, IsTheStoredSetAndTheOneThatTheNetworkIsScaledBy)
@@ -12,4 +12,4 @@ TEST(ImpactOscillatorGate, IsTheStoredSetAndTheOneThatTheNetworkIsScaledBy)
 }
 
 }  // namespace
-}  // namespace ricochet::studies
+}  // namespace ricochet::studies::training_data_full_test

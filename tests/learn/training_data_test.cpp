@@ -8,7 +8,7 @@
 #include "ricochet/detail/fault_kernel.hpp"
 #include "ricochet/faults/additive_pair.hpp"
 
-namespace ricochet::studies {
+namespace ricochet::studies::training_data_test {
 namespace {
 
 // --- files ---
@@ -182,4 +182,4 @@ TEST_F(Program, ListsTheModelsWithAndWithoutASet)
 }
 
 }  // namespace
-}  // namespace ricochet::studies
+}  // namespace ricochet::studies::training_data_test

@@ -2,7 +2,7 @@
 
 #include "locators.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::bisection_test {
 namespace {
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Bisection, LocatorSuite, Bisection);
@@ -16,4 +16,4 @@ TEST(Bisection, HalvesOncePerBitOfTheTolerance)
 }
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::bisection_test

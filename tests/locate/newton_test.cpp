@@ -9,7 +9,7 @@
 #include "locators.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::newton_test {
 namespace {
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Newton, LocatorSuite, Newton);
@@ -143,4 +143,4 @@ TEST(Newton, CloseRootsOfASmoothGuardAreNotTakenForNoise)
 }
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::newton_test

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace ricochet {
+namespace ricochet::classifier_test {
 namespace {
 
 /// x -> scale (x - offset), the identity as network.
@@ -127,4 +127,4 @@ TEST(Classifier, RefusesOffsetsScalesAndDomainsThatAreNotOnePerInput)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::classifier_test

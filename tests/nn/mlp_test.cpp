@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-namespace ricochet {
+namespace ricochet::mlp_test {
 namespace {
 
 using Widths = std::vector<std::size_t>;
@@ -332,4 +332,4 @@ TEST(InstructionSet, AnUnsupportedOneIsRefused)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::mlp_test

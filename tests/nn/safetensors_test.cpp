@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-namespace ricochet {
+namespace ricochet::safetensors_test {
 namespace {
 
 using nlohmann::json;
@@ -851,4 +851,4 @@ TEST_F(SafetensorsFile, TheMessageNamesTheFile)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::safetensors_test

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-namespace ricochet {
+namespace ricochet::static_mlp_test {
 namespace {
 
 template <Activation activation, class T, std::size_t... Widths>
@@ -104,4 +104,4 @@ TEST(StaticMlp, RefusesTooFewWeights)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::static_mlp_test

@@ -7,7 +7,7 @@
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 
-namespace ricochet {
+namespace ricochet::allocation_test {
 namespace {
 
 template <class System>
@@ -53,4 +53,4 @@ TEST(NonsmoothAllocation, StepsOfFixedSizeAllocateNothing)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::allocation_test

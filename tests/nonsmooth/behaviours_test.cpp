@@ -8,7 +8,7 @@
 
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
-namespace ricochet {
+namespace ricochet::behaviours_test {
 namespace {
 
 using namespace sets;
@@ -161,4 +161,4 @@ TEST(NonsmoothBehaviours, AChainOfThreeHundredUnknownsIsFollowed)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::behaviours_test

@@ -10,7 +10,7 @@
 #include "ricochet/systems/two_contact_block.hpp"
 #include "ricochet/systems/woodpecker.hpp"
 
-namespace ricochet {
+namespace ricochet::contact_motion_test {
 namespace {
 
 /// A point of 1 kg over a floor with friction that may move up and down.
@@ -204,4 +204,4 @@ TEST(ContactMotion, RefusesAStartInsideAnObstacle)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::contact_motion_test

@@ -5,7 +5,7 @@
 #include "random_contacts.hpp"
 #include "ricochet/detail/contact_problem.hpp"
 
-namespace ricochet {
+namespace ricochet::contacts_full_test {
 namespace {
 
 TEST(ContactSolverFull, SolvesOrReportsRandomProblemsOfUpToFiftyContacts)
@@ -28,4 +28,4 @@ TEST(ContactSolverFull, SolvesOrReportsRandomProblemsOfUpToFiftyContacts)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::contacts_full_test

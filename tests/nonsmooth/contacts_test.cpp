@@ -9,7 +9,7 @@
 #include "ricochet/detail/contact_problem.hpp"
 #include "ricochet/detail/linear_cases.hpp"
 
-namespace ricochet {
+namespace ricochet::contacts_test {
 namespace {
 
 using testing_support::RandomContacts;
@@ -249,4 +249,4 @@ TEST(ContactSolver, WrongInputIsRefused)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::contacts_test

@@ -6,7 +6,7 @@
 
 #include "ricochet/nonsmooth/step_controllers.hpp"
 
-namespace ricochet {
+namespace ricochet::controllers_test {
 namespace {
 
 TEST(StepControllers, TheHeuristicGrowsByErrorToTheMinusQAtMostTwice)
@@ -74,4 +74,4 @@ TEST(StepControllers, ThePrintedPiRuleDoesNotControlTheError)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::controllers_test

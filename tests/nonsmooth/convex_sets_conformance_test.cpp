@@ -1,7 +1,7 @@
 // Every convex set by the suite of all.
 #include "conformance/convex_sets.hpp"
 
-namespace ricochet::test {
+namespace ricochet::test::convex_sets_conformance_test {
 namespace {
 
 using namespace sets;
@@ -189,4 +189,4 @@ TEST(ConvexSets, WhatIsNoSetSaysWhy)
 }
 
 }  // namespace
-}  // namespace ricochet::test
+}  // namespace ricochet::test::convex_sets_conformance_test

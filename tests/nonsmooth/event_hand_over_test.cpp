@@ -9,7 +9,7 @@
 #include "ricochet/systems/friction_inclusion.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
-namespace ricochet {
+namespace ricochet::event_hand_over_test {
 namespace {
 
 /// A mass on a spring and on a belt, written as one would without a thought of sticking: the
@@ -258,4 +258,4 @@ TEST(EventHandOver, RefusesWhatAHandOverDoesNotHave)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::event_hand_over_test

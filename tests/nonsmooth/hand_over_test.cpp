@@ -16,7 +16,7 @@
 #include "ricochet/systems/sliding_mode.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 
-namespace ricochet {
+namespace ricochet::hand_over_test {
 namespace {
 
 using namespace sets;
@@ -591,4 +591,4 @@ TEST(HandOver, RefusesAStartInsideAnObstacle)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::hand_over_test

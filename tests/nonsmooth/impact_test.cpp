@@ -12,7 +12,7 @@
 #include "ricochet/systems/two_contact_block.hpp"
 #include "ricochet/systems/woodpecker.hpp"
 
-namespace ricochet {
+namespace ricochet::impact_test {
 namespace {
 
 // --- friction in the plane ---
@@ -271,4 +271,4 @@ TEST(TimeStepping, RefusesAStartInsideAnObstacleAndWrongCoefficients)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::impact_test

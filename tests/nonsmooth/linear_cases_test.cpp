@@ -10,7 +10,7 @@
 
 #include "ricochet/detail/any_inclusion.hpp"
 
-namespace ricochet {
+namespace ricochet::linear_cases_test {
 namespace {
 
 template <int M>
@@ -72,4 +72,4 @@ TEST(Invert, FindsTheRankOfDiagonalMatricesAsOfOthers)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::linear_cases_test

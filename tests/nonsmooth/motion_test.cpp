@@ -12,7 +12,7 @@
 #include "ricochet/systems/sliding_mode.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 
-namespace ricochet {
+namespace ricochet::motion_test {
 namespace {
 
 using namespace sets;
@@ -744,4 +744,4 @@ TEST(Failure, AStepLimitIsKept)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::motion_test

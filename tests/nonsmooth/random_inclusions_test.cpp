@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ricochet {
+namespace ricochet::random_inclusions_test {
 namespace {
 
 using test::InclusionFamily;
@@ -110,4 +110,4 @@ TEST(RandomInclusions, ThreeMassesWithFiveContactsEnd)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::random_inclusions_test

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ricochet {
+namespace ricochet::random_mechanisms_test {
 namespace {
 
 using test::MechanismMaker;
@@ -39,4 +39,4 @@ TEST(RandomMechanisms, BallsSlideRollAndRestOnMovingPlates)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::random_mechanisms_test

@@ -10,7 +10,7 @@
 
 #include "ricochet/detail/sparse_direction.hpp"
 
-namespace ricochet {
+namespace ricochet::semismooth_newton_test {
 namespace {
 
 // y + c y^3 = 0 in every component.
@@ -163,4 +163,4 @@ TEST(SemismoothNewton, ReportsWhatHasNoSolution)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::semismooth_newton_test

@@ -8,7 +8,7 @@
 
 #include "ricochet/nonsmooth/convex_sets.hpp"
 
-namespace ricochet {
+namespace ricochet::sets_test {
 namespace {
 
 using namespace sets;
@@ -141,4 +141,4 @@ TEST(ConvexSets, ASetThatDoesNotSayHasNoFault)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::sets_test

@@ -9,7 +9,7 @@
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
 
-namespace ricochet {
+namespace ricochet::stage_test {
 namespace {
 
 using namespace sets;
@@ -232,4 +232,4 @@ TEST(SuperTwistingMotion, ReachesZeroInFiniteTimeAndStays)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::stage_test

@@ -14,7 +14,7 @@
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
-namespace ricochet {
+namespace ricochet::step_policy_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -298,4 +298,4 @@ TEST(ErrorFields, OutsideOfTheStateAreRefused)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::step_policy_test

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace ricochet {
+namespace ricochet::bouncing_ball_test {
 namespace {
 
 // t_0 = sqrt(2 h / g), t_{n+1} = t_n + 2 t_0 r^{n+1}, in 34 digits, rounded.
@@ -71,4 +71,4 @@ TEST(BouncingBall, ParametersOutsideTheirRangeAreNamed)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::bouncing_ball_test

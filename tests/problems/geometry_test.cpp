@@ -14,7 +14,7 @@
 #include "ricochet/detail/random.hpp"
 #include "scene_bounds.hpp"
 
-namespace ricochet::geometry {
+namespace ricochet::geometry::geometry_test {
 namespace {
 
 using learn::Random;
@@ -361,4 +361,4 @@ TEST(ConcaveTable, SaysNothingOutsideAndRefusesWhatIsNoTable)
 }
 
 }  // namespace
-}  // namespace ricochet::geometry
+}  // namespace ricochet::geometry::geometry_test

@@ -13,7 +13,7 @@
 #include "ricochet/detail/random.hpp"
 #include "scene_bounds.hpp"
 
-namespace ricochet::geometry {
+namespace ricochet::geometry::mesh_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -301,4 +301,4 @@ TEST(CaveBody, BadMeshesAreRefused)
 }
 
 }  // namespace
-}  // namespace ricochet::geometry
+}  // namespace ricochet::geometry::mesh_test

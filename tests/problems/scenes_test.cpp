@@ -17,7 +17,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "scene_bounds.hpp"
 
-namespace ricochet {
+namespace ricochet::scenes_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -529,4 +529,4 @@ TEST(Opaque, AHiddenGuardHasNeitherRateNorBounds)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::scenes_test

@@ -18,7 +18,7 @@
 #include "known_solutions.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::systems_test {
 namespace {
 
 using test::Happening;
@@ -734,4 +734,4 @@ TEST(Parameters, OutsideTheirRangeAreRefusedByName)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::systems_test

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-namespace ricochet::detail {
+namespace ricochet::detail::contact_island_test {
 namespace {
 
 constexpr double g = 9.81;
@@ -486,4 +486,4 @@ TEST(ContactIsland, WhatIsNotSolvedIsReported)
 }
 
 }  // namespace
-}  // namespace ricochet::detail
+}  // namespace ricochet::detail::contact_island_test

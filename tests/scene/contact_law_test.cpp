@@ -10,7 +10,7 @@
 
 #include "ricochet/detail/contact_problem.hpp"
 
-namespace ricochet::detail {
+namespace ricochet::detail::contact_law_test {
 namespace {
 
 class RandomLaw {
@@ -159,4 +159,4 @@ TEST(ContactLaw, WithoutFrictionVelocitiesAreThoseOfTheDenseSolver)
 }
 
 }  // namespace
-}  // namespace ricochet::detail
+}  // namespace ricochet::detail::contact_law_test

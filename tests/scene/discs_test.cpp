@@ -14,7 +14,7 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "scene/gas.hpp"
 
-namespace ricochet {
+namespace ricochet::discs_test {
 namespace {
 
 using test::gas;
@@ -264,4 +264,4 @@ TEST(Discs, SleepersAreStruckAndHaveNoEventsBefore)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::discs_test

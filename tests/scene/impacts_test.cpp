@@ -10,7 +10,7 @@
 #include "ricochet/scene/simulate.hpp"
 #include "scene/gas.hpp"
 
-namespace ricochet {
+namespace ricochet::impacts_test {
 namespace {
 
 /// Balls in contact on a line; the first comes at speed 1.
@@ -215,4 +215,4 @@ TEST(Impacts, TerrainIsMetOnItsSegmentsAndItsEnds)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::impacts_test

@@ -8,7 +8,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/scene/simulate.hpp"
 
-namespace ricochet {
+namespace ricochet::islands_test {
 namespace {
 
 /// Two dumbbells that fly at each other: x, y, x', y' of four discs, all pairs of different
@@ -129,4 +129,4 @@ TEST(Islands, AnIslandTakesTheSameStepsWhateverElseMoves)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::islands_test

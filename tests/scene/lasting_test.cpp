@@ -10,7 +10,7 @@
 #include "gas.hpp"
 #include "ricochet/scene/contact.hpp"
 
-namespace ricochet {
+namespace ricochet::lasting_test {
 namespace {
 
 constexpr double g = 9.81;
@@ -223,4 +223,4 @@ TEST(LastingContact, SamplesChangeNoBit)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::lasting_test

@@ -11,7 +11,7 @@
 #include "ricochet/scene/json.hpp"
 #include "ricochet/scene/simulate.hpp"
 
-namespace ricochet {
+namespace ricochet::scene_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -205,4 +205,4 @@ TEST(Scene, LastingContactOfDiscsEndsTheRunAndNamesThem)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::scene_test

@@ -14,7 +14,7 @@
 #include "ricochet/systems/thermostat.hpp"
 #include "sensitivity_systems.hpp"
 
-namespace ricochet {
+namespace ricochet::dual_sensitivity_test {
 
 namespace {
 
@@ -183,4 +183,4 @@ TEST(DualSensitivity, OfStatesThatAreSizedAtRunTime)
 
 }  // namespace
 
-}  // namespace ricochet
+}  // namespace ricochet::dual_sensitivity_test

@@ -11,7 +11,7 @@
 #include "ricochet/sensitivity/sensitivities.hpp"
 #include "sensitivity_systems.hpp"
 
-namespace ricochet {
+namespace ricochet::sensitivity_events_test {
 namespace {
 
 using namespace test;
@@ -451,4 +451,4 @@ TEST(SensitivityThroughEvents, TheDimensionMayChange)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::sensitivity_events_test

@@ -17,7 +17,7 @@
 #include "ricochet/systems/thermostat.hpp"
 #include "sensitivity_systems.hpp"
 
-namespace ricochet {
+namespace ricochet::sensitivity_test {
 namespace {
 
 using namespace test;
@@ -621,4 +621,4 @@ TEST(Sensitivity, EveryReasonHasANameAndASentence)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::sensitivity_test

@@ -14,7 +14,7 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 
-namespace ricochet {
+namespace ricochet::shooting_test {
 namespace {
 
 using std::numbers::pi;
@@ -421,4 +421,4 @@ TEST(Shooting, EveryEndHasANameAndASentence)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::shooting_test

@@ -1,7 +1,7 @@
 // The papers' tables and figures that take seconds.
 #include "exhibits.hpp"
 
-namespace ricochet {
+namespace ricochet::figures_full_test {
 namespace {
 
 TEST_F(Exhibits, FaultsByRulesAreDrawn)
@@ -31,4 +31,4 @@ TEST_F(Exhibits, SlidersFailWhereThePapersDo)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::figures_full_test

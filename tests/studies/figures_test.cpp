@@ -4,7 +4,7 @@
 
 #include "exhibits.hpp"
 
-namespace ricochet {
+namespace ricochet::figures_test {
 namespace {
 
 TEST_F(Exhibits, ListNamesEveryTableAndFigureOfThePapers)
@@ -67,4 +67,4 @@ TEST_F(Exhibits, RefusesWhatThereIsNot)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::figures_test

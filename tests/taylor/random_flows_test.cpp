@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ricochet {
+namespace ricochet::random_flows_test {
 namespace {
 
 template <class System>
@@ -27,4 +27,4 @@ TYPED_TEST(TaylorOnRandomFlows, FindsTheEventsOfTheMotionInLongDouble)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::random_flows_test

@@ -13,7 +13,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/taylor.hpp"
 
-namespace ricochet {
+namespace ricochet::series_guard_test {
 namespace {
 
 using detail::first_leaving;
@@ -242,4 +242,4 @@ TEST(SeriesGuard, StepsThatTheSeriesClearsAreProved)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::series_guard_test

@@ -8,7 +8,7 @@
 #include "ricochet/detail/taylor_series.hpp"
 #include "taylor/series_reference.hpp"
 
-namespace ricochet {
+namespace ricochet::taylor_series_test {
 namespace {
 
 using detail::read_constants;
@@ -229,4 +229,4 @@ TEST(TaylorSeries, OperationsThatDependOnAParameterAreSeenWhenTheObjectIsRead)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::taylor_series_test

@@ -14,7 +14,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 
-namespace ricochet {
+namespace ricochet::taylor_test {
 namespace {
 
 using Two = std::array<double, 2>;
@@ -490,4 +490,4 @@ TEST(Taylor, WhatCannotBeExpandedIsRefusedBeforeTheRun)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::taylor_test

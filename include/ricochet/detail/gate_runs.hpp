@@ -86,6 +86,26 @@ public:
     /// Stopped by the callback: what was asked for is not complete.
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
+    /// Tells the callback what the runs will cost. Those that are tested are run twice, and again
+    /// for each rival.
+    void announce()
+    {
+        if (!progress_) return;
+        Random random(training_.seed);
+        const detail::RunCost cost = detail::cost_of_runs([&] { return start(random); });
+        const GateTraining& t = training_;
+        const std::size_t hard = t.hard_events > 0 ? t.hard_events : t.events;
+        const std::size_t sets = 2 + (t.rounds - 1) + 2;
+        std::uint64_t most = sets * t.most_steps;
+        if (t.kind == GateKind::level) most = (sets - 1) * 2 * t.states + 2 * t.most_steps;
+        const TrainingEstimate estimate = cost.for_events(
+            t.events + t.validation_events + (t.rounds - 1) * hard + 2 * t.fresh_events, most);
+        stopped_ = !progress_({.total = t.events,
+                               .loss = std::numeric_limits<double>::quiet_NaN(),
+                               .stage = "sampling",
+                               .estimate = estimate});
+    }
+
     /// States of runs with so many events in all. Of states without an event within reach about
     /// as many are kept as make `states` in all, each with its weight.
     [[nodiscard]] GateSamples sample(std::size_t events, std::size_t states, std::uint64_t seed)

@@ -22,6 +22,41 @@ namespace detail {
 /// Processor time of this thread's process [s].
 [[nodiscard]] double processor_seconds() noexcept;
 
+/// Guard calls and time of runs.
+struct RunCost {
+    std::uint64_t events = 0;
+    std::uint64_t steps = 0;
+    std::uint64_t guard_calls = 0;
+    double seconds = 0;  ///< of processor time
+
+    /// So many runs' worth of it: until `wanted` events, or `most` steps in all.
+    [[nodiscard]] TrainingEstimate for_events(std::uint64_t wanted,
+                                              std::uint64_t most) const noexcept;
+};
+
+/// The cost of the runs that `start` deals out, until 20 events, 100 000 steps or a fifth of a
+/// second.
+template <class Start>
+[[nodiscard]] RunCost cost_of_runs(const Start& start)
+{
+    RunCost cost;
+    const double before = processor_seconds();
+    const auto goes_on = [&](std::uint64_t events, std::uint64_t steps) {
+        cost.seconds = processor_seconds() - before;
+        return events < 20 && steps < 100'000 && cost.seconds < 0.2;
+    };
+    while (goes_on(cost.events, cost.steps)) {
+        auto run = start();
+        const Statistics& counts = run.run().statistics;
+        while (run.step() && goes_on(cost.events + counts.events, cost.steps + counts.steps)) {
+        }
+        cost.events += counts.events;
+        cost.steps += counts.steps + 1;
+        cost.guard_calls += counts.guard_calls;
+    }
+    return cost;
+}
+
 /// The same runs in all ways that there are.
 template <class System, class X, class Stepping, class Network>
 class RivalRuns {

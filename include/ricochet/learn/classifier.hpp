@@ -55,6 +55,18 @@ struct TrainingOptions {
     const std::atomic<bool>* cancelled = nullptr;
 };
 
+/// Cost of the runs of a training, by a few of them. Where these have no event, it is what
+/// all the steps cost that the training may take.
+struct TrainingEstimate {
+    std::uint64_t guard_calls = 0;
+    double seconds = 0;        ///< of processor time
+    std::uint64_t events = 0;  ///< that the training asks for
+    std::uint64_t seen = 0;    ///< events in the few runs
+};
+
+/// One sentence.
+[[nodiscard]] std::string describe(const TrainingEstimate& estimate);
+
 /// Progress of a training; given at every check of the validation set.
 struct Progress {
     std::size_t iteration = 0;
@@ -64,6 +76,8 @@ struct Progress {
     double seconds = 0;      ///< elapsed, earlier parts of a resumed training included
     /// Anything else than "training": before or after it, with events for iterations.
     std::string_view stage = "training";
+    /// In the first report of a training whose states come from runs.
+    std::optional<TrainingEstimate> estimate{};
 };
 
 /// A way of looking for events.

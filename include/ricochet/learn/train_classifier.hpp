@@ -107,6 +107,17 @@ public:
         every_ = every;
         calls_ = 0;
     }
+    /// What the runs will cost.
+    /// @throws Stopped if the callback says so
+    void announce(const TrainingEstimate& estimate)
+    {
+        if (!(*progress_)({.total = total_,
+                           .loss = std::numeric_limits<double>::quiet_NaN(),
+                           .stage = stage_,
+                           .estimate = estimate})) {
+            throw Stopped{};
+        }
+    }
     /// @throws Stopped if the callback says so
     void operator()(std::size_t done)
     {
@@ -336,6 +347,17 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
     };
 
     try {
+        if (progress) {
+            Random random(training.seed);
+            const auto cost = detail::cost_of_runs([&] {
+                const RunStart<X> from = start(random);
+                return Simulation(system, from.x, run_options, FixedStep<Method>{});
+            });
+            // The trial follows each run twice.
+            asked.begin("sampling", training.surface_points);
+            asked.announce(cost.for_events(2 * (training.surface_points + training.trial_events),
+                                           4 * training.most_steps));
+        }
         const Surface surface = meet(training.seed);
         const SurfaceSample seen = sample(surface, training.states, training.seed, false);
         TrainingOptions how = training.training;

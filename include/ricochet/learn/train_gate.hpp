@@ -45,6 +45,8 @@ template <class System, class X, class Stepping>
         trained.report.outcome = TrainingOutcome::stopped;
         return trained;
     };
+    runs.announce();
+    if (runs.stopped()) return stop();
     if (training.kind == GateKind::level) {
         if constexpr (Bounded<System, X>) {
             runs.check_bounds(20'000, training.seed + 5'000'003);

@@ -23,6 +23,10 @@ class ProgressBar {
 public:
     void show(const learn::Progress& progress)
     {
+        if (progress.estimate) {
+            say("ricochet: {}\n", describe(*progress.estimate));
+            return;
+        }
         const double now = progress.seconds;
         if (progress.stage != stage_) {
             stage_ = progress.stage;
