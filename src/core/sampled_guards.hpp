@@ -1,6 +1,7 @@
 // All guards of a system, evaluated at a state.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -48,7 +49,8 @@ public:
         if (records_[i].info.boolean || !rules_.uses_rates) return 0;
         if (!system_->rates) return view(i, mode, calls).rate(t, x, dxdt, scale);
         rates_together(mode, t, x, dxdt, behind_);
-        return behind_[i];
+        if (std::isfinite(behind_[i])) return behind_[i];
+        return view(i, mode, calls).rate(t, x, dxdt, scale);
     }
 
     /// Updates which guards are enabled.
@@ -85,20 +87,22 @@ protected:
                       std::uint64_t& calls, Doubles& rates)
     {
         if (!rules_.uses_rates || size() == 0) return;
-        if (system_->rates) return rates_together(mode, t, x, dxdt, rates);
-        if (system_->each_rate && !selective_ && !backward_) {
-            return system_->each_rate(system_.door(), mode, t, x, dxdt, all(rates));
-        }
-        if (!system_->each_rate && !system_->guard_alone) {
+        if (system_->rates) {
+            rates_together(mode, t, x, dxdt, rates);
+        } else if (system_->each_rate && !selective_ && !backward_) {
+            system_->each_rate(system_.door(), mode, t, x, dxdt, all(rates));
+        } else if (!system_->each_rate && !system_->guard_alone) {
             difference(mode, t, x, dxdt, scale, rates);
             calls += 2 * size();
+        } else {
+            for (std::size_t i = 0; i < size(); ++i) {
+                rates[i] = is_rateless(i) ? 0 : view(i, mode, calls).rate(t, x, dxdt, scale);
+            }
             return;
         }
-        for (std::size_t i = 0; i < size(); ++i) {
-            rates[i] = records_[i].info.boolean || !records_[i].enabled
-                           ? 0
-                           : view(i, mode, calls).rate(t, x, dxdt, scale);
-        }
+        double lost = 0;
+        for (std::size_t i = 0; i < size(); ++i) lost += 0 * rates[i];
+        if (!(lost == 0)) replace_lost(mode, t, x, dxdt, scale, calls, rates);
     }
 
     /// Rates of all guards from the system in one call.
@@ -131,6 +135,23 @@ protected:
     PerGuard<GuardRecord, single> records_{};
 
 private:
+    [[nodiscard]] bool is_rateless(std::size_t i) const noexcept
+    {
+        return records_[i].info.boolean || !records_[i].enabled;
+    }
+
+    /// Asks guard by guard for the rates that are not finite, as nothing can be concluded from
+    /// them.
+    [[gnu::cold, gnu::noinline]] void replace_lost(Mode mode, double t, const X& x, const X& dxdt,
+                                                   double scale, std::uint64_t& calls,
+                                                   Doubles& rates)
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (std::isfinite(rates[i]) || is_rateless(i)) continue;
+            rates[i] = view(i, mode, calls).rate(t, x, dxdt, scale);
+        }
+    }
+
     [[nodiscard]] std::span<double> all(Doubles& numbers) const noexcept
     {
         return {numbers.data(), size()};

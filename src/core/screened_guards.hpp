@@ -198,6 +198,18 @@ public:
         return no_guard;
     }
 
+    /// The first guard whose rate at an end of the step is asked for and not finite, or `no_guard`.
+    [[nodiscard]] std::size_t first_without_rate() const noexcept
+    {
+        if (!rules_.uses_rates) return no_guard;
+        for (std::size_t i = 0; i < size(); ++i) {
+            const GuardRecord& record = records_[i];
+            if (!record.enabled || record.deferred || record.info.boolean) continue;
+            if (!std::isfinite(rate0_[i]) || !std::isfinite(rate1_[i])) return i;
+        }
+        return no_guard;
+    }
+
     /// Whether guard i, on a plateau, has its event in the step, or is not a number at its end.
     [[nodiscard]] bool leaves_plateau(std::size_t i) const noexcept
     {
