@@ -424,6 +424,10 @@ private:
     /// False: there is no such step, and the run has ended.
     [[nodiscard]] bool return_to_domain();
 
+    /// Takes the step again, shorter, until its polynomial follows the motion inside: a swing that
+    /// the motion does not do holds no events. False: the run has ended.
+    [[nodiscard]] bool smooth_step();
+
     /// A length at whose end a guard may be a number again: `beyond` a surface that lies within
     /// the step by a little, where it can be seen to be crossed, else before it.
     [[nodiscard]] double shorten_into_domain(bool beyond);

@@ -295,6 +295,14 @@ public:
         return kernel_->attempt(system_.door(), state_, h, rtol, atol);
     }
 
+    /// Whether the polynomial of the step may be worse than its end, and by how much: see
+    /// `StepKernel::roughness`.
+    [[nodiscard]] bool may_be_rough() const noexcept { return kernel_->roughness; }
+    [[nodiscard]] double roughness(double rtol, double atol) const
+    {
+        return kernel_->roughness(system_.door(), state_, rtol, atol);
+    }
+
     /// Whether guards have power series over the step.
     [[nodiscard]] bool has_guard_series() const noexcept { return kernel_->guard_series; }
     [[nodiscard]] SeriesTerms guard_series() const
