@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/guard_record.hpp"
+#include "core/wide.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/guard_view.hpp"
 
@@ -100,9 +102,7 @@ protected:
             }
             return;
         }
-        double lost = 0;
-        for (std::size_t i = 0; i < size(); ++i) lost += 0 * rates[i];
-        if (!(lost == 0)) replace_lost(mode, t, x, dxdt, scale, calls, rates);
+        if (!all_finite(rates)) replace_lost(mode, t, x, dxdt, scale, calls, rates);
     }
 
     /// Rates of all guards from the system in one call.
@@ -138,6 +138,26 @@ private:
     [[nodiscard]] bool is_rateless(std::size_t i) const noexcept
     {
         return records_[i].info.boolean || !records_[i].enabled;
+    }
+
+    [[nodiscard]] static bool is_finite(double rate) noexcept
+    {
+        return std::fabs(rate) <= std::numeric_limits<double>::max();
+    }
+    [[nodiscard]] bool all_finite(const Doubles& rates) const noexcept
+    {
+        if (size() >= 8) return all_of_many_finite(rates.data());
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (!is_finite(rates[i])) return false;
+        }
+        return true;
+    }
+    RICOCHET_WIDE bool all_of_many_finite(const double* rates) const noexcept
+    {
+        double any = 0;  // a double, so that the loop is vectorised
+        const std::size_t count = size();
+        for (std::size_t i = 0; i < count; ++i) any = is_finite(rates[i]) ? any : 1.0;
+        return any == 0;
     }
 
     /// Asks guard by guard for the rates that are not finite, as nothing can be concluded from

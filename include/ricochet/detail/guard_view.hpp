@@ -157,11 +157,21 @@ public:
     template <class V, class D>
     [[nodiscard]] double rate(double t, const V& x, const D& dxdt, double scale) const
     {
+        const double rate = raw_rate(t, x, dxdt, scale);
         if constexpr (detail::RateAlone<System, V, D>) {
-            const double known = known_rate(t, x, dxdt);
-            if (std::fabs(known) <= std::numeric_limits<double>::max()) [[likely]]
-                return known;
-            return replaced_rate(t, x, dxdt, scale);
+            constexpr double largest = std::numeric_limits<double>::max();
+            if (!(std::fabs(rate) <= largest)) return replaced_rate(t, x, dxdt, scale);
+        }
+        return rate;
+    }
+
+    /// As `rate`, but a closed form that is not finite stays so.
+    template <class V, class D>
+    [[nodiscard, gnu::always_inline]] double raw_rate(double t, const V& x, const D& dxdt,
+                                                      double scale) const
+    {
+        if constexpr (detail::RateAlone<System, V, D>) {
+            return known_rate(t, x, dxdt);
         } else {
             return difference(t, x, dxdt, scale);
         }
