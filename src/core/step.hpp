@@ -231,6 +231,11 @@ public:
     }
 
     [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
+    /// Whether a host's path is the cubic through the states and rates at the ends.
+    [[nodiscard]] bool is_hosts_cubic() const noexcept
+    {
+        return state_.host && state_.host->is_cubic;
+    }
 
     /// Makes a step that a host has taken from the current state the current one.
     void show(const HostStepTable& host) noexcept
