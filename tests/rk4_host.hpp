@@ -117,19 +117,25 @@ struct HostRun {
     Statistics statistics;
 };
 
+/// What a host shows of its steps, and of the rate after an event: all as it is.
+struct AsItIs {
+    [[nodiscard]] const auto& step(const auto& taken) const { return taken; }
+    [[nodiscard]] auto rate(const auto& dxdt) const { return dxdt; }
+};
+
 /// Drives a host to `t_end` in steps of h [s], with a monitor that has not been started.
-template <class System, std::size_t n, class Monitor>
+template <class System, std::size_t n, class Monitor, class Shown = AsItIs>
 auto drive(const System& system, Monitor& monitor, const std::array<double, n>& x0, double t_end,
-           double h, Mode mode = 0)
+           double h, Mode mode = 0, const Shown& shown = {})
 {
     Rk4Host<System, n> host(system, 0, x0, mode);
     HostRun<typename Monitor::State> run;
-    Verdict verdict = monitor.start(Instant{0}, x0, host.rate(), h, mode);
+    Verdict verdict = monitor.start(Instant{0}, x0, shown.rate(host.rate()), h, mode);
     for (;;) {
         while (verdict == Verdict::cut) {
             run.cuts.push_back(monitor.cut());
             host.restart(monitor.cut().t, monitor.cut().after, monitor.cut().mode_after);
-            verdict = monitor.resume(host.rate(), h);
+            verdict = monitor.resume(shown.rate(host.rate()), h);
         }
         if (verdict == Verdict::rests && monitor.must_stop_at() <= t_end) {
             verdict = monitor.hold(monitor.must_stop_at());
@@ -138,7 +144,7 @@ auto drive(const System& system, Monitor& monitor, const std::array<double, n>& 
         if (verdict != Verdict::stands || host.t() >= t_end) break;
         const double ahead = host.until(std::min(t_end, monitor.must_stop_at()));
         typename Rk4Host<System, n>::Step step(host, h * (1 + 1e-9) < ahead ? h : ahead);
-        verdict = monitor.examine(step);
+        verdict = monitor.examine(shown.step(step));
         if (verdict == Verdict::stands) host.accept(step);
     }
     run.verdict = verdict;

@@ -74,10 +74,21 @@ concept RepeatableHostStep = HostStep<S> && requires(const S& step, double s, st
     step.restep(s, x);
 };
 
+/// A host that declares, by `static constexpr bool is_cubic = true`, that its path is the cubic
+/// through the states and the rates at the ends of the step. A guard of degree 1 is then known
+/// inside the step without an evaluation there.
+template <class S>
+concept CubicHostStep = HostStep<S> && requires
+{
+    requires S::is_cubic;
+};
+
 /// The cubic through the values and the rates at the ends of a step, for hosts without an
 /// interpolant of their own. Keeps views of its arguments.
 class HermiteStep {
 public:
+    static constexpr bool is_cubic = true;
+
     /// Takes a step from t0 over h [s] from x0 to x1, with the rates at both ends; arrays of n
     /// doubles each.
     HermiteStep(const Instant& t0, double h, std::span<const double> x0, std::span<const double> x1,
@@ -226,7 +237,8 @@ public:
                                     .rate1 = checked(step.rate1(), n),
                                     .host = &step,
                                     .interpolate = &interpolate<S>,
-                                    .t_remainder = start.remainder};
+                                    .t_remainder = start.remainder,
+                                    .is_cubic = CubicHostStep<S>};
         if constexpr (RatedHostStep<S>) table.rate = &interpolate_rate<S>;
         if constexpr (RepeatableHostStep<S>) table.restep = &restep<S>;
         return monitor_->examine(table);

@@ -420,7 +420,13 @@ class KernelOf<System, X, Rosenbrock4> {
     static double attempt(void* door, State& state, double h, double rtol, double atol)
     {
         if (!go(door, state, h)) return std::numeric_limits<double>::quiet_NaN();
-        const C& error = at(door).room.error;
+        return largest_ratio(state, at(door).room.error, rtol, atol);
+    }
+
+    /// The largest component of an error over its tolerance.
+    [[nodiscard]] static double largest_ratio(const State& state, const C& error, double rtol,
+                                              double atol)
+    {
         const double* const each = state.component_atol;
         double worst = 0;
         double lost = 0;
@@ -432,6 +438,19 @@ class KernelOf<System, X, Rosenbrock4> {
             lost += 0 * ratio;
         });
         return worst + lost;
+    }
+
+    /// The step damps a transient that is faster than itself, and its error estimate with it, but
+    /// the interpolant swings through as far to the other side. What the flow at the start has over
+    /// the slope of the interpolant, damped as in a stage, is the size of that transient.
+    static double roughness(void* door, State& state, double rtol, double atol)
+    {
+        D& of = at(door);
+        Room& room = of.room;
+        if (!solve(of, state, state.h)) return 0;
+        for_each_component(state.x0, [&](auto i) { room.at[i] = room.rate[i] - state.rate0[i]; });
+        substitute(state.x0.size(), room.factors.data(), room.rows.data(), room.at);
+        return largest_ratio(state, room.at, rtol, atol);
     }
 
     /// The method's own step of another length from the same start.
@@ -468,6 +487,7 @@ public:
         kernel.attempt = &attempt;
         kernel.depart = &depart;
         kernel.series = &series;
+        kernel.roughness = &roughness;
         kernel.renew = &renew;
         return kernel;
     }

@@ -127,6 +127,7 @@ protected:
     {
         if (bank_.on_series() || !bank_.looks() || !options_.look_inside)
             return bank_.suspicious(step_.h());
+        if (step_.is_hosts_cubic() && bank_.clear_as_cubics(step_.h())) return false;
         look_inside();
         return is_suspicious(error_controlled_ && hardly_moves());
     }

@@ -219,6 +219,10 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
         }
     }
     if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
+    if (!std::isfinite(rate)) {
+        end(Outcome::non_finite, i);
+        return Side::plateau;
+    }
     if (rate != 0 && bank_[i].fired) return side_of(rate);
     // The second derivative has the sign that the rate has a little later. A rate that it
     // cancels within rounding of the time counts as zero, as does a rate that is all rounding.

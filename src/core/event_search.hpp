@@ -117,7 +117,7 @@ public:
             last = i;
         }
         if (suspects == 0) return false;
-        if (suspects == 1 && find_by_series(step, bank, last, calls)) {
+        if (suspects == 1 && bank.has_series(last) && find_by_series(step, bank, last, calls)) {
             settle_place(step, resolution, time_event_due);
             return true;
         }
@@ -514,7 +514,7 @@ private:
         return find_only_carefully(step, bank, i, resolution, calls);
     }
 
-    /// As `find_only`, where the series of the guard says where it leaves its side first.
+    /// As `find_only`, of a guard with a series, where that says where it leaves its side first.
     [[nodiscard]] bool find_by_series(const CurrentStep& step, Bank& bank, std::size_t i,
                                       std::uint64_t& calls);
 

@@ -80,7 +80,7 @@ bool EventSearch<X, single>::find_by_series(const CurrentStep& step, Bank& bank,
                                             std::uint64_t& calls)
 {
     const GuardRecord& record = bank[i];
-    if (!finest_ || !bank.has_series(i) || !finders_->locator.yields_to_series) return false;
+    if (!finest_ || !finders_->locator.yields_to_series) return false;
     if (record.from > 0 || !counts(record.side, record.info.crossing)) return false;
     if (record.info.touch > 0) return false;
     SeriesCrossing crossing{.which = i,

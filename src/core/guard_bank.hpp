@@ -131,13 +131,17 @@ public:
     }
     /// Takes over from a quiet run: the guard at the start of the current step, at its end and
     /// inside.
-    void take_back(const QuietRun& run) noexcept
+    void take_back(const QuietRun& run, const Step<X>& step, std::uint64_t& calls)
     {
         if (size() == 0) return;
         g0_[0] = run.g0;
         rate0_[0] = run.rate0;
         g1_[0] = run.g1;
         rate1_[0] = run.rate1;
+        const bool stands = run.why == QuietEnd::doubt || run.why == QuietEnd::moving;
+        if (stands && !std::isfinite(run.rate1)) {
+            rate1_[0] = rate_at(0, step, step.h(), step.x1(), step.rate1(), calls);
+        }
         forget_screening();
         if (!run.looks) return;
         inside_[0] = run.inside;
@@ -199,16 +203,16 @@ public:
     [[nodiscard]] double touch_of(std::size_t i, double largest) const noexcept
     {
         constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
-        return std::fmax(records_[i].info.touch, ulps * largest);
+        return larger(records_[i].info.touch, ulps * largest);
     }
 
     /// The largest |g| that the ends of a step of length h suggest.
     [[nodiscard]] double scale(std::size_t i, double h) const noexcept
     {
-        const double ends = std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i]));
+        const double ends = larger(std::fabs(g0_[i]), std::fabs(g1_[i]));
         if (!rules_.uses_rates) return ends;
-        return std::fmax(ends, std::fmax(std::fabs(g0_[i] + rate0_[i] * (h / 3)),
-                                         std::fabs(g1_[i] - rate1_[i] * (h / 3))));
+        return larger(ends, larger(std::fabs(g0_[i] + rate0_[i] * (h / 3)),
+                                   std::fabs(g1_[i] - rate1_[i] * (h / 3))));
     }
 
     void arm(std::size_t i, Side side) noexcept
@@ -351,6 +355,12 @@ public:
     [[nodiscard]] bool waiting() const noexcept { return waiting_; }
 
 private:
+    /// std::fmax, which the compiler calls: the larger, or the one that is a number.
+    [[nodiscard]] static double larger(double a, double b) noexcept
+    {
+        return a >= b || std::isnan(b) ? a : b;
+    }
+
     void leave_rates_out() noexcept
     {
         rates_left_out_ = true;

@@ -25,6 +25,12 @@ public:
     explicit ForTheGuard(std::size_t /*guards*/ = 1) : std::array<T, 1>{} {}
     void resize(std::size_t /*guards*/) noexcept {}
     void swap(ForTheGuard& other) noexcept { std::swap((*this)[0], other[0]); }
+    /// The one element, whatever the number, which the compiler need not know.
+    [[nodiscard]] T& operator[](std::size_t /*guard*/) noexcept { return this->front(); }
+    [[nodiscard]] const T& operator[](std::size_t /*guard*/) const noexcept
+    {
+        return this->front();
+    }
 };
 
 /// A T for every guard; of a few guards without an allocation. Most systems have one guard, and

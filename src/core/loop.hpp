@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -424,6 +425,10 @@ private:
     /// False: there is no such step, and the run has ended.
     [[nodiscard]] bool return_to_domain();
 
+    /// Takes the step again, shorter, until its polynomial follows the motion inside: a swing that
+    /// the motion does not do holds no events. False: the run has ended.
+    [[nodiscard]] bool smooth_step();
+
     /// A length at whose end a guard may be a number again: `beyond` a surface that lies within
     /// the step by a little, where it can be seen to be crossed, else before it.
     [[nodiscard]] double shorten_into_domain(bool beyond);
@@ -465,6 +470,20 @@ private:
     void visit_samples(Visitor&& visit);
 
     static constexpr ErrorRule rule_{};
+
+    /// `rule_.factor`, for which the powers that it begins with are constants.
+    [[nodiscard]] static double step_factor(double error, int order) noexcept
+    {
+        static constexpr auto floors = [] {
+            std::array<double, 16> powers{1};
+            for (std::size_t k = 1; k < powers.size(); ++k) {
+                powers[k] = powers[k - 1] * (rule_.safety / rule_.largest);
+            }
+            return powers;
+        }();
+        const auto k = static_cast<std::size_t>(order);
+        return k < floors.size() && error <= floors[k] ? rule_.largest : rule_.factor(error, order);
+    }
 
     std::size_t components_;         ///< of the state at the start
     QuietKernel<X> quiet_;           ///< null: every step is one of the loop

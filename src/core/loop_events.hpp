@@ -23,6 +23,7 @@ bool Loop<X, single>::search(bool cleared)
             return false;
         }
     }
+    if (error_controlled_ && step_.may_be_rough() && !smooth_step()) return true;
     if (!this->find(cleared)) return ended_;
     emit_samples(search_.at());
     record_step(search_.at());
@@ -51,6 +52,24 @@ inline bool Loop<X, single>::return_to_domain()
         step_.attempt(h);
         this->sample_end();
     }
+}
+
+template <class X, bool single>
+bool Loop<X, single>::smooth_step()
+{
+    // Some errors of the state are as large as the tolerance, and more is not asked of the inside.
+    constexpr double most = 4;
+    while (step_.roughness(options_.rtol, options_.atol) > most) {
+        const double h = 0.1 * step_.h();
+        if (is_tentative() || h < smallest_step()) return true;
+        ++run_.statistics.rejected;
+        is_last_ = time_event_due_ = false;
+        if (!take_controlled_step(h, h)) return false;
+        this->sample_end();
+        if (bank_.first_not_finite() != no_guard) return return_to_domain();
+        if (!this->any_suspicious()) return true;
+    }
+    return true;
 }
 
 template <class X, bool single>

@@ -30,7 +30,7 @@ inline bool Loop<X, single>::run_quietly_from_here()
     if (this->on_series_) {
         bank_.take_back_on_series(quiet, step_);
     } else {
-        bank_.take_back(quiet);
+        bank_.take_back(quiet, step_, calls());
     }
     h_next_ = error_controlled_ || quiet.why == QuietEnd::due ? quiet.h_next : h_next_;
     if (quiet.steps > 0) last_h_ = step_.h();

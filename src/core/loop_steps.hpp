@@ -174,14 +174,14 @@ inline bool Loop<X, single>::retry(double h, double proposed, double largest, do
     const int order = step_.error_order() + 1;
     for (;;) {
         if (rule_.accepts(error)) {
-            const double next = h * std::min(largest, rule_.factor(error, order));
+            const double next = h * std::min(largest, step_factor(error, order));
             const bool cut = largest > 1 && h < proposed;
             h_next_ = std::min(cut ? std::max(next, proposed) : next, options_.h_max);
             return true;
         }
         ++run_.statistics.rejected;
         const bool finite = std::isfinite(error);
-        h = finite ? h * rule_.factor(error, order) : shorten_to_surface(h);
+        h = finite ? h * step_factor(error, order) : shorten_to_surface(h);
         is_last_ = false;
         time_event_due_ = false;
         largest = 1;

@@ -334,7 +334,8 @@ private:
 
     [[nodiscard]] bool finds(bool cleared)
     {
-        const std::size_t broken = bank_.first_not_finite();
+        std::size_t broken = bank_.first_not_finite();
+        if (broken == no_guard) broken = bank_.first_without_rate();  // the host has lost it
         if (broken == no_guard) return this->find(cleared);
         this->end(Outcome::non_finite, broken);
         return false;

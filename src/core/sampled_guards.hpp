@@ -1,11 +1,14 @@
 // All guards of a system, evaluated at a state.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/guard_record.hpp"
+#include "core/wide.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/guard_view.hpp"
 
@@ -48,7 +51,8 @@ public:
         if (records_[i].info.boolean || !rules_.uses_rates) return 0;
         if (!system_->rates) return view(i, mode, calls).rate(t, x, dxdt, scale);
         rates_together(mode, t, x, dxdt, behind_);
-        return behind_[i];
+        if (std::isfinite(behind_[i])) return behind_[i];
+        return view(i, mode, calls).rate(t, x, dxdt, scale);
     }
 
     /// Updates which guards are enabled.
@@ -85,20 +89,20 @@ protected:
                       std::uint64_t& calls, Doubles& rates)
     {
         if (!rules_.uses_rates || size() == 0) return;
-        if (system_->rates) return rates_together(mode, t, x, dxdt, rates);
-        if (system_->each_rate && !selective_ && !backward_) {
-            return system_->each_rate(system_.door(), mode, t, x, dxdt, all(rates));
-        }
-        if (!system_->each_rate && !system_->guard_alone) {
+        if (system_->rates) {
+            rates_together(mode, t, x, dxdt, rates);
+        } else if (system_->each_rate && !selective_ && !backward_) {
+            system_->each_rate(system_.door(), mode, t, x, dxdt, all(rates));
+        } else if (!system_->each_rate && !system_->guard_alone) {
             difference(mode, t, x, dxdt, scale, rates);
             calls += 2 * size();
+        } else {
+            for (std::size_t i = 0; i < size(); ++i) {
+                rates[i] = is_rateless(i) ? 0 : view(i, mode, calls).rate(t, x, dxdt, scale);
+            }
             return;
         }
-        for (std::size_t i = 0; i < size(); ++i) {
-            rates[i] = records_[i].info.boolean || !records_[i].enabled
-                           ? 0
-                           : view(i, mode, calls).rate(t, x, dxdt, scale);
-        }
+        if (!all_finite(rates)) replace_lost(mode, t, x, dxdt, scale, calls, rates);
     }
 
     /// Rates of all guards from the system in one call.
@@ -131,6 +135,43 @@ protected:
     PerGuard<GuardRecord, single> records_{};
 
 private:
+    [[nodiscard]] bool is_rateless(std::size_t i) const noexcept
+    {
+        return records_[i].info.boolean || !records_[i].enabled;
+    }
+
+    [[nodiscard]] static bool is_finite(double rate) noexcept
+    {
+        return std::fabs(rate) <= std::numeric_limits<double>::max();
+    }
+    [[nodiscard]] bool all_finite(const Doubles& rates) const noexcept
+    {
+        if (size() >= 8) return all_of_many_finite(rates.data());
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (!is_finite(rates[i])) return false;
+        }
+        return true;
+    }
+    RICOCHET_WIDE bool all_of_many_finite(const double* rates) const noexcept
+    {
+        double any = 0;  // a double, so that the loop is vectorised
+        const std::size_t count = size();
+        for (std::size_t i = 0; i < count; ++i) any = is_finite(rates[i]) ? any : 1.0;
+        return any == 0;
+    }
+
+    /// Asks guard by guard for the rates that are not finite, as nothing can be concluded from
+    /// them.
+    [[gnu::cold, gnu::noinline]] void replace_lost(Mode mode, double t, const X& x, const X& dxdt,
+                                                   double scale, std::uint64_t& calls,
+                                                   Doubles& rates)
+    {
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (std::isfinite(rates[i]) || is_rateless(i)) continue;
+            rates[i] = view(i, mode, calls).rate(t, x, dxdt, scale);
+        }
+    }
+
     [[nodiscard]] std::span<double> all(Doubles& numbers) const noexcept
     {
         return {numbers.data(), size()};

@@ -38,7 +38,11 @@ protected:
             for (auto* numbers : {&inside_, &further_, &worst_}) numbers->resize(size());
         }
         for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_}) numbers->resize(size());
-        for (const GuardRecord& record : records_) bands_ = bands_ || record.info.touch > 0;
+        for (const GuardRecord& record : records_) {
+            bands_ = bands_ || record.info.touch > 0;
+            linear_ = linear_ && record.info.degree == 1 && !record.info.boolean;
+        }
+        linear_ = linear_ && !bands_ && rules.screening == Screening::extremum;
     }
 
 public:
@@ -105,6 +109,22 @@ public:
     }
 
     [[nodiscard]] bool looked_everywhere() const noexcept { return looked_ == Looked::everywhere; }
+
+    /// Whether all guards are the cubics of their ends, since they are of degree 1 on a path that
+    /// is a cubic, and have control points on their sides by more than rounding: then no evaluation
+    /// inside the step would tell more.
+    [[nodiscard]] bool clear_as_cubics(double h) const noexcept
+    {
+        if (!linear_ || waiting_) return false;
+        constexpr double rounding = 0x1p-20;  // of rates that are differences, and more
+        return !any_of([ this, h ](std::size_t i) __attribute__((always_inline)) {
+            const CubicLook look = cubic(i, h);
+            const bool known = is_finite(look.b1 + look.b2);
+            const bool clear = look.lowest(sign_[i]) > rounding * look.size();
+            const bool armed = sign_[i] != 0;
+            return !(clear & known) & armed;
+        });
+    }
 
     /// Whether any guard needs a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
@@ -194,6 +214,18 @@ public:
         for (std::size_t i = 0; i < size(); ++i) {
             const bool idle = !records_[i].enabled || records_[i].deferred;
             if (!idle && !std::isfinite(g1_[i])) return i;
+        }
+        return no_guard;
+    }
+
+    /// The first guard whose rate at an end of the step is asked for and not finite, or `no_guard`.
+    [[nodiscard]] std::size_t first_without_rate() const noexcept
+    {
+        if (!rules_.uses_rates) return no_guard;
+        for (std::size_t i = 0; i < size(); ++i) {
+            const GuardRecord& record = records_[i];
+            if (!record.enabled || record.deferred || record.info.boolean) continue;
+            if (!std::isfinite(rate0_[i]) || !std::isfinite(rate1_[i])) return i;
         }
         return no_guard;
     }
@@ -436,6 +468,7 @@ protected:
     bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
     bool bands_ = false;        ///< whether any guard declares a touch
+    bool linear_ = true;        ///< whether all guards are of degree 1, and screened so
     bool screened_ = false;     ///< whether `suspects_` is of the current step
     bool as_screened_ = false;  ///< and no guard has changed since
     // A value does not lie beside its rate: both are written one by one, see `HostStepTable`.

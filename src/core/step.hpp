@@ -231,6 +231,11 @@ public:
     }
 
     [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
+    /// Whether a host's path is the cubic through the states and rates at the ends.
+    [[nodiscard]] bool is_hosts_cubic() const noexcept
+    {
+        return state_.host && state_.host->is_cubic;
+    }
 
     /// Makes a step that a host has taken from the current state the current one.
     void show(const HostStepTable& host) noexcept
@@ -293,6 +298,14 @@ public:
     [[nodiscard]] double attempt(double h, double rtol, double atol)
     {
         return kernel_->attempt(system_.door(), state_, h, rtol, atol);
+    }
+
+    /// Whether the polynomial of the step may be worse than its end, and by how much: see
+    /// `StepKernel::roughness`.
+    [[nodiscard]] bool may_be_rough() const noexcept { return kernel_->roughness; }
+    [[nodiscard]] double roughness(double rtol, double atol) const
+    {
+        return kernel_->roughness(system_.door(), state_, rtol, atol);
     }
 
     /// Whether guards have power series over the step.

@@ -136,6 +136,7 @@ public:
         x1_[1] = cos_ * x0_[1] - sin_ * x0_[0];
         rate(x1_, rate1_);
     }
+    static constexpr bool is_cubic = true;
     [[nodiscard]] double t0() const noexcept { return t0_; }
     [[nodiscard]] double h() const noexcept { return 0.01; }
     [[nodiscard]] const X& x0() const noexcept { return x0_; }
@@ -187,6 +188,7 @@ struct FarGuards {
 struct FarGuard {
     using State = std::array<double, 2>;
 
+    [[nodiscard]] static GuardInfo guard_info(std::size_t /*which*/) { return {.degree = 1}; }
     void flow(double /*t*/, const State& x, State& dxdt) const { dxdt = {x[1], -x[0]}; }
     template <class X>
     [[nodiscard]] double guard(double /*t*/, const X& x) const

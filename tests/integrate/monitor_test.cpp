@@ -57,6 +57,77 @@ TEST(Monitor, TheBouncingBallHasItsThirteenImpacts)
     }
 }
 
+/// An oscillator with lines at `level` of the amplitude, which it passes in pairs, and a wall.
+struct Lines {
+    static constexpr std::size_t guard_count = 3;
+    double level = 1;
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.crossing = which == 0 ? Crossing::falling : Crossing::either,
+                .resets = which == 0,
+                .degree = 1};
+    }
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -x[0]}; }
+    [[nodiscard]] double guard(std::size_t which, double t, const X& x) const
+    {
+        return which == 0 ? x[0] + 0.9 : which == 1 ? level - x[0] : x[0] + 0.01 * t;
+    }
+    void reset(std::size_t, double, X& x) const { x = {-0.9, -x[1]}; }
+};
+
+/// Steps whose paths are declared to be the cubics that they are.
+template <class Step>
+struct CubicStep {
+    static constexpr bool is_cubic = true;
+    const Step& of;
+    [[nodiscard]] const Instant& t0() const { return of.t0(); }
+    [[nodiscard]] double h() const { return of.h(); }
+    [[nodiscard]] std::span<const double> x0() const { return of.x0(); }
+    [[nodiscard]] std::span<const double> x1() const { return of.x1(); }
+    [[nodiscard]] std::span<const double> rate0() const { return of.rate0(); }
+    [[nodiscard]] std::span<const double> rate1() const { return of.rate1(); }
+    void interpolate(double s, std::span<double> x) const { of.interpolate(s, x); }
+    void interpolate_rate(double s, std::span<double> dxdt) const { of.interpolate_rate(s, dxdt); }
+    void restep(double s, std::span<double> x) const { of.restep(s, x); }
+};
+struct Cubics {
+    template <class Step>
+    [[nodiscard]] CubicStep<Step> step(const Step& taken) const
+    {
+        return {taken};
+    }
+    [[nodiscard]] X rate(const X& dxdt) const { return dxdt; }
+};
+
+// Up to 1e-9 below the crest lines are passed twice within a step. Where a step is a cubic, and a
+// guard of degree 1, the values and rates at its ends tell all that a value inside tells: the
+// events are the same to the bit, and most steps take one evaluation of each guard, not two.
+TEST(Monitor, CubicStepsKeepTheirEventsWithFewerEvaluations)
+{
+    for (const double h : {0.3, 0.1, 0.07, 0.01}) {
+        for (int k = 0; k < 12; ++k) {
+            const Lines system{1 - std::pow(10, -k)};
+            EventMonitor plain(system, X{});
+            EventMonitor cubic(system, X{});
+            const auto a = drive(system, plain, X{1, 0}, 40, h);
+            const auto b = drive(system, cubic, X{1, 0}, 40, h, 0, Cubics{});
+            ASSERT_EQ(a.verdict, Verdict::stands);
+            ASSERT_EQ(a.events.size(), b.events.size()) << h << ' ' << k;
+            EXPECT_GT(a.events.size(), 20u);
+            for (std::size_t i = 0; i < a.events.size(); ++i) {
+                EXPECT_EQ(a.events[i].t, b.events[i].t);
+                EXPECT_EQ(a.events[i].guard, b.events[i].guard);
+                EXPECT_EQ(a.events[i].kind, b.events[i].kind);
+                EXPECT_EQ(a.events[i].after, b.events[i].after);
+            }
+            const auto& seen = a.statistics.evidence;
+            EXPECT_EQ(seen.checked, b.statistics.evidence.checked);
+            EXPECT_EQ(seen.assumed, b.statistics.evidence.assumed);
+            EXPECT_LT(b.statistics.guard_calls, a.statistics.guard_calls);
+        }
+    }
+}
+
 /// Back and forth at constant speed between walls at 0 and 1, and a mark between them. With
 /// dyadic numbers nothing is rounded.
 struct Shuttle {

@@ -205,6 +205,54 @@ TEST(Rosenbrock, SamplesAndSolutionAreThoseOfTheMotion)
     }
 }
 
+/// x follows 1 + 0.2 sin t at a rate of 1e4, and is moved 1 away from it every second.
+struct Kicked {
+    using State = std::array<double, 2>;
+    static constexpr std::size_t guard_count = 2;
+    double level = 0;
+    bool acts = false;
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.crossing = Crossing::either, .resets = acts && which == 0};
+    }
+    template <class X>
+    void flow(const ScalarOf<X>& t, const X& x, X& dxdt) const
+    {
+        using std::sin;
+        dxdt[0] = -1e4 * (x[0] - 1 - 0.2 * sin(t));
+        dxdt[1] = x[0];
+    }
+    template <class X>
+    [[nodiscard]] ScalarOf<X> guard(std::size_t which, const ScalarOf<X>&, const X& x) const
+    {
+        return which == 0 ? x[0] - level : x[1] - 4;
+    }
+    void reset(std::size_t, double, State& x) const { x[0] = 1; }
+    [[nodiscard]] double next_time_event(double t) const { return std::floor(t + 1e-9) + 1; }
+    void time_reset(double, State& x) const { x[0] += 1; }
+};
+
+// At 0.5 the motion never is, which stays above 0.8; the interpolant of a step that is longer than
+// the transient is there, since it swings by 0.94 to the other side of 1 + 0.2 sin t. At 1.5 it is
+// twice each second: where it is moved up, and on its way back, unless an event takes it back at
+// the same instant.
+TEST(Rosenbrock, TransientsShorterThanAStepHaveNoEventsOfTheirOwn)
+{
+    for (const bool acts : {false, true}) {
+        for (const double rtol : {1e-2, 1e-3, 1e-4, 1e-6}) {
+            for (const double level : {0.5, 1.5}) {
+                const auto run = integrate(Kicked{level, acts}, {1.0, 0.0},
+                                           {.t_end = 7.5, .rtol = rtol, .atol = rtol}, Stiff{});
+                ASSERT_EQ(run.outcome, Outcome::reached_end);
+                std::size_t crossed = 0;
+                for (const auto& event : run.events) crossed += event.guard == 0;
+                EXPECT_EQ(crossed, level < 1 ? 0u : acts ? 7u : 14u) << rtol << ' ' << acts;
+                EXPECT_LT(run.statistics.steps, 1500u) << rtol << ' ' << acts;
+            }
+        }
+    }
+}
+
 // There and back, each way with an error of some rtol; the turning points are met again.
 TEST(Rosenbrock, RunsBackward)
 {

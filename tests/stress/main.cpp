@@ -18,9 +18,9 @@ struct Class {
 };
 
 constexpr Class classes[] = {
-    {"bounces", bounces}, {"scales", scales},           {"poison", poison},
-    {"bounds", bounds},   {"memory", memory},           {"saves", saves},
-    {"cancels", cancels}, {"oscillators", oscillators}, {"crowds", crowds}};
+    {"bounces", bounces},         {"scales", scales}, {"poison", poison}, {"rates", rates},
+    {"bounds", bounds},           {"memory", memory}, {"saves", saves},   {"cancels", cancels},
+    {"oscillators", oscillators}, {"crowds", crowds}};
 
 bool run(const Class& of, const Size& size)
 {

@@ -1,11 +1,16 @@
 // Numbers that are none, at any call of a system's functions, and bounds that are none.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
+#include <span>
 
+#include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
+#include "ricochet/monitor.hpp"
+#include "rk4_host.hpp"
 #include "stress.hpp"
 
 namespace ricochet::stress {
@@ -100,10 +105,9 @@ void poison_all(Tally& tally, Outcomes& outcomes, const Size& size, const Steppi
                     refused = error.what();  // at the start
                 }
                 bool holds = true;
-                // A rate is believed, an infinite one as well: the guard sqrt(x) has them.
                 if (!refused.empty() || run.outcome == Outcome::non_finite) {
                     ++outcomes.named;
-                } else if (std::isfinite(value) || (place == rate_at && std::isinf(value))) {
+                } else if (std::isfinite(value)) {
                     ++outcomes.other;
                     holds = all_finite(run.x);
                 } else {
@@ -132,7 +136,233 @@ struct Liar {
     [[nodiscard]] double speed_bound(double /*t*/, const Two& /*x*/) const { return truth * 15; }
 };
 
+// --- rates of guards ---
+
+/// A number in the place of one of the rates that a guard returns.
+struct BadRate {
+    std::uint64_t call = ~std::uint64_t{0};
+    double value = 0;
+    std::uint64_t* calls = nullptr;
+
+    [[nodiscard]] double operator()(double rate) const { return (*calls)++ == call ? value : rate; }
+};
+
+struct RatedBall : Liar {
+    BadRate bad;
+    [[nodiscard]] double guard_rate(double /*t*/, const Two& /*x*/, const Two& dxdt) const
+    {
+        return bad(dxdt[0]);
+    }
+};
+
+/// A forced oscillator between two walls, whose rates come all together.
+struct RatedOscillator {
+    using State = Two;
+    static constexpr std::size_t guard_count = 2;
+    BadRate bad;
+    void flow(double t, const Two& x, Two& dxdt) const
+    {
+        dxdt = {x[1], std::cos(0.8 * t) - x[0] - 0.1 * x[1]};
+    }
+    [[nodiscard]] double guard(std::size_t which, double /*t*/, const Two& x) const
+    {
+        return which == 0 ? 0.8 - x[0] : 0.9 + x[0];
+    }
+    void guard_rates(double /*t*/, const Two& /*x*/, const Two& dxdt, std::span<double> r) const
+    {
+        r[0] = bad(-dxdt[0]);
+        r[1] = bad(dxdt[0]);
+    }
+    void reset(std::size_t which, double /*t*/, Two& x) const
+    {
+        x = {which == 0 ? 0.8 : -0.9, -0.8 * x[1]};
+    }
+    [[nodiscard]] double speed_bound(std::size_t /*which*/, double /*t*/, const Two& /*x*/) const
+    {
+        return 10;
+    }
+};
+
+/// A mass on a spring and a moving belt, which sticks and slips.
+struct RatedBelt {
+    using State = Two;
+    enum : Mode { slips, sticks };
+    static constexpr std::size_t mode_count = 2;
+    static constexpr double belt = 0.5;
+    BadRate bad;
+    void flow(Mode mode, double /*t*/, const Two& x, Two& dxdt) const
+    {
+        dxdt = {mode == slips ? x[1] : belt, mode == slips ? 0.6 - x[0] : 0};
+    }
+    [[nodiscard]] double guard(Mode mode, double /*t*/, const Two& x) const
+    {
+        return mode == slips ? belt - x[1] : 1 - x[0];
+    }
+    [[nodiscard]] double guard_rate(Mode mode, double /*t*/, const Two& /*x*/,
+                                    const Two& dxdt) const
+    {
+        return bad(mode == slips ? -dxdt[1] : -dxdt[0]);
+    }
+    [[nodiscard]] Mode reset(Mode mode, double /*t*/, Two& x) const
+    {
+        x[1] = belt;
+        return mode == slips ? sticks : slips;
+    }
+    [[nodiscard]] double speed_bound(Mode /*mode*/, double /*t*/, const Two& /*x*/) const
+    {
+        return 2;
+    }
+};
+
+/// A host's step, one of whose rates has such a number in a component.
+template <class Step>
+struct BadStep {
+    const Step& of;
+    Two r0, r1;
+    [[nodiscard]] const Instant& t0() const { return of.t0(); }
+    [[nodiscard]] double h() const { return of.h(); }
+    [[nodiscard]] std::span<const double> x0() const { return of.x0(); }
+    [[nodiscard]] std::span<const double> x1() const { return of.x1(); }
+    [[nodiscard]] std::span<const double> rate0() const { return r0; }
+    [[nodiscard]] std::span<const double> rate1() const { return r1; }
+    void interpolate(double s, std::span<double> x) const { of.interpolate(s, x); }
+    void interpolate_rate(double s, std::span<double> dxdt) const
+    {
+        HermiteStep(t0(), h(), x0(), x1(), r0, r1).interpolate_rate(s, dxdt);
+    }
+    void restep(double s, std::span<double> x) const { of.restep(s, x); }
+};
+
+struct BadRates {
+    std::size_t component = 0;
+    BadRate bad;
+    [[nodiscard]] Two rate(Two dxdt) const
+    {
+        dxdt[component] = bad(dxdt[component]);
+        return dxdt;
+    }
+    template <class Step>
+    [[nodiscard]] BadStep<Step> step(const Step& taken) const
+    {
+        return {taken, rate({taken.rate0()[0], taken.rate0()[1]}),
+                rate({taken.rate1()[0], taken.rate1()[1]})};
+    }
+};
+
+/// What a run, of the library or of a host, says of its events.
+struct Told {
+    Outcome outcome = Outcome::reached_end;
+    std::size_t guard = no_guard;
+    std::vector<Event<Two>> events;
+};
+
+[[nodiscard]] bool same_events(const Told& a, const Told& b)
+{
+    if (a.outcome != b.outcome || a.events.size() != b.events.size()) return false;
+    for (std::size_t i = 0; i < a.events.size(); ++i) {
+        const auto& p = a.events[i];
+        const auto& q = b.events[i];
+        if (p.guard != q.guard || p.kind != q.kind || p.mode_after != q.mode_after) return false;
+        if (!(std::fabs(p.t - q.t) <= 1e-6)) return false;
+    }
+    return true;
+}
+
+/// A rate that is none leaves the events as they are, or the run names its guard.
+void spoil_rates(Tally& tally, std::uint64_t& named, const Size& size, std::string_view what,
+                 const auto& run_with)
+{
+    std::uint64_t calls = 0;
+    const Told clean = run_with(BadRate{.calls = &calls});
+    tally.expect(clean.events.size() >= 3 && calls > 0,
+                 [&] { return fmt::format("{}: {} events", what, clean.events.size()); });
+    const std::uint64_t stride = std::max<std::uint64_t>(1, calls / size.cases(400, calls));
+    constexpr double inf = std::numeric_limits<double>::infinity();
+    for (std::uint64_t call = 0; call < calls; call += stride) {
+        for (const double value : {inf, -inf, std::numeric_limits<double>::quiet_NaN()}) {
+            std::uint64_t counted = 0;
+            const Told told = run_with(BadRate{.call = call, .value = value, .calls = &counted});
+            const bool says = told.outcome == Outcome::non_finite && told.guard != no_guard;
+            named += says;
+            tally.expect(says || same_events(told, clean), [&] {
+                return fmt::format("{}, {} as rate {} of {}: {}, {} events for {}", what, value,
+                                   call, calls, name(told.outcome), told.events.size(),
+                                   clean.events.size());
+            });
+        }
+    }
+}
+
+template <class System, class Detector, class Stepping>
+[[nodiscard]] Told rated_run(const System& system, const Two& x0, const Detector& detector,
+                             const Stepping& stepping)
+{
+    const Options options{.t_end = 8, .step = 0.02, .rtol = 1e-9, .atol = 1e-9};
+    const auto run = integrate(system, x0, options, stepping, detector);
+    return {run.outcome, run.guard, run.events};
+}
+
+template <class System, class Detector, class Shown = test::AsItIs>
+[[nodiscard]] Told hosted_run(const System& system, const Two& x0, const Detector& detector,
+                              const Shown& shown = {})
+{
+    EventMonitor<System, Two, Detector> monitor(system, Two{}, {}, detector);
+    const auto run = test::drive(system, monitor, x0, 8, 0.02, 0, shown);
+    return {run.outcome, monitor.guard(), run.events};
+}
+
+template <class System, class Detector>
+void spoil_detector(Tally& tally, std::uint64_t& named, const Size& size, std::string_view what,
+                    const Two& x0, const Detector& detector)
+{
+    const auto with = [](const BadRate& bad) {
+        System system;
+        system.bad = bad;
+        return system;
+    };
+    spoil_rates(tally, named, size, fmt::format("{}, fixed steps", what), [&](const BadRate& bad) {
+        return rated_run(with(bad), x0, detector, FixedStep<Rk4>{});
+    });
+    spoil_rates(tally, named, size, fmt::format("{}, controlled steps", what),
+                [&](const BadRate& bad) {
+                    return rated_run(with(bad), x0, detector, ErrorControlled<Dopri5>{});
+                });
+    spoil_rates(tally, named, size, fmt::format("{}, a host's steps", what),
+                [&](const BadRate& bad) { return hosted_run(with(bad), x0, detector); });
+    for (const std::size_t component : {0, 1}) {
+        spoil_rates(tally, named, size, fmt::format("{}, a host's rate {}", what, component),
+                    [&](const BadRate& bad) {
+                        std::uint64_t unused = 0;
+                        const System system = with({.calls = &unused});
+                        return hosted_run(system, x0, detector, BadRates{component, bad});
+                    });
+    }
+}
+
+template <class System>
+void spoil_system(Tally& tally, std::uint64_t& named, const Size& size, std::string_view what,
+                  const Two& x0)
+{
+    const auto with = [&](std::string_view detector) {
+        return fmt::format("{}, {}", what, detector);
+    };
+    spoil_detector<System>(tally, named, size, with("Extremum"), x0, Extremum{});
+    spoil_detector<System>(tally, named, size, with("Bernstein"), x0, Bernstein{});
+    spoil_detector<System>(tally, named, size, with("Planned"), x0, Planned<Extremum>{});
+}
+
 }  // namespace
+
+Tally rates(const Size& size)
+{
+    Tally tally;
+    std::uint64_t named = 0;
+    spoil_system<RatedBall>(tally, named, size, "ball", Two{10, 0});
+    spoil_system<RatedOscillator>(tally, named, size, "oscillator", Two{0, 3});
+    spoil_system<RatedBelt>(tally, named, size, "belt", Two{0, 0});
+    tally.said = fmt::format("{} named", named);
+    return tally;
+}
 
 Tally poison(const Size& size)
 {

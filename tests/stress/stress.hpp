@@ -89,6 +89,7 @@ template <class X>
 Tally bounces(const Size& size);      ///< balls that bounce for very long, under several laws
 Tally scales(const Size& size);       ///< times, lengths, masses, steps of every size
 Tally poison(const Size& size);       ///< numbers that are none, at any call
+Tally rates(const Size& size);        ///< rates of guards that are none, at any call
 Tally bounds(const Size& size);       ///< bounds that are none
 Tally memory(const Size& size);       ///< no memory at the n-th allocation
 Tally saves(const Size& size);        ///< saved and restored at every event

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -68,6 +69,18 @@ public:
 private:
     const X* x_;
 };
+
+/// The difference quotient of a guard, g here and `ahead` and `behind` at `delta` [s] to either
+/// side, to the side on which it is finite; NaN if there is none.
+[[nodiscard, gnu::cold, gnu::noinline]] inline double one_sided(double g, double ahead,
+                                                                double behind,
+                                                                double delta) noexcept
+{
+    const double forward = (ahead - g) / delta;
+    const double backward = (g - behind) / delta;
+    if (std::isfinite(forward)) return forward;
+    return std::isfinite(backward) ? backward : std::numeric_limits<double>::quiet_NaN();
+}
 
 template <class X>
 [[nodiscard]] X negated(X x)
@@ -139,16 +152,39 @@ public:
     }
 
     /// The rate at (t, x) with x' = dxdt: `guard_rate` of the system, else by dual numbers through
-    /// its guard where that takes any scalar, else the central
-    /// difference along the flow over 1e-5 of the time `scale` [s] to either side:
-    /// its truncation error is 1e-10 scale^2 / 6 times the third derivative, and it
-    /// magnifies rounding in g by 1e5 / scale.
+    /// its guard where that takes any scalar, else `difference`, which also replaces a rate that is
+    /// not finite.
     template <class V, class D>
     [[nodiscard]] double rate(double t, const V& x, const D& dxdt, double scale) const
     {
+        const double rate = raw_rate(t, x, dxdt, scale);
+        if constexpr (detail::RateAlone<System, V, D>) {
+            constexpr double largest = std::numeric_limits<double>::max();
+            if (!(std::fabs(rate) <= largest)) return replaced_rate(t, x, dxdt, scale);
+        }
+        return rate;
+    }
+
+    /// As `rate`, but a closed form that is not finite stays so.
+    template <class V, class D>
+    [[nodiscard, gnu::always_inline]] double raw_rate(double t, const V& x, const D& dxdt,
+                                                      double scale) const
+    {
+        if constexpr (detail::RateAlone<System, V, D>) {
+            return known_rate(t, x, dxdt);
+        } else {
+            return difference(t, x, dxdt, scale);
+        }
+    }
+
+private:
+    /// The rate in closed form.
+    template <class V, class D>
+    [[nodiscard, gnu::always_inline]] double known_rate(double t, const V& x, const D& dxdt) const
+    {
         if constexpr (detail::RateByDuals<System, V> && !detail::RateWritten<System, V, D>) {
             return detail::rate_by_duals(*system_, which_, mode_, t, backward_ ? -1 : 1, x, dxdt);
-        } else if constexpr (detail::RateAlone<System, V, D>) {
+        } else {
             if (!backward_) return detail::call_rate(*system_, which_, mode_, t, x, dxdt);
             if constexpr (sees_rate<V, D>) {
                 const detail::NegatedView<D> forward(dxdt);
@@ -156,13 +192,33 @@ public:
             } else {
                 return -detail::call_rate(*system_, which_, mode_, t, x, detail::negated(dxdt));
             }
-        } else {
-            const double delta = 1e-5 * scale;
-            return (moved(t, x, dxdt, delta) - moved(t, x, dxdt, -delta)) / (2 * delta);
         }
     }
 
-private:
+    /// The rate where the closed form has none. Its evaluations are not counted.
+    template <class V, class D>
+    [[nodiscard, gnu::cold, gnu::noinline]] double replaced_rate(double t, const V& x,
+                                                                 const D& dxdt, double scale) const
+    {
+        std::uint64_t calls = 0;
+        return GuardView(*system_, calls, which_, mode_, crossing_, backward_)
+            .difference(t, x, dxdt, scale);
+    }
+
+    /// The central difference along the flow over 1e-5 of the time `scale` [s] to either side: its
+    /// truncation error is 1e-10 scale^2 / 6 times the third derivative, and it magnifies rounding
+    /// in g by 1e5 / scale. Where the guard exists on one side only, the difference to that side.
+    template <class V, class D>
+    [[nodiscard]] double difference(double t, const V& x, const D& dxdt, double scale) const
+    {
+        const double delta = 1e-5 * scale;
+        const double ahead = moved(t, x, dxdt, delta);
+        const double behind = moved(t, x, dxdt, -delta);
+        const double central = (ahead - behind) / (2 * delta);
+        return std::isfinite(central) ? central
+                                      : detail::one_sided(value(t, x), ahead, behind, delta);
+    }
+
     /// The guard a time `s` later along a straight line.
     template <class V, class D>
     [[nodiscard]] double moved(double t, const V& x, const D& dxdt, double s) const

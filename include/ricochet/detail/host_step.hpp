@@ -28,6 +28,7 @@ struct HostStepTable {
     /// The host's own map from the start of the step. Null: `interpolate` is as good.
     void (*restep)(const void* host, double s, double* x, std::size_t n) = nullptr;
     double t_remainder = 0;  ///< [s] of the start
+    bool is_cubic = false;   ///< the path is the cubic through the states and rates at both ends
 
     [[nodiscard]] Instant start() const noexcept { return {t, t_remainder}; }
 };

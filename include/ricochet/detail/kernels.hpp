@@ -497,9 +497,11 @@ class KernelOf {
                 const auto guard = guard_of(door, run, caller);
                 const double t1 = caller.time(h);
                 g1 = guard.value(t1, x1);
-                if constexpr (rates) g_rate1 = guard.rate(t1, x1, rate1, h);
+                if constexpr (rates) g_rate1 = guard.raw_rate(t1, x1, rate1, h);
                 QuietEnd why = QuietEnd::due;
-                if (Screen::suspects(sign, g0, g_rate0, g1, g_rate1, h) || !std::isfinite(g1)) {
+                // A rate that is not finite is replaced by the loop.
+                if (Screen::suspects(sign, g0, g_rate0, g1, g_rate1, h) ||
+                    !std::isfinite(g1 + g_rate1)) {
                     why = QuietEnd::doubt;
                 }
                 if (rates && run.looks) {

@@ -137,6 +137,9 @@ struct StepKernel {
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
     /// The current step where it is a power series, or null.
     SeriesTerms (*series)(void* door, const StepState<X>& step) = nullptr;
+    /// Largest error of the current step's polynomial inside the step, over atol + rtol max(|x0|,
+    /// |x1|). Null where the step's own error limits it.
+    double (*roughness)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
     /// The guards on it, all of them, or null.
     SeriesTerms (*guard_series)(void* door, const StepState<X>& step) = nullptr;
     /// Locates a crossing by a guard's series, and leaves the state there in `at`; false where that

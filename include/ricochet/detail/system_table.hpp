@@ -176,7 +176,12 @@ public:
         *calls_ += system_->calls_of_rate;
         return system_->rate(system_.door(), which_, mode_, backward_, t, x, dxdt, scale);
     }
-    [[nodiscard]] GuardPoint point(double t, const X& x, const X& dxdt, double scale) const
+    [[nodiscard]] double raw_rate(double t, const X& x, const X& dxdt, double scale) const
+    {
+        return rate(t, x, dxdt, scale);
+    }
+    [[nodiscard, gnu::always_inline]] GuardPoint point(double t, const X& x, const X& dxdt,
+                                                       double scale) const
     {
         if (!system_->point) return {value(t, x), rate(t, x, dxdt, scale)};
         *calls_ += 1 + system_->calls_of_rate;

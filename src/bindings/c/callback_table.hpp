@@ -1,6 +1,7 @@
 // The table of a system of callbacks, with what it has.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -57,17 +58,26 @@ class CallbackTable {
         return guard(door, which, mode, t, moved);
     }
 
+    /// As `GuardView::difference`.
+    static double difference(void* door, std::size_t which, Mode mode, bool backward, double t,
+                             const X& x, const X& dxdt, double scale)
+    {
+        const double delta = 1e-5 * scale;
+        const double later = backward ? -delta : delta;
+        const double ahead = guard_at(door, which, mode, t + later, x, dxdt, delta);
+        const double behind = guard_at(door, which, mode, t - later, x, dxdt, -delta);
+        const double central = (ahead - behind) / (2 * delta);
+        if (std::isfinite(central)) return central;
+        return detail::one_sided(guard(door, which, mode, t, x), ahead, behind, delta);
+    }
+
     static double rate(void* door, std::size_t which, Mode mode, bool backward, double t,
                        const X& x, const X& dxdt, double scale)
     {
         const CallbackSystem& system = of(door);
         const rc_callbacks& has = system.callbacks();
         if (!has.guard_rate && !has.guard_rates) {
-            const double delta = 1e-5 * scale;
-            const double ahead = backward ? -delta : delta;
-            const double after = guard_at(door, which, mode, t + ahead, x, dxdt, delta);
-            const double before = guard_at(door, which, mode, t - ahead, x, dxdt, -delta);
-            return (after - before) / (2 * delta);
+            return difference(door, which, mode, backward, t, x, dxdt, scale);
         }
         const X* forward = &dxdt;
         if (backward) {
@@ -83,6 +93,7 @@ class CallbackTable {
             system.guard_rates(mode, t, x, *forward, at(door).all);
             rate = at(door).all[which];
         }
+        if (!std::isfinite(rate)) return difference(door, which, mode, backward, t, x, dxdt, scale);
         return backward ? -rate : rate;
     }
 

@@ -54,7 +54,8 @@ public:
                                     .rate1 = given_.rate1,
                                     .host = this,
                                     .interpolate = &interpolate,
-                                    .t_remainder = given_.t0_remainder};
+                                    .t_remainder = given_.t0_remainder,
+                                    .is_cubic = !given_.interpolate};
         if (given_.interpolate_rate || !given_.interpolate) table.rate = &interpolate_rate;
         if (given_.restep) table.restep = &restep;
         return table;
