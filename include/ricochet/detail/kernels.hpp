@@ -22,9 +22,10 @@
 #include <type_traits>
 
 #include "ricochet/detail/cubic_look.hpp"
-#include "ricochet/detail/door.hpp"
+#include "ricochet/detail/flow_caller.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/step_control.hpp"
+#include "ricochet/detail/stepper_door.hpp"
 #include "ricochet/integrate/methods.hpp"
 
 // Components of a small state are computed one by one: as pairs, which g++ makes of them, they take
@@ -37,29 +38,9 @@
 
 namespace ricochet::detail {
 
-/// A door with what a stepper of the user's keeps.
-template <class System, class X, class Method>
-struct StepperDoor : Door<System, X> {
-    using Stepper = typename Method::template Stepper<X>;
-
-    StepperDoor(const System& system, const X& like) : Door<System, X>(system, like) {}
-
-    Stepper advancing{};
-    Stepper probing{};
-};
-template <class System, class X, class Method>
-requires(NameOf<Method>::known ||
-         std::is_same_v<Method, MethodByName>) struct StepperDoor<System, X, Method>
-    : Door<System, X> {
-    using Door<System, X>::Door;
-};
-
 /// Whether steps of such states are computed in registers.
 template <class X>
 inline constexpr bool fits_registers = is_small<X>&& std::is_trivially_copyable_v<X>;
-
-/// Stands for a system whose flow is called by pointer.
-struct ByPointer {};
 
 template <class System, class X, class Method>
 class KernelOf {
@@ -83,31 +64,7 @@ class KernelOf {
         return *static_cast<StepperDoor<System, X, Method>*>(static_cast<Door<System, X>*>(door));
     }
 
-    /// State at which the flow is called, and its result.
-    struct Caller {
-        void* door;
-        bool (*flow)(void* door, Mode mode, double t, const C& x, C& dxdt);
-        Instant start;
-        Mode mode;
-        bool backward;
-        std::uint64_t calls = 0;
-        bool fits = true;
-
-        Caller(void* door_, const State& step)
-            : door(door_),
-              flow(step.flow),
-              start(step.start),
-              mode(step.mode),
-              backward(step.backward)
-        {
-        }
-        [[nodiscard]] double time(double s) const noexcept { return start.plus(backward ? -s : s); }
-        void leave(State& step) const noexcept
-        {
-            step.flow_calls += calls;
-            step.flow_fits &= fits;
-        }
-    };
+    using Caller = FlowCaller<C>;
 
     [[gnu::always_inline]] static bool call(const Caller& caller, double t, const Y& x, Y& dxdt)
     {

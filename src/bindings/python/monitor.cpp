@@ -125,6 +125,7 @@ public:
                 table.host = &cubic;
                 table.interpolate = &hermite_at;
                 table.rate = &hermite_rate_at;
+                table.is_cubic = true;
                 return monitor_->examine(table);
             }
             if (!PyCallable_Check(interpolate.ptr())) {

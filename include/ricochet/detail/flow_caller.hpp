@@ -1,0 +1,38 @@
+// Internal: what it declares may change without notice.
+//
+// How a step calls the flow: by pointer, or inlined.
+#pragma once
+
+#include <cstdint>
+
+#include "ricochet/detail/step_state.hpp"
+
+namespace ricochet::detail {
+
+/// Stands for a system whose flow is called by pointer.
+struct ByPointer {};
+
+/// The flow of a step by pointer, when and in which mode it is called, and how often it was.
+template <class C>
+struct FlowCaller {
+    void* door;
+    bool (*flow)(void* door, Mode mode, double t, const C& x, C& dxdt);
+    Instant start;
+    Mode mode;
+    bool backward;
+    std::uint64_t calls = 0;
+    bool fits = true;
+
+    FlowCaller(void* door_, const StepState<C>& step)
+        : door(door_), flow(step.flow), start(step.start), mode(step.mode), backward(step.backward)
+    {
+    }
+    [[nodiscard]] double time(double s) const noexcept { return start.plus(backward ? -s : s); }
+    void leave(StepState<C>& step) const noexcept
+    {
+        step.flow_calls += calls;
+        step.flow_fits &= fits;
+    }
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,30 @@
+// Internal: what it declares may change without notice.
+//
+// What a run with a stepper of the user's keeps beside the system.
+#pragma once
+
+#include <type_traits>
+
+#include "ricochet/detail/door.hpp"
+#include "ricochet/integrate/methods.hpp"
+
+namespace ricochet::detail {
+
+/// A door with what a stepper of the user's keeps.
+template <class System, class X, class Method>
+struct StepperDoor : Door<System, X> {
+    using Stepper = typename Method::template Stepper<X>;
+
+    StepperDoor(const System& system, const X& like) : Door<System, X>(system, like) {}
+
+    Stepper advancing{};
+    Stepper probing{};
+};
+template <class System, class X, class Method>
+requires(NameOf<Method>::known ||
+         std::is_same_v<Method, MethodByName>) struct StepperDoor<System, X, Method>
+    : Door<System, X> {
+    using Door<System, X>::Door;
+};
+
+}  // namespace ricochet::detail
