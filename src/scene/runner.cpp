@@ -9,6 +9,13 @@
 
 namespace ricochet::detail {
 
+namespace {
+
+/// Acts in a row at one time, and 64 for each body: by trial, far more than any collapse takes.
+constexpr std::uint64_t most_idle = 100'000;
+
+}  // namespace
+
 Runner::Runner(World& world, double t_end)
     : world_(world),
       t_end_{t_end, 0},
@@ -35,6 +42,7 @@ void Runner::begin(std::vector<std::uint32_t> bodies)
     calendar_.clear();
     now_ = {world_.options.t_start, 0};
     fruitless_ = 0;
+    idle_ = 0;
     next_sample_ = 0;
     result_ = {};
 }
@@ -115,7 +123,13 @@ GroupResult Runner::run(std::vector<std::uint32_t> bodies_of_group, Samples& sam
         const Instant t = calendar_.first_time();
         if (before(t_end_, t)) break;
         if (next_sample_ < options.sample_times.size()) sample_until(t, false, samples);
-        if (before(now_, t)) now_ = t;
+        if (before(now_, t)) {
+            now_ = t;
+            idle_ = 0;
+        } else if (++idle_ > most_idle + 64 * members_.size()) {
+            fail(Outcome::endless_cascade, {}, "the time does not advance any more");
+            break;
+        }
         const std::uint32_t who = calendar_.first();
         if (who >= bodies) {
             const auto groups = entry_of_group(0);
@@ -174,14 +188,18 @@ void Runner::consider(std::uint32_t i, const Meeting& meeting, bool surface, std
     if (!(meeting.after < never)) return;
     const Instant t = meeting.from.after(meeting.after);
     Pending& pending = pending_[i];
-    if (!before(t, pending.t)) return;
+    using Kind = Pending::Kind;
+    const bool pressing = pending.kind == Kind::presses || pending.kind == Kind::presses_face;
+    // Where a body presses on one and approaches another, it is the impact that comes first.
+    if (before(pending.t, t)) return;
+    if (!before(t, pending.t) && (!pressing || meeting.presses)) return;
     pending.t = t;
     pending.other = other;
     pending.other_version = surface ? 0 : world_.bodies[other].version;
     if (surface) {
-        pending.kind = meeting.presses ? Pending::Kind::presses_face : Pending::Kind::face;
+        pending.kind = meeting.presses ? Kind::presses_face : Kind::face;
     } else {
-        pending.kind = meeting.presses ? Pending::Kind::presses : Pending::Kind::pair;
+        pending.kind = meeting.presses ? Kind::presses : Kind::pair;
     }
 }
 
@@ -360,6 +378,7 @@ void Runner::happen(std::uint32_t i)
         case Kind::edge: return leave_edge(i);
         case Kind::face: return impact(i);
         case Kind::presses_face:
+            if (rests_on_face(i)) return predict(i);
             return press(
                 i,
                 fmt::format("{} presses on {}", called(i),
