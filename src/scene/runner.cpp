@@ -177,6 +177,12 @@ void Runner::step_island(std::uint32_t island)
                     fmt::format("the step of the island of {} fell below what the time resolves",
                                 called(islands.members(island)[0])));
     }
+    if (islands.stalls(island)) {
+        return fail(Outcome::stalled, islands.members(island),
+                    fmt::format("the steps of the island of {} are shorter than 1e-8 of the run: "
+                                "its drag or a spring is too stiff for the method",
+                                called(islands.members(island)[0])));
+    }
     const Instant& end = islands.end(island);
     calendar_.set(id, before(end, t_end_) ? end : no_instant);
     for (const std::uint32_t i : islands.members(island)) predict(i);
