@@ -11,6 +11,10 @@ namespace ricochet::detail {
 
 namespace {
 
+/// With no more than these there are no cells.
+constexpr std::size_t few_bodies = 16;
+constexpr std::size_t few_faces = 64;
+
 /// Acts in a row at one time, and 64 for each body: by trial, far more than any collapse takes.
 constexpr std::uint64_t most_idle = 100'000;
 
@@ -71,6 +75,9 @@ void Runner::place_all()
     const double slack = islands_.empty() ? 1.0001 : 1.3;
     double side = std::max(2 * radius * slack, 0.65 * std::sqrt(width * height / count));
     if (!(side > 0)) side = std::max({width, height, 1.0});
+    if (members_.size() <= few_bodies && world_.faces.size() - world_.wall_count <= few_faces) {
+        side = 0x1p200;  // so few are all asked, and none pays for the cells that it crosses
+    }
     const auto buckets = [&](double extent) {
         const double wanted = std::clamp(extent / side, 4.0, 4 * std::sqrt(count) + 1e3);
         return std::bit_ceil(static_cast<std::uint32_t>(wanted));
