@@ -126,7 +126,10 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
     group.length = length;
     group.planned = true;
     group.start = now;
-    group.end = length == left ? t_end : now.after(length);
+    group.end = now.after(length);
+    // No step is as short as what rounding leaves of the run.
+    const bool over = seconds(group.end, t_end) <= resolution(t_end);
+    if (length == left || (over && outcome != IslandOutcome::impact)) group.end = t_end;
     const bool asleep = outcome == IslandOutcome::asleep;
     const bool moves =
         step > 0 && (outcome == IslandOutcome::reached || outcome == IslandOutcome::impact);

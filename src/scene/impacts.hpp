@@ -28,7 +28,8 @@ struct Cluster {
     std::vector<Vector2> before;  ///< velocities
     std::vector<Vector2> after;
     std::vector<Contact> contacts;
-    bool lasting = false;  ///< whether one of the bodies is in lasting contact
+    std::vector<std::vector<Side>> sides;  ///< of bodies that are points
+    bool lasting = false;                  ///< whether one of the bodies is in lasting contact
 
     void clear()
     {
@@ -36,6 +37,7 @@ struct Cluster {
         before.clear();
         after.clear();
         contacts.clear();
+        sides.clear();
     }
 };
 

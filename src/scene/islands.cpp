@@ -11,6 +11,11 @@ namespace ricochet::detail {
 
 namespace {
 
+/// So many steps in a row, each so small a part of the run, are taken for the rule: a run of 10^8
+/// steps takes half a minute and more.
+constexpr std::uint32_t most_short_steps = 1000;
+constexpr double short_part = 1e-8;
+
 using Dopri5 = RungeKutta<Dopri5Tableau, std::vector<double>>;
 
 std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i)
@@ -183,6 +188,9 @@ bool Islands::attempt(std::uint32_t which)
             if (island.h < left || factor < 1) island.next = island.h * factor;
             island.end = island.h == left ? t_end : island.start.after(island.h);
             ++world_.statistics.steps;
+            const double run = world_.options.t_end - world_.options.t_start;
+            const bool is_short = island.h < left && island.h < short_part * run;
+            island.short_steps = is_short ? island.short_steps + 1 : 0;
             return true;
         }
         ++world_.statistics.rejected;
@@ -237,6 +245,11 @@ bool Islands::advance(std::uint32_t which)
     if (!attempt(which)) return false;
     record(island);
     return true;
+}
+
+bool Islands::stalls(std::uint32_t which) const
+{
+    return islands_[which].short_steps > most_short_steps;
 }
 
 void Islands::look_at(const Island& island, const Instant& t) const

@@ -31,6 +31,8 @@ public:
     /// The next step of an island; its members get new records. False where no step is short
     /// enough, or nothing finite comes out.
     bool advance(std::uint32_t island);
+    /// Whether its steps have become so short that it would hardly ever come to the end.
+    [[nodiscard]] bool stalls(std::uint32_t island) const;
 
     /// An island goes on from t with changed velocities of some members: the current step is cut
     /// there, and its length is kept for the next one.
@@ -65,6 +67,7 @@ private:
         double h = 0;     ///< of the current step
         double next = 0;  ///< length that the error allows
         bool begun = false;
+        std::uint32_t short_steps = 0;         ///< in a row
         State x, remainder, rate;              ///< at the start of the current step
         State x_end, remainder_end, rate_end;  ///< at its end
     };

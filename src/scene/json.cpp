@@ -12,6 +12,7 @@
 #include "files/strict_json.hpp"
 #include "scene/json_lines.hpp"
 #include "scene/names.hpp"
+#include "scene/options.hpp"
 
 namespace ricochet {
 
@@ -180,9 +181,18 @@ public:
         top.each("terrain", [&](const json& value, const JsonPath& path) {
             terrain({value, path, "terrain"}, file.scene);
         });
+        std::vector<std::size_t> ends;  // of the bodies of each entry
         top.each("bodies", [&](const json& value, const JsonPath& path) {
             body({value, path, "a body"}, file.scene);
+            ends.push_back(file.scene.bodies().size());
         });
+        try {
+            file.scene.check();
+        } catch (const Misplaced& error) {
+            const auto entry = std::ranges::upper_bound(ends, std::size_t{error.body});
+            const auto index = static_cast<std::size_t>(entry - ends.begin());
+            throw Trouble{{"bodies", index}, error.what()};
+        }
         top.each("springs", [&](const json& value, const JsonPath& path) {
             spring({value, path, "a spring"}, file.scene);
         });
@@ -263,7 +273,8 @@ private:
             shape.only({"mass"});
         } else {
             shape.only({"radius", "mass"});
-            disc.radius = shape.number("radius");
+            disc.radius = Disc{}.radius;
+            shape.number("radius", disc.radius);
         }
         shape.number("mass", disc.mass);
         if (part.has("grid")) return grid(part, disc, point, scene);

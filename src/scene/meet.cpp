@@ -141,29 +141,16 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
     return meeting;
 }
 
-/// Whether a body at p is on the side of a segment to which its normal points. A point on the line
-/// is where it comes from, and where its flight begins on the line it is where that leads.
-static bool is_above(const Face& face, const Body& body, const Vector2& p, const Vector2& v)
-{
-    const double height = dot(p - face.at, face.normal);
-    const double rounding = World::rounding(p, body.radius) + World::rounding(face.at, 0);
-    if (body.radius > 0 || std::fabs(height) > rounding) return height > 0;
-    const double rate = dot(v, face.normal);
-    if (rate == 0) return dot(body.a, face.normal) > 0;
-    return std::fabs(dot(body.p - face.at, face.normal)) > rounding ? rate < 0 : rate > 0;
-}
-
-FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, const Vector2& v)
+FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above)
 {
     const double radius = body.radius;
     if (face.kind == Face::Kind::wall) {
         return {dot(p - face.at, face.normal) - radius, face.normal};
     }
     if (face.kind == Face::Kind::segment) {
-        const double along = -dot(p - face.at, turned(face.normal));
-        const double slack = 8 * epsilon * face.length;
-        if (along < -slack || along > face.length + slack) return {};
-        const Vector2 normal = is_above(face, body, p, v) ? face.normal : -1.0 * face.normal;
+        const double slack = radius == 0 ? World::end_slack(face, p) : 8 * epsilon * face.length;
+        if (!lies_on(face, p, slack)) return {};
+        const Vector2 normal = above ? face.normal : -1.0 * face.normal;
         return {dot(p - face.at, normal) - radius, normal};
     }
     if (radius == 0) return {};
@@ -172,68 +159,82 @@ FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, const Vec
     return {distance - radius, {apart[0] / distance, apart[1] / distance}};
 }
 
-/// Whether the foot of p on the line lies on the segment.
-static bool lies_on(const Face& face, const Vector2& p, double radius)
+bool lies_on(const Face& face, const Vector2& p, double slack)
 {
     const double along = -dot(p - face.at, turned(face.normal));
-    const double slack = radius == 0 ? World::rounding(p, 0) + World::rounding(face.at, 0) : 0;
     return along >= -slack && along <= face.length + slack;
 }
 
-static bool lands_on(const Face& face, const Body& body, double after)
+/// Whether a body that comes to the line of a segment at p meets it between its ends.
+static bool lands_on(const World& world, const Body& body, std::uint32_t which, bool above,
+                     const Vector2& p, const Vector2& v)
 {
-    return std::isfinite(after) && lies_on(face, place(body, after), body.radius);
+    const Face& face = world.faces[which];
+    if (body.radius > 0) return lies_on(face, p, 0);
+    return lies_on(face, p, World::end_slack(face, p)) &&
+           !world.passes_end(body, which, above, p, v);
 }
 
 /// A wall, or the inside of a segment.
-static Meeting meet_line(const World& world, std::uint32_t i, const Face& face)
+static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t which)
 {
+    const Face& face = world.faces[which];
     const Body& b = world.bodies[i];
     const bool segment = face.kind == Face::Kind::segment;
     const Path path = world.path(i, b.t);
-    const bool turn = segment && !is_above(face, b, path.c[0], path.c[1]);
-    const Vector2 normal = turn ? -1.0 * face.normal : face.normal;
+    const bool above = !segment || world.begins_above(b, which);
+    const Vector2 normal = above ? face.normal : -1.0 * face.normal;
     const double gap = dot(path.c[0] - face.at, normal) - b.radius;
     const double rounding = World::rounding(path.c[0], b.radius) + World::rounding(face.at, 0);
+    // What is on the line beside a segment comes to its end a little later.
+    const bool on =
+        !segment || lies_on(face, path.c[0], b.radius > 0 ? 0 : World::end_slack(face, path.c[0]));
+    const double closed = on ? rounding : 0;
     double rate = dot(path.c[1], normal);
     const double bend = dot(path.c[2], normal);
+    const auto lands = [&](double s, bool side) {
+        if (!segment || !std::isfinite(s)) return true;
+        Path at = path;
+        for (std::size_t k = 4; k-- > 0;) {
+            for (std::size_t j = k; j < 4; ++j) at.c[j] = at.c[j] + s * at.c[j + 1];
+        }
+        return lands_on(world, b, which, side, at.c[0], at.c[1]);
+    };
     Meeting meeting{.from = b.t};
-    if (gap <= rounding && std::fabs(rate) <= noise(path.c[1], {})) {
-        if (bend < 0) return {.from = b.t, .after = 0, .presses = true};
+    const Polynomial c{gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};
+    // Beside the end of a segment a disc may reach across its line: it meets the segment when it
+    // has left the line and comes back.
+    const bool beside = gap < -rounding && !on;
+    if (on && gap <= rounding && std::fabs(rate) <= noise(path.c[1], {})) {
+        const Vector2& heading = is_zero(path.c[1]) ? path.c[2] : path.c[1];
+        const bool ahead = dot(heading, turned(face.normal)) < 0;
+        const bool free = b.radius > 0 || (ahead ? face.next : face.previous) == none;
+        if (free && world.leads_off(face, path.c[0], heading)) return {};
+        if (bend < 0 && lands(0, above)) return {.from = b.t, .after = 0, .presses = true};
         rate = 0;
     }
     if (path.degree <= 2) {
-        meeting.after = falls_after(gap, rate, 2 * bend, rounding);
-        if (segment && bend > 0 && !lands_on(face, b, meeting.after)) {
-            // Past its end, and back from behind.
-            const double behind = -(gap + 2 * b.radius);
-            const double square = rate * rate + 4 * bend * behind;
-            meeting.after =
-                rate < 0 && square > 0 ? (std::sqrt(square) - rate) / (2 * bend) : never;
-        }
-    } else {
-        if (gap > reach_of(path)) return meeting;
-        Polynomial c{gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};
-        meeting.after = falls_within(c, 4, path.until, rounding);
-        if (meeting.after > 0 && std::isfinite(meeting.after)) {
-            meeting.after = on_map(meeting.after, path.until, [&](double s) {
-                const Instant t = b.t.after(s);
-                return GapAndRate{dot(world.position(i, t) - face.at, normal) - b.radius,
-                                  dot(world.velocity(i, t), normal)};
-            });
-        }
+        meeting.after = beside ? falls_again(c, path.degree, path.until)
+                               : falls_after(gap, rate, 2 * bend, closed);
+        if (!(beside && meeting.after == never) && lands(meeting.after, above)) return meeting;
+        if (bend <= 0 || rate >= 0) return {};
+        // Past its end, and back from behind.
+        const double behind = -(gap + 2 * b.radius);
+        const double square = rate * rate + 4 * bend * behind;
+        if (!(square > 0)) return {};
+        meeting.after = (std::sqrt(square) - rate) / (2 * bend);
+        return lands(meeting.after, !above) ? meeting : Meeting{};
     }
-    if (segment && std::isfinite(meeting.after) && path.degree <= 2 &&
-        !lands_on(face, b, meeting.after)) {
-        meeting.after = never;
+    if (gap > reach_of(path)) return meeting;
+    meeting.after = beside ? falls_again(c, 4, path.until) : falls_within(c, 4, path.until, closed);
+    if (meeting.after > 0 && std::isfinite(meeting.after)) {
+        meeting.after = on_map(meeting.after, path.until, [&](double s) {
+            const Instant t = b.t.after(s);
+            return GapAndRate{dot(world.position(i, t) - face.at, normal) - b.radius,
+                              dot(world.velocity(i, t), normal)};
+        });
     }
-    if (segment && std::isfinite(meeting.after) && path.degree > 2) {
-        const double s = meeting.after;
-        const Vector2 at =
-            path.c[0] + s * (path.c[1] + s * (path.c[2] + s * (path.c[3] + s * path.c[4])));
-        if (!lies_on(face, at, b.radius)) meeting.after = never;
-    }
-    return meeting;
+    return lands(meeting.after, above) ? meeting : Meeting{};
 }
 
 Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
@@ -241,8 +242,15 @@ Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
     const Face& face = world.faces[which];
     const Body& b = world.bodies[i];
     if (b.held == which) return {};
-    if (face.kind != Face::Kind::vertex) return meet_line(world, i, face);
+    if (face.kind != Face::Kind::vertex) return meet_line(world, i, which);
     if (b.radius == 0) return {};
+    if (b.held != none && world.faces[b.held].kind == Face::Kind::segment) {
+        // What slides along a segment passes the ends of those that go on in its line.
+        const Face& under = world.faces[b.held];
+        const double height = dot(face.at - under.at, under.normal);
+        const double rounding = World::rounding(face.at, 0) + World::rounding(under.at, 0);
+        if (std::fabs(height) <= rounding) return {};
+    }
     const Path path = world.path(i, b.t);
     Path apart = path;
     apart.c[0] = path.c[0] - face.at;
@@ -251,7 +259,9 @@ Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
     const bool steps = std::isfinite(path.until);
     Meeting meeting{.from = b.t};
     if (steps && norm(apart.c[0]) - b.radius > reach_of(path)) return meeting;
-    if (now.at_once <= now.tolerance && std::fabs(now.rate) <= noise(path.c[1], {}) * b.radius) {
+    // The direction to the vertex is rounded as the places of both are.
+    const double slowest = noise(path.c[1], {}) * b.radius + norm(path.c[1]) * rounding;
+    if (now.at_once <= now.tolerance && std::fabs(now.rate) <= slowest) {
         now.rate = 0;
         if (dot(path.c[1], path.c[1]) + 2 * dot(apart.c[0], path.c[2]) < 0) {
             return {.from = b.t, .after = 0, .presses = true};

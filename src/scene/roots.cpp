@@ -97,4 +97,13 @@ double falls_within(Polynomial c, int degree, double until, double tolerance) no
     return roots.count > 0 ? roots.at[0] : never;
 }
 
+double falls_again(const Polynomial& c, int degree, double until) noexcept
+{
+    while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;
+    if (degree < 2) return never;
+    const double end = std::isfinite(until) ? until : bound_of_roots(c, degree);
+    const Roots roots = roots_in(c, degree, end);
+    return roots.count > 1 ? roots.at[1] : never;
+}
+
 }  // namespace ricochet::detail

@@ -44,4 +44,7 @@ using Polynomial = std::array<double, largest_degree + 1>;
 [[nodiscard]] double falls_within(Polynomial c, int degree, double until,
                                   double tolerance) noexcept;
 
+/// Time from now until a polynomial that is negative now has risen and falls to zero again.
+[[nodiscard]] double falls_again(const Polynomial& c, int degree, double until) noexcept;
+
 }  // namespace ricochet::detail

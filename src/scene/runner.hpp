@@ -94,14 +94,18 @@ private:
     }
     void gather(std::uint32_t i, const Pending& seed);
     void gather_faces(std::uint32_t slot, std::uint32_t sure);
+    [[nodiscard]] std::vector<Side> sides_of(std::uint32_t i, std::uint32_t sure) const;
     void gather_pairs(std::uint32_t slot, std::uint32_t sure);
     void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);
     std::uint32_t slot_of(std::uint32_t body);
     void apply();
+    std::uint32_t begin_record(std::uint32_t i, const Vector2& velocity,
+                               const std::vector<Side>& sides);
     void bounce(std::uint32_t i);
     bool collapses(std::uint32_t i);
     void restart_island(std::uint32_t island);
     void settle(std::uint32_t i, std::uint32_t was);
+    bool rests_on_face(std::uint32_t i);
     void halt(std::uint32_t i);
     void leave_edge(std::uint32_t i);
     [[nodiscard]] std::vector<std::uint32_t> touching_faces(std::uint32_t i) const;
@@ -142,6 +146,7 @@ private:
     std::vector<Series> series_;  ///< of impacts of a body
     Instant now_{};
     std::uint32_t fruitless_ = 0;  ///< predicted impacts in a row that moved nothing
+    std::uint64_t idle_ = 0;       ///< acts in a row at one time
     std::size_t next_sample_ = 0;
     GroupResult result_;
 };

@@ -49,6 +49,36 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
     for (const std::uint32_t body : cluster_.bodies) slots_[body] = none;
 }
 
+/// Segments that a point touches now, and on which side, from a record that has led there; `sure`
+/// is one of them whatever its distance, and the first.
+std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
+{
+    std::vector<Side> sides;
+    const Body& body = world_.bodies[i];
+    if (body.radius > 0 || !celled_ || !cells_.any_faces()) return sides;
+    const Vector2 p = world_.position(i, now_);
+    const Vector2 v = world_.velocity(i, now_);
+    // A long flight and its height round more than its end.
+    const double s = seconds(body.t, now_);
+    const double flown = 4 * epsilon * s * (norm(body.v) + s * norm(body.a));
+    for (const std::uint32_t f : cells_.faces(body.bucket)) {
+        const Face& face = world_.faces[f];
+        if (face.kind != Face::Kind::segment) continue;
+        const bool above = world_.arrives_above(body, f, p, v);
+        if (f != sure) {
+            const double gap = face_gap(face, body, p, above).gap;
+            const double tolerance = World::rounding(p, 0) + World::rounding(face.at, 0) + flown +
+                                     2 * resolution(now_) * std::fabs(dot(v, face.normal));
+            // Four times, since it is moved onto the line of another one before it goes on.
+            if (std::fabs(gap) > 4 * tolerance) continue;
+        }
+        sides.push_back({f, above});
+        if (f == sure) std::swap(sides.front(), sides.back());
+    }
+    world_.make_one(sides);
+    return sides;
+}
+
 /// Contacts of a body of the cluster with faces; the face `sure` touches whatever its gap.
 void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
 {
@@ -56,26 +86,36 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     const Body& body = world_.bodies[i];
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = cluster_.before[slot];
+    const auto touch = [&](std::uint32_t f, const Vector2& normal) {
+        Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
+        contact.normal = normal;
+        contact.at = p - body.radius * normal;
+        contact.restitution = world_.restitution(body.material, world_.faces[f].material);
+        contact.friction = world_.friction(body.material, world_.faces[f].material);
+        cluster_.contacts.push_back(contact);
+    };
     const auto look = [&](std::uint32_t f) {
         const Face& face = world_.faces[f];
         if (face.kind == Face::Kind::wall && f != sure &&
             dot(p - face.at, face.normal) > body.radius + 1e-6 * (body.radius + norm(p))) {
             return;
         }
-        const FaceGap at = face_gap(face, body, p, v);
+        const bool above = face.kind == Face::Kind::segment && world_.arrives_above(body, f, p, v);
+        const FaceGap at = face_gap(face, body, p, above);
         double tolerance = World::rounding(p, body.radius) + World::rounding(face.at, 0) +
                            2 * resolution(now_) * std::fabs(dot(v, at.normal));
         if (known_to_group(i, true, f)) tolerance += loose * (body.radius + norm(p));
         if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) return;
-        Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
-        contact.normal = at.normal;
-        contact.at = p - body.radius * at.normal;
-        contact.restitution = world_.restitution(body.material, face.material);
-        contact.friction = world_.friction(body.material, face.material);
-        cluster_.contacts.push_back(contact);
+        touch(f, at.normal);
     };
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
-    if (celled_ && cells_.any_faces()) {
+    cluster_.sides.push_back(sides_of(i, sure));
+    for (const Side& side : cluster_.sides.back()) {
+        const Face& face = world_.faces[side.face];
+        if (side.face != sure && world_.passes_end(body, side.face, side.above, p, v)) continue;
+        touch(side.face, side.above ? face.normal : -1.0 * face.normal);
+    }
+    if (body.radius > 0 && celled_ && cells_.any_faces()) {
         for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
     }
 }
@@ -213,6 +253,22 @@ void Runner::resolve_cluster(std::uint32_t i)
     }
 }
 
+/// A flight from now on, of a body in closed form. Returns the face that held it before.
+std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
+                                   const std::vector<Side>& sides)
+{
+    Body& body = world_.bodies[i];
+    body.p = place(body, seconds(body.t, now_));
+    // A velocity whose square vanishes is none: in a corner it would be halved for ever.
+    body.v = norm(velocity) < 1e-150 ? Vector2{} : velocity;
+    body.a = world_.gravity;
+    body.t = now_;
+    ++body.version;
+    body.asleep = false;
+    if (body.radius == 0) world_.remember(body, sides);
+    return std::exchange(body.held, none);
+}
+
 /// New records of those whose velocity has changed, and what they meet now.
 void Runner::apply()
 {
@@ -226,6 +282,9 @@ void Runner::apply()
         changed_.push_back(i);
         Body& body = world_.bodies[i];
         series_[i].last = now_;
+        if (body.radius == 0 && body.island != none) {
+            world_.remember(body, cluster_.sides[k]);
+        }
         if (!is_finite(cluster_.after[k])) {
             return fail(Outcome::non_finite, {i},
                         fmt::format("the velocity of {} is not finite", called(i)));
@@ -242,13 +301,7 @@ void Runner::apply()
             }
             continue;
         }
-        body.p = place(body, seconds(body.t, now_));
-        body.v = cluster_.after[k];
-        body.a = world_.gravity;
-        body.t = now_;
-        ++body.version;
-        body.asleep = false;
-        const std::uint32_t held = std::exchange(body.held, none);
+        const std::uint32_t held = begin_record(i, cluster_.after[k], cluster_.sides[k]);
         const bool on_surface = std::ranges::any_of(
             cluster_.contacts, [&](const Contact& c) { return c.a == i && c.surface; });
         if (on_surface) settle(i, held);
@@ -352,8 +405,12 @@ std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
     const auto look = [&](std::uint32_t f) {
         const Face& face = world_.faces[f];
         if (face.kind == Face::Kind::vertex) return;
-        const double gap = face_gap(face, body, body.p, body.v).gap;
-        if (gap <= World::rounding(body.p, body.radius) + World::rounding(face.at, 0)) {
+        const bool above = face.kind == Face::Kind::segment && world_.begins_above(body, f);
+        const double gap = face_gap(face, body, body.p, above).gap;
+        const double rounding = World::rounding(body.p, body.radius) + World::rounding(face.at, 0);
+        const bool known =
+            std::ranges::any_of(body.sides, [&](std::uint32_t side) { return side / 2 == f; });
+        if (known || gap <= rounding) {
             faces.push_back(f);
         }
     };
@@ -370,28 +427,58 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
 {
     Body& body = world_.bodies[i];
     const Vector2 velocity = body.v;
+    const std::vector<std::uint32_t> faces = touching_faces(i);
+    // In a corner, what rises by less than the rounding of its place does not move.
+    const double pull_of_all = norm(world_.gravity);
+    const double rise = faces.size() > 1 ? 4 * World::rounding(body.p, body.radius) : 0;
+    const double gained =
+        std::max(resolution(body.t) * pull_of_all, std::sqrt(2 * pull_of_all * rise));
+    if (norm(body.v) <= gained) body.v = {};
+    const double still = std::max(8 * epsilon * norm(body.v), 0.5 * gained);
+    const double rounding = 8 * epsilon * pull_of_all;
     std::vector<std::uint32_t> holding;
-    for (const std::uint32_t f : touching_faces(i)) {
+    std::vector<Vector2> blocking;  // by what it cannot be pulled into, overhanging faces included
+    for (const std::uint32_t f : faces) {
         const Vector2 n = world_.push_of(body, f);
         const double pull = dot(world_.gravity, n);
         const double leaves = dot(body.v, n);
-        if (!(pull < 0) || leaves < -8 * epsilon * norm(body.v)) continue;
+        if (leaves < -still) continue;
+        if (leaves <= still) blocking.push_back(n);
+        if (pull >= 0) continue;
         if (2 * leaves <= resolution(body.t) * -pull || leaves <= 8 * epsilon * norm(body.v)) {
             holding.push_back(f);
         }
     }
-    if (holding.empty()) return;
+    if (holding.empty()) {
+        body.v = velocity;
+        return;
+    }
     for (const std::uint32_t f : holding) {
         const Vector2 n = world_.push_of(body, f);
         body.v = body.v - dot(body.v, n) * n;
     }
     std::uint32_t chosen = none;
+    bool leaves = false;
+    const Vector2 flight = body.v;
     for (std::size_t k = 0; k < holding.size() && chosen == none; ++k) {
+        body.v = flight;
         world_.slide(i, holding[k]);
-        const bool stays = std::ranges::all_of(holding, [&](std::uint32_t f) {
-            return dot(body.a, world_.push_of(body, f)) >= -8 * epsilon * norm(world_.gravity);
-        });
-        if (stays) chosen = holding[k];
+        const bool stays = std::ranges::all_of(
+            blocking, [&](const Vector2& n) { return dot(body.a, n) >= -rounding; });
+        if (!stays) continue;
+        const Vector2& heading = is_zero(body.v) ? body.a : body.v;
+        if (world_.leads_off(world_.faces[holding[k]], body.p, heading)) {
+            leaves = true;
+        } else {
+            chosen = holding[k];
+        }
+    }
+    if (chosen == none && leaves) {
+        body.v = flight;
+        body.a = world_.gravity;
+        body.held = none;
+        body.asleep = false;
+        return;
     }
     if (chosen == none) {
         // No single one carries it, so it lies in the corner of two.
@@ -400,6 +487,16 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
         body.held = chosen = holding[0];
     }
     if (chosen != was) note(SceneEvent::Kind::held, i, chosen, velocity);
+}
+
+/// Whether surfaces alone hold from now on what presses on one of them.
+bool Runner::rests_on_face(std::uint32_t i)
+{
+    Body& body = world_.bodies[i];
+    if (body.island != none || body.contact != none) return false;
+    begin_record(i, speed(body, seconds(body.t, now_)), sides_of(i, none));
+    settle(i, none);
+    return body.held != none;
 }
 
 /// When friction stops it, or its face ends.
@@ -434,13 +531,8 @@ void Runner::consider_own(std::uint32_t i)
 void Runner::halt(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
-    const double s = seconds(body.t, now_);
-    const Vector2 velocity = speed(body, s);
-    body.p = place(body, s);
-    body.v = {};
-    body.t = now_;
-    ++body.version;
-    const std::uint32_t face = body.held;
+    const Vector2 velocity = speed(body, seconds(body.t, now_));
+    const std::uint32_t face = begin_record(i, {}, sides_of(i, body.held));
     world_.slide(i, face);
     if (body.asleep) {
         note(SceneEvent::Kind::stopped, i, face, velocity);
@@ -452,25 +544,19 @@ void Runner::halt(std::uint32_t i)
 void Runner::leave_edge(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
-    const double s = seconds(body.t, now_);
-    const Vector2 velocity = speed(body, s);
-    body.p = place(body, s);
-    body.v = velocity;
-    body.a = world_.gravity;
-    body.t = now_;
-    ++body.version;
-    body.held = none;
+    const Vector2 velocity = speed(body, seconds(body.t, now_));
+    begin_record(i, velocity, sides_of(i, body.held));
+    if (is_zero(velocity)) {
+        settle(i, none);
+        return predict(i);
+    }
     for (const std::uint32_t f : touching_faces(i)) {
         const Face& face = world_.faces[f];
         if (face.kind != Face::Kind::segment) continue;
         // The face that goes on from here, in the direction of the motion.
-        const Vector2 along = -1.0 * turned(face.normal);
-        const double place_on = dot(body.p - face.at, along);
-        const bool ahead =
-            dot(body.v, along) > 0 ? place_on < 0.5 * face.length : place_on > 0.5 * face.length;
         const Vector2 n = world_.push_of(body, f);
-        if (ahead && std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) &&
-            dot(world_.gravity, n) < 0) {
+        if (!world_.leads_off(face, body.p, velocity) &&
+            std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) && dot(world_.gravity, n) < 0) {
             world_.slide(i, f);
             break;
         }
@@ -482,9 +568,19 @@ void Runner::settle_at_start()
 {
     for (const std::uint32_t i : members_) {
         Body& body = world_.bodies[i];
-        if (body.island != none || body.asleep || is_zero(world_.gravity)) continue;
+        const bool fixed = body.island != none || body.asleep || is_zero(world_.gravity);
+        if (fixed && body.radius > 0) continue;
         const std::vector<std::uint32_t> faces = touching_faces(i);
-        if (!faces.empty()) settle(i, faces.size() == 1 ? faces[0] : none);
+        if (body.radius == 0) {
+            std::vector<Side> sides;
+            for (const std::uint32_t f : faces) {
+                if (world_.faces[f].kind != Face::Kind::segment) continue;
+                sides.push_back({f, world_.begins_above(body, f)});
+            }
+            world_.make_one(sides);
+            world_.remember(body, sides);
+        }
+        if (!fixed && !faces.empty()) settle(i, faces.size() == 1 ? faces[0] : none);
     }
 }
 

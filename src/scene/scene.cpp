@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "checks/require.hpp"
 #include "scene/names.hpp"
+#include "scene/options.hpp"
 #include "scene/vector2.hpp"
 
 namespace ricochet {
@@ -230,7 +232,13 @@ void Scene::require_outside(const Disc& body, const Surface& surface) const
 void Scene::check() const
 {
     for (const Surface& surface : surfaces_) {
-        for (const Disc& body : bodies_) require_outside(body, surface);
+        for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+            try {
+                require_outside(bodies_[i], surface);
+            } catch (const std::invalid_argument& error) {
+                throw Misplaced(error.what(), i);
+            }
+        }
     }
     // By the left edge: who begins before another one ends may overlap it.
     std::vector<std::uint32_t> order(bodies_.size());
@@ -249,8 +257,10 @@ void Scene::check() const
             const double overlap = reach - norm(a.at - b.at);
             if (overlap > rounding_of(a.at, a.radius) + rounding_of(b.at, b.radius)) {
                 const auto [first, second] = std::minmax(i, j);
-                refuse(fmt::format("{} and {} overlap by {:.3g} at the start",
-                                   name_of(BodyId{first}), name_of(BodyId{second}), overlap));
+                throw Misplaced(
+                    fmt::format("Scene: {} and {} overlap by {:.3g} at the start",
+                                name_of(BodyId{first}), name_of(BodyId{second}), overlap),
+                    second);
             }
         }
         open.push_back(i);

@@ -18,6 +18,9 @@ void add_faces(const Scene::Surface& surface, std::uint32_t index, std::vector<F
     }
     const auto& points = surface.points;
     const bool closed = points.front() == points.back();
+    const auto first = static_cast<std::uint32_t>(faces.size());
+    const auto count = static_cast<std::uint32_t>(points.size() - 1);
+    const auto segment = [&](std::uint32_t k) { return first + 2 * (k % count); };
     for (std::size_t k = 0; k < points.size(); ++k) {
         if (k + 1 < points.size()) {
             const Vector2 along = points[k + 1] - points[k];
@@ -28,6 +31,9 @@ void add_faces(const Scene::Surface& surface, std::uint32_t index, std::vector<F
                              .length = length,
                              .surface = index,
                              .material = surface.material.index});
+            const auto at = static_cast<std::uint32_t>(k);
+            if (k > 0 || closed) faces.back().previous = segment(at + count - 1);
+            if (k + 1 < count || closed) faces.back().next = segment(at + 1);
         }
         if (k + 1 < points.size() || !closed) {
             faces.push_back({.kind = Face::Kind::vertex,
@@ -75,9 +81,17 @@ Vector2 World::push_of(const Body& body, std::uint32_t face) const
 {
     const Face& on = faces[face];
     if (on.kind == Face::Kind::wall) return on.normal;
-    const double height = dot(body.p - on.at, on.normal);
-    const bool above = body.radius == 0 ? dot(gravity, on.normal) < 0 : height > 0;
-    return above ? on.normal : -1.0 * on.normal;
+    return begins_above(body, face) ? on.normal : -1.0 * on.normal;
+}
+
+bool World::leads_off(const Face& face, const Vector2& p, const Vector2& heading) const
+{
+    if (face.kind != Face::Kind::segment) return false;
+    const Vector2 along = -1.0 * turned(face.normal);
+    const double place_on = dot(p - face.at, along);
+    const double slack = 0.5 * rounding(p, 0);  // so near, it touches what joins it there, too
+    const double ahead = dot(heading, along);
+    return ahead > 0 ? place_on >= face.length - slack : ahead < 0 && place_on <= slack;
 }
 
 /// A body on a face moves along it: pulled by gravity, slowed by friction.

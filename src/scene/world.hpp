@@ -51,9 +51,12 @@ struct alignas(64) Body {
     std::uint32_t island = none;   ///< of those that advance by steps
     std::uint32_t held = none;     ///< face on which it slides
     std::uint32_t contact = none;  ///< group in lasting contact: a is 0, v the step's chord
+    /// Of a point: segments that it touches at t, 2 face + (whether it is above).
+    std::array<std::uint32_t, 3> sides{none, none, none};
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4
 };
+static_assert(sizeof(Body) == 128);
 
 /// What bodies meet that is no body: a wall, a segment or an end of segments.
 struct Face {
@@ -64,6 +67,13 @@ struct Face {
     double length = 0;
     std::uint32_t surface = 0;
     std::uint32_t material = 0;
+    std::uint32_t previous = none, next = none;  ///< segments of the same chain
+};
+
+/// On which side of a segment a point is that touches it.
+struct Side {
+    std::uint32_t face = none;
+    bool above = true;  ///< to where the normal points
 };
 
 /// Position from an instant on: c[0] + c[1] s + ... within `until`.
@@ -112,8 +122,32 @@ struct World {
 
     /// The direction in which a face pushes a body that slides on it.
     [[nodiscard]] Vector2 push_of(const Body& body, std::uint32_t face) const;
+
+    /// Whether a body is on the side to which a segment's normal points: at the start of its
+    /// record, and where that has led it to p with velocity v. A point on the line is where it was
+    /// when it came there, which its record remembers.
+    [[nodiscard]] bool begins_above(const Body& body, std::uint32_t face) const;
+    [[nodiscard]] bool arrives_above(const Body& body, std::uint32_t face, const Vector2& p,
+                                     const Vector2& v) const;
+    /// Makes the sides of adjacent segments one: where they differ the point is on the side on
+    /// which their angle is larger.
+    void make_one(std::vector<Side>& sides) const;
+    /// A point lies on these sides from now on, from which rounding has moved it.
+    void remember(Body& body, const std::vector<Side>& sides) const;
+    /// Whether a point that reaches the end of a segment at p with velocity v passes there.
+    [[nodiscard]] bool passes_end(const Body& body, std::uint32_t face, bool above,
+                                  const Vector2& p, const Vector2& v) const;
+    /// Whether a body at the foot of p on a segment leaves it over one of its ends.
+    [[nodiscard]] bool leads_off(const Face& face, const Vector2& p, const Vector2& heading) const;
     /// A body on a face moves along it from now on: pulled by gravity, slowed by friction.
     void slide(std::uint32_t i, std::uint32_t face);
+
+    /// [m] So far beyond its ends a segment holds a point, which the rounding of two sides of a
+    /// sharp corner moves by a multiple of it.
+    [[nodiscard]] static double end_slack(const Face& face, const Vector2& p) noexcept
+    {
+        return 32 * (rounding(p, 0) + rounding(face.at, 0));
+    }
 
     /// What rounding makes of a gap at these coordinates [m].
     [[nodiscard]] static double rounding(const Vector2& p, double radius) noexcept
@@ -219,7 +253,8 @@ struct FaceGap {
     double gap = never;
     Vector2 normal{};
 };
-[[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p,
-                               const Vector2& v);
+[[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above);
+/// Whether the foot of p on the line lies on the segment.
+[[nodiscard]] bool lies_on(const Face& face, const Vector2& p, double slack);
 
 }  // namespace ricochet::detail

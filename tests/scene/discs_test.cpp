@@ -263,5 +263,16 @@ TEST(Discs, SleepersAreStruckAndHaveNoEventsBefore)
     EXPECT_TRUE(run.bodies[60].asleep);
 }
 
+TEST(Discs, AFastDiscPaysForNoCells)
+{
+    Scene scene;
+    scene.disc({.at = {0, 0}, .velocity = {1e6, 0}, .radius = 0.05});
+    scene.disc({.at = {1e6, 0}, .radius = 0.05});
+    const SceneRun run = simulate(scene, {.t_end = 10});
+    ASSERT_EQ(run.events.size(), 1U);
+    EXPECT_DOUBLE_EQ(run.events[0].t, (1e6 - 0.1) / 1e6);
+    EXPECT_LE(run.statistics.crossings, 4U);
+}
+
 }  // namespace
 }  // namespace ricochet::discs_test

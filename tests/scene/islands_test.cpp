@@ -128,5 +128,27 @@ TEST(Islands, AnIslandTakesTheSameStepsWhateverElseMoves)
     }
 }
 
+TEST(Islands, DragThatIsTooStiffEndsTheRunInASentence)
+{
+    for (const double drag : {1e9, 1e12}) {
+        Scene scene({.gravity = {0, -9.81}});
+        scene.disc({.name = "feather", .at = {0, 0}, .drag = drag});
+        const SceneRun run = simulate(scene, {.t_end = 100});
+        EXPECT_EQ(run.outcome, Outcome::stalled);
+        EXPECT_LT(run.statistics.steps, 2000U);
+        EXPECT_EQ(
+            run.message,
+            "the steps of the island of feather are shorter than 1e-8 of the run: its drag or "
+            "a spring is too stiff for the method");
+    }
+    // Ten thousand times as stiff as an ordinary one, and no more expensive than its steps.
+    Scene scene({.gravity = {0, -9.81}});
+    scene.disc({.at = {0, 0}, .drag = 1e4});
+    const SceneRun run = simulate(scene, {.t_end = 10});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    // Where drag and weight balance it sinks at g / drag, within the tolerance of 1e-8.
+    EXPECT_NEAR(run.bodies[0].velocity[1], -9.81e-4, 1e-8);
+}
+
 }  // namespace
 }  // namespace ricochet::islands_test

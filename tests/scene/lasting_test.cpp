@@ -222,5 +222,28 @@ TEST(LastingContact, SamplesChangeNoBit)
     }
 }
 
+TEST(LastingContact, ADumbbellOnTheFloorComesToAnyEnd)
+{
+    // The last step is what rounding has left over of the run.
+    for (const double t_end : {9.0, 10.0, 20.0}) {
+        for (const double damping : {0.0, 0.1, 1.0, 5.0}) {
+            for (const double lift : {0.0, 0.5}) {
+                Scene scene({.gravity = {0, -9.81}});
+                const auto dull = scene.material({.restitution = 0.3});
+                scene.wall({.normal = {0, 1}, .material = dull});
+                const auto a = scene.disc({.at = {0, 0.5 + lift}, .radius = 0.5, .material = dull});
+                const auto b =
+                    scene.disc({.at = {1.65, 0.5 + lift}, .radius = 0.5, .material = dull});
+                scene.spring(
+                    {.between = {a, b}, .rest = 1.5, .stiffness = 100, .damping = damping});
+                const SceneRun run =
+                    simulate(scene, {.t_end = t_end, .contacts = scene_contacts()});
+                EXPECT_EQ(run.outcome, Outcome::reached_end) << t_end << ", " << damping;
+                EXPECT_LE(run.statistics.contact_steps, 1010 * t_end);
+            }
+        }
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::lasting_test

@@ -113,6 +113,12 @@ TEST(Scene, ErrorsInAFileNameTheLineTheKeyAndWhatWasExpected)
     EXPECT_EQ(trouble("{\"bodies\": [{\"name\": \"a\", \"point\": {}, \"at\": [0, 0]}],\n"
                       "\"springs\": [{\"between\": [\"a\", \"b\"]}]}"),
               "bin.json:2: Scene: there is no body \"b\", the nearest known is \"a\"");
+    EXPECT_EQ(trouble("{\"bodies\": [{\"disc\": {}, \"at\": [0, 0]},\n"
+                      "{\"disc\": {}, \"at\": [1.5, 0]}]}"),
+              "bin.json:2: Scene: body 0 and body 1 overlap by 0.5 at the start");
+    EXPECT_EQ(trouble("{\"bodies\": [{\"disc\": {}, \"at\": [0, 0], \"grid\": [2, 1], \"spacing\": "
+                      "[3, 3]},\n{\"disc\": {},\n\"at\": [4.5, 0]}]}"),
+              "bin.json:2: Scene: body 1 and body 2 overlap by 0.5 at the start");
     EXPECT_EQ(trouble(std::string(100000, '[')),
               "bin.json:1: expected at most 8 levels of JSON, found more");
 }

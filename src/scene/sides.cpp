@@ -1,0 +1,116 @@
+// On which side of a segment a point is. Its coordinates do not tell where it is on the line by
+// rounding, so that its record keeps the sides of the segments that it touches.
+#include <algorithm>
+
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+[[nodiscard]] double height(const Face& face, const Vector2& p) noexcept
+{
+    return dot(p - face.at, face.normal);
+}
+
+[[nodiscard]] double rounding_at(const Face& face, const Vector2& p) noexcept
+{
+    return World::rounding(p, 0) + World::rounding(face.at, 0);
+}
+
+/// Whether the chain turns to the side of its normals from one segment to the next, so that the
+/// angle on that side is the smaller one.
+[[nodiscard]] bool turns_up(const Face& first, const Face& second) noexcept
+{
+    return dot(turned(first.normal), second.normal) >= 0;
+}
+
+}  // namespace
+
+bool World::begins_above(const Body& body, std::uint32_t f) const
+{
+    const Face& face = faces[f];
+    const double up = height(face, body.p);
+    if (body.radius > 0 || std::fabs(up) > rounding_at(face, body.p)) return up > 0;
+    for (const std::uint32_t which : {f, face.previous, face.next}) {
+        if (which == none) continue;
+        for (const std::uint32_t side : body.sides) {
+            if (side != none && side / 2 == which) return side % 2 == 1;
+        }
+    }
+    // Nothing is known before the first contact: it is where the motion leads, or what does not
+    // move lies upon the segment.
+    const double rate = dot(body.v, face.normal);
+    if (std::fabs(rate) > noise(body.v, {})) return rate > 0;
+    return dot(gravity, face.normal) <= 0;
+}
+
+bool World::arrives_above(const Body& body, std::uint32_t f, const Vector2& p,
+                          const Vector2& v) const
+{
+    const Face& face = faces[f];
+    if (body.radius > 0) return height(face, p) > 0;
+    const bool above = begins_above(body, f);
+    const double start = height(face, body.p);
+    const double rounding = rounding_at(face, body.p);
+    if (std::fabs(start) <= rounding) return above;
+    // Back from behind, where it has passed the end of the segment and turned round.
+    const double rate = dot(v, face.normal) * (above ? 1 : -1);
+    const double before = dot(body.v, face.normal) * (above ? 1 : -1);
+    const double bend = std::fabs(dot(body.a, face.normal));
+    const double lowest = std::fabs(start) - before * before / (2 * bend);
+    const bool behind = before < 0 && rate > noise(v, {}) && lowest < -rounding;
+    return above != behind;
+}
+
+void World::make_one(std::vector<Side>& sides) const
+{
+    for (Side& first : sides) {
+        for (Side& second : sides) {
+            if (faces[first.face].next != second.face || first.above == second.above) continue;
+            first.above = second.above = !turns_up(faces[first.face], faces[second.face]);
+        }
+    }
+}
+
+void World::remember(Body& body, const std::vector<Side>& sides) const
+{
+    // Twenty times for what rounding leaves at a corner.
+    for (int k = 0; k < 20; ++k) {
+        bool moved = false;
+        for (const Side& side : sides) {
+            const double up = height(faces[side.face], body.p);
+            if (side.above ? up >= 0 : up <= 0) continue;
+            body.p = body.p - up * faces[side.face].normal;
+            moved = true;
+        }
+        if (!moved) break;
+    }
+    body.sides.fill(none);
+    for (std::size_t k = 0; k < std::min(sides.size(), body.sides.size()); ++k) {
+        body.sides[k] = 2 * sides[k].face + (sides[k].above ? 1 : 0);
+    }
+}
+
+bool World::passes_end(const Body& body, std::uint32_t f, bool above, const Vector2& p,
+                       const Vector2& v) const
+{
+    const Face& face = faces[f];
+    const double along = -dot(p - face.at, turned(face.normal));
+    const double slack = end_slack(face, p);
+    for (const bool at_start : {true, false}) {
+        const std::uint32_t other = at_start ? face.previous : face.next;
+        if (other == none || (at_start ? along : face.length - along) > slack) continue;
+        const Face& beside = faces[other];
+        const bool up = at_start ? turns_up(beside, face) : turns_up(face, beside);
+        const bool side = arrives_above(body, other, p, v) == above ? above : !up;
+        if (side != above) return true;
+        if (side == up) continue;
+        // Around an outer corner: it is struck by what leads behind both segments.
+        const double rate = dot(v, beside.normal) * (side ? 1 : -1);
+        if (rate >= -noise(v, {})) return true;
+    }
+    return false;
+}
+
+}  // namespace ricochet::detail

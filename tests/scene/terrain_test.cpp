@@ -1,0 +1,139 @@
+// Points and small discs among segments: what is inside stays inside.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "ricochet/scene/contact.hpp"
+#include "ricochet/scene/simulate.hpp"
+
+namespace ricochet {
+namespace {
+
+/// Distance of p to a closed polygon, negative outside.
+double inside_by(const std::vector<Vector2>& polygon, const Vector2& p)
+{
+    double nearest = std::numeric_limits<double>::infinity();
+    bool inside = false;
+    for (std::size_t k = 0; k < polygon.size(); ++k) {
+        const Vector2& a = polygon[k];
+        const Vector2& b = polygon[(k + 1) % polygon.size()];
+        const double dx = b[0] - a[0];
+        const double dy = b[1] - a[1];
+        const double part =
+            std::clamp(((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
+        nearest = std::min(nearest, std::hypot(p[0] - a[0] - part * dx, p[1] - a[1] - part * dy));
+        if ((a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) * dx / dy) {
+            inside = !inside;
+        }
+    }
+    return inside ? nearest : -nearest;
+}
+
+/// A polygon around the origin with corners of both kinds, some of them sharp.
+std::vector<Vector2> star(std::mt19937_64& random)
+{
+    std::uniform_real_distribution<double> part(0, 1);
+    const int corners = 3 + static_cast<int>(random() % 8);
+    const bool regular = random() % 4 == 0;
+    const double turn = regular ? 0 : part(random);
+    std::vector<Vector2> polygon;
+    for (int k = 0; k < corners; ++k) {
+        const double shift = regular ? 0.5 : 0.8 * part(random);
+        const double angle = 2 * std::numbers::pi * (k + shift + turn) / corners;
+        const double radius = regular ? 1 : 0.25 + 0.75 * part(random);
+        polygon.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+    }
+    return polygon;
+}
+
+struct Trial {
+    Scene scene;
+    std::vector<Vector2> polygon;
+};
+
+/// Bodies of this radius in a polygon, made of one chain or of separate segments.
+Trial trial(std::uint64_t seed, double radius)
+{
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> part(0, 1);
+    const auto one_of = [&](std::initializer_list<double> values) {
+        return *(values.begin() + random() % values.size());
+    };
+    const double gravity = one_of({0, 1, 9.81});
+    Trial made{Scene({.gravity = {0, -gravity}}), star(random)};
+    const double restitution = one_of({0, 0.3, 0.7, 0.95, 1});
+    const double friction = one_of({0, 0, 0.1, 0.6, 2});
+    const MaterialId material =
+        made.scene.material({.restitution = restitution, .friction = friction});
+    if (random() % 2 == 0) {
+        made.scene.terrain({.points = made.polygon, .closed = true, .material = material});
+    } else {
+        for (std::size_t k = 0; k < made.polygon.size(); ++k) {
+            made.scene.terrain(
+                {.points = {made.polygon[k], made.polygon[(k + 1) % made.polygon.size()]},
+                 .material = material});
+        }
+    }
+    for (int tries = 0; tries < 100; ++tries) {
+        const Vector2 at{2 * part(random) - 1, 2 * part(random) - 1};
+        if (inside_by(made.polygon, at) <= 1.01 * radius) continue;
+        Vector2 velocity{2 * part(random) - 1, 2 * part(random) - 1};
+        if (random() % 4 == 0) {
+            // Into a corner.
+            const Vector2& corner = made.polygon[random() % made.polygon.size()];
+            velocity = {corner[0] - at[0], corner[1] - at[1]};
+        } else if (random() % 4 == 0) {
+            velocity = {};
+        }
+        if (radius == 0) {
+            made.scene.point({.at = at, .velocity = velocity, .material = material});
+        } else {
+            made.scene.disc(
+                {.at = at, .velocity = velocity, .radius = radius, .material = material});
+        }
+        break;
+    }
+    return made;
+}
+
+void stays_inside(std::uint64_t seed, double radius)
+{
+    const Trial made = trial(seed, radius);
+    if (made.scene.bodies().empty()) return;
+    std::vector<double> times;
+    for (int k = 0; k <= 20; ++k) times.push_back(0.25 * k);
+    const SceneRun run = simulate(made.scene, {.t_end = 5,
+                                               .contacts = radius > 0 ? scene_contacts() : nullptr,
+                                               .sample_times = times,
+                                               .max_events = 1'000'000});
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << "seed " << seed << ": " << run.message;
+    double most = energy(made.scene, run.samples[0]);
+    for (std::size_t k = 0; k < run.samples.size(); ++k) {
+        const BodyState& body = run.samples[k][0];
+        // Coordinates and velocities are of size 1 to 5, and a run has up to some thousand impacts
+        // whose place is rounded to some ulp.
+        ASSERT_GE(inside_by(made.polygon, body.at) - radius, -1e-12)
+            << "seed " << seed << " at " << times[k];
+        const double now = energy(made.scene, run.samples[k]);
+        ASSERT_LE(now, most + 1e-11) << "seed " << seed << " at " << times[k];
+        most = std::min(most, now);
+    }
+}
+
+TEST(Terrain, PointsInPolygonsStayInside)
+{
+    for (std::uint64_t seed = 0; seed < 4000; ++seed) stays_inside(seed, 0);
+}
+
+TEST(Terrain, SmallDiscsInPolygonsStayInside)
+{
+    for (std::uint64_t seed = 0; seed < 4000; ++seed) stays_inside(seed, 0.01);
+}
+
+}  // namespace
+}  // namespace ricochet
