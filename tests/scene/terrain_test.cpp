@@ -11,7 +11,7 @@
 #include "ricochet/scene/contact.hpp"
 #include "ricochet/scene/simulate.hpp"
 
-namespace ricochet {
+namespace ricochet::terrain_test {
 namespace {
 
 /// Distance of p to a closed polygon, negative outside.
@@ -136,4 +136,4 @@ TEST(Terrain, SmallDiscsInPolygonsStayInside)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::terrain_test
