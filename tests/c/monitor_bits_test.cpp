@@ -444,6 +444,7 @@ std::size_t compare(const char* name, System system, const typename System::X& x
 
 int main()
 {
+    using namespace ricochet::monitor_bits_test;
     using namespace ricochet;
     for (const double h : {0.5, 0.1}) {
         CHECK(compare("a ball", Balls<1>{}, {10, 0}, 20.5, h, Verdict::stands) == 13);

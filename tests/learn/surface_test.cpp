@@ -22,7 +22,7 @@ State fall(const State& x, double h)
 
 /// The floor under a ball, with the state as its own features.
 struct Floor {
-    using State = learn::State;
+    using State = surface_test::State;
 
     [[nodiscard]] State surface(Random& random) const { return {0, -random.log_uniform(0.01, 15)}; }
     [[nodiscard]] double guard(const State& x) const { return x[0]; }

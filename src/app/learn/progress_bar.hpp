@@ -24,7 +24,8 @@ public:
     void show(const learn::Progress& progress)
     {
         if (progress.estimate) {
-            say("ricochet: {}\n", describe(*progress.estimate));
+            const bool known = progress.estimate->seen > 0;
+            if (known) say("ricochet: {}\n", describe(*progress.estimate));
             return;
         }
         const double now = progress.seconds;
