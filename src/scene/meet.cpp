@@ -171,8 +171,7 @@ static bool lands_on(const World& world, const Body& body, std::uint32_t which, 
 {
     const Face& face = world.faces[which];
     if (body.radius > 0) return lies_on(face, p, 0);
-    return lies_on(face, p, World::end_slack(face, p)) &&
-           !world.passes_end(body, which, above, p, v);
+    return world.holds(face, p) && !world.passes_end(body, which, above, p, v);
 }
 
 /// A wall, or the inside of a segment.

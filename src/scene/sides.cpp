@@ -92,20 +92,36 @@ void World::remember(Body& body, const std::vector<Side>& sides) const
     }
 }
 
+double World::corner_slack(const Face& face, std::uint32_t other, const Vector2& p) const
+{
+    const double least = end_slack(face, p);
+    if (other == none) return least;
+    const double sine = std::fabs(dot(turned(face.normal), faces[other].normal));
+    const double rounding = rounding_at(face, p) + rounding_at(faces[other], p);
+    return std::clamp(rounding / sine, least, std::max(least, 1e-3 * face.length));
+}
+
+bool World::holds(const Face& face, const Vector2& p) const
+{
+    const double along = -dot(p - face.at, turned(face.normal));
+    return along >= -corner_slack(face, face.previous, p) &&
+           along <= face.length + corner_slack(face, face.next, p);
+}
+
 bool World::passes_end(const Body& body, std::uint32_t f, bool above, const Vector2& p,
                        const Vector2& v) const
 {
     const Face& face = faces[f];
     const double along = -dot(p - face.at, turned(face.normal));
-    const double slack = end_slack(face, p);
     for (const bool at_start : {true, false}) {
         const std::uint32_t other = at_start ? face.previous : face.next;
-        if (other == none || (at_start ? along : face.length - along) > slack) continue;
+        const double inside = at_start ? along : face.length - along;
+        if (other == none || inside > corner_slack(face, other, p)) continue;
         const Face& beside = faces[other];
         const bool up = at_start ? turns_up(beside, face) : turns_up(face, beside);
         const bool side = arrives_above(body, other, p, v) == above ? above : !up;
         if (side != above) return true;
-        if (side == up) continue;
+        if (side == up || inside > end_slack(face, p)) continue;
         // Around an outer corner: it is struck by what leads behind both segments.
         const double rate = dot(v, beside.normal) * (side ? 1 : -1);
         if (rate >= -noise(v, {})) return true;

@@ -148,6 +148,12 @@ struct World {
     {
         return 32 * (rounding(p, 0) + rounding(face.at, 0));
     }
+    /// [m] The same at the corner with an adjacent segment. What is on both lines by rounding is
+    /// as much farther from a flat corner as the sine of its angle is small.
+    [[nodiscard]] double corner_slack(const Face& face, std::uint32_t other,
+                                      const Vector2& p) const;
+    /// Whether a point on the line of a segment is between its ends, by these.
+    [[nodiscard]] bool holds(const Face& face, const Vector2& p) const;
 
     /// What rounding makes of a gap at these coordinates [m].
     [[nodiscard]] static double rounding(const Vector2& p, double radius) noexcept

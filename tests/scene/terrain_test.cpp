@@ -130,6 +130,13 @@ TEST(Terrain, PointsInPolygonsStayInside)
     for (std::uint64_t seed = 0; seed < 4000; ++seed) stays_inside(seed, 0);
 }
 
+TEST(Terrain, APointThatSlidesOverAnAlmostFlatCornerStaysInside)
+{
+    // Its angle of 1.2e-3 rad makes of the rounding across the segments 800 times as much along
+    // them.
+    stays_inside(26927, 0);
+}
+
 TEST(Terrain, SmallDiscsInPolygonsStayInside)
 {
     for (std::uint64_t seed = 0; seed < 4000; ++seed) stays_inside(seed, 0.01);
