@@ -26,7 +26,7 @@
 #include "ricochet/detail/random.hpp"
 #include "ricochet/detail/trainable_mlp.hpp"
 #include "ricochet/learn/certify.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::bench {
 namespace {

@@ -19,7 +19,6 @@
 //     inference_bench --benchmark_repetitions=25 --benchmark_enable_random_interleaving=true
 #include "networks.hpp"
 #include "ricochet/nn/mlp.hpp"
-#include "ricochet/nn/static_mlp.hpp"
 
 #include <benchmark/benchmark.h>
 

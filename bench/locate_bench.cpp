@@ -11,12 +11,10 @@
 #include <string>
 
 #include "problems.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/newton.hpp"
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/locate/locators.hpp"
 #include "timing.hpp"
 
 namespace {

@@ -16,11 +16,11 @@
 
 #include "report/problems.hpp"
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/diode_circuit.hpp"

@@ -16,7 +16,6 @@
 #include <limits>
 #include <vector>
 
-#include "ricochet/detect/cover.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/bounds.hpp"

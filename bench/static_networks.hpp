@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-#include "ricochet/nn/static_mlp.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 namespace ricochet::bench {
 

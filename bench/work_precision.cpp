@@ -6,11 +6,10 @@
 #include <string_view>
 
 #include "odeint_by_hand.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::bench {
 

@@ -1,5 +1,5 @@
 // An earthquake on a strike-slip fault of 20 x 20 elements: the mean motion, and where it slipped.
-#include <ricochet/faults/fault_rupture.hpp>
+#include <ricochet/faults/strike_slip_fault.hpp>
 
 #include <cstdio>
 

@@ -9,7 +9,7 @@
 #include <complex>
 #include <cstdio>
 
-#include "ricochet/sensitivity/shooting.hpp"
+#include "ricochet/sensitivity/sensitivities.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 
 using ricochet::ImpactOscillator;

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/learn/train_gate.hpp"
 

@@ -8,7 +8,7 @@ seeded, in float32 or float64, so that the export can be tried:
     export_pytorch.py untrained.safetensors [float64]
 
 `network` is a torch.nn.Sequential of Linear layers with ReLU or Tanh between them.
-`about` holds the strings that nn/safetensors.hpp lists, all but those which
+`about` holds the strings that nn/model.hpp lists, all but those which
 `export` adds: numbers in decimal, lists separated by blanks. `features` is one raw
 sample, recorded with the logits that PyTorch computes from it and computed again at
 every load: a layer transposed, an activation or a scale forgotten, and the file is

@@ -1,8 +1,8 @@
 // Additive pairs to try things on.
 #pragma once
 
-#include "ricochet/faults/additive_pair.hpp"
 #include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/potentials.hpp"
 
 namespace ricochet::test {
 

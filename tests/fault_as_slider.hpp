@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "ricochet/faults/fault_rate_state.hpp"
 #include "ricochet/faults/spring_slider.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::test {
 

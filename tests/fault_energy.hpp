@@ -21,8 +21,6 @@
 
 #include "ricochet/detail/stiffness_series.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
-#include "ricochet/faults/fault_rupture.hpp"
 #include "ricochet/faults/laws.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 

@@ -30,11 +30,11 @@
 #include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/fault_kernel.hpp"
-#include "ricochet/faults/additive_pair.hpp"
+#include "ricochet/faults/potentials.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/learn/evolution.hpp"
-#include "ricochet/learn/td3.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/learn/policies.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::file_fuzz {

@@ -19,7 +19,7 @@
 #include "problems/hidden_pair.hpp"
 #include "problems/near_tangent.hpp"
 #include "problems/three_body.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
 
 namespace ricochet::test {
 

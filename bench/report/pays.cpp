@@ -14,9 +14,9 @@
 #if defined(RICOCHET_PAYS_planning)
 #include "ricochet/detect/planned.hpp"
 #elif defined(RICOCHET_PAYS_network)
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/detect/network.hpp"
-#include "ricochet/detect/verified.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #elif defined(RICOCHET_PAYS_friction)
 #include "ricochet/nonsmooth/hand_over.hpp"

@@ -29,7 +29,7 @@
 #include "ricochet/detail/monitor_core.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/system.hpp"
-#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet {
 

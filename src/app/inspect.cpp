@@ -25,7 +25,7 @@
 #include "ricochet/detail/gate_features.hpp"
 #include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/mlp.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
 #include "timing.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "files.hpp"
 #include "input.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "say.hpp"
 
 namespace ricochet::app {

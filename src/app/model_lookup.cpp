@@ -11,7 +11,7 @@
 #include "input.hpp"
 #include "joined.hpp"
 #include "ricochet/detail/features.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::app {
 

@@ -6,7 +6,7 @@
 
 #include "input.hpp"
 #include "model_lookup.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::app {
 

@@ -20,7 +20,7 @@
 #include "joined.hpp"
 #include "options.hpp"
 #include "report.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "say.hpp"
 
 namespace ricochet::app {

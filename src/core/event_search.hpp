@@ -21,12 +21,11 @@
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/resolved_parts.hpp"
 #include "ricochet/detail/series_guard.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/event.hpp"
 #include "ricochet/integrate/options.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet::detail {
 

@@ -22,7 +22,7 @@
 #include "core/guard_bank.hpp"
 #include "core/metering.hpp"
 #include "core/tentative_steps.hpp"
-#include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/statistics.hpp"
 #include "ricochet/integrate/run.hpp"
 

@@ -18,7 +18,6 @@
 #include "ricochet/detail/cubic_look.hpp"
 #include "ricochet/detail/series_guard.hpp"
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/event.hpp"
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/gates.hpp"
 
 namespace ricochet {
 

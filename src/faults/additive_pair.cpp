@@ -1,4 +1,4 @@
-#include "ricochet/faults/additive_pair.hpp"
+#include "ricochet/faults/potentials.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 #include <algorithm>
 #include <array>

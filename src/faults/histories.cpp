@@ -1,4 +1,4 @@
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
 
 #include <fmt/format.h>
 

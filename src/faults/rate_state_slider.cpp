@@ -1,4 +1,4 @@
-#include "ricochet/faults/rate_state_slider.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 
 #include "../checks/require.hpp"
 

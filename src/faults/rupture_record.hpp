@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::detail {
 

@@ -11,8 +11,8 @@
 
 #include "../faults/fast_tanh.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/faults/additive_pair.hpp"
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/potentials.hpp"
 
 namespace ricochet::learn::detail {
 

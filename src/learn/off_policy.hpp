@@ -11,8 +11,7 @@
 
 #include "checkpoint_file.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/learn/environment.hpp"
-#include "ricochet/learn/policy_training.hpp"
+#include "ricochet/learn/policies.hpp"
 #include "transitions.hpp"
 
 namespace ricochet::learn {

@@ -1,4 +1,5 @@
 #include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/gate.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +13,6 @@
 
 #include "../checks/require.hpp"
 #include "ricochet/detail/assessment.hpp"
-#include "ricochet/learn/gate.hpp"
 
 namespace ricochet::learn {
 

@@ -1,4 +1,4 @@
-#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/locators.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/locators.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 #include "../files/read_file.hpp"
 #include "model_metadata.hpp"

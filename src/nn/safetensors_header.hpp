@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::model_file {
 

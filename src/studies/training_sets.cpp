@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "ricochet/detail/gate_specs.hpp"
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
 #include "ricochet/learn/bouncing_ball.hpp"
 
 namespace ricochet::studies {

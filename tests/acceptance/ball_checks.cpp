@@ -11,12 +11,11 @@
 #include "allocations.hpp"
 #include "measure.hpp"
 #include "problems.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "timing.hpp"
 #include "work_precision.hpp"
 

@@ -14,9 +14,9 @@
 
 #include "fault_energy.hpp"
 #include "measure.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/learn/step_control.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::bench {
 

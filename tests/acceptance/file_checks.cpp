@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "measure.hpp"
-#include "ricochet/detect/ends.hpp"
-#include "ricochet/faults/additive_pair.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/faults/potentials.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/snapshot.hpp"
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/locate/locators.hpp"
 #include "saved_systems.hpp"
 
 namespace ricochet::bench {

@@ -8,9 +8,9 @@
 
 #include "measure.hpp"
 #include "problems/least_eigenvalue.hpp"
-#include "ricochet/detect/certified.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/nn/certificate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

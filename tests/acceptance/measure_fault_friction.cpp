@@ -11,8 +11,8 @@
 #include "fault_as_slider.hpp"
 #include "measure_fault.hpp"
 #include "ricochet/detail/fault_friction_stage.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
 #include "ricochet/faults/spring_slider.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::bench {
 

@@ -16,7 +16,6 @@
 #include "events_problems.hpp"
 #include "measure.hpp"
 #include "odeint_by_hand.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"

@@ -12,7 +12,7 @@
 #include "problems/cavern.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
-#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/locators.hpp"
 #include "scene_rows.hpp"
 
 namespace ricochet::bench {

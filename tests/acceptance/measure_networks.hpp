@@ -12,9 +12,7 @@
 #include <vector>
 
 #include "measure.hpp"
-#include "ricochet/detect/calibrated.hpp"
-#include "ricochet/detect/metered.hpp"
-#include "ricochet/detect/verified.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "scene_rows.hpp"
 #include "timing.hpp"
 

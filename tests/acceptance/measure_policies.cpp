@@ -8,7 +8,7 @@
 
 #include "ricochet/detail/step_environment.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
-#include "ricochet/learn/tqc.hpp"
+#include "ricochet/learn/policies.hpp"
 
 namespace ricochet::bench {
 

@@ -15,7 +15,7 @@
 
 #include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/learn/step_control.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 

@@ -13,8 +13,7 @@
 #include <vector>
 
 #include "ricochet/detail/random.hpp"
-#include "ricochet/learn/td3.hpp"
-#include "ricochet/learn/tqc.hpp"
+#include "ricochet/learn/policies.hpp"
 #include "ricochet/nn/mlp.hpp"
 
 namespace ricochet::bench {

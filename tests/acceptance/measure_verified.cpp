@@ -13,9 +13,8 @@
 
 #include "measure.hpp"
 #include "problems.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/verified.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 

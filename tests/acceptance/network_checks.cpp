@@ -20,7 +20,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/learn/bouncing_ball.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "score.hpp"
 
 namespace ricochet::bench {

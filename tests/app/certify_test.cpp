@@ -8,7 +8,7 @@
 
 #include "app.hpp"
 #include "ricochet/nn/certificate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::certify_test {
 namespace {

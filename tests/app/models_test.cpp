@@ -9,7 +9,7 @@
 #include <string>
 
 #include "ricochet/nn/mlp.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::models_test {
 namespace {

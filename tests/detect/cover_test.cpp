@@ -1,4 +1,4 @@
-#include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/planned.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,10 +2,9 @@
 #include "conformance/detectors.hpp"
 
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/detect/network.hpp"
-#include "ricochet/detect/verified.hpp"
 
 namespace ricochet::test::detectors_conformance_test {
 namespace {

@@ -2,12 +2,9 @@
 // that are trusted; and what gates answer.
 #include "conformance/gates.hpp"
 
-#include "ricochet/detect/calibrated.hpp"
-#include "ricochet/detect/certified.hpp"
-#include "ricochet/detect/ends.hpp"
-#include "ricochet/detect/metered.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/detect/network.hpp"
-#include "ricochet/detect/verified.hpp"
 #include "ricochet/learn/certify.hpp"
 
 namespace ricochet::test::gates_conformance_test {

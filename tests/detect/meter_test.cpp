@@ -1,5 +1,5 @@
 // Networks that are asked only while it pays.
-#include "ricochet/detect/metered.hpp"
+#include "ricochet/detect/gates.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,9 +12,6 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/detect/calibrated.hpp"
-#include "ricochet/detect/certified.hpp"
-#include "ricochet/detect/verified.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/learn/certify.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::network_test {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
 namespace ricochet::planned_test {

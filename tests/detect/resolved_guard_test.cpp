@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "random_guards.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
 namespace ricochet::resolved_guard_test {

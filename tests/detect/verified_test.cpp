@@ -1,4 +1,4 @@
-#include "ricochet/detect/verified.hpp"
+#include "ricochet/detect/gates.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::verified_test {

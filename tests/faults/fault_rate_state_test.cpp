@@ -10,8 +10,8 @@
 #include "fault_as_slider.hpp"
 #include "refusal.hpp"
 #include "ricochet/detail/fault_friction_stage.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
 #include "ricochet/faults/spring_slider.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::fault_rate_state_test {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ricochet/detail/identify_friction.hpp"
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
 #include "ricochet/faults/potentials.hpp"
 #include "theta_reference.hpp"
 

@@ -1,5 +1,5 @@
 // The slider in the event loop, beside variational steps.
-#include "ricochet/faults/rate_state_slider.hpp"
+#include "ricochet/faults/spring_slider.hpp"
 
 #include <gtest/gtest.h>
 

@@ -14,9 +14,8 @@
 #include <vector>
 
 #include "filippov_runs.hpp"
-#include "ricochet/detect/ends.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet::filippov_test {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "walled_oscillator.hpp"

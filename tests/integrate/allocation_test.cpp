@@ -11,13 +11,12 @@
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
 #include "problems/zones.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/toms748.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/locate/locators.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::allocation_test {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "walled_oscillator.hpp"
 

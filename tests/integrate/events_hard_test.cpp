@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/filippov.hpp"
 #include "ricochet/integrate/integrate.hpp"
 

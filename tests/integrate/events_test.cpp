@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "problems/near_tangent.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/locate/bisection.hpp"
+#include "ricochet/locate/locators.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::events_test {

@@ -9,9 +9,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "ricochet/detect/ends.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/locate/locators.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::integrate_test {

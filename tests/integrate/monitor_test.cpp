@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "allocations.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"

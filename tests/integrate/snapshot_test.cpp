@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/locate/locators.hpp"
 #include "saved_systems.hpp"
 
 namespace ricochet::snapshot_test {

@@ -11,7 +11,7 @@
 #include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::learn::bouncing_ball_test {

@@ -19,7 +19,7 @@
 #include "ricochet/detail/gate.hpp"
 #include "ricochet/detail/random.hpp"
 #include "ricochet/nn/certificate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::certify_test {
 namespace {

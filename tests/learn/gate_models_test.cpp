@@ -15,9 +15,9 @@
 
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
-#include "ricochet/detect/calibrated.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::gate_models_test {
 namespace {

@@ -1,4 +1,4 @@
-#include "ricochet/learn/policy_training.hpp"
+#include "ricochet/learn/policies.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,10 +15,8 @@
 #include <vector>
 
 #include "ricochet/detail/random.hpp"
-#include "ricochet/learn/td3.hpp"
-#include "ricochet/learn/tqc.hpp"
 #include "ricochet/nn/mlp.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::learn::policy_training_test {
 namespace {

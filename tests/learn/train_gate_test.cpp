@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::learn::train_gate_test {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "studies/table_files.hpp"
 #include "studies/training_sets.hpp"
 

@@ -1,5 +1,5 @@
-#include "ricochet/locate/newton.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/locate/locators.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/locate/locators.hpp"
 
 #include "locators.hpp"
 

@@ -1,7 +1,7 @@
 // RICOCHET_TEST_FIXTURES is the folder of the stored files. RICOCHET_PYTHON_WITH_TORCH,
 // where there is one, is a Python that has PyTorch, and RICOCHET_EXPORT_SCRIPT the script
 // that it runs.
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 #include "nn_models.hpp"
 #include "ricochet/detail/classifier.hpp"

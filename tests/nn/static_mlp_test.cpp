@@ -1,7 +1,5 @@
 // Built with -O3 -march=native where the compiler knows it, as users build header-only
 // code, and linked with a library built for the baseline.
-#include "ricochet/nn/static_mlp.hpp"
-
 #include "ricochet/nn/mlp.hpp"
 
 #include "nn_models.hpp"

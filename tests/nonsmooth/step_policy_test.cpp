@@ -8,7 +8,7 @@
 
 #include "refusal.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"
 #include "ricochet/systems/diode_circuit.hpp"

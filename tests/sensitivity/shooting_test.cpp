@@ -1,4 +1,4 @@
-#include "ricochet/sensitivity/shooting.hpp"
+#include "ricochet/sensitivity/sensitivities.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // Balls that bounce for very long, and quantities of every size.
 #include <fmt/format.h>
 
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ricochet/detail/variational_step.hpp"
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
 
 namespace ricochet {
 

@@ -8,7 +8,7 @@
 
 #include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/step_state.hpp"
-#include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet {

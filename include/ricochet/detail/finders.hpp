@@ -10,7 +10,7 @@
 #include "ricochet/detail/door.hpp"
 #include "ricochet/detail/meter.hpp"
 #include "ricochet/detect/planned.hpp"
-#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet::detail {
 

@@ -22,8 +22,8 @@
 
 #include "ricochet/detail/random.hpp"
 #include "ricochet/detail/rivals.hpp"
-#include "ricochet/detect/calibrated.hpp"
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/simulation.hpp"
 #include "ricochet/learn/gate.hpp"
 

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <vector>
 
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
 
 namespace ricochet::learn {
 

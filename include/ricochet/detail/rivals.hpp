@@ -9,7 +9,6 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"

@@ -20,7 +20,7 @@
 #include <functional>
 #include <numbers>
 
-#include "ricochet/learn/environment.hpp"
+#include "ricochet/learn/policies.hpp"
 #include "ricochet/learn/step_control.hpp"
 
 namespace ricochet::learn {

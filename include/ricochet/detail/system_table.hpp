@@ -13,7 +13,7 @@
 #include <string>
 
 #include "ricochet/detail/step_state.hpp"
-#include "ricochet/detect/cover.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet::detail {

@@ -1,10 +1,4 @@
-// The honest classical rival: the guard and its rate at both ends of the step.
-//
-// The four numbers make a cubic. Where the guard heads for its surface at the start
-// and away from it at the end, or the cubic's control points reach across, there may
-// be an extremum on the other side: it is found on the step itself, by Newton's method
-// on the rate, and only as exactly as it takes to know on which side it lies. Smooth
-// guards are caught unless they turn more often within a step than a cubic can.
+// Detectors that sample a guard: at the ends of a step, and at its extremum inside.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +7,52 @@
 #include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet {
+
+// The simple approach: which side is the guard on after the step?
+//
+// One guard call a step. Two crossings within one step cancel and are not seen,
+// so "no event" is only assumed.
+
+/// Detector that compares the signs of a guard at both ends of a step, at one guard call a step.
+/// Two crossings within one step cancel and are not found.
+struct Ends {
+    static constexpr bool uses_rates = false;
+    static constexpr Screening screening = Screening::ends;
+    static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
+
+    /// Whether a step needs a check, in the guard times `sign`, positive on its
+    /// armed side.
+    [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
+                                                 double g1, double /*rate1*/, double /*h*/) noexcept
+    {
+        return !(sign * g1 > 0);
+    }
+
+    /// Whether the interval holds one crossing and nothing else, as far as its ends tell.
+    [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& /*start*/,
+                                             const GuardSample& end, double /*touch*/) noexcept
+    {
+        return sign * end.value < 0;
+    }
+
+    [[nodiscard]] Finding examine(GuardPath& probe, Watch& watch) const
+    {
+        const bool left = has_left(watch.side, watch.end.value);
+        watch.side_after = left ? opposite(watch.side) : watch.side;
+        if (left && counts(watch.side, probe.crossing())) {
+            return Finding::leaving(watch.side, watch.start, watch.end);
+        }
+        return Finding::clear(Evidence::assumed);
+    }
+};
+
+// The honest classical rival: the guard and its rate at both ends of the step.
+//
+// The four numbers make a cubic. Where the guard heads for its surface at the start
+// and away from it at the end, or the cubic's control points reach across, there may
+// be an extremum on the other side: it is found on the step itself, by Newton's method
+// on the rate, and only as exactly as it takes to know on which side it lies. Smooth
+// guards are caught unless they turn more often within a step than a cubic can.
 
 /// Detector that evaluates a guard at both ends of a step and once inside, compares it with the
 /// cubic through values and rates, and searches for extrema where that leaves a doubt: the default.

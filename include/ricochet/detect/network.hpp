@@ -20,7 +20,7 @@
 
 #include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/features.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 
 namespace ricochet {
 

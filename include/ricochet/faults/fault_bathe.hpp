@@ -17,7 +17,7 @@
 #include <functional>
 #include <memory>
 
-#include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
 #include "ricochet/nonsmooth/step_policy.hpp"

@@ -22,7 +22,6 @@
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/system.hpp"
@@ -30,7 +29,7 @@
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/integrate/snapshot.hpp"
-#include "ricochet/locate/newton.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet {
 

@@ -29,7 +29,7 @@
 #include <vector>
 
 #include "ricochet/detail/surface.hpp"
-#include "ricochet/detect/ends.hpp"
+#include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/network.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/learn/classifier.hpp"

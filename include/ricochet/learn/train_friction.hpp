@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "ricochet/detail/levenberg_marquardt.hpp"
-#include "ricochet/faults/additive_pair.hpp"
-#include "ricochet/faults/histories.hpp"
+#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/potentials.hpp"
 
 namespace ricochet::learn {
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::app {
 

@@ -16,7 +16,7 @@
 #include "json_text.hpp"
 #include "plot.hpp"
 #include "report.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "run_watch.hpp"
 #include "simulate.hpp"
 #include "step_progress.hpp"

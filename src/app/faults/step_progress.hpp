@@ -11,7 +11,7 @@
 #include <string_view>
 #include <utility>
 
-#include "ricochet/faults/fault_rupture.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "say.hpp"
 
 namespace ricochet::app {

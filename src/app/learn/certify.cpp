@@ -19,7 +19,7 @@
 #include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/learn/certify.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "run_watch.hpp"
 #include "say.hpp"
 #include "timing.hpp"

@@ -9,7 +9,7 @@
 #include "model_lookup.hpp"
 #include "policy_advice.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 

@@ -18,7 +18,7 @@
 #include "registry.hpp"
 #include "report.hpp"
 #include "ricochet/detail/checkpoint.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "say.hpp"
 #include "timing.hpp"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "entries.hpp"
-#include "ricochet/faults/fault_rate_state.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::app {
 

@@ -13,16 +13,11 @@
 #include "ricochet/detail/ballistic_line.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/calibrated.hpp"
-#include "ricochet/detect/certified.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/verified.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/newton.hpp"
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet::app {
 

@@ -10,14 +10,11 @@
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/calibrated.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/detect/planned.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/newton.hpp"
-#include "ricochet/locate/toms748.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/locate/locators.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::c {
 

@@ -8,8 +8,7 @@
 #include <utility>
 
 #include "ricochet/detail/finders.hpp"
-#include "ricochet/detect/calibrated.hpp"
-#include "ricochet/detect/certified.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/detect/network.hpp"
 #include "setup.hpp"
 

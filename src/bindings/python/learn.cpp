@@ -23,7 +23,7 @@
 #include "ricochet/learn/certify.hpp"
 #include "ricochet/learn/train_classifier.hpp"
 #include "ricochet/learn/train_gate.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace py = pybind11;
 

@@ -12,7 +12,7 @@
 #include "bindings.hpp"
 #include "callbacks.hpp"
 #include "ready.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 #include "source.hpp"
 
 namespace py = pybind11;

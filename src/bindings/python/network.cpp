@@ -15,7 +15,7 @@
 
 #include "bindings.hpp"
 #include "results.hpp"
-#include "ricochet/nn/safetensors.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::python {
 

@@ -7,12 +7,9 @@
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
 #include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/ends.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
-#include "ricochet/locate/bisection.hpp"
-#include "ricochet/locate/newton.hpp"
-#include "ricochet/locate/toms748.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet::python {
 

@@ -1,5 +1,5 @@
 // needs: faults
-#include <ricochet/faults/fault_rate_state.hpp>
+#include <ricochet/faults/strike_slip_fault.hpp>
 
 using namespace ricochet;
 

@@ -2,10 +2,9 @@
 #include <ricochet/detail/random.hpp>
 #include <ricochet/detail/step_environment.hpp>
 #include <ricochet/faults/strike_slip_fault.hpp>
-#include <ricochet/learn/environment.hpp>
 #include <ricochet/learn/evolution.hpp>
-#include <ricochet/learn/tqc.hpp>
-#include <ricochet/nn/safetensors.hpp>
+#include <ricochet/learn/policies.hpp>
+#include <ricochet/nn/model.hpp>
 
 using namespace ricochet;
 using namespace ricochet::learn;

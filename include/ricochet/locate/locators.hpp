@@ -1,3 +1,20 @@
+// Locators: where in a bracket a guard leaves its side.
+#pragma once
+
+#include "ricochet/detect/step_probe.hpp"
+
+namespace ricochet {
+
+// Bisection on the step's own map: the plainest location, and the source paper's.
+
+/// Halves the bracket until it is no wider than the tolerance or its ends are
+/// neighbouring doubles. Only the side of the guard is used, so any guard will do; its
+/// values say at the end whether it has a zero there.
+struct Bisection {
+    [[nodiscard]] Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                  double tolerance) const;
+};
+
 // Newton's method inside a bracket, with the slope from the flow: the default.
 //
 // The first guess is the root of the cubic through the guard and its rates at both
@@ -7,11 +24,6 @@
 // price of guard calls alone, and does not widen with the rounding of a long step.
 // That the guard is straight does not say that the rest of the state is: the way
 // is never longer than a small part of the bracket, of which the square is rounding.
-#pragma once
-
-#include "ricochet/detect/step_probe.hpp"
-
-namespace ricochet {
 
 namespace detail {
 
@@ -25,6 +37,15 @@ namespace detail {
 
 /// Locator by Newton's method inside a bracket, with the slope along the flow: the default.
 struct Newton {
+    [[nodiscard]] Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                  double tolerance) const;
+};
+
+// TOMS 748 from Boost.Math, for guards whose slope is not to be had.
+
+/// Inverse cubic interpolation on the values alone (Alefeld, Potra and Shi, ACM
+/// Transactions on Mathematical Software 21, 1995).
+struct Toms748 {
     [[nodiscard]] Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
                                   double tolerance) const;
 };

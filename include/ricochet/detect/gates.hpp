@@ -1,3 +1,66 @@
+// Gates: networks before guards, which decide whether a step is checked.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include "ricochet/detail/around.hpp"
+#include "ricochet/detail/gate.hpp"
+#include "ricochet/detail/meter.hpp"
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/planned.hpp"
+#include "ricochet/nn/certificate.hpp"
+
+namespace ricochet {
+
+// The verified gate: a network may change what a run costs, never what it finds.
+//
+// The network proposes which exact checks to defer, and every interval is closed
+// by an exact check that covers all of it. What covers an interval longer than one
+// step is a bound on the guard's rate; without a declared bound no interval can be
+// covered, and every step keeps its exact check. The network is then evaluated without
+// gain, and the statistics show it: no checks deferred, and how often it would have
+// been right. With any weights whatever the events are those of the exact detector,
+// bit for bit.
+
+/// Detector that counts how often a network predicts what `Exact` finds, and defers checks where
+/// the guard declares bounds. The events are those of `Exact`, bit for bit, whatever the weights.
+template <class Exact = Extremum>
+class Verified : public detail::Around<Exact> {
+public:
+    static constexpr bool checks_every_step = true;
+    static constexpr bool keeps_events = true;
+
+    /// Takes the network that predicts and the detector that decides.
+    explicit Verified(Network network, const Exact& exact = {})
+        : detail::Around<Exact>(exact), network_(std::move(network))
+    {
+    }
+
+    /// Checks the system like `Network::check`.
+    template <class System, class X>
+    void check(const System& system, const X& x, double smallest, double largest) const
+    {
+        network_.check(system, x, smallest, largest);
+    }
+
+    /// Prediction of the network for the step, for the statistics.
+    template <class Guard, class Step>
+    [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
+    {
+        return network_.clears(guard, step);
+    }
+
+private:
+    Network network_;
+};
+
 // Calibrated gates: checks deferred on the word of a network.
 //
 // Nothing else in the library skips a check without proof, so that it is asked for by name.
@@ -18,17 +81,6 @@
 //                       when to look, exact values and declared bounds close every interval.
 //                       Verified: with any weights the events are those of the exact detector, bit
 //                       for bit.
-#pragma once
-
-#include <algorithm>
-#include <cstddef>
-#include <utility>
-
-#include "ricochet/detail/gate.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/planned.hpp"
-
-namespace ricochet {
 
 namespace detail {
 
@@ -160,6 +212,108 @@ public:
     {
         return this->gate().ask(system, mode, t, x);
     }
+};
+
+// The certified gate: what a network clears has been proved.
+//
+// A certificate (nn/certificate.hpp) says that where the network clears, the first guard is above
+// a margin. With the system's own bounds that is as good as a value: `Planned` closes intervals
+// with it, and no exact look is needed where that is enough. Such steps are `proved`, and the
+// events are those of the exact detector, bit for bit. Outside the box of the certificate, in a
+// box that it lists as unproved, in modes other than 0 and for other guards the exact guard is
+// asked. A system without bounds has every step checked: a state that is clear says nothing of the
+// next one.
+
+/// Uses the levels of a gate that a certificate proves as lower bounds of the guard in the planner:
+/// the events are those of `Exact`, bit for bit.
+template <class Exact = Extremum>
+class Certified : public Planned<Exact> {
+public:
+    static constexpr bool keeps_events = true;
+
+    /// @throws std::invalid_argument if the model has no certificate or one that is void, names no
+    /// known recipe of features, or has too many of them; or as `Planned`.
+    explicit Certified(Model model, const PlannerOptions& options = {}, const Exact& exact = {})
+        : Planned<Exact>(options, exact),
+          certified_(std::make_shared<const CertifiedClassifier>(std::move(model))),
+          recipe_(gate_recipe(this->model().recipe))
+    {
+        detail::check_certified(this->model());
+    }
+
+    [[nodiscard]] const Model& model() const noexcept { return certified_->classifier().model(); }
+    [[nodiscard]] const Certificate& certificate() const noexcept
+    {
+        return certified_->certificate();
+    }
+
+    /// Whether the certificate speaks of this system: its name, where it has one, and the
+    /// parameters that the model depends on, where it declares them. Steps may be of any length.
+    /// @throws std::invalid_argument naming what the model is for and what it would have to be.
+    template <class System, class X>
+    void check(const System& system, const X& x, double /*smallest*/, double /*largest*/) const
+    {
+        detail::check_gate_model(model(), system);
+        detail::check_gate_layout(model(), recipe_, feature_count(recipe_, system, x),
+                                  mode_count_of(system));
+    }
+
+    /// The least that it ever clears.
+    [[nodiscard]] double lowest_level() const noexcept
+    {
+        return certificate().levels.front().margin;
+    }
+
+    /// A value that the guard is proved to be above; 0: none.
+    template <class System, class X>
+    [[nodiscard]] gates::Gate::Answer level(const System& system, std::size_t which, Mode mode,
+                                            double t, const X& x) const
+    {
+        if (which != 0 || mode != 0) return {};
+        std::array<double, GateRecipe::most> features;
+        gate_features(recipe_, system, mode, t, x, features.data());
+        if (!certified_->classifier().in_domain(features.data())) return {.outside = true};
+        return {.cleared = std::max(certified_->lower_bound(features.data()), 0.0)};
+    }
+
+private:
+    std::shared_ptr<const CertifiedClassifier> certified_;
+    GateRecipe recipe_;
+};
+
+// A network that is asked only while that pays.
+//
+//     integrate(system, x0, options, FixedStep<Rk4>{}, Metered(Foreseen(gate)));
+//
+// For gates that cannot change what is found (`Verified`, `Foreseen`, `Certified`): events are
+// the same, bit for bit, whether the network is asked or not. How often it is asked depends on
+// the clock, and so differs from run to run; `MeterOptions::decision` fixes it.
+
+/// A gate under which the events are those of its exact detector, whatever the network says (or,
+/// of a certificate, whether it is asked or not).
+template <class Detector>
+concept KeepsEvents = requires
+{
+    requires Detector::keeps_events;
+};
+
+/// Detector that asks its network only while that saves time, measured on the run itself; the
+/// events are those of `Detector`.
+template <KeepsEvents Detector>
+class Metered : public Detector {
+public:
+    /// @throws std::invalid_argument if a cost is negative, `trials` outside of [0, 1] or `piece`
+    /// 0.
+    explicit Metered(Detector detector, const MeterOptions& options = {})
+        : Detector(std::move(detector)), options_(options)
+    {
+        detail::validate(options);
+    }
+
+    [[nodiscard]] const MeterOptions& metering() const noexcept { return options_; }
+
+private:
+    MeterOptions options_;
 };
 
 }  // namespace ricochet

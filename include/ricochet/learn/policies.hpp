@@ -1,0 +1,186 @@
+// Reinforcement learning: environments, and the trainers of policies that act in them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ricochet/nn/model.hpp"
+
+namespace ricochet::learn {
+
+// The environment in which a reinforcement learner acts.
+
+/// Reward and end of an action; the observation after it is returned apart.
+struct Reaction {
+    double reward = 0;
+    bool terminal = false;   ///< the episode is over, and no reward can follow
+    bool truncated = false;  ///< the episode is cut here, though rewards would follow
+};
+
+/// A world in episodes, as its functions.
+///
+///     reset(seed, o);  while not over: choose a from o;  step(a, o)
+///
+/// Everything in an episode follows from its seed and the actions, so that a training can be
+/// repeated, and resumed: a trainer returns to the middle of an episode by `reset` with its
+/// seed and the actions taken. Rewards and observations of order one are learnt best.
+/// A trainer calls from one thread at a time.
+struct Environment {
+    std::size_t observations = 0;  ///< length of an observation
+    std::size_t actions = 0;       ///< length of an action, whose components lie in [-1, 1]
+
+    /// Begins an episode; writes the first observation.
+    std::function<void(std::uint64_t episode_seed, std::span<double> observation)> reset{};
+
+    /// Acts; writes the observation after. Not called after `terminal` or `truncated`.
+    std::function<Reaction(std::span<const double> action, std::span<double> observation)> step{};
+};
+
+// Options, progress and result that all trainers of policies share.
+//
+// A policy is a network from observations to actions, which a reinforcement learner finds by
+// acting. It acts once per step in an `Environment`, keeps what came of it, and learns from a batch
+// of what it keeps once per step. `train_tqc` and `train_td3` do so.
+
+/// Options that all trainers of policies share.
+struct PolicyTraining {
+    std::size_t steps = 20'000;      ///< in the environment
+    std::size_t random_steps = 100;  ///< the first ones: uniform actions, and nothing learnt yet
+    std::size_t batch = 256;
+    std::size_t buffer = 1'000'000;  ///< transitions kept, at most
+    double discount = 0.99;          ///< of the reward per step, in [0, 1]
+    double polyak = 0.005;           ///< target += polyak (network - target), in (0, 1]
+    std::uint64_t seed = 1;
+    unsigned threads = 2;  ///< 1 to 64; the result does not depend on it
+    double max_seconds = std::numeric_limits<double>::infinity();  ///< those before a resume count
+
+    /// Every so many steps: progress, checkpoint, and a look for weights that are not finite.
+    std::size_t report_every = 1000;
+    std::filesystem::path checkpoint{};  ///< empty: none
+    bool resume = false;                 ///< continue from `checkpoint`, to the same bits
+
+    /// The checkpoint of an earlier training, in another environment or with other options but with
+    /// networks of the same shape: this one starts from its networks and the moments of their
+    /// optimiser, with a buffer that is empty, and acts by its policy from the first step. Empty:
+    /// none.
+    std::filesystem::path start_from{};
+};
+
+/// How the training stands. One after the other they are its curve.
+struct PolicyProgress {
+    std::size_t step = 0;      ///< done so far
+    std::size_t steps = 0;     ///< of the training
+    std::size_t episodes = 0;  ///< ended so far
+    /// Mean return of the episodes that ended since the last report, undiscounted; NaN: none.
+    double mean_return = 0;
+    /// Loss of the last batch; NaN where there is none, or no report was due. The same holds for
+    /// the next two.
+    double critic_loss = 0;
+    double actor_loss = 0;
+    double temperature = 0;  ///< weight of the entropy; 0 for a trainer without
+    double seconds = 0;      ///< so far
+};
+
+/// Gets the deterministic policy as it is now. False stops the training; what was learnt is kept.
+using PolicyCallback = std::function<bool(const PolicyProgress&, const Model& policy)>;
+
+/// How a training of a policy ended.
+enum class PolicyOutcome {
+    finished,     ///< all steps
+    max_seconds,  ///< reached
+    stopped,      ///< by the callback
+    non_finite,   ///< the environment gave a reward or an observation that is not finite
+    diverged,     ///< weights are not finite; the policy is that of the last report
+};
+
+/// One sentence with the remedy.
+[[nodiscard]] std::string_view describe(PolicyOutcome outcome) noexcept;
+
+/// A trained policy and its report.
+struct TrainedPolicy {
+    PolicyOutcome outcome = PolicyOutcome::finished;
+    std::string message;  ///< what was not finite, and where; else empty
+
+    /// The deterministic policy: action = tanh(network(observation)). Of `domain`, what
+    /// was observed; kind, system, parameters and recipe are left to the caller.
+    Model policy;
+
+    std::vector<PolicyProgress> curve;
+    std::size_t steps = 0;  ///< done
+    std::size_t episodes = 0;
+    double seconds = 0;
+    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    std::string checkpoint_trouble{};
+};
+
+// TQC: reinforcement learning with truncated quantile critics.
+//
+// Several critics estimate the distribution of the return by its quantiles; of all their quantiles
+// together the highest are left out where the target is formed, which keeps the critics from
+// overestimating. The policy is stochastic and is paid for its entropy, with a weight that
+// holds the entropy at -1 per action.
+//
+//   A. Kuznetsov, P. Shvechikov, A. Grishin and D. Vetrov, "Controlling overestimation bias with
+//   truncated mixture of continuous distributional quantile critics", ICML 2020;
+//   T. Haarnoja et al., "Soft actor-critic algorithms and applications", arXiv:1812.05905, 2018
+//   (weight of the entropy: its equation 18);
+//   A. Raffin, J. Kober and F. Stulp, "Smooth exploration for robotic reinforcement learning",
+//   CoRL 2021 (exploration that depends on the state).
+
+/// Options of `train_tqc`.
+struct TqcOptions {
+    PolicyTraining training{};
+    std::vector<std::size_t> actor{64, 64};       ///< hidden layers, ReLU
+    std::vector<std::size_t> critic{64, 64, 64};  ///< hidden layers, ReLU
+    std::size_t critics = 5;
+    std::size_t quantiles = 25;      ///< of each critic
+    std::size_t dropped = 2;         ///< of each critic, counted; the highest of all go
+    double rate = 3e-4;              ///< of Adam, for critics, actor and temperature
+    double first_temperature = 1;    ///< weight of the entropy at the start, positive
+    std::size_t noise_interval = 1;  ///< steps after which the noise of the exploration is redrawn
+};
+
+/// Trains a policy. Everything follows from options and environment, to the bit on one machine,
+/// however many threads run and however often it was interrupted and resumed. A training that had
+/// ended continues if it is resumed with more steps.
+/// @throws std::invalid_argument if an option is outside its range, or the environment is
+/// incomplete.
+/// @throws std::runtime_error if the checkpoint cannot be written or read, is of another training,
+///         or the environment does not repeat the episode that was interrupted.
+[[nodiscard]] TrainedPolicy train_tqc(const Environment& environment,
+                                      const TqcOptions& options = {},
+                                      const PolicyCallback& progress = {});
+
+// TD3: reinforcement learning with twin delayed deterministic policy gradients.
+//
+// Two critics, of which the lower one counts; targets smoothed by noise on the action; a
+// deterministic policy, updated at every second step, that explores by noise on its action.
+//
+//   S. Fujimoto, H. van Hoof and D. Meger, "Addressing function approximation error in actor-critic
+//   methods", ICML 2018.
+
+/// Options of `train_td3`.
+struct Td3Options {
+    PolicyTraining training{};
+    std::vector<std::size_t> actor{64, 64};       ///< hidden layers, ReLU
+    std::vector<std::size_t> critic{64, 64, 64};  ///< hidden layers, ReLU
+    double rate = 1e-3;                           ///< of Adam, for critics and actor
+    double exploration = 0.1;                     ///< standard deviation of the noise on the action
+    double smoothing = 0.2;                       ///< the same, on the action of a target
+    double smoothing_bound = 0.5;                 ///< that noise is clamped to +- this
+    std::size_t delay = 2;  ///< the policy and the targets move at every so many-th update
+};
+
+/// Trains a policy by TD3 (Fujimoto, van Hoof and Meger 2018), with the contract of `train_tqc`.
+[[nodiscard]] TrainedPolicy train_td3(const Environment& environment,
+                                      const Td3Options& options = {},
+                                      const PolicyCallback& progress = {});
+
+}  // namespace ricochet::learn
