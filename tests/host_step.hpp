@@ -8,7 +8,6 @@
 
 #include "ricochet/detail/guard_view.hpp"
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/step.hpp"
 
 namespace ricochet::test {
 

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -80,7 +81,13 @@ private:
     std::vector<std::pair<std::string, std::string>> versions_;
 };
 
-inline constexpr double tolerances[] = {1e-4, 1e-6, 1e-8, 1e-10, 1e-12};
+/// Tolerances at which every peer solves a problem; a single one where a run takes seconds.
+[[nodiscard]] inline std::span<const double> tolerances_of(const std::string& problem)
+{
+    static constexpr double all[] = {1e-4, 1e-6, 1e-8, 1e-10, 1e-12};
+    const bool is_large = problem == "balls-10000" || problem == "balls-100000";
+    return is_large ? std::span<const double>(all).subspan(3, 1) : all;
+}
 
 /// Every problem once: `visit(name, title, make_task)`, where a call of `make_task` returns
 /// the task. Problems of several runs are given as vectors of tasks.
@@ -90,6 +97,8 @@ void for_each_problem(Visit visit)
     visit("ball", "Bouncing ball, 13 impacts", [] { return std::vector{ball()}; });
     visit("impacts", "Impact oscillator, 200 impacts in 200 periods",
           [] { return std::vector{impact_oscillator(1.2, 200)}; });
+    visit("impacts-1000", "Impact oscillator, 1000 periods",
+          [] { return std::vector{impact_oscillator(1.2, 1000)}; });
     visit("henon-heiles", "Henon-Heiles, section", [] { return std::vector{henon_heiles()}; });
     visit("arenstorf", "Arenstorf orbit, section", [] { return std::vector{arenstorf()}; });
     visit("stick-slip", "Stick-slip on a belt, 100 periods",
@@ -104,8 +113,8 @@ void for_each_problem(Visit visit)
                   return tasks;
               });
     }
-    for (const std::size_t n : {1U, 10U, 100U, 1000U}) {
-        visit("balls-" + std::to_string(n), std::to_string(n) + " balls in one state",
+    for (const std::size_t n : {1U, 10U, 100U, 1000U, 10000U, 100000U}) {
+        visit("balls-" + std::to_string(n), std::to_string(n) + " balls",
               [n] { return std::vector{balls(n)}; });
     }
     for (const std::size_t n : {10U, 100U}) {
@@ -166,6 +175,8 @@ void add_ode(Cells& cells);
 #ifdef RICOCHET_REPORT_BULLET
 void add_bullet(Cells& cells);
 #endif
+void add_scene(Cells& cells);
 void add_set_valued(Cells& cells);
+void add_stiff(Cells& cells);
 
 }  // namespace ricochet::report

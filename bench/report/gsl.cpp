@@ -165,7 +165,7 @@ void add_gsl(Cells& cells)
     cells.add_version("GSL", gsl_version);
     for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
         using S = decltype(make().front().system);
-        for (const double tolerance : tolerances) {
+        for (const double tolerance : tolerances_of(name)) {
             cells.add({name, "GSL", "rk8pd, bisection", tolerance, [make, tolerance] {
                            std::vector<std::shared_ptr<Solver<S>>> solvers;
                            for (auto& task : make()) {

@@ -84,7 +84,9 @@ Cells all_cells()
     Cells cells;
     add_ours(cells);
     add_taylor(cells);
+    add_scene(cells);
     add_set_valued(cells);
+    add_stiff(cells);
     add_odeint(cells);
 #ifdef RICOCHET_REPORT_CVODE
     add_cvode(cells);

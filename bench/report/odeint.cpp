@@ -195,7 +195,7 @@ void add_odeint(Cells& cells)
     cells.add_version("odeint", std::to_string(BOOST_VERSION / 100000) + "." +
                                     std::to_string(BOOST_VERSION / 100 % 1000));
     for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
-        for (const double tolerance : tolerances) {
+        for (const double tolerance : tolerances_of(name)) {
             cells.add({name, "odeint", "step map", tolerance, [make, tolerance] {
                            return over(make(), [tolerance](const auto& task, Answer& answer,
                                                            std::size_t offset) {

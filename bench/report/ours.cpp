@@ -27,7 +27,7 @@ bool solve(const Task<S>& task, double tolerance, Answer& answer, std::size_t of
 template <class Stepping, class Make>
 void add_method(Cells& cells, const std::string& problem, const std::string& how, const Make& make)
 {
-    for (const double tolerance : tolerances) {
+    for (const double tolerance : tolerances_of(problem)) {
         cells.add({problem, "ricochet", how, tolerance, [make, tolerance] {
                        return over(make(), [tolerance](const auto& task, Answer& answer,
                                                        std::size_t offset) {

@@ -135,8 +135,8 @@ def figures(report):
                     near_tangent(tangent)))
     balls = [row for row in rows if row["problem"].startswith("balls-")]
     if balls:
-        out.append(("balls", "N balls in one state: time of an impact, errors within 1e-8 s",
-                    [over_size(balls, "balls-", "N balls in one state, per impact", 1e-8,
+        out.append(("balls", "N balls, in one state and as a scene: time of an impact, errors within 1e-8 s",
+                    [over_size(balls, "balls-", "N balls, per impact", 1e-8,
                                lambda name: problems[name]["events"])]))
     idle = [row for row in rows if row["problem"].startswith("guards-") and row["value"] == 1e-8]
     if idle:

@@ -296,11 +296,11 @@ struct Balls {
 };
 
 /// From heights spread evenly over 5 to 10 m. There are about eight impacts a ball for few of them,
-/// two for a hundred, and 187 in all for a thousand.
+/// two for a hundred, and some 200 to 300 in all for a thousand and more.
 [[nodiscard]] inline Task<Balls> balls(std::size_t n)
 {
     Task<Balls> task{.system = {.balls = n}, .x0 = std::vector<double>(2 * n, 0.0)};
-    task.t_end = n <= 10 ? 15 : n <= 100 ? 3 : 1.1;
+    task.t_end = n <= 10 ? 15 : n <= 100 ? 3 : n <= 1000 ? 1.1 : n <= 10000 ? 1.02 : 1.011;
     for (std::size_t i = 0; i < n; ++i) {
         const double height = 5 + 5 * (static_cast<double>(i) + 0.5) / static_cast<double>(n);
         task.x0[2 * i] = height;

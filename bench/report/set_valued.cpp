@@ -88,7 +88,7 @@ void add_inclusion(Cells& cells, const std::string& name, const std::string& tit
         for (const double t : out.sample_times) out.samples.push_back(solution(t));
         return out;
     });
-    for (const double tolerance : tolerances) {
+    for (const double tolerance : tolerances_of(name)) {
         cells.add({name, "ricochet", "hand-over, fehlberg78", tolerance, [tolerance] {
                        return [tolerance] { return by_hand_over<System>(tolerance); };
                    }});

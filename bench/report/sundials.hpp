@@ -104,7 +104,7 @@ void add_solver_cells(Cells& cells, const std::string& peer, const std::string& 
 {
     for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
         using S = decltype(make().front().system);
-        for (const double tolerance : tolerances) {
+        for (const double tolerance : tolerances_of(name)) {
             cells.add({name, peer, setting, tolerance, [make, tolerance] {
                            std::vector<std::shared_ptr<Solver<S>>> solvers;
                            for (auto& task : make()) {

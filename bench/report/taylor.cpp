@@ -35,7 +35,7 @@ void add_taylor(Cells& cells)
         // States of fixed size, whose flow is a template over its scalar, too.
         if constexpr (!std::is_same_v<typename System::State, std::vector<double>> &&
                       !std::is_same_v<System, Watched> && !std::is_same_v<System, Unwatched>) {
-            for (const double tolerance : tolerances) {
+            for (const double tolerance : tolerances_of(name)) {
                 cells.add({name, "ricochet", "Taylor", tolerance, [make, tolerance] {
                                return over(make(), [tolerance](const auto& task, Answer& answer,
                                                                std::size_t offset) {

@@ -92,7 +92,7 @@ void choose_stepping(const RunRequest& request, RunSettings& settings)
             fmt::format("stepper {} has no error estimate and needs --step; "
                         "steppers with error control are dopri5, fehlberg78, "
                         "cash-karp54",
-                        name(settings.stepper)));
+                        app::name(settings.stepper)));
     }
     options.rtol = request.rtol.value_or(options.rtol);
     options.atol = request.atol.value_or(options.atol);

@@ -67,7 +67,7 @@ double log_cosh(double z)
 }
 
 template <class Function>
-double integral(const Function& f, double from, double to)
+double integral_of_pair(const Function& f, double from, double to)
 {
     if (std::isnan(to)) return to;
     return boost::math::quadrature::gauss_kronrod<double, 31>::integrate(f, from, to, 10, 1e-13);
@@ -147,12 +147,12 @@ RateStateJet AdditivePair::rate_potential(double v, double xi) const
     const ScalarJet a = p_.direct.jet(y);
     const ScalarJet c = p_.state.jet(xi);
     const double heal = std::exp(-c.value);
-    // The integral of A dV over (0, V) is V times that of A(y - s) e^-s ds.
+    // The integral_of_pair of A dV over (0, V) is V times that of A(y - s) e^-s ds.
     const double direct =
-        v *
-        integral([&](double s) { return p_.direct.jet(y - s).value * std::exp(-s); }, 0.0, 60.0);
+        v * integral_of_pair([&](double s) { return p_.direct.jet(y - s).value * std::exp(-s); },
+                             0.0, 60.0);
     const double stored =
-        integral([&](double z) { return -std::exp(-p_.state.jet(z).value); }, 0.0, xi);
+        integral_of_pair([&](double z) { return -std::exp(-p_.state.jet(z).value); }, 0.0, xi);
     const double unit = p_.beta * p_.v_star;
     return {direct + p_.beta * v * xi + unit * stored,
             a.value + p_.beta * xi,

@@ -13,7 +13,7 @@ namespace ricochet {
 namespace {
 
 template <class Function>
-double integral(const Function& f, double from, double to)
+double integral_of_law(const Function& f, double from, double to)
 {
     if (from == to) return 0;
     if (std::isnan(to)) return to;
@@ -23,7 +23,7 @@ double integral(const Function& f, double from, double to)
                                                                          1e-14);
 }
 
-constexpr detail::Refuse refuse{"AffineLawPotential"};
+constexpr detail::Refuse refuse_law{"AffineLawPotential"};
 
 }  // namespace
 
@@ -31,11 +31,11 @@ AffineLawPotential::AffineLawPotential(AffineLaw law) : law_(std::move(law))
 {
     if (!law_.direct || !law_.direct_slope || !law_.state || !law_.state_slope || !law_.heal ||
         !law_.wear) {
-        refuse("all six functions of the law are needed");
+        refuse_law("all six functions of the law are needed");
     }
     if (!(law_.theta_min > 0 && law_.theta_max > law_.theta_min)) {
-        refuse(fmt::format("expected 0 < theta_min < theta_max, got {} and {}", law_.theta_min,
-                           law_.theta_max));
+        refuse_law(fmt::format("expected 0 < theta_min < theta_max, got {} and {}", law_.theta_min,
+                               law_.theta_max));
     }
     constexpr int samples = 64;
     for (int i = 0; i <= samples; ++i) {
@@ -49,25 +49,27 @@ double AffineLawPotential::slope(double theta) const
 {
     const double rise = law_.state_slope(theta);
     const double wear = law_.wear(theta);
-    if (!(rise > 0)) refuse(fmt::format("dB/dtheta must be positive, found {} at {}", rise, theta));
-    if (!(wear > 0)) refuse(fmt::format("q must be positive, found {} at theta = {}", wear, theta));
+    if (!(rise > 0))
+        refuse_law(fmt::format("dB/dtheta must be positive, found {} at {}", rise, theta));
+    if (!(wear > 0))
+        refuse_law(fmt::format("q must be positive, found {} at theta = {}", wear, theta));
     return std::sqrt(rise / wear);
 }
 
 double AffineLawPotential::xi_of_theta(double theta) const
 {
     if (!(theta >= law_.theta_min && theta <= law_.theta_max)) {
-        refuse(fmt::format("theta must lie in [{}, {}], got {}", law_.theta_min, law_.theta_max,
-                           theta));
+        refuse_law(fmt::format("theta must lie in [{}, {}], got {}", law_.theta_min, law_.theta_max,
+                               theta));
     }
-    return integral([&](double x) { return slope(std::exp(x)) * std::exp(x); },
-                    std::log(law_.theta_min), std::log(theta));
+    return integral_of_law([&](double x) { return slope(std::exp(x)) * std::exp(x); },
+                           std::log(law_.theta_min), std::log(theta));
 }
 
 double AffineLawPotential::theta_of_xi(double xi) const
 {
     if (!(xi >= 0 && xi <= xi_max_)) {
-        refuse(fmt::format("xi must lie in [0, {}], got {}", xi_max_, xi));
+        refuse_law(fmt::format("xi must lie in [0, {}], got {}", xi_max_, xi));
     }
     double lower = std::log(law_.theta_min);
     double upper = std::log(law_.theta_max);
@@ -87,7 +89,7 @@ RateStateJet AffineLawPotential::rate_potential(double v, double xi) const
 {
     const double theta = theta_of_xi(xi);
     const double g = slope(theta);  // dxi/dtheta
-    const double c = integral(
+    const double c = integral_of_law(
         [&](double x) {
             const double at = std::exp(x);
             const double s = slope(at);
@@ -103,7 +105,7 @@ RateStateJet AffineLawPotential::rate_potential(double v, double xi) const
     constexpr double h = 1e-5;
     const double curvature =
         (by_xi(theta * std::exp(h)) - by_xi(theta * std::exp(-h))) / (2 * h * theta * g);
-    return {integral(law_.direct, law_.v_reference, v) + law_.state(theta) * v + c,
+    return {integral_of_law(law_.direct, law_.v_reference, v) + law_.state(theta) * v + c,
             law_.direct(v) + law_.state(theta),
             rise * v / g - law_.heal(theta) * g,
             law_.direct_slope(v),

@@ -373,7 +373,7 @@ private:
     double rest_time_ = std::numeric_limits<double>::quiet_NaN();
 };
 
-constexpr detail::Refuse refuse{"BatheOptions"};
+constexpr detail::Refuse refuse_options{"BatheOptions"};
 
 }  // namespace
 
@@ -381,29 +381,33 @@ void validate(const BatheOptions& o)
 {
     validate(o.controller);
     if (o.first_stage == FirstStage::switch_aware) {
-        refuse("the first stage of a fault is averaged or at_end");
+        refuse_options("the first stage of a fault is averaged or at_end");
     }
     const bool constant = std::holds_alternative<ConstantStep>(o.controller);
     if (!constant && o.estimate == ErrorEstimate::none)
-        refuse("a controller needs an estimate of the error");
+        refuse_options("a controller needs an estimate of the error");
     if (o.estimate == ErrorEstimate::embedded && o.first_stage == FirstStage::at_end) {
-        refuse("the embedded estimate is of the averaged first stage");
+        refuse_options("the embedded estimate is of the averaged first stage");
     }
     if (o.estimate == ErrorEstimate::embedded && o.norm == FaultNorm::components) {
-        refuse("the norm of components is that of step doubling");
+        refuse_options("the norm of components is that of step doubling");
     }
     if (const auto* learned = std::get_if<LearnedStep>(&o.controller)) {
         if (o.estimate != ErrorEstimate::embedded) {
-            refuse("a learned controller needs the embedded estimate of the error");
+            refuse_options("a learned controller needs the embedded estimate of the error");
         }
         learned->policy->require(fault_step_layout());
     }
-    if (!(o.rtol > 0)) refuse(fmt::format("rtol must be positive, got {}", o.rtol));
-    if (!(o.atol >= 0)) refuse(fmt::format("atol must be zero or positive, got {}", o.atol));
-    if (!(o.floor > 0)) refuse(fmt::format("floor must be positive, got {}", o.floor));
-    if (!(o.h_max >= 0)) refuse(fmt::format("h_max must be zero or positive, got {}", o.h_max));
-    if (!(o.tolerance > 0)) refuse(fmt::format("tolerance must be positive, got {}", o.tolerance));
-    if (o.max_iterations < 1 || o.max_inner < 1) refuse("at least one iteration must be allowed");
+    if (!(o.rtol > 0)) refuse_options(fmt::format("rtol must be positive, got {}", o.rtol));
+    if (!(o.atol >= 0))
+        refuse_options(fmt::format("atol must be zero or positive, got {}", o.atol));
+    if (!(o.floor > 0)) refuse_options(fmt::format("floor must be positive, got {}", o.floor));
+    if (!(o.h_max >= 0))
+        refuse_options(fmt::format("h_max must be zero or positive, got {}", o.h_max));
+    if (!(o.tolerance > 0))
+        refuse_options(fmt::format("tolerance must be positive, got {}", o.tolerance));
+    if (o.max_iterations < 1 || o.max_inner < 1)
+        refuse_options("at least one iteration must be allowed");
 }
 
 const StepLayout& fault_step_layout() noexcept

@@ -15,7 +15,7 @@ namespace ricochet {
 
 namespace {
 
-constexpr detail::Refuse refuse{"friction history"};
+constexpr detail::Refuse refuse_history{"friction history"};
 
 double log_uniform(detail::SplitMix& random, double lower, double upper)
 {
@@ -85,27 +85,28 @@ FrictionHistory with_corners(detail::SplitMix& random, double v_star)
 void validate(const FrictionHistory& history)
 {
     const std::size_t n = history.t.size();
-    if (n < 2) refuse(fmt::format("expected at least two samples, found {}", n));
+    if (n < 2) refuse_history(fmt::format("expected at least two samples, found {}", n));
     if (history.v.size() != n) {
-        refuse(fmt::format("expected {} slip rates, one for every time, found {}", n,
-                           history.v.size()));
+        refuse_history(fmt::format("expected {} slip rates, one for every time, found {}", n,
+                                   history.v.size()));
     }
     if (!history.friction.empty() && history.friction.size() != n) {
-        refuse(
+        refuse_history(
             fmt::format("expected {} friction coefficients, found {}", n, history.friction.size()));
     }
     for (std::size_t i = 0; i < n; ++i) {
         if (i > 0 && !(history.t[i] > history.t[i - 1])) {
-            refuse(fmt::format("times must rise, found {} s after {} s at sample {}", history.t[i],
-                               history.t[i - 1], i));
+            refuse_history(fmt::format("times must rise, found {} s after {} s at sample {}",
+                                       history.t[i], history.t[i - 1], i));
         }
         if (!(history.v[i] > 0 && std::isfinite(history.v[i]))) {
-            refuse(fmt::format("slip rates must be positive and finite, found {} m/s at sample {}",
-                               history.v[i], i));
+            refuse_history(
+                fmt::format("slip rates must be positive and finite, found {} m/s at sample {}",
+                            history.v[i], i));
         }
         if (!history.friction.empty() && !std::isfinite(history.friction[i])) {
-            refuse(fmt::format("friction must be finite, found {} at sample {}",
-                               history.friction[i], i));
+            refuse_history(fmt::format("friction must be finite, found {} at sample {}",
+                                       history.friction[i], i));
         }
     }
 }

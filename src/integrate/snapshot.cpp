@@ -16,7 +16,7 @@ constexpr std::string_view heading = "ricochet-snapshot 2";
 constexpr std::string_view between = " = ";
 constexpr std::string_view last_line = "checksum ";
 
-constexpr detail::Refuse refuse{"snapshot"};
+constexpr detail::Refuse refuse_snapshot{"snapshot"};
 
 /// The last line: 64 bits that differ where two texts do (Fowler, Noll and Vo's hash, 1a).
 std::string checksum(std::string_view text)
@@ -32,7 +32,7 @@ std::string checksum(std::string_view text)
 std::string_view next_line(std::string_view& text)
 {
     const auto stop = text.find('\n');
-    if (stop == std::string_view::npos) refuse("the text ends in the middle of a line");
+    if (stop == std::string_view::npos) refuse_snapshot("the text ends in the middle of a line");
     const std::string_view line = text.substr(0, stop);
     text.remove_prefix(stop + 1);
     return line;
@@ -45,7 +45,7 @@ T parse(std::string_view word, auto... format)
     const auto [end, error] =
         std::from_chars(word.data(), word.data() + word.size(), value, format...);
     if (word.empty() || error != std::errc() || end != word.data() + word.size()) {
-        refuse(fmt::format("expected a number, got \"{}\"", word.substr(0, 40)));
+        refuse_snapshot(fmt::format("expected a number, got \"{}\"", word.substr(0, 40)));
     }
     return value;
 }
@@ -93,18 +93,19 @@ std::string to_text(const Snapshot& snapshot)
 Snapshot snapshot_from_text(std::string_view text)
 {
     if (text.starts_with("ricochet-snapshot 1 ")) {
-        refuse("it was written by an earlier version, which did not say of which run it is");
+        refuse_snapshot(
+            "it was written by an earlier version, which did not say of which run it is");
     }
     if (!text.starts_with(heading)) {
-        refuse(fmt::format("expected \"{}\", got \"{}\"", heading, text.substr(0, 40)));
+        refuse_snapshot(fmt::format("expected \"{}\", got \"{}\"", heading, text.substr(0, 40)));
     }
     const auto end = std::min(text.rfind(last_line), text.size());
     if (text.substr(end) != checksum(text.substr(0, end))) {
-        refuse("the text was changed or cut after it was written: its checksum differs");
+        refuse_snapshot("the text was changed or cut after it was written: its checksum differs");
     }
     text = text.substr(heading.size(), end - heading.size());
     std::string_view sizes = next_line(text);
-    if (!next_word(sizes).empty()) refuse("another version wrote it");
+    if (!next_word(sizes).empty()) refuse_snapshot("another version wrote it");
     const auto properties = parse<std::size_t>(next_word(sizes));
     const auto numbers = parse<std::size_t>(next_word(sizes));
     const auto counts = parse<std::size_t>(sizes);
@@ -112,7 +113,7 @@ Snapshot snapshot_from_text(std::string_view text)
     for (std::size_t i = 0; i < properties; ++i) {
         const std::string_view line = next_line(text);
         const auto at = line.find(between);
-        if (at == std::string_view::npos) refuse("expected a property of the run");
+        if (at == std::string_view::npos) refuse_snapshot("expected a property of the run");
         snapshot.run.push_back(
             {std::string(line.substr(0, at)), std::string(line.substr(at + between.size()))});
     }
@@ -122,7 +123,7 @@ Snapshot snapshot_from_text(std::string_view text)
     for (std::size_t i = 0; i < counts; ++i) {
         snapshot.counts.push_back(parse<std::uint64_t>(next_line(text)));
     }
-    if (!text.empty()) refuse("its text is longer than it says");
+    if (!text.empty()) refuse_snapshot("its text is longer than it says");
     return snapshot;
 }
 
@@ -130,12 +131,12 @@ namespace detail {
 
 void throw_snapshot_does_not_fit()
 {
-    refuse("it was saved by a simulation with another number of guards or components");
+    refuse_snapshot("it was saved by a simulation with another number of guards or components");
 }
 
 void throw_snapshot_is_no_state(std::string_view what)
 {
-    refuse(fmt::format("{} has a value that it has in no run of this kind", what));
+    refuse_snapshot(fmt::format("{} has a value that it has in no run of this kind", what));
 }
 
 std::string plain_type_name(std::string_view written)
@@ -203,13 +204,14 @@ std::vector<RunProperty> properties_of_run(const RunParts& parts, const Options&
 
 void require_same_run(const std::vector<RunProperty>& saved, const std::vector<RunProperty>& here)
 {
-    if (saved.empty()) refuse("it does not say of which run it is");
+    if (saved.empty()) refuse_snapshot("it does not say of which run it is");
     for (std::size_t i = 0; i < std::min(saved.size(), here.size()); ++i) {
         if (saved[i] == here[i]) continue;
-        refuse(fmt::format("it is of a run with {} = {}, and this one has {} = {}", saved[i].name,
-                           saved[i].value, here[i].name, here[i].value));
+        refuse_snapshot(fmt::format("it is of a run with {} = {}, and this one has {} = {}",
+                                    saved[i].name, saved[i].value, here[i].name, here[i].value));
     }
-    if (saved.size() != here.size()) refuse("it is of a run with other properties than this one");
+    if (saved.size() != here.size())
+        refuse_snapshot("it is of a run with other properties than this one");
 }
 
 }  // namespace detail

@@ -94,7 +94,7 @@ Json json(const Begun& begun)
             {"parts", begun.done.size()},       {"done", done}};
 }
 
-[[noreturn]] void refuse(const std::filesystem::path& file, std::string_view what)
+[[noreturn]] void refuse_certification(const std::filesystem::path& file, std::string_view what)
 {
     throw std::runtime_error(fmt::format("checkpoint '{}' {}", file.string(), what));
 }
@@ -152,25 +152,27 @@ void save(const Progressed& all, const std::string& key, const std::filesystem::
             const int why = errno;
             std::error_code ignored;
             std::filesystem::remove(fresh, ignored);
-            refuse(file, "cannot be written: " + std::generic_category().message(why));
+            refuse_certification(file,
+                                 "cannot be written: " + std::generic_category().message(why));
         }
     }
     std::error_code error;
     std::filesystem::rename(fresh, file, error);
-    if (error) refuse(file, "cannot be written: " + error.message());
+    if (error) refuse_certification(file, "cannot be written: " + error.message());
 }
 
 Progressed load(const std::string& key, const std::filesystem::path& file)
 {
-    const std::string text = ricochet::detail::read_file(
-        file, [&](const std::string& why) { refuse(file, "cannot be read: " + why); });
+    const std::string text = ricochet::detail::read_file(file, [&](const std::string& why) {
+        refuse_certification(file, "cannot be read: " + why);
+    });
     try {
         const nlohmann::json from = ricochet::detail::parse_strictly(text, deepest);
         if (from.at("format") != checkpoint_format) {
-            refuse(file, "is not a certification of this version");
+            refuse_certification(file, "is not a certification of this version");
         }
         if (from.at("key") != key) {
-            refuse(file, "belongs to another model, another guard or other options");
+            refuse_certification(file, "belongs to another model, another guard or other options");
         }
         Progressed out;
         for (const nlohmann::json& level : from.at("levels")) {
@@ -186,11 +188,11 @@ Progressed load(const std::string& key, const std::filesystem::path& file)
         if (!from.at("current").is_null()) out.current = begun_of(from.at("current"));
         return out;
     } catch (const ricochet::detail::JsonTrouble&) {
-        refuse(file, "is cut short or has been altered");
+        refuse_certification(file, "is cut short or has been altered");
     } catch (const nlohmann::json::exception&) {
-        refuse(file, "is cut short or has been altered");
+        refuse_certification(file, "is cut short or has been altered");
     } catch (const std::out_of_range&) {
-        refuse(file, "is cut short or has been altered");
+        refuse_certification(file, "is cut short or has been altered");
     }
 }
 

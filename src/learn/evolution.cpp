@@ -12,48 +12,49 @@
 #include "../checks/require.hpp"
 #include "../ensemble/workers.hpp"
 #include "checkpoint_file.hpp"
+#include "limits.hpp"
 #include "ricochet/detail/random.hpp"
 
 namespace ricochet::learn {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::string_view first_line = "ricochet evolution checkpoint 1\n";
 constexpr double checkpoint_interval = 1;  // [s]: an interruption costs no more
 
-constexpr ricochet::detail::Refuse refuse{"evolve"};
+constexpr ricochet::detail::Refuse refuse_search{"evolve"};
 
 void check(std::span<const double> x0, const EvolutionOptions& o)
 {
     const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
-    if (x0.empty()) refuse("expected a start of at least one component, got none");
+    if (x0.empty()) refuse_search("expected a start of at least one component, got none");
     for (std::size_t i = 0; i < x0.size(); ++i) {
-        if (!std::isfinite(x0[i])) refuse(fmt::format("component {} of the start is {}", i, x0[i]));
+        if (!std::isfinite(x0[i]))
+            refuse_search(fmt::format("component {} of the start is {}", i, x0[i]));
     }
     if (o.population != 0 && o.population < 4) {
-        refuse(fmt::format("population must be 0 or at least 4, got {}", o.population));
+        refuse_search(fmt::format("population must be 0 or at least 4, got {}", o.population));
     }
-    if (!positive(o.spread)) refuse(fmt::format("spread must be positive, got {}", o.spread));
+    if (!positive(o.spread))
+        refuse_search(fmt::format("spread must be positive, got {}", o.spread));
     if (!o.scales.empty() && o.scales.size() != x0.size()) {
-        refuse(fmt::format("expected {} scales, got {}", x0.size(), o.scales.size()));
+        refuse_search(fmt::format("expected {} scales, got {}", x0.size(), o.scales.size()));
     }
     for (const double scale : o.scales) {
-        if (!positive(scale)) refuse(fmt::format("scales must be positive, got {}", scale));
+        if (!positive(scale)) refuse_search(fmt::format("scales must be positive, got {}", scale));
     }
-    if (o.max_evaluations == 0) refuse("max_evaluations must be positive, got 0");
+    if (o.max_evaluations == 0) refuse_search("max_evaluations must be positive, got 0");
     if (!(o.max_seconds > 0)) {
-        refuse(fmt::format("max_seconds must be positive, got {}", o.max_seconds));
+        refuse_search(fmt::format("max_seconds must be positive, got {}", o.max_seconds));
     }
-    if (std::isnan(o.target)) refuse("target is NaN");
+    if (std::isnan(o.target)) refuse_search("target is NaN");
     if (!(o.least_spread >= 0)) {
-        refuse(fmt::format("least_spread must not be negative, got {}", o.least_spread));
+        refuse_search(fmt::format("least_spread must not be negative, got {}", o.least_spread));
     }
     if (o.threads < 1 || o.threads > 64) {
-        refuse(fmt::format("threads must lie in [1, 64], got {}", o.threads));
+        refuse_search(fmt::format("threads must lie in [1, 64], got {}", o.threads));
     }
-    if (o.resume && o.checkpoint.empty()) refuse("resume needs a checkpoint");
+    if (o.resume && o.checkpoint.empty()) refuse_search("resume needs a checkpoint");
 }
 
 /// NaN is behind everything.

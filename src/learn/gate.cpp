@@ -14,6 +14,7 @@
 
 #include "../checks/require.hpp"
 #include "checkpoint_file.hpp"
+#include "limits.hpp"
 #include "ricochet/detail/assessment.hpp"
 #include "ricochet/detail/checkpoint.hpp"
 #include "ricochet/detail/random.hpp"
@@ -23,9 +24,7 @@ namespace ricochet::learn {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-constexpr ricochet::detail::Refuse refuse{"train_gate"};
+constexpr ricochet::detail::Refuse refuse_gate{"train_gate"};
 
 /// What the network is to say of a state: the higher, the nearer.
 double target_of(double value, double unit)
@@ -272,13 +271,13 @@ private:
             const std::string_view what =
                 horizon() ? "with an event within the longest horizon" : "below the highest level";
             if (near == 0) {
-                refuse(
+                refuse_gate(
                     fmt::format("of {} states of runs there is none {}; sample elsewhere, or "
                                 "longer",
                                 set->size(), what));
             }
             if (near == set->size()) {
-                refuse(
+                refuse_gate(
                     fmt::format("all {} states of runs are {}: nothing is ever clear; take "
                                 "shorter horizons or lower levels",
                                 set->size(), what));

@@ -6,19 +6,17 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 
 #include "../checks/require.hpp"
+#include "limits.hpp"
 
 namespace ricochet::learn {
 
 namespace {
 
 constexpr std::string_view first_line = "ricochet policy checkpoint 1\n";
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// All of the loop that a checkpoint holds; the learner and the buffer add theirs.
 struct State {

@@ -1,15 +1,13 @@
 #include "ricochet/detail/rivals.hpp"
+#include "limits.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 namespace ricochet::learn {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::string lost(const Rival& rival, const Rival& exact)
 {

@@ -17,7 +17,7 @@ namespace ricochet::learn {
 
 namespace {
 
-constexpr double usual_step = 0.125 / 0.8660254037844386;  // [time units]: 0.125 s at 3 km
+constexpr double usual_fault_step = 0.125 / 0.8660254037844386;  // [time units]: 0.125 s at 3 km
 
 using detail::Comparison;
 using detail::FaultReference;
@@ -41,7 +41,7 @@ public:
         const bool doubling = rule.estimate == ErrorEstimate::doubling;
         const bool constant = std::holds_alternative<ConstantStep>(rule.controller);
         RuptureOptions options{.t_end = t_end_,
-                               .step = first_step(rule, usual_step * fault_.time_unit()),
+                               .step = first_step(rule, usual_fault_step * fault_.time_unit()),
                                .max_steps = 4000};
         if (rule.watch) options.progress = [&](double t) { return rule.watch(t / t_end_); };
         const Rupture r = runs->simulate(
@@ -114,7 +114,7 @@ StepProblem fault_problem(const StrikeSlipFault& fault, double t_end, double pol
     return {.description = fmt::format("fault of {0} x {0} elements, side {1:.0f} m",
                                        fault.elements(), fault.parameters().side),
             .group = fault.elements(),
-            .usual_step = usual_step * fault.time_unit(),
+            .usual_step = usual_fault_step * fault.time_unit(),
             .run = [problem](const StepRule& rule) { return problem->run(rule); }};
 }
 

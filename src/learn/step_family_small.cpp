@@ -15,7 +15,7 @@ namespace ricochet::learn {
 
 namespace {
 
-constexpr double usual_step = 0.1;  // over the system's unit of time
+constexpr double usual_small_step = 0.1;  // over the system's unit of time
 
 using detail::Reference;
 using detail::samples;
@@ -34,7 +34,7 @@ struct SmallProblem {
         const bool constant = std::holds_alternative<ConstantStep>(rule.controller);
         SetValuedOptions out{
             .t_end = t_end,
-            .step = std::min(first_step(rule, usual_step * system.step_unit()), t_end),
+            .step = std::min(first_step(rule, usual_small_step * system.step_unit()), t_end),
             .controller = rule.controller,
             .estimate = constant ? ErrorEstimate::none : rule.estimate,
             .fields = {{.first = 0,
@@ -95,7 +95,7 @@ StepProblem as_problem(SmallProblem<System> problem, int group)
     auto shared = std::make_shared<const SmallProblem<System>>(std::move(problem));
     return {.description = fmt::format("{} until {:.4g} s", System::name, shared->t_end),
             .group = group,
-            .usual_step = usual_step * shared->system.step_unit(),
+            .usual_step = usual_small_step * shared->system.step_unit(),
             .run = [shared](const StepRule& rule) { return shared->run(rule); }};
 }
 

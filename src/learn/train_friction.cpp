@@ -20,7 +20,7 @@ namespace {
 using detail::FrictionModel;
 using detail::sum_of_squares;
 
-constexpr ricochet::detail::Refuse refuse{"train_friction"};
+constexpr ricochet::detail::Refuse refuse_friction{"train_friction"};
 
 double processor_time()
 {
@@ -208,23 +208,24 @@ namespace {
 
 void check(const std::vector<FrictionHistory>& histories, const FrictionTrainingOptions& o)
 {
-    if (histories.empty()) refuse("expected histories, got none");
+    if (histories.empty()) refuse_friction("expected histories, got none");
     for (const FrictionHistory& h : histories) {
         validate(h);
-        if (h.friction.empty()) refuse("a history without friction");
+        if (h.friction.empty()) refuse_friction("a history without friction");
     }
     if (o.internal < 0 || o.internal > 2) {
-        refuse(fmt::format("internal must be 0, 1 or 2, got {}", o.internal));
+        refuse_friction(fmt::format("internal must be 0, 1 or 2, got {}", o.internal));
     }
     if (o.network == FrictionNetwork::general && o.internal != 1) {
-        refuse(fmt::format("the general network has one internal variable, got {}", o.internal));
+        refuse_friction(
+            fmt::format("the general network has one internal variable, got {}", o.internal));
     }
     constexpr std::size_t most = MonotoneNet::most_units;
     if (std::max({o.direct_units, o.state_units, o.rate_units}) > most) {
-        refuse(fmt::format("a monotone net has at most {} units", most));
+        refuse_friction(fmt::format("a monotone net has at most {} units", most));
     }
     if (!(o.v_star > 0 && std::isfinite(o.v_star))) {
-        refuse(fmt::format("v_star must be positive and finite, got {}", o.v_star));
+        refuse_friction(fmt::format("v_star must be positive and finite, got {}", o.v_star));
     }
 }
 

@@ -7,24 +7,22 @@
 #include <cmath>
 #include <cstdint>
 #include <ctime>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "../checks/require.hpp"
+#include "limits.hpp"
 #include "ricochet/detail/assessment.hpp"
 
 namespace ricochet::learn {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-constexpr ricochet::detail::Refuse refuse{"train_gate"};
+constexpr ricochet::detail::Refuse refuse_training{"train_gate"};
 
 void require_positive(double value, const char* name)
 {
-    ricochet::detail::require_positive(refuse.who, name, value);
+    ricochet::detail::require_positive(refuse_training.who, name, value);
 }
 
 }  // namespace
@@ -37,12 +35,13 @@ std::string_view name(GateKind kind) noexcept
 void check(const GateTraining& training, bool fixed_step)
 {
     if (training.levels.empty() || training.levels.size() > 32) {
-        refuse(fmt::format("expected 1 to 32 levels, got {}", training.levels.size()));
+        refuse_training(fmt::format("expected 1 to 32 levels, got {}", training.levels.size()));
     }
     double before = 0;
     for (const double level : training.levels) {
         if (!(level > before && std::isfinite(level))) {
-            refuse(fmt::format("levels must be positive and rise, got {} after {}", level, before));
+            refuse_training(
+                fmt::format("levels must be positive and rise, got {} after {}", level, before));
         }
         before = level;
     }
@@ -50,8 +49,8 @@ void check(const GateTraining& training, bool fixed_step)
         require_positive(training.step_min, "step_min");
         require_positive(training.step_max, "step_max");
         if (training.step_min > training.step_max) {
-            refuse(fmt::format("step_min {} is above step_max {}", training.step_min,
-                               training.step_max));
+            refuse_training(fmt::format("step_min {} is above step_max {}", training.step_min,
+                                        training.step_max));
         }
     }
     require_positive(training.run_length, "run_length");
@@ -66,13 +65,13 @@ void check(const GateTraining& training, bool fixed_step)
                                       {training.evaluate_every, "evaluate_every"},
                                       {training.patience, "patience"},
                                       {training.most_steps, "most_steps"}}) {
-        if (value == 0) refuse(fmt::format("{} must be positive, got 0", what));
+        if (value == 0) refuse_training(fmt::format("{} must be positive, got 0", what));
     }
     if (!(training.quantile > 0 && training.quantile < 1)) {
-        refuse(fmt::format("quantile must lie in (0, 1), got {}", training.quantile));
+        refuse_training(fmt::format("quantile must lie in (0, 1), got {}", training.quantile));
     }
     if (!(training.logit_margin >= 0 && training.fatal_weight >= 0)) {
-        refuse("logit_margin and fatal_weight must not be negative");
+        refuse_training("logit_margin and fatal_weight must not be negative");
     }
 }
 
@@ -144,35 +143,36 @@ namespace detail {
 
 void throw_no_start(const std::string& why)
 {
-    refuse("none of 1000 starts can be run: " + why);
+    refuse_training("none of 1000 starts can be run: " + why);
 }
 
 void throw_no_features(const std::string& recipe, std::size_t components)
 {
-    refuse(fmt::format("the recipe '{}' cannot be computed from a state of {} components", recipe,
-                       components));
+    refuse_training(fmt::format("the recipe '{}' cannot be computed from a state of {} components",
+                                recipe, components));
 }
 
 void throw_no_events(std::uint64_t steps)
 {
-    refuse(fmt::format("{} steps of runs hold no event; start elsewhere, or make the runs longer",
-                       steps));
+    refuse_training(fmt::format(
+        "{} steps of runs hold no event; start elsewhere, or make the runs longer", steps));
 }
 
 void throw_no_bounds()
 {
-    refuse("a level gate is for a system that declares a speed_bound, and this one does not");
+    refuse_training(
+        "a level gate is for a system that declares a speed_bound, and this one does not");
 }
 
 void throw_wrong_bound(std::size_t guard, double since, double then, double t, double value,
                        double allowed)
 {
-    refuse(t > since
-               ? fmt::format("guard {} went from {} at {} s to {} at {} s, where its declared "
-                             "bounds allow a change of {}",
-                             guard, then, since, value, t, allowed)
-               : fmt::format("guard {} is {} at {} s, where its declared bound is {}", guard, value,
-                             t, allowed));
+    refuse_training(
+        t > since ? fmt::format("guard {} went from {} at {} s to {} at {} s, where its declared "
+                                "bounds allow a change of {}",
+                                guard, then, since, value, t, allowed)
+                  : fmt::format("guard {} is {} at {} s, where its declared bound is {}", guard,
+                                value, t, allowed));
 }
 
 double processor_seconds() noexcept

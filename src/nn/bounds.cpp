@@ -24,7 +24,7 @@ double gamma(std::size_t n, double u = unit) noexcept
     return 2 * nu / (1 - nu);
 }
 
-constexpr detail::Refuse refuse{"NetworkBounds"};
+constexpr detail::Refuse refuse_bounds{"NetworkBounds"};
 
 /// Half a block: registers of every x86-64 hold two doubles.
 using Pair = double __attribute__((vector_size(2 * sizeof(double))));
@@ -50,28 +50,29 @@ struct NetworkBounds::Place {
 void NetworkBounds::check(const Model& model) const
 {
     detail::check_layers(model, "NetworkBounds");
-    if (model.activation != Activation::relu) refuse("expected ReLU activations, found tanh");
+    if (model.activation != Activation::relu)
+        refuse_bounds("expected ReLU activations, found tanh");
     const std::size_t n = model.layers.front().inputs;
     if (model.layers.back().outputs != 1) {
-        refuse("expected one output, found " + std::to_string(model.layers.back().outputs));
+        refuse_bounds("expected one output, found " + std::to_string(model.layers.back().outputs));
     }
     if (n > max_inputs) {
-        refuse("expected at most " + std::to_string(max_inputs) + " features, found " +
-               std::to_string(n));
+        refuse_bounds("expected at most " + std::to_string(max_inputs) + " features, found " +
+                      std::to_string(n));
     }
     if (model.offset.size() != n || model.scale.size() != n || model.domain.size() != n) {
-        refuse("expected an offset, a scale and a range of the domain for each of " +
-               std::to_string(n) + " features");
+        refuse_bounds("expected an offset, a scale and a range of the domain for each of " +
+                      std::to_string(n) + " features");
     }
     for (std::size_t i = 0; i < n; ++i) {
         const Interval& range = model.domain[i];
         const std::string feature = "feature " + std::to_string(i);
         if (!std::isfinite(range.lower) || !std::isfinite(range.upper) ||
             !(range.lower <= range.upper)) {
-            refuse(feature + ": expected a finite range as its domain");
+            refuse_bounds(feature + ": expected a finite range as its domain");
         }
         if (!std::isfinite(model.offset[i]) || !std::isfinite(model.scale[i])) {
-            refuse(feature + ": expected a finite offset and scale");
+            refuse_bounds(feature + ": expected a finite offset and scale");
         }
     }
     for (std::size_t k = 0; k < model.layers.size(); ++k) {
@@ -82,7 +83,7 @@ void NetworkBounds::check(const Model& model) const
         const DenseLayer& layer = model.layers[k];
         if (!std::all_of(layer.weight.begin(), layer.weight.end(), finite) ||
             !std::all_of(layer.bias.begin(), layer.bias.end(), finite)) {
-            refuse("layer " + std::to_string(k) + ": expected finite weights and biases");
+            refuse_bounds("layer " + std::to_string(k) + ": expected finite weights and biases");
         }
     }
 }
@@ -349,8 +350,8 @@ void NetworkBounds::bound_evaluation(const Model& model)
     }
     for (std::size_t i = 0; i < inputs_; ++i) {
         if (!(x[i] < largest)) {
-            refuse("feature " + std::to_string(i) +
-                   ": normalised, it could overflow in the domain");
+            refuse_bounds("feature " + std::to_string(i) +
+                          ": normalised, it could overflow in the domain");
         }
     }
     for (std::size_t k = 0; k < layers_.size(); ++k) {
@@ -369,8 +370,8 @@ void NetworkBounds::bound_evaluation(const Model& model)
                 magnitude += w * (x[i] + error[i]);
             }
             if (!(magnitude < largest)) {
-                refuse("layer " + std::to_string(k) +
-                       ": the weights are so large that an evaluation could overflow");
+                refuse_bounds("layer " + std::to_string(k) +
+                              ": the weights are so large that an evaluation could overflow");
             }
             layer.most.push_back(sum * 1.01);
             const double pads = static_cast<double>(layer.inputs + 8) * tiny;

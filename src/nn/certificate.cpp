@@ -41,7 +41,7 @@ private:
     std::uint64_t hash_ = 0xcbf29ce484222325U;
 };
 
-[[noreturn]] void refuse(const std::string& what)
+[[noreturn]] void refuse_certificate(const std::string& what)
 {
     throw std::invalid_argument("cannot be read: " + what);
 }
@@ -55,41 +55,44 @@ Json json(const std::vector<Interval>& box)
 
 double number(const Json& value, std::string_view what)
 {
-    if (!value.is_number()) refuse(fmt::format("expected a number as {}", what));
+    if (!value.is_number()) refuse_certificate(fmt::format("expected a number as {}", what));
     const double number = value.get<double>();
-    if (!std::isfinite(number)) refuse(fmt::format("{} is not finite", what));
+    if (!std::isfinite(number)) refuse_certificate(fmt::format("{} is not finite", what));
     return number;
 }
 
 const Json& member(const Json& object, const char* name)
 {
-    if (!object.is_object() || !object.contains(name)) refuse(fmt::format("'{}' is missing", name));
+    if (!object.is_object() || !object.contains(name))
+        refuse_certificate(fmt::format("'{}' is missing", name));
     return object.at(name);
 }
 
 const Json& list(const Json& object, const char* name)
 {
     const Json& found = member(object, name);
-    if (!found.is_array()) refuse(fmt::format("expected '{}' to be a list", name));
+    if (!found.is_array()) refuse_certificate(fmt::format("expected '{}' to be a list", name));
     return found;
 }
 
 std::string text(const Json& object, const char* name)
 {
     const Json& found = member(object, name);
-    if (!found.is_string()) refuse(fmt::format("expected '{}' to be text", name));
+    if (!found.is_string()) refuse_certificate(fmt::format("expected '{}' to be text", name));
     return found.get<std::string>();
 }
 
 std::vector<Interval> box(const Json& value)
 {
     std::vector<Interval> out;
-    if (!value.is_array()) refuse("expected a box to be a list of ranges");
+    if (!value.is_array()) refuse_certificate("expected a box to be a list of ranges");
     for (const Json& range : value) {
-        if (!range.is_array() || range.size() != 2) refuse("expected a range to be two numbers");
+        if (!range.is_array() || range.size() != 2)
+            refuse_certificate("expected a range to be two numbers");
         out.push_back(
             {number(range[0], "an end of a range"), number(range[1], "an end of a range")});
-        if (!(out.back().lower <= out.back().upper)) refuse("a range ends before it begins");
+        if (!(out.back().lower <= out.back().upper))
+            refuse_certificate("a range ends before it begins");
     }
     return out;
 }
@@ -101,13 +104,13 @@ CertificateLevel level(const Json& from, std::size_t dimension)
     out.threshold = number(member(from, "threshold"), "'threshold'");
     out.seconds = number(member(from, "seconds"), "'seconds'");
     const Json& boxes = member(from, "boxes");
-    if (!boxes.is_number_unsigned()) refuse("expected 'boxes' to be a whole number");
+    if (!boxes.is_number_unsigned()) refuse_certificate("expected 'boxes' to be a whole number");
     out.boxes = boxes.get<std::uint64_t>();
     for (const Json& one : list(from, "unproved")) {
         out.unproved.push_back(box(one));
         if (out.unproved.back().size() != dimension) {
-            refuse(fmt::format("expected an unproved box of {} ranges, found {}", dimension,
-                               out.unproved.back().size()));
+            refuse_certificate(fmt::format("expected an unproved box of {} ranges, found {}",
+                                           dimension, out.unproved.back().size()));
         }
     }
     return out;
@@ -176,23 +179,23 @@ std::string to_text(const Certificate& certificate)
 Certificate parse_certificate(std::string_view given)
 {
     const Json from = Json::parse(given, nullptr, false);
-    if (from.is_discarded()) refuse("it is no JSON");
+    if (from.is_discarded()) refuse_certificate("it is no JSON");
     Certificate out;
     out.tool = text(from, "tool");
     out.fingerprint = text(from, "fingerprint");
     out.system = text(from, "system");
     const Json& parameters = member(from, "parameters");
-    if (!parameters.is_object()) refuse("expected 'parameters' to be an object");
+    if (!parameters.is_object()) refuse_certificate("expected 'parameters' to be an object");
     for (const auto& [name, value] : parameters.items()) {
         out.parameters[name] = number(value, "a parameter");
     }
     out.box = box(member(from, "box"));
     for (const Json& one : list(from, "levels")) out.levels.push_back(level(one, out.box.size()));
-    if (out.levels.empty()) refuse("it has no level");
+    if (out.levels.empty()) refuse_certificate("it has no level");
     for (std::size_t k = 1; k < out.levels.size(); ++k) {
         if (!(out.levels[k].margin > out.levels[k - 1].margin) ||
             !(out.levels[k].threshold <= out.levels[k - 1].threshold)) {
-            refuse("expected margins that rise and thresholds that do not");
+            refuse_certificate("expected margins that rise and thresholds that do not");
         }
     }
     return out;

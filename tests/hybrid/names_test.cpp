@@ -113,7 +113,6 @@
 #include "ricochet/hybrid/filippov.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/statistics.hpp"
-#include "ricochet/hybrid/step.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"

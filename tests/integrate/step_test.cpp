@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "ricochet/hybrid/step.hpp"
+#include "ricochet/detect/step_probe.hpp"
 #include "walled_oscillator.hpp"
 
 namespace ricochet::step_test {

@@ -36,6 +36,14 @@
 #define RICOCHET_BY_ONES
 #endif
 
+// A program of many small systems that seldom step compiles in half the time with flows called by
+// pointer: it defines RICOCHET_CALLS_FLOWS_BY_POINTER. The bits of a run are the same.
+#if defined(__OPTIMIZE__) && !defined(RICOCHET_CALLS_FLOWS_BY_POINTER)
+#define RICOCHET_INLINES_FLOWS 1
+#else
+#define RICOCHET_INLINES_FLOWS 0
+#endif
+
 namespace ricochet::detail {
 
 /// Whether steps of such states are computed in registers.
@@ -574,7 +582,7 @@ requires(
 template <class System, class X, class Method>
 [[nodiscard]] const StepKernel<CoreState<X>>& kernel_for([[maybe_unused]] const Method& method)
 {
-#ifdef __OPTIMIZE__
+#if RICOCHET_INLINES_FLOWS
     constexpr bool by_pointer = NameOf<Method>::known && !fits_registers<X>;
 #else
     constexpr bool by_pointer = NameOf<Method>::known;

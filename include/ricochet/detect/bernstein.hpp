@@ -21,7 +21,6 @@
 
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/step.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {

@@ -14,6 +14,15 @@
 
 #include "ricochet/hosts/detail/body_step.hpp"
 
+// Bullet writes vectors as floats and copies them as vectors of SSE. Where writing and reading are
+// inlined into one function, g++ 12 takes them at -O2 for different memory, and what was written
+// last is read unrounded (with -fno-strict-aliasing it is not).
+#ifdef __GNUC__
+#define RICOCHET_NOT_INLINED [[gnu::noinline]]
+#else
+#define RICOCHET_NOT_INLINED
+#endif
+
 namespace ricochet::hosts {
 
 /// A body in its world.
@@ -27,16 +36,15 @@ struct BulletEngine {
         btTransform place{};
         btVector3 spin{};
     };
-    [[nodiscard]] Body read() const
+    [[nodiscard]] RICOCHET_NOT_INLINED Body read() const
     {
-        Body at{{}, body->getWorldTransform(), body->getAngularVelocity()};
-        for (int i = 0; i < 3; ++i) {
-            at.x[std::size_t(i)] = at.place.getOrigin()[i];
-            at.x[std::size_t(3 + i)] = body->getLinearVelocity()[i];
-        }
-        return at;
+        const btVector3 place = body->getCenterOfMassPosition();
+        const btVector3 velocity = body->getLinearVelocity();
+        return {{place.x(), place.y(), place.z(), velocity.x(), velocity.y(), velocity.z()},
+                body->getWorldTransform(),
+                body->getAngularVelocity()};
     }
-    void write(Body at) const
+    RICOCHET_NOT_INLINED void write(Body at) const
     {
         at.place.setOrigin({btScalar(at.x[0]), btScalar(at.x[1]), btScalar(at.x[2])});
         body->setCenterOfMassTransform(at.place);
@@ -44,10 +52,16 @@ struct BulletEngine {
         body->setAngularVelocity(at.spin);
     }
     void advance(double s) const { world->stepSimulation(btScalar(s), 0); }
-    [[nodiscard]] double gravity(std::size_t i) const { return body->getGravity()[int(i)]; }
+    [[nodiscard]] double gravity(std::size_t i) const
+    {
+        const btVector3 all = body->getGravity();
+        return i == 0 ? all.x() : i == 1 ? all.y() : all.z();
+    }
 };
 
 /// x = (position [m], velocity [m/s]) of the body's centre of mass. The rotation goes with it.
 using BulletBody = detail::BodyStep<BulletEngine>;
 
 }  // namespace ricochet::hosts
+
+#undef RICOCHET_NOT_INLINED

@@ -69,7 +69,7 @@ class PartsOfRun {
 
     [[nodiscard]] static constexpr QuietKernel<C> quiet() noexcept
     {
-#ifdef __OPTIMIZE__
+#if RICOCHET_INLINES_FLOWS
         using D = DetectorTableOf<Detector, System, X>;
         constexpr Screening screening = screening_of<Detector>;
         if constexpr (NameOf<Method>::known && fits_registers<X>) {

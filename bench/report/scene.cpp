@@ -1,0 +1,53 @@
+// ricochet itself: N balls as a scene, each with a clock of its own.
+#include "ricochet/scene/scene.hpp"
+
+#include "cells.hpp"
+#include "ricochet/scene/simulate.hpp"
+
+namespace ricochet::report {
+
+namespace {
+
+/// The balls of a task as points above a floor, side by side.
+[[nodiscard]] Scene scene_of(const Task<Balls>& task)
+{
+    Scene scene({.gravity = {0, -9.81}});
+    const MaterialId rubber = scene.material({.name = "rubber", .restitution = 0.9});
+    scene.wall({.point = {0, 0}, .normal = {0, 1}, .material = rubber});
+    for (std::size_t i = 0; i < task.system.balls; ++i) {
+        scene.point({.at = {static_cast<double>(i), task.x0[2 * i]}, .material = rubber});
+    }
+    return scene;
+}
+
+[[nodiscard]] Answer solve(const Scene& scene, double t_end)
+{
+    const SceneRun run = simulate(scene, {.t_end = t_end});
+    Answer answer{.finished = run.outcome == Outcome::reached_end,
+                  .steps = run.statistics.steps,
+                  .flow_calls = run.statistics.flow_calls,
+                  .note = run.message};
+    for (const SceneEvent& event : run.events) {
+        if (event.kind == SceneEvent::Kind::impact) answer.add(event.t, event.body);
+    }
+    return answer;
+}
+
+}  // namespace
+
+void add_scene(Cells& cells)
+{
+    for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
+        using Task = typename std::decay_t<decltype(make())>::value_type;
+        if constexpr (std::is_same_v<decltype(Task::system), Balls>) {
+            cells.add({name, "ricochet", "scene", 0, [make] {
+                           const auto task = make().front();
+                           return [scene = scene_of(task), t_end = task.t_end] {
+                               return solve(scene, t_end);
+                           };
+                       }});
+        }
+    });
+}
+
+}  // namespace ricochet::report

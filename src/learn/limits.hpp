@@ -1,0 +1,11 @@
+// Doubles that are no numbers of a motion.
+#pragma once
+
+#include <limits>
+
+namespace ricochet::learn {
+
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
+inline constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace ricochet::learn
