@@ -95,6 +95,28 @@ struct Impact {
     }
 };
 
+/// A quadrature of a polynomial: the motion is of degree 3.
+struct Cubic {
+    using State = std::array<double, 1>;
+    template <class S>
+    constexpr void flow(const S& t, const std::array<S, 1>& /*x*/, std::array<S, 1>& dxdt) const
+    {
+        dxdt[0] = (3.0 * t + 12.0) * t - 4.0;
+    }
+};
+
+TEST(Taylor, AMotionThatIsAPolynomialIsOneStepWhateverItsDegree)
+{
+    // x = (t + 6) (t + 2) (t - 2), of terms up to 12^3, each of which is rounded.
+    for (const double rtol : {1e-6, 1e-15}) {
+        const auto run =
+            integrate(Cubic{}, Cubic::State{-120}, {.t_start = -8, .t_end = 4, .rtol = rtol},
+                      ErrorControlled<Taylor>{});
+        EXPECT_NEAR(run.x[0], 120, 4 * 1728 * 1.2e-16);
+        EXPECT_LE(run.statistics.steps, 3U);
+    }
+}
+
 TEST(Taylor, EveryImpactOfAForcedOscillatorIsFoundToTheRoundingOfItsTime)
 {
     for (const double wall : {1.0, 1.2}) {

@@ -489,11 +489,11 @@ constexpr void record_flow(const System& system, Mode mode, Recording& recording
 
 /// The operations that the outputs depend on, numbered from the first one: operands before results,
 /// left before right. Inputs keep their numbers; `outputs` are renumbered.
-template <std::size_t n, std::size_t outputs_count>
-constexpr void put_in_order(const Recording& from, Recording& to,
-                            std::array<int, outputs_count>& outputs)
+template <class Outputs>
+constexpr void put_in_order(std::size_t states, const Recording& from, Recording& to,
+                            Outputs& outputs)
 {
-    const int inputs = static_cast<int>(n) + 1;
+    const int inputs = static_cast<int>(states) + 1;
     GrowingArray<int> number;  // in `to`, or -1
     for (int i = 0; i < from.size(); ++i) number.push_back(i < inputs ? i : -1);
     for (int i = 0; i < inputs; ++i) to.push_back(from[i]);

@@ -101,8 +101,9 @@ struct TaylorStep {
     Instant start;
     Mode mode = 0;
     bool backward = false;
-    int order = 0;  ///< of what is known; 0: nothing
-    int asked = 0;  ///< of the run; larger where the motion is a polynomial
+    int order = 0;           ///< of what is known; 0: nothing
+    int asked = 0;           ///< of the run; larger where the motion is a polynomial
+    bool is_motion = false;  ///< a polynomial in time, not a series that was cut
     double reach = std::numeric_limits<double>::quiet_NaN();  ///< [s]; see `StepKernel::reach`
 };
 
