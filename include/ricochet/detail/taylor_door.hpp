@@ -7,12 +7,16 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <map>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "ricochet/detail/door.hpp"
+#include "ricochet/detail/lazy_tape.hpp"
 #include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/detail/taylor_series.hpp"
 #include "ricochet/detail/taylor_step.hpp"
@@ -21,14 +25,6 @@
 
 namespace ricochet::detail {
 
-[[noreturn]] inline void throw_structure_differs(const std::string& name)
-{
-    throw std::invalid_argument(
-        name +
-        ": the operations of the flow differ from those of an object that is constructed by "
-        "default; write them so that they do not depend on parameters, or use another "
-        "method, such as Fehlberg78");
-}
 [[noreturn]] inline void throw_constant_not_finite(const std::string& name)
 {
     throw std::invalid_argument(name + ": a constant of the flow is not finite");
@@ -39,63 +35,131 @@ namespace ricochet::detail {
                                 std::to_string(order));
 }
 
-/// How many tapes a flow has: one for each mode.
+/// A flow for power series in vectors, whose size is known at run time.
+template <class System>
+concept VectorFlow = requires(const System& system, Mode mode, const Recorded& t,
+                              const std::vector<Recorded>& x, std::vector<Recorded>& dxdt)
+{
+    system.flow(mode, t, x, dxdt);
+}
+|| requires(const System& system, const Recorded& t, const std::vector<Recorded>& x,
+            std::vector<Recorded>& dxdt)
+{
+    system.flow(t, x, dxdt);
+};
+template <class System>
+concept ConstantModeCount = requires
+{
+    std::integral_constant<std::size_t, System::mode_count>{};
+};
+
+/// A flow whose operations the compiler can read: a template over its scalar that a constant
+/// expression evaluates, of an object that is constructed by default.
+template <class System, std::size_t n>
+concept ConstantFlow = n >
+0 && std::is_default_constructible_v<System> &&
+    (ScalarFlow<System, n> || (ModedScalarFlow<System, n> && ConstantModeCount<System>)) &&
+    RecordableFlow<System, n>;
+
+/// The same of a flow that is known to be no template over its scalar where it is none.
+template <class System, std::size_t n>
+concept HasSeries = FlowOfScalars<System, ArraysOf<n>::template Of>&& ConstantFlow<System, n>;
+
+/// How many tapes the compiler makes of a flow: one for each mode.
 template <class System, std::size_t n>
 [[nodiscard]] constexpr std::size_t tape_count() noexcept
 {
-    if constexpr (ModedScalarFlow<System, n>) {
-        static_assert(
-            requires { std::integral_constant<std::size_t, System::mode_count>{}; },
-            "ricochet: found a flow with modes for Taylor, and no constant number of them; "
-            "expected static constexpr std::size_t mode_count");
+    if constexpr (!ConstantFlow<System, n>) {
+        return 0;
+    } else if constexpr (ModedScalarFlow<System, n>) {
         return System::mode_count;
     } else {
         return 1;
     }
 }
 
-/// Whether the flow of a system can be a power series in arrays of n: a template over its scalar
-/// that a constant expression evaluates.
+/// How many guards have series of their own, where the size of the state is known.
 template <class System, std::size_t n>
-concept HasSeries = n >
-0 && FlowOfScalars<System, ArraysOf<n>::template Of>&& std::is_default_constructible_v<System>&&
-         RecordableFlow<System, n>;
+[[nodiscard]] constexpr std::size_t guards_with_series() noexcept
+{
+    if constexpr (ConstantFlow<System, n>) {
+        return series_guards<System, n>();
+    } else if constexpr (ScalarGuards<System, n>) {
+        return fixed_guard_count<System, std::array<double, n>>();
+    } else {
+        return 0;
+    }
+}
 
-/// A door with the constants of the flow and the current step, for states of n components.
+/// A step of a state of n components, 0: sized at run time, and scratch of its size.
+template <class System, class X, std::size_t n>
+struct TaylorSizes {
+    static constexpr std::size_t m = guards_with_series<System, n>();
+    static constexpr bool on_series = m > 0;
+    using Step = TaylorStep<n, m>;
+    struct Room {
+        using Array = std::array<double, n>;
+        /// States that guards are evaluated at.
+        using Guarded = std::conditional_t<fixed_size<X>() == 0, Array, X>;
+        Array w, rate;
+        Guarded x, there;
+    };
+};
+template <class System, class X>
+struct TaylorSizes<System, X, 0> {
+    static constexpr bool on_series =
+        Guarded<System, X> && ScalarGuardsOn<System, std::vector<Recorded>>;
+    using Step = LargeTaylorStep;
+    struct Room {
+        using Array = std::vector<double>;
+        using Guarded = X;
+        Array w, rate;
+        Guarded x, there;
+    };
+};
+
+/// A door with the operations of the flow and the current step.
+///
+/// Operations that the compiler has read are unrolled by it. Where it cannot, or the object does
+/// other ones than an object that is constructed by default, they are recorded here, once for each
+/// mode, and done one by one.
 template <class System, class X, std::size_t n>
 struct TaylorDoor : Door<System, X> {
-    /// Guards with series of their own.
-    static constexpr std::size_t m = series_guards<System, n>();
+    using Sizes = TaylorSizes<System, X, n>;
+    using Step = typename Sizes::Step;
+    using Room = typename Sizes::Room;
+    static constexpr bool on_series = Sizes::on_series;
+    static constexpr bool is_constant = ConstantFlow<System, n>;
     static constexpr bool takes_series = [] {
-        static_assert(n > 0,
-                      "ricochet: found a state sized at run time for Taylor; expected "
-                      "std::array");
-        constexpr bool callable = ScalarFlow<System, n> || ModedScalarFlow<System, n>;
+        constexpr bool of_arrays = ScalarFlow<System, n> || ModedScalarFlow<System, n>;
+        constexpr bool of_vectors = VectorFlow<System>;
         static_assert(
-            callable,
+            n == 0 || of_arrays,
             "ricochet: found no flow that takes Taylor series; expected template <class S> "
             "constexpr void flow([Mode,] const S& t, const std::array<S, n>& x, "
             "std::array<S, n>& dxdt) const");
-        if constexpr (callable) {
-            static_assert(std::is_default_constructible_v<System>,
-                          "ricochet: found a system without a default constructor for Taylor; "
-                          "expected a constexpr one, from which the operations of the flow are "
-                          "read");
-            static_assert(RecordableFlow<System, n>,
-                          "ricochet: found a flow that no constant expression can evaluate; "
-                          "expected constexpr on the flow template, on what it calls and on the "
-                          "default constructor of the system");
-            return RecordableFlow<System, n>;
-        }
-        return callable;
+        static_assert(
+            n > 0 || of_vectors,
+            "ricochet: found no flow that takes Taylor series; expected template <class S> "
+            "void flow([Mode,] const S& t, const std::vector<S>& x, std::vector<S>& dxdt) const");
+        return n > 0 ? of_arrays : of_vectors;
     }();
 
     TaylorDoor(const System& system, const X& like) : Door<System, X>(system, like)
     {
-        if constexpr (takes_series) {
-            read_all(system, std::make_index_sequence<tape_count<System, n>()>{});
+        if constexpr (is_constant) {
+            as_compiled_ = read_all(system, std::make_index_sequence<tapes>{});
+        }
+        if constexpr (n == 0) {
+            room.x = room.there = like;
+            resize(static_cast<std::size_t>(like.size()));
+        } else if constexpr (takes_series) {
+            if (!as_compiled_) record_known_modes(n);
         }
     }
+
+    /// Whether the compiler has unrolled the series of this object.
+    [[nodiscard]] bool as_compiled() const noexcept { return as_compiled_; }
 
     /// @throws std::invalid_argument if there is no such order
     void prepare_order(int order)
@@ -104,63 +168,137 @@ struct TaylorDoor : Door<System, X> {
         given_order = order;
     }
 
+    /// For a state of another size, where it is not that of the type.
+    void resize(std::size_t size) requires(n == 0)
+    {
+        step.resize(0, 0);  // until all is known, whatever the flow throws
+        recorded_.clear();
+        if constexpr (takes_series) record_known_modes(size);
+        room.w.assign(size, 0);
+        room.rate.assign(size, 0);
+        copy_state(room.w, room.x);
+        copy_state(room.w, room.there);
+        step.resize(size, guard_count());
+    }
+
     /// The coefficients up to `order`, or all of them where these are fewer; returns how many.
     int compute(Mode mode, double t, const double* x, int order, double* out, double* guards)
     {
-        int computed = order;
-        if constexpr (takes_series) {
-            dispatch(mode, t, x, computed, out, guards,
-                     std::make_index_sequence<tape_count<System, n>()>{});
+        if constexpr (is_constant) {
+            if (as_compiled_) {
+                int computed = order;
+                dispatch(mode, t, x, computed, out, guards, std::make_index_sequence<tapes>{});
+                return computed;
+            }
         }
-        return computed;
+        if constexpr (takes_series) {
+            return recorded(mode, step.size()).compute(t, x, order, out, guards);
+        }
+        return order;
     }
 
     /// Whether the motion in a mode is a polynomial, of which `compute` has all coefficients.
-    [[nodiscard]] bool is_polynomial(Mode mode) const noexcept
+    [[nodiscard]] bool is_polynomial(Mode mode)
     {
-        return polynomial_[mode < polynomial_.size() ? mode : 0];
+        if constexpr (is_constant) {
+            if (as_compiled_) return polynomial_[mode < tapes ? mode : 0];
+        }
+        if constexpr (takes_series) return recorded(mode, step.size()).is_polynomial();
+        return false;
     }
 
     int given_order = 0;
-    TaylorStep<n, m> step;
+    Step step;
+    [[no_unique_address]] std::conditional_t<n == 0, Room, std::tuple<>> room;
 
 private:
-    static constexpr std::size_t most_constants = [] {
-        if constexpr (!takes_series) {
-            return std::size_t{0};
-        } else {
-            return []<std::size_t... mode>(std::index_sequence<mode...>)
-            {
-                return std::max({std::size_t{0},
-                                 taylor_tape<System, n, static_cast<Mode>(mode)>.ops.size()...});
-            }
-            (std::make_index_sequence<tape_count<System, n>()>{});
-        }
+    static constexpr std::size_t tapes = tape_count<System, n>();
+    static constexpr bool moded = [] {
+        if constexpr (n > 0) return ModedScalarFlow<System, n>;
+        return requires(const System& system, Mode mode, const Recorded& t,
+                        const std::vector<Recorded>& x, std::vector<Recorded>& dxdt)
+        {
+            system.flow(mode, t, x, dxdt);
+        };
     }();
+
+    // --- operations that are recorded ---
+
+    /// Known modes are recorded before the first step, so that what is wrong is said there.
+    void record_known_modes(std::size_t size)
+    {
+        const std::size_t modes = moded ? mode_count_of(this->system()) : 1;
+        for (std::size_t mode = 0; mode < modes; ++mode) {
+            static_cast<void>(recorded(static_cast<Mode>(mode), size));
+        }
+    }
+
+    [[nodiscard]] std::size_t guard_count() const
+    {
+        if constexpr (n > 0) {
+            return Sizes::m;
+        } else if constexpr (on_series) {
+            return guard_count_of<X>(this->system());
+        } else {
+            return 0;
+        }
+    }
+
+    [[nodiscard]] LazyTape& recorded(Mode mode, std::size_t size)
+    {
+        const std::size_t at = moded ? mode : 0;
+        const auto found = recorded_.find(at);
+        if (found != recorded_.end()) return found->second;
+        LazyTape tape = record(mode, size);
+        if (!tape.is_finite()) throw_constant_not_finite(name_of_system(this->system()));
+        return recorded_.emplace(at, std::move(tape)).first->second;
+    }
+
+    [[nodiscard]] LazyTape record(Mode mode, std::size_t size) const
+    {
+        Recording recording;
+        std::vector<int> outputs(size + guard_count());
+        if constexpr (n > 0) {
+            std::array<Recorded, n> x{}, dxdt{};
+            record_into(this->system(), mode, recording, x, dxdt, guard_count(), outputs);
+        } else {
+            std::vector<Recorded> x(size), dxdt(size);
+            record_into(this->system(), mode, recording, x, dxdt, guard_count(), outputs);
+        }
+        return {size, recording, std::move(outputs)};
+    }
+
+    // --- operations that the compiler knows ---
+
+    static constexpr std::size_t most_constants =
+        []<std::size_t... mode>(std::index_sequence<mode...>)
+    {
+        return std::max(
+            {std::size_t{0}, taylor_tape<System, n, static_cast<Mode>(mode)>.ops.size()...});
+    }
+    (std::make_index_sequence<tapes>{});
 
     static constexpr auto polynomial_ = []<std::size_t... mode>(std::index_sequence<mode...>)
     {
-        if constexpr (takes_series) {
-            return std::array{polynomial_order(taylor_tape<System, n, static_cast<Mode>(mode)>) <=
-                              least_taylor_order...};
-        } else {
-            return std::array<bool, 1>{};
-        }
+        return std::array<bool, tapes>{
+            polynomial_order(taylor_tape<System, n, static_cast<Mode>(mode)>) <=
+            least_taylor_order...};
     }
-    (std::make_index_sequence<takes_series ? tape_count<System, n>() : 1>{});
+    (std::make_index_sequence<tapes>{});
 
+    /// False: this object does other operations.
     template <std::size_t... mode>
-    void read_all(const System& system, std::index_sequence<mode...>)
+    [[nodiscard]] bool read_all(const System& system, std::index_sequence<mode...>)
     {
-        (read<mode>(system), ...);
+        return (... && read<mode>(system));
     }
     template <std::size_t mode>
-    void read(const System& system)
+    [[nodiscard]] bool read(const System& system)
     {
         const auto match =
             read_constants<System, n, static_cast<Mode>(mode)>(system, constants_[mode]);
-        if (match == TapeMatch::differs) throw_structure_differs(name_of_system(system));
         if (match == TapeMatch::not_finite) throw_constant_not_finite(name_of_system(system));
+        return match == TapeMatch::fits;
     }
 
     template <std::size_t... mode>
@@ -184,7 +322,9 @@ private:
         return true;
     }
 
-    std::array<std::array<double, most_constants>, tape_count<System, n>()> constants_{};
+    bool as_compiled_ = false;
+    std::array<std::array<double, most_constants>, tapes> constants_{};
+    std::map<std::size_t, LazyTape> recorded_;  ///< by mode
 };
 
 }  // namespace ricochet::detail

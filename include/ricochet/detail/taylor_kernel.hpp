@@ -28,11 +28,22 @@ template <class System, class X, std::size_t n>
 class TaylorKernel {
     using C = CoreState<X>;
     using State = StepState<C>;
-    static constexpr std::size_t m = series_guards<System, n>();
-    using Array = std::array<double, n>;
     using D = TaylorDoor<System, X, n>;
-    /// States that guards are evaluated at.
-    using Y = std::conditional_t<fixed_size<X>() == 0, Array, X>;
+    using TStep = typename D::Step;
+    using Room = typename D::Room;
+    using Array = typename Room::Array;
+    using Y = typename Room::Guarded;
+
+    /// Scratch of the size of the state: in registers where the compiler knows it.
+    [[nodiscard, gnu::always_inline]] static decltype(auto) room_of([[maybe_unused]] D& of)
+    {
+        if constexpr (n > 0) {
+            Room room;
+            return room;
+        } else {
+            return (of.room);
+        }
+    }
 
     [[nodiscard]] static D& at(void* door) noexcept
     {
@@ -40,31 +51,36 @@ class TaylorKernel {
     }
 
     /// The coefficients of the step from the current start, if they are not those already.
-    [[gnu::always_inline]] static TaylorStep<n, m>& expand(void* door, const State& state,
-                                                           int order)
+    [[gnu::always_inline]] static TStep& expand(void* door, const State& state, int order)
     {
         D& of = at(door);
-        TaylorStep<n, m>& step = of.step;
-        bool same = step.asked >= order && step.order > 0 && step.mode == state.mode &&
-                    step.backward == state.backward && step.start.value == state.start.value &&
+        TStep& step = of.step;
+        const std::size_t size = step.size();
+        bool same = size == state.x0.size() && step.asked >= order && step.order > 0 &&
+                    step.mode == state.mode && step.backward == state.backward &&
+                    step.start.value == state.start.value &&
                     step.start.remainder == state.start.remainder;
-        for (std::size_t i = 0; i < n; ++i) same = same && step.x[i] == state.x0[i];
+        for (std::size_t i = 0; i < size; ++i) same = same && step.x[i] == state.x0[i];
         if (!same) expand_anew(of, state, order);
         return step;
     }
 
     [[gnu::noinline]] static void expand_anew(D& of, const State& state, int order)
     {
-        TaylorStep<n, m>& step = of.step;
+        TStep& step = of.step;
         step.order = 0;  // until all is known, whatever the flow throws
-        for (std::size_t i = 0; i < n; ++i) step.x[i] = state.x0[i];
+        if constexpr (n == 0) {
+            if (step.size() != state.x0.size()) of.resize(state.x0.size());
+        }
+        const std::size_t size = step.size(), guards = step.guard_count();
+        for (std::size_t i = 0; i < size; ++i) step.x[i] = state.x0[i];
         double* const c = step.coefficients.data();
         double* const g = step.guards.data();
         const int computed = of.compute(state.mode, state.start.value, step.x.data(), order, c, g);
         if (state.backward) {
             for (std::size_t k = 1; k <= static_cast<std::size_t>(computed); k += 2) {
-                for (std::size_t i = 0; i < n; ++i) c[k * n + i] = -c[k * n + i];
-                for (std::size_t i = 0; i < m; ++i) g[k * m + i] = -g[k * m + i];
+                for (std::size_t i = 0; i < size; ++i) c[k * size + i] = -c[k * size + i];
+                for (std::size_t i = 0; i < guards; ++i) g[k * guards + i] = -g[k * guards + i];
             }
         }
         step.start = state.start;
@@ -76,38 +92,44 @@ class TaylorKernel {
         step.reach = std::numeric_limits<double>::quiet_NaN();
     }
 
-    [[nodiscard, gnu::always_inline]] static double length_of(const TaylorStep<n, m>& step,
-                                                              const State& state, double rtol,
-                                                              double atol)
+    [[nodiscard, gnu::always_inline]] static double length_of(D& of, const State& state,
+                                                              double rtol, double atol)
     {
+        const TStep& step = of.step;
         if (step.is_motion) return std::numeric_limits<double>::infinity();
-        return find_reach<n>(state.x0, state.component_atol, step.coefficients.data(), step.order,
-                             rtol, atol);
+        auto&& room = room_of(of);
+        return find_reach(state.x0, state.component_atol, step.coefficients.data(), step.order,
+                          rtol, atol, room.w);
     }
 
     static double reach(void* door, State& state, double rtol, double atol)
     {
         const int order = taylor_order(at(door).given_order, rtol);
-        TaylorStep<n, m>& step = expand(door, state, order);
+        TStep& step = expand(door, state, order);
         const double* const c = step.coefficients.data();
+        const std::size_t size = step.size();
         ++state.flow_calls;
-        for (std::size_t i = 0; i < n; ++i) state.rate0[i] = c[n + i];
-        step.reach = length_of(step, state, rtol, atol);
+        for (std::size_t i = 0; i < size; ++i) state.rate0[i] = c[size + i];
+        step.reach = length_of(at(door), state, rtol, atol);
         return step.reach;
     }
 
     /// False where the end is not finite.
-    [[gnu::always_inline]] static bool go(const TaylorStep<n, m>& step, State& state, double h)
+    [[gnu::always_inline]] static bool go(D& of, State& state, double h)
     {
+        const TStep& step = of.step;
+        const std::size_t size = step.size();
         const double* const c = step.coefficients.data();
         state.h = h;
         state.has_middle = false;
         state.asked_alone = 0;
-        Array w, rate;
+        auto&& room = room_of(of);
+        Array& w = room.w;
+        Array& rate = room.rate;
         evaluate_departure<true>(c, step.order, h, w, rate);
         double sum = 0;
-        for (std::size_t i = 0; i < n; ++i) {
-            const double rate0 = c[n + i];
+        for (std::size_t i = 0; i < size; ++i) {
+            const double rate0 = c[size + i];
             const TwoSum end = two_sum(step.x[i], h * rate0 + (w[i] + state.remainder[i]));
             state.rate0[i] = rate0;
             state.w[i] = w[i];
@@ -123,10 +145,10 @@ class TaylorKernel {
     static double attempt(void* door, State& state, double h, double rtol, double atol)
     {
         const int order = taylor_order(at(door).given_order, rtol);
-        const TaylorStep<n, m>& step = expand(door, state, order);
+        const TStep& step = expand(door, state, order);
         double longest = step.reach;
         if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
-        if (!go(step, state, h)) return std::numeric_limits<double>::quiet_NaN();
+        if (!go(at(door), state, h)) return std::numeric_limits<double>::quiet_NaN();
         // The last millionths are those by which a step is stretched to the end of a run.
         return h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
     }
@@ -135,38 +157,41 @@ class TaylorKernel {
     {
         const int order = at(door).step.asked;  // that of the run, where it has begun
         const int given = at(door).given_order;
-        return go(expand(door, state, given ? given : order ? order : most_taylor_order), state, h);
+        expand(door, state, given ? given : order ? order : most_taylor_order);
+        return go(at(door), state, h);
     }
 
     static void depart(void* door, State& state, double s, C& w, C& rate)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        Array w_own, rate_own;
-        evaluate_departure<true>(step.coefficients.data(), step.order, s, w_own, rate_own);
-        for (std::size_t i = 0; i < n; ++i) {
-            w[i] = w_own[i];
-            rate[i] = rate_own[i];
+        const TStep& step = expand(door, state, at(door).step.asked);
+        auto&& room = room_of(at(door));
+        evaluate_departure<true>(step.coefficients.data(), step.order, s, room.w, room.rate);
+        const std::size_t size = step.size();
+        for (std::size_t i = 0; i < size; ++i) {
+            w[i] = room.w[i];
+            rate[i] = room.rate[i];
         }
     }
 
     static void departure(void* door, const State& state, double s, C& w)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        Array w_own, none;
-        evaluate_departure<false>(step.coefficients.data(), step.order, s, w_own, none);
-        for (std::size_t i = 0; i < n; ++i) w[i] = w_own[i];
+        const TStep& step = expand(door, state, at(door).step.asked);
+        auto&& room = room_of(at(door));
+        evaluate_departure<false>(step.coefficients.data(), step.order, s, room.w, room.rate);
+        const std::size_t size = step.size();
+        for (std::size_t i = 0; i < size; ++i) w[i] = room.w[i];
     }
 
     static SeriesTerms series(void* door, const State& state)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        return {step.coefficients.data(), step.order, n};
+        const TStep& step = expand(door, state, at(door).step.asked);
+        return {step.coefficients.data(), step.order, step.size()};
     }
 
     static SeriesTerms guard_series(void* door, const State& state)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        return {step.guards.data(), step.order, m};
+        const TStep& step = expand(door, state, at(door).step.asked);
+        return {step.guards.data(), step.order, step.guard_count()};
     }
 
     // --- crossings ---
@@ -176,25 +201,28 @@ class TaylorKernel {
     /// As `StepKernel::cross`.
     static bool cross(void* door, State& state, SeriesCrossing& crossing)
     {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
+        const TStep& step = expand(door, state, at(door).step.asked);
         const double sign = crossing.side == Side::above ? 1 : -1;
         SeriesRoot root;
-        if (!find_first_root({step.guards.data(), step.order, m}, crossing.which, sign, state.h,
-                             sign * crossing.end, crossing.from_surface, root)) {
+        if (!find_first_root({step.guards.data(), step.order, step.guard_count()}, crossing.which,
+                             sign, state.h, sign * crossing.end, crossing.from_surface, root)) {
             return false;
         }
         const Guard guard(at(door).system(), crossing.calls, crossing.which, state.mode,
                           Crossing::falling, state.backward);
         const double* const c = step.coefficients.data();
-        Array w, rate;
-        Y x;
+        const std::size_t size = step.size();
+        auto&& room = room_of(at(door));
+        Array& w = room.w;
+        Array& rate = room.rate;
+        Y& x = room.x;
         double correction = 0;
         for (int k = 0;; ++k) {
             evaluate_departure<true>(c, step.order, root.s, w, rate);
-            for (std::size_t i = 0; i < n; ++i) {
+            for (std::size_t i = 0; i < size; ++i) {
                 w[i] += state.remainder[i];
-                x[i] = step.x[i] + (root.s * c[n + i] + w[i]);
-                rate[i] += c[n + i];
+                x[own(i, x)] = step.x[i] + (root.s * c[size + i] + w[i]);
+                rate[i] += c[size + i];
             }
             // The guard itself has the last word: its series leaves out its last terms.
             correction = -guard.value(state.time(root.s), x) / root.slope;
@@ -202,11 +230,11 @@ class TaylorKernel {
             root.s += correction;
             if (k == most_corrections || !(root.s > 0 && root.s < state.h)) return false;
         }
-        const OnLine line{guard, state, x, rate, root};
+        const OnLine line{guard, state, x, rate, root, room.there};
         if (!close_in(line, correction, crossing)) return false;
         const double ahead = (crossing.root - root.s) + crossing.root_remainder;
-        for (std::size_t i = 0; i < n; ++i) {
-            state.at[i] = step.x[i] + (root.s * c[n + i] + (w[i] + ahead * rate[i]));
+        for (std::size_t i = 0; i < size; ++i) {
+            state.at[i] = step.x[i] + (root.s * c[size + i] + (w[i] + ahead * rate[i]));
         }
         return true;
     }
@@ -221,11 +249,13 @@ class TaylorKernel {
         const Y& x;
         const Array& rate;
         const SeriesRoot& near;
+        Y& there;  ///< scratch
 
         [[nodiscard]] double operator()(double s) const
         {
-            Y there;
-            for (std::size_t i = 0; i < n; ++i) there[i] = x[i] + (s - near.s) * rate[i];
+            for (std::size_t i = 0; i < rate.size(); ++i) {
+                there[own(i, there)] = x[own(i, x)] + (s - near.s) * rate[i];
+            }
             return guard.value(state.time(s), there);
         }
     };
@@ -275,7 +305,8 @@ class TaylorKernel {
     {
         state.start = state.start.after(state.in_time(state.h));
         if constexpr (is_small<C>) {
-            for (std::size_t i = 0; i < n; ++i) {
+            constexpr std::size_t size = n;
+            for (std::size_t i = 0; i < size; ++i) {
                 const TwoSum sum = two_sum(
                     state.x0[i], state.h * state.rate0[i] + (state.w[i] + state.remainder[i]));
                 state.x0[i] = sum.value;
@@ -290,12 +321,12 @@ class TaylorKernel {
     }
 
     /// Whether the guard has no event in the current step, of which `run.g1` is the end.
-    [[gnu::always_inline]] static bool is_clear(const TaylorStep<n, m>& step, const State& state,
+    [[gnu::always_inline]] static bool is_clear(const TStep& step, const State& state,
                                                 const QuietRun& run)
     {
         if (!(run.sign * run.g1 > 0) || (!run.departs && run.sign * run.g0 < 0)) return false;
         const bool from_surface = run.departs || run.sign * run.g0 <= 0;
-        const SeriesTerms terms{step.guards.data(), step.order, m};
+        const SeriesTerms terms{step.guards.data(), step.order, step.guard_count()};
         if (!series_converges(terms, 0, state.h, run.g0, run.g1)) return false;
         return series_clears(terms, 0, run.sign, state.h, 0, from_surface) ||
                series_clears_closely(terms, 0, run.sign, state.h, 0, from_surface);
@@ -314,10 +345,10 @@ class TaylorKernel {
         for (;;) {
             if (run.steps == run.most_steps) return;
             if (run.cancelled && run.cancelled->load(std::memory_order_relaxed)) return;
-            TaylorStep<n, m>& step = expand(door, state, order);
+            TStep& step = expand(door, state, order);
             double h = run.h_next;
             if constexpr (controlled) {
-                step.reach = length_of(step, state, run.rtol, run.atol);
+                step.reach = length_of(at(door), state, run.rtol, run.atol);
                 // A step that is too long even so is refused by the loop.
                 if (!(step.reach >= smallest_step(run.h_min, state.start.value))) return;
                 h = std::min(h, step.reach);
@@ -325,17 +356,17 @@ class TaylorKernel {
             const double until = state.start.until(run.end);
             if (h * (1 + 1e-6) >= (state.backward ? -until : until)) return;
             if constexpr (controlled) ++state.flow_calls;
-            if (!go(step, state, h)) {
+            if (!go(at(door), state, h)) {
                 run.why = QuietEnd::failed;
                 run.error = std::numeric_limits<double>::quiet_NaN();
                 run.h_next = h;
                 return;
             }
             const double next = controlled ? std::min(10 * h, run.h_max) : h;
-            if constexpr (m > 0) {
+            if constexpr (on_series) {
                 const Guard guard(at(door).system(), run.guard_calls, 0, state.mode,
                                   Crossing::falling, state.backward);
-                run.g1 = guard.value(state.time(h), loaded(state.x1));
+                run.g1 = guard.value(state.time(h), loaded(at(door), state.x1));
                 if (!is_clear(step, state, run)) {
                     run.why = QuietEnd::doubt;
                     run.h_next = next;
@@ -351,14 +382,19 @@ class TaylorKernel {
         }
     }
 
-    [[nodiscard, gnu::always_inline]] static decltype(auto) loaded(const C& x)
+    [[nodiscard, gnu::always_inline]] static decltype(auto) loaded([[maybe_unused]] D& of,
+                                                                   const C& x)
     {
         if constexpr (std::is_same_v<Y, C>) {
             return (x);
-        } else {
+        } else if constexpr (n > 0) {
             Y out;
-            for (std::size_t i = 0; i < n; ++i) out[i] = x[i];
+            for (std::size_t i = 0; i < n; ++i) out[own(i, out)] = x[i];
             return out;
+        } else {
+            Y& out = of.room.x;
+            for (std::size_t i = 0; i < x.size(); ++i) out[own(i, out)] = x[i];
+            return (out);
         }
     }
 
@@ -380,7 +416,7 @@ class TaylorKernel {
 
 public:
     /// Whether guards have series.
-    static constexpr bool on_series = m > 0;
+    static constexpr bool on_series = D::on_series;
 
     template <bool controlled>
     [[nodiscard]] static constexpr QuietKernel<C> quiet() noexcept
@@ -400,7 +436,7 @@ public:
         kernel.depart = &depart;
         kernel.departure = &departure;
         kernel.series = &series;
-        if constexpr (m > 0) {
+        if constexpr (on_series) {
             kernel.guard_series = &guard_series;
             kernel.cross = &cross;
         }
