@@ -64,6 +64,38 @@ LazyTape::LazyTape(std::size_t states, const Recording& as_called, std::vector<i
     inverses_.assign(tape_.ops_count, 0);
 }
 
+/// The operand that an operation only repeats, or -1. One that is always zero becomes a constant;
+/// derivatives by dual numbers are full of both.
+int LazyTape::repeated(TapeOp& op, double& constant) const
+{
+    const auto is_zero = [&](int i) {
+        const auto at = static_cast<std::size_t>(i);
+        return tape_.ops[at].op == TaylorOp::constant && constants_[at] == 0;
+    };
+    bool vanishes = false;
+    switch (op.op) {
+        case TaylorOp::sum: return is_zero(op.a) ? op.b : is_zero(op.b) ? op.a : -1;
+        case TaylorOp::difference: return is_zero(op.b) ? op.a : -1;
+        case TaylorOp::plus_constant:
+        case TaylorOp::minus_constant: return constant == 0 ? op.a : -1;
+        case TaylorOp::times_constant:
+        case TaylorOp::over_constant:
+            if (constant == 1) return op.a;
+            vanishes = constant == 0 || is_zero(op.a);
+            break;
+        case TaylorOp::product: vanishes = is_zero(op.a) || is_zero(op.b); break;
+        case TaylorOp::negative:
+        case TaylorOp::square:
+        case TaylorOp::quotient: vanishes = is_zero(op.a); break;
+        default: break;
+    }
+    if (vanishes) {
+        op = {.op = TaylorOp::constant};
+        constant = 0;
+    }
+    return -1;
+}
+
 void LazyTape::simplify(const Recording& recording)
 {
     std::vector<int> place;
@@ -82,6 +114,10 @@ void LazyTape::simplify(const Recording& recording)
         if (has_constant(op.op)) {
             constant = op.op == TaylorOp::over_constant ? 1 / recorded.value : recorded.value;
             finite_ = finite_ && std::isfinite(constant);
+        }
+        if (const int same = repeated(op, constant); same >= 0) {
+            place.push_back(same);
+            continue;
         }
         const int next = static_cast<int>(tape_.ops.size());
         int at = next;

@@ -52,6 +52,7 @@ private:
     };
 
     void simplify(const Recording& recording);
+    [[nodiscard]] int repeated(TapeOp& op, double& constant) const;
     void add_partners();
     void find_slopes();
     void start();

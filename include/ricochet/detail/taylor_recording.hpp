@@ -22,6 +22,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 
@@ -455,10 +456,7 @@ template <class System, class Xs>
 
 /// Whether guards take any scalar, in states Xs of it.
 template <class System, class Xs>
-concept ScalarGuardsOn =
-    std::is_same_v<Recorded, decltype(scalar_guard<System, Xs>(
-                                 std::declval<const System&>(), std::size_t{}, Mode{},
-                                 std::declval<const Recorded&>(), std::declval<const Xs&>()))>;
+concept ScalarGuardsOn = GuardReturns<System, Recorded, Xs, Recorded>;
 
 /// Whether all guards take any scalar, and there is a constant number of them.
 template <class System, std::size_t n>
