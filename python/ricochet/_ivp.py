@@ -108,7 +108,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     unchanged. What differs:
 
     - ``method``: ``'RK45'`` (Dormand and Prince, as SciPy's) or ``'DOP853'``, for which a method
-      of order 8 by Fehlberg stands in; for ready systems also ``'Taylor'``. There are no others.
+      of order 8 by Fehlberg stands in; for ready systems and formulas also ``'Taylor'``. There
+      are no others.
     - ``fun`` may also be a `System`, whose guards then are the events.
     - An event may have, besides ``terminal`` (also a number of events) and ``direction``:
 

@@ -1,6 +1,7 @@
 // Taylor series of flows whose operations the compiler cannot know.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -289,6 +290,37 @@ TEST(LazySeries, PolynomialsInTimeAreKnownAsSuch)
     for (const auto& event : run.events) {
         EXPECT_NEAR(event.t, t, 2e-14);
         t += flight *= 0.9;
+    }
+}
+
+/// As many guards as there are walls.
+struct Walled {
+    using State = Vector;
+    Vector walls;
+    [[nodiscard]] std::size_t guard_count() const { return walls.size(); }
+    template <class S>
+    void flow(const S& /*t*/, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+    template <class S>
+    [[nodiscard]] S guard(std::size_t which, const S& /*t*/, const std::vector<S>& x) const
+    {
+        return walls[which] - x[0];
+    }
+};
+
+TEST(LazySeries, GuardsMayBeAsManyAsARunHasOrNone)
+{
+    const Options options{.t_end = 2 * pi, .rtol = 1e-14, .atol = 1e-14};
+    for (const Vector& walls : {Vector{}, Vector{0.5}, Vector{0.5, 0.9, 2}}) {
+        const auto run = integrate(Walled{walls}, Vector{0, 1}, options, ByTaylor{});
+        EXPECT_NEAR(run.x[1], 1, 1e-13);
+        ASSERT_EQ(run.events.size(), std::min(walls.size(), std::size_t{2}));
+        for (std::size_t i = 0; i < run.events.size(); ++i) {
+            EXPECT_NEAR(run.events[i].t, std::asin(walls[i]), 1e-14);
+        }
     }
 }
 

@@ -332,6 +332,23 @@ class TaylorKernel {
                series_clears_closely(terms, 0, run.sign, state.h, 0, from_surface);
     }
 
+    /// Whether the guard, if there is one, has no event in the current step, which then is the last
+    /// one that it has seen.
+    [[gnu::always_inline]] static bool passes(D& of, State& state, QuietRun& run)
+    {
+        if constexpr (on_series) {
+            if (of.step.guard_count() == 0) return true;
+            const Guard guard(of.system(), run.guard_calls, 0, state.mode, Crossing::falling,
+                              state.backward);
+            run.g1 = guard.value(state.time(state.h), loaded(of, state.x1));
+            if (!is_clear(of.step, state, run)) return false;
+            run.g0 = run.g1;
+            run.rate0 = std::numeric_limits<double>::quiet_NaN();
+            run.departs = false;
+        }
+        return true;
+    }
+
     template <bool controlled>
     static void take_quiet_steps(void* door, State& state, QuietRun& run)
     {
@@ -363,18 +380,10 @@ class TaylorKernel {
                 return;
             }
             const double next = controlled ? std::min(10 * h, run.h_max) : h;
-            if constexpr (on_series) {
-                const Guard guard(at(door).system(), run.guard_calls, 0, state.mode,
-                                  Crossing::falling, state.backward);
-                run.g1 = guard.value(state.time(h), loaded(at(door), state.x1));
-                if (!is_clear(step, state, run)) {
-                    run.why = QuietEnd::doubt;
-                    run.h_next = next;
-                    return;
-                }
-                run.g0 = run.g1;
-                run.rate0 = std::numeric_limits<double>::quiet_NaN();
-                run.departs = false;
+            if (!passes(at(door), state, run)) {
+                run.why = QuietEnd::doubt;
+                run.h_next = next;
+                return;
             }
             accept(state);
             ++run.steps;

@@ -75,7 +75,7 @@ public:
         throw std::logic_error("a door that is not opened for steps by series");
     }
 
-    [[nodiscard]] SignalWatch& watch() noexcept { return watch_; }
+    [[nodiscard]] virtual SignalWatch& watch() noexcept { return watch_; }
 
 protected:
     SignalWatch watch_;
@@ -98,7 +98,8 @@ public:
     {
         throw std::invalid_argument(
             "method: found 'taylor', which needs the flow as a formula, for functions of Python; "
-            "expected a ready system, or another method, such as 'fehlberg78'");
+            "expected a ready system, a system with formula=n, or another method, such as "
+            "'fehlberg78'");
     }
 
     /// The whole run by a loop made for this system, if there is one for such a request. Does not
