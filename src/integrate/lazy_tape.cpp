@@ -192,6 +192,60 @@ void LazyTape::find_slopes()
     }
 }
 
+[[gnu::always_inline]] inline double LazyTape::coefficient(std::size_t i, int k) const
+{
+    const TapeOp& op = tape_.ops[i];
+    const double* const a = series(std::max(op.a, 0));
+    const double* const b = series(std::max(op.b, 0));
+    const double* const own = series(static_cast<int>(i));
+    const int da = degree(op.a), db = degree(op.b);
+    const int upto_a = std::min(da, k), upto_b = std::min(db, k);
+    switch (op.op) {
+        case TaylorOp::input:
+        case TaylorOp::constant: return 0;
+        case TaylorOp::sum: return a[k] + b[k];
+        case TaylorOp::difference: return a[k] - b[k];
+        case TaylorOp::negative:
+        case TaylorOp::constant_minus: return -a[k];
+        case TaylorOp::plus_constant:
+        case TaylorOp::minus_constant: return a[k];
+        case TaylorOp::times_constant:
+        case TaylorOp::over_constant: return constants_[i] * a[k];
+        case TaylorOp::product: return convolve(k, std::max(0, k - db), upto_a, a, b);
+        case TaylorOp::square: return square(k, std::max(0, k - da), a);
+        case TaylorOp::quotient: return (a[k] - convolve(k, 1, upto_b, b, own)) * inverses_[i];
+        case TaylorOp::constant_over: return convolve(k, 1, upto_a, a, own) * inverses_[i];
+        case TaylorOp::square_root: return (a[k] - square(k, 1, own)) * inverses_[i];
+        case TaylorOp::power: {
+            double sum = 0;
+            const double each = (op.exponent + 1) / k;
+            for (int j = 1; j <= upto_a; ++j) sum += (each * j - 1) * a[j] * own[k - j];
+            return sum * inverses_[i];
+        }
+        case TaylorOp::exponential:
+        case TaylorOp::sine:
+        case TaylorOp::cosine:
+        case TaylorOp::hyperbolic_sine:
+        case TaylorOp::hyperbolic_cosine:
+        case TaylorOp::tangent:
+        case TaylorOp::hyperbolic_tangent: return coefficient_of_function(i, k);
+        case TaylorOp::logarithm:
+        case TaylorOp::arc_sine:
+        case TaylorOp::arc_cosine:
+        case TaylorOp::arc_tangent:
+        case TaylorOp::angle: return coefficient_of_inverse(i, k);
+    }
+    return 0;
+}
+
+[[gnu::always_inline]] inline void LazyTape::compute_at(std::size_t i, int k)
+{
+    double* const own = series(static_cast<int>(i));
+    // Coefficients beyond a degree are zeros, and stay so.
+    if (i > tape_.states && k <= tape_.degree[i]) own[k] = coefficient(i, k);
+    if (has_slope_[i]) slopes_[i * width + static_cast<std::size_t>(k)] = k * own[k];
+}
+
 int LazyTape::compute(double t, const double* x, int order, double* out, double* guards)
 {
     if (is_polynomial()) order = degree_;
@@ -234,14 +288,6 @@ void LazyTape::keep_guards(int k, double* guards) const
     }
 }
 
-void LazyTape::compute_at(std::size_t i, int k)
-{
-    double* const own = series(static_cast<int>(i));
-    // Coefficients beyond a degree are zeros, and stay so.
-    if (i > tape_.states && k <= tape_.degree[i]) own[k] = coefficient(i, k);
-    if (has_slope_[i]) slopes_[i * width + static_cast<std::size_t>(k)] = k * own[k];
-}
-
 /// Coefficient 0, and what later ones are multiplied by.
 double LazyTape::begin(std::size_t i)
 {
@@ -281,52 +327,6 @@ double LazyTape::begin(std::size_t i)
         case TaylorOp::arc_cosine: inverse = 1 / b; return std::acos(a);
         case TaylorOp::arc_tangent: inverse = 1 / b; return std::atan(a);
         case TaylorOp::angle: inverse = 1 / series(op.c)[0]; return std::atan2(a, b);
-    }
-    return 0;
-}
-
-double LazyTape::coefficient(std::size_t i, int k) const
-{
-    const TapeOp& op = tape_.ops[i];
-    const double* const a = series(std::max(op.a, 0));
-    const double* const b = series(std::max(op.b, 0));
-    const double* const own = series(static_cast<int>(i));
-    const int da = degree(op.a), db = degree(op.b);
-    const int upto_a = std::min(da, k), upto_b = std::min(db, k);
-    switch (op.op) {
-        case TaylorOp::input:
-        case TaylorOp::constant: return 0;
-        case TaylorOp::sum: return a[k] + b[k];
-        case TaylorOp::difference: return a[k] - b[k];
-        case TaylorOp::negative:
-        case TaylorOp::constant_minus: return -a[k];
-        case TaylorOp::plus_constant:
-        case TaylorOp::minus_constant: return a[k];
-        case TaylorOp::times_constant:
-        case TaylorOp::over_constant: return constants_[i] * a[k];
-        case TaylorOp::product: return convolve(k, std::max(0, k - db), upto_a, a, b);
-        case TaylorOp::square: return square(k, std::max(0, k - da), a);
-        case TaylorOp::quotient: return (a[k] - convolve(k, 1, upto_b, b, own)) * inverses_[i];
-        case TaylorOp::constant_over: return convolve(k, 1, upto_a, a, own) * inverses_[i];
-        case TaylorOp::square_root: return (a[k] - square(k, 1, own)) * inverses_[i];
-        case TaylorOp::power: {
-            double sum = 0;
-            const double each = (op.exponent + 1) / k;
-            for (int j = 1; j <= upto_a; ++j) sum += (each * j - 1) * a[j] * own[k - j];
-            return sum * inverses_[i];
-        }
-        case TaylorOp::exponential:
-        case TaylorOp::sine:
-        case TaylorOp::cosine:
-        case TaylorOp::hyperbolic_sine:
-        case TaylorOp::hyperbolic_cosine:
-        case TaylorOp::tangent:
-        case TaylorOp::hyperbolic_tangent: return coefficient_of_function(i, k);
-        case TaylorOp::logarithm:
-        case TaylorOp::arc_sine:
-        case TaylorOp::arc_cosine:
-        case TaylorOp::arc_tangent:
-        case TaylorOp::angle: return coefficient_of_inverse(i, k);
     }
     return 0;
 }
