@@ -85,7 +85,7 @@ public:
     constexpr int push_back(const T& item)
     {
         if (size_ == capacity_) {
-            capacity_ = capacity_ == 0 ? 64 : 2 * capacity_;
+            capacity_ = capacity_ == 0 ? 16 : 2 * capacity_;
             T* const items = new T[static_cast<std::size_t>(capacity_)]{};
             for (int i = 0; i < size_; ++i) items[i] = items_[i];
             delete[] items_;
