@@ -196,8 +196,10 @@ typedef enum rc_method {
     RC_DOPRI5 = 0,     /**< order 5, error estimate, dense output */
     RC_FEHLBERG78 = 1, /**< order 8, error estimate: the cheapest for small errors */
     RC_CASH_KARP54 = 2,
-    RC_RK4 = 3,  /**< fixed steps only */
-    RC_EULER = 4 /**< fixed steps only */
+    RC_RK4 = 3,   /**< fixed steps only */
+    RC_EULER = 4, /**< fixed steps only */
+    RC_TAYLOR = 5 /**< power series, which need the flow as a formula: refused for callbacks, and
+                     offered by C++ (ricochet/taylor.hpp) and by ready systems in Python */
 } rc_method;
 
 /** How it is decided whether a step holds events. */

@@ -16,32 +16,24 @@
 //
 // It may use + - * / sqrt cbrt pow exp log sin cos tan asin acos atan atan2 sinh cosh tanh
 // hypot, and
-// must be the same operations whatever the values are: no comparisons, no kinks. A system with
+// must be the same operations whatever the state is: no comparisons, no kinks. A system with
 // modes takes the mode first, and its `mode_count` is a constant. The system has a constexpr
 // default constructor; the parameters of the object are those of the run.
+//
+// Where the compiler cannot know the operations they are recorded at the start of a run, and done
+// one by one, in four to five times the time: for states in vectors (const std::vector<S>& x), a
+// flow that is not constexpr, a system that cannot be constructed by default, parameters that
+// decide what is computed.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <stdexcept>
-#include <string>
-#include <type_traits>
 
-#include "ricochet/detail/guard_view.hpp"
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/core.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detail/quiet_run.hpp"
-#include "ricochet/detail/series_guard.hpp"
-#include "ricochet/detail/series_root.hpp"
-#include "ricochet/detail/taylor_series.hpp"
-#include "ricochet/detail/taylor_step.hpp"
-#include "ricochet/detail/taylor_tape.hpp"
-#include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/detail/stepper_door.hpp"
+#include "ricochet/detail/taylor_door.hpp"
+#include "ricochet/detail/taylor_kernel.hpp"
 
 namespace ricochet {
 
@@ -61,525 +53,65 @@ struct Taylor {
     };
 };
 
+/// Whether the compiler unrolls the series of the flow, as long as parameters only change its
+/// constants.
+template <class System, class X = typename System::State>
+concept UnrolledSeries = detail::ConstantFlow < System,
+        detail::fixed_size<X>()
+> ;
+
 namespace detail {
 
-[[noreturn]] inline void throw_structure_differs(const std::string& name)
-{
-    throw std::invalid_argument(
-        name +
-        ": the operations of the flow differ from those of an object that is constructed by "
-        "default; write them so that they do not depend on parameters, or use another "
-        "method, such as Fehlberg78");
-}
-[[noreturn]] inline void throw_constant_not_finite(const std::string& name)
-{
-    throw std::invalid_argument(name + ": a constant of the flow is not finite");
-}
-[[noreturn]] inline void throw_bad_taylor_order(int order)
-{
-    throw std::invalid_argument("Taylor: order must be 12, 16 or 20, or 0, got " +
-                                std::to_string(order));
-}
-
-/// How many tapes a flow has: one for each mode.
-template <class System, std::size_t n>
-[[nodiscard]] constexpr std::size_t tape_count() noexcept
-{
-    if constexpr (ModedScalarFlow<System, n>) {
-        static_assert(
-            requires { std::integral_constant<std::size_t, System::mode_count>{}; },
-            "ricochet: found a flow with modes for Taylor, and no constant number of them; "
-            "expected static constexpr std::size_t mode_count");
-        return System::mode_count;
-    } else {
-        return 1;
-    }
-}
-
-/// A door with the constants of the flow and the current step.
 template <class System, class X>
-struct StepperDoor<System, X, Taylor> : Door<System, X> {
-    static constexpr std::size_t n = fixed_size<X>();
-    /// Guards with series of their own.
-    static constexpr std::size_t m = series_guards<System, n>();
-    static constexpr bool takes_series = [] {
-        static_assert(n > 0,
-                      "ricochet: found a state sized at run time for Taylor; expected "
-                      "std::array");
-        constexpr bool callable = ScalarFlow<System, n> || ModedScalarFlow<System, n>;
-        static_assert(
-            callable,
-            "ricochet: found no flow that takes Taylor series; expected template <class S> "
-            "constexpr void flow([Mode,] const S& t, const std::array<S, n>& x, "
-            "std::array<S, n>& dxdt) const");
-        if constexpr (callable) {
-            static_assert(std::is_default_constructible_v<System>,
-                          "ricochet: found a system without a default constructor for Taylor; "
-                          "expected a constexpr one, from which the operations of the flow are "
-                          "read");
-            static_assert(RecordableFlow<System, n>,
-                          "ricochet: found a flow that no constant expression can evaluate; "
-                          "expected constexpr on the flow template, on what it calls and on the "
-                          "default constructor of the system");
-            return RecordableFlow<System, n>;
-        }
-        return callable;
-    }();
+struct StepperDoor<System, X, Taylor> : TaylorDoor<System, X, fixed_size<X>()> {
+    using TaylorDoor<System, X, fixed_size<X>()>::TaylorDoor;
 
-    StepperDoor(const System& system, const X& like) : Door<System, X>(system, like)
-    {
-        if constexpr (takes_series) {
-            read_all(system, std::make_index_sequence<tape_count<System, n>()>{});
-        }
-    }
-
-    /// @throws std::invalid_argument if there is no such order
-    void prepare(const Taylor& method)
-    {
-        const int order = method.order;
-        if (order != 0 && order != 12 && order != 16 && order != 20) throw_bad_taylor_order(order);
-        given_order = order;
-    }
-
-    /// The coefficients up to `order`, or all of them where these are fewer; returns how many.
-    int compute(Mode mode, double t, const double* x, int order, double* out, double* guards)
-    {
-        int computed = order;
-        if constexpr (takes_series) {
-            dispatch(mode, t, x, computed, out, guards,
-                     std::make_index_sequence<tape_count<System, n>()>{});
-        }
-        return computed;
-    }
-
-    int given_order = 0;
-    TaylorStep<n, m> step;
-
-private:
-    static constexpr std::size_t most_constants = [] {
-        if constexpr (!takes_series) {
-            return std::size_t{0};
-        } else {
-            return []<std::size_t... mode>(std::index_sequence<mode...>)
-            {
-                return std::max({std::size_t{0},
-                                 taylor_tape<System, n, static_cast<Mode>(mode)>.ops.size()...});
-            }
-            (std::make_index_sequence<tape_count<System, n>()>{});
-        }
-    }();
-
-    template <std::size_t... mode>
-    void read_all(const System& system, std::index_sequence<mode...>)
-    {
-        (read<mode>(system), ...);
-    }
-    template <std::size_t mode>
-    void read(const System& system)
-    {
-        const auto match =
-            read_constants<System, n, static_cast<Mode>(mode)>(system, constants_[mode]);
-        if (match == TapeMatch::differs) throw_structure_differs(name_of_system(system));
-        if (match == TapeMatch::not_finite) throw_constant_not_finite(name_of_system(system));
-    }
-
-    template <std::size_t... mode>
-    void dispatch(Mode at, double t, const double* x, int& order, double* out, double* guards,
-                  std::index_sequence<mode...>)
-    {
-        constexpr bool one = sizeof...(mode) == 1;
-        static_cast<void>((... || ((one || at == static_cast<Mode>(mode)) &&
-                                   compute_in<static_cast<Mode>(mode)>(t, x, order, out, guards))));
-    }
-    template <Mode mode>
-    bool compute_in(double t, const double* x, int& order, double* out, double* guards)
-    {
-        constexpr int degree = polynomial_order(taylor_tape<System, n, mode>);
-        constexpr bool is_polynomial = degree <= least_taylor_order;
-        if (is_polynomial) order = degree;
-        using Series =
-            TaylorSeries<taylor_tape<System, n, mode>, is_polynomial ? degree : most_taylor_order>;
-        Series::compute(constants_[static_cast<std::size_t>(mode)].data(), t, x, order, out,
-                        guards);
-        return true;
-    }
-
-    std::array<std::array<double, most_constants>, tape_count<System, n>()> constants_{};
+    void prepare(const Taylor& method) { this->prepare_order(method.order); }
+};
+template <class System, class X>
+class KernelOf<System, X, Taylor> : public TaylorKernel<System, X, fixed_size<X>()> {
 };
 
-template <class System, class X>
-class KernelOf<System, X, Taylor> {
-    using C = CoreState<X>;
-    using State = StepState<C>;
-    static constexpr std::size_t n = fixed_size<X>();
-    static constexpr std::size_t m = series_guards<System, n>();
-    using Array = std::array<double, n>;
-    using D = StepperDoor<System, X, Taylor>;
+/// Taylor's method for states X of n components whose type does not fix n, where the flow takes
+/// arrays of n: for programs that keep states of all systems in one type.
+template <std::size_t n>
+struct TaylorOf {
+    static constexpr std::size_t components = n;
+    int order = 0;
 
-    [[nodiscard]] static D& at(void* door) noexcept
-    {
-        return *static_cast<D*>(static_cast<Door<System, X>*>(door));
-    }
-
-    /// The coefficients of the step from the current start, if they are not those already.
-    [[gnu::always_inline]] static TaylorStep<n, m>& expand(void* door, const State& state,
-                                                           int order)
-    {
-        D& of = at(door);
-        TaylorStep<n, m>& step = of.step;
-        bool same = step.asked >= order && step.order > 0 && step.mode == state.mode &&
-                    step.backward == state.backward && step.start.value == state.start.value &&
-                    step.start.remainder == state.start.remainder;
-        for (std::size_t i = 0; i < n; ++i) same = same && step.x[i] == state.x0[i];
-        if (!same) expand_anew(of, state, order);
-        return step;
-    }
-
-    [[gnu::noinline]] static void expand_anew(D& of, const State& state, int order)
-    {
-        TaylorStep<n, m>& step = of.step;
-        step.order = 0;  // until all is known, whatever the flow throws
-        for (std::size_t i = 0; i < n; ++i) step.x[i] = state.x0[i];
-        double* const c = step.coefficients.data();
-        double* const g = step.guards.data();
-        const int computed = of.compute(state.mode, state.start.value, step.x.data(), order, c, g);
-        if (state.backward) {
-            for (std::size_t k = 1; k <= static_cast<std::size_t>(computed); k += 2) {
-                for (std::size_t i = 0; i < n; ++i) c[k * n + i] = -c[k * n + i];
-                for (std::size_t i = 0; i < m; ++i) g[k * m + i] = -g[k * m + i];
-            }
-        }
-        step.start = state.start;
-        step.mode = state.mode;
-        step.backward = state.backward;
-        step.order = computed;
-        step.asked = order;
-        step.reach = std::numeric_limits<double>::quiet_NaN();
-    }
-
-    static double reach(void* door, State& state, double rtol, double atol)
-    {
-        const int order = taylor_order(at(door).given_order, rtol);
-        TaylorStep<n, m>& step = expand(door, state, order);
-        const double* const c = step.coefficients.data();
-        ++state.flow_calls;
-        for (std::size_t i = 0; i < n; ++i) state.rate0[i] = c[n + i];
-        step.reach = find_reach<n>(state.x0, state.component_atol, c, step.order, rtol, atol);
-        return step.reach;
-    }
-
-    /// False where the end is not finite.
-    [[gnu::always_inline]] static bool go(const TaylorStep<n, m>& step, State& state, double h)
-    {
-        const double* const c = step.coefficients.data();
-        state.h = h;
-        state.has_middle = false;
-        state.asked_alone = 0;
-        Array w, rate;
-        evaluate_departure<true>(c, step.order, h, w, rate);
-        double sum = 0;
-        for (std::size_t i = 0; i < n; ++i) {
-            const double rate0 = c[n + i];
-            const TwoSum end = two_sum(step.x[i], h * rate0 + (w[i] + state.remainder[i]));
-            state.rate0[i] = rate0;
-            state.w[i] = w[i];
-            state.w_rate1[i] = rate[i];
-            state.x1[i] = end.value;
-            state.rate1[i] = rate0 + rate[i];
-            if constexpr (!is_small<C>) state.large.remainder1[i] = end.remainder;
-            sum += 0 * (state.x1[i] + state.rate1[i]);
-        }
-        return sum == 0;
-    }
-
-    static double attempt(void* door, State& state, double h, double rtol, double atol)
-    {
-        const int order = taylor_order(at(door).given_order, rtol);
-        const TaylorStep<n, m>& step = expand(door, state, order);
-        double longest = step.reach;
-        if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
-        if (!go(step, state, h)) return std::numeric_limits<double>::quiet_NaN();
-        // The last millionths are those by which a step is stretched to the end of a run.
-        return h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
-    }
-
-    static bool take(void* door, State& state, double h)
-    {
-        const int order = at(door).step.asked;  // that of the run, where it has begun
-        const int given = at(door).given_order;
-        return go(expand(door, state, given ? given : order ? order : most_taylor_order), state, h);
-    }
-
-    static void depart(void* door, State& state, double s, C& w, C& rate)
-    {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        Array w_own, rate_own;
-        evaluate_departure<true>(step.coefficients.data(), step.order, s, w_own, rate_own);
-        for (std::size_t i = 0; i < n; ++i) {
-            w[i] = w_own[i];
-            rate[i] = rate_own[i];
-        }
-    }
-
-    static void departure(void* door, const State& state, double s, C& w)
-    {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        Array w_own, none;
-        evaluate_departure<false>(step.coefficients.data(), step.order, s, w_own, none);
-        for (std::size_t i = 0; i < n; ++i) w[i] = w_own[i];
-    }
-
-    static SeriesTerms series(void* door, const State& state)
-    {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        return {step.coefficients.data(), step.order, n};
-    }
-
-    static SeriesTerms guard_series(void* door, const State& state)
-    {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        return {step.guards.data(), step.order, m};
-    }
-
-    // --- crossings ---
-
-    using Guard = GuardView<System, X>;
-
-    /// As `StepKernel::cross`.
-    static bool cross(void* door, State& state, SeriesCrossing& crossing)
-    {
-        const TaylorStep<n, m>& step = expand(door, state, at(door).step.asked);
-        const double sign = crossing.side == Side::above ? 1 : -1;
-        SeriesRoot root;
-        if (!find_first_root({step.guards.data(), step.order, m}, crossing.which, sign, state.h,
-                             sign * crossing.end, crossing.from_surface, root)) {
-            return false;
-        }
-        const Guard guard(at(door).system(), crossing.calls, crossing.which, state.mode,
-                          Crossing::falling, state.backward);
-        const double* const c = step.coefficients.data();
-        Array w, rate;
-        X x;
-        double correction = 0;
-        for (int k = 0;; ++k) {
-            evaluate_departure<true>(c, step.order, root.s, w, rate);
-            for (std::size_t i = 0; i < n; ++i) {
-                w[i] += state.remainder[i];
-                x[i] = step.x[i] + (root.s * c[n + i] + w[i]);
-                rate[i] += c[n + i];
-            }
-            // The guard itself has the last word: its series leaves out its last terms.
-            correction = -guard.value(state.time(root.s), x) / root.slope;
-            if (std::fabs(correction) <= straight_part * root.s) break;
-            root.s += correction;
-            if (k == most_corrections || !(root.s > 0 && root.s < state.h)) return false;
-        }
-        const OnLine line{guard, state, x, rate, root};
-        if (!close_in(line, correction, crossing)) return false;
-        const double ahead = (crossing.root - root.s) + crossing.root_remainder;
-        for (std::size_t i = 0; i < n; ++i) {
-            state.at[i] = step.x[i] + (root.s * c[n + i] + (w[i] + ahead * rate[i]));
-        }
-        return true;
-    }
-    /// Of a root: its square is rounding, so that the motion is straight for as long.
-    static constexpr double straight_part = 0x1p-26;
-    static constexpr int most_corrections = 3;
-
-    /// The guard near a root, along the flow there.
-    struct OnLine {
-        const Guard& guard;
-        const State& state;
-        const X& x;
-        const Array& rate;
-        const SeriesRoot& near;
-
-        [[nodiscard]] double operator()(double s) const
-        {
-            X there;
-            for (std::size_t i = 0; i < n; ++i) there[i] = x[i] + (s - near.s) * rate[i];
-            return guard.value(state.time(s), there);
-        }
-    };
-
-    /// Brackets the root as closely as doubles lie, or as the guard's rounding allows.
-    static bool close_in(const OnLine& value, double correction, SeriesCrossing& crossing)
-    {
-        const TwoSum root = two_sum(value.near.s, correction);
-        const double h = value.state.h;
-        double margin = 0.75 * finest_bracket(root.value, h);
-        double lo = root.value - margin, hi = root.value + margin;
-        double beyond = value(hi);
-        for (int k = 0; !has_left(crossing.side, beyond); ++k) {
-            if (k == most_widenings) return false;
-            lo = hi;
-            hi += margin *= 2;
-            beyond = value(hi);
-        }
-        for (int k = 0; lo < root.value && has_left(crossing.side, value(lo)); ++k) {
-            if (k == most_widenings) return false;
-            hi = lo;
-            beyond = value(hi);
-            lo -= margin *= 2;
-        }
-        if (!(lo > 0 && hi < h)) return false;
-        const TwoSum at = root.value < lo ? TwoSum{lo, 0} : root.value > hi ? TwoSum{hi, 0} : root;
-        crossing.lo = lo;
-        crossing.hi = hi;
-        crossing.root = at.value;
-        crossing.root_remainder = at.remainder;
-        crossing.slope = value.near.slope;
-        crossing.error = std::max(std::fabs(beyond / value.near.slope), hi - lo);
-        return true;
-    }
-    static constexpr int most_widenings = 8;
-
-    // --- quiet runs ---
-
-    [[nodiscard]] static double smallest_step(double h_min, double t) noexcept
-    {
-        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(t);
-        return std::max(h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
-    }
-
-    /// As `Step::accept`.
-    [[gnu::always_inline]] static void accept(State& state)
-    {
-        state.start = state.start.after(state.in_time(state.h));
-        if constexpr (is_small<C>) {
-            for (std::size_t i = 0; i < n; ++i) {
-                const TwoSum sum = two_sum(
-                    state.x0[i], state.h * state.rate0[i] + (state.w[i] + state.remainder[i]));
-                state.x0[i] = sum.value;
-                state.remainder[i] = sum.remainder;
-                state.rate0[i] = state.rate1[i];
-            }
-        } else {
-            std::swap(state.x0, state.x1);
-            std::swap(state.remainder, state.large.remainder1);
-            std::swap(state.rate0, state.rate1);
-        }
-    }
-
-    /// Whether the guard has no event in the current step, of which `run.g1` is the end.
-    [[gnu::always_inline]] static bool is_clear(const TaylorStep<n, m>& step, const State& state,
-                                                const QuietRun& run)
-    {
-        if (!(run.sign * run.g1 > 0) || (!run.departs && run.sign * run.g0 < 0)) return false;
-        const bool from_surface = run.departs || run.sign * run.g0 <= 0;
-        const SeriesTerms terms{step.guards.data(), step.order, m};
-        if (!series_converges(terms, 0, state.h, run.g0, run.g1)) return false;
-        return series_clears(terms, 0, run.sign, state.h, 0, from_surface) ||
-               series_clears_closely(terms, 0, run.sign, state.h, 0, from_surface);
-    }
-
-    template <bool controlled>
-    static void take_quiet_steps(void* door, State& state, QuietRun& run)
-    {
-        const int given = at(door).given_order;
-        const int order = controlled                ? taylor_order(given, run.rtol)
-                          : given                   ? given
-                          : at(door).step.asked > 0 ? at(door).step.asked
-                                                    : most_taylor_order;
-        run.why = QuietEnd::due;
-        run.repeated = false;
-        for (;;) {
-            if (run.steps == run.most_steps) return;
-            if (run.cancelled && run.cancelled->load(std::memory_order_relaxed)) return;
-            TaylorStep<n, m>& step = expand(door, state, order);
-            double h = run.h_next;
-            if constexpr (controlled) {
-                step.reach = find_reach<n>(state.x0, state.component_atol, step.coefficients.data(),
-                                           step.order, run.rtol, run.atol);
-                // A step that is too long even so is refused by the loop.
-                if (!(step.reach >= smallest_step(run.h_min, state.start.value))) return;
-                h = std::min(h, step.reach);
-            }
-            const double until = state.start.until(run.end);
-            if (h * (1 + 1e-6) >= (state.backward ? -until : until)) return;
-            if constexpr (controlled) ++state.flow_calls;
-            if (!go(step, state, h)) {
-                run.why = QuietEnd::failed;
-                run.error = std::numeric_limits<double>::quiet_NaN();
-                run.h_next = h;
-                return;
-            }
-            const double next = controlled ? std::min(10 * h, run.h_max) : h;
-            if constexpr (m > 0) {
-                const Guard guard(at(door).system(), run.guard_calls, 0, state.mode,
-                                  Crossing::falling, state.backward);
-                run.g1 = guard.value(state.time(h), loaded(state.x1));
-                if (!is_clear(step, state, run)) {
-                    run.why = QuietEnd::doubt;
-                    run.h_next = next;
-                    return;
-                }
-                run.g0 = run.g1;
-                run.rate0 = std::numeric_limits<double>::quiet_NaN();
-                run.departs = false;
-            }
-            accept(state);
-            ++run.steps;
-            run.h_next = next;
-        }
-    }
-
-    [[nodiscard, gnu::always_inline]] static decltype(auto) loaded(const C& x)
-    {
-        if constexpr (std::is_same_v<X, C>) {
-            return (x);
-        } else {
-            X out;
-            for (std::size_t i = 0; i < n; ++i) out[i] = x[i];
-            return out;
-        }
-    }
-
-    template <bool controlled>
-    static void run_quietly(void* door, State& state, QuietRun& run)
-    {
-        const Instant start = state.start;
-        const C x0 = state.x0, remainder = state.remainder, rate0 = state.rate0;
-        try {
-            take_quiet_steps<controlled>(door, state, run);
-        } catch (...) {
-            state.start = start;
-            state.x0 = x0;
-            state.remainder = remainder;
-            state.rate0 = rate0;
-            throw;
-        }
-    }
-
-public:
-    /// Whether guards have series.
-    static constexpr bool on_series = m > 0;
-
-    template <bool controlled>
-    [[nodiscard]] static constexpr QuietKernel<C> quiet() noexcept
-    {
-        return &run_quietly<controlled>;
-    }
-
-    [[nodiscard]] static constexpr StepKernel<C> make()
-    {
-        StepKernel<C> kernel;
-        kernel.order = most_taylor_order;
-        kernel.error_order = most_taylor_order - 1;
-        kernel.end_rate = true;
-        kernel.take = &take;
-        kernel.attempt = &attempt;
-        kernel.reach = &reach;
-        kernel.depart = &depart;
-        kernel.departure = &departure;
-        kernel.series = &series;
-        if constexpr (m > 0) {
-            kernel.guard_series = &guard_series;
-            kernel.cross = &cross;
-        }
-        return kernel;
-    }
+    template <class State>
+    using Stepper = Taylor::Stepper<State>;
 };
+template <class System, class X, std::size_t n>
+struct StepperDoor<System, X, TaylorOf<n>> : TaylorDoor<System, X, n> {
+    using TaylorDoor<System, X, n>::TaylorDoor;
+
+    void prepare(const TaylorOf<n>& method) { this->prepare_order(method.order); }
+};
+template <class System, class X, std::size_t n>
+class KernelOf<System, X, TaylorOf<n>> : public TaylorKernel<System, X, n> {
+};
+
+/// Lets a run whose door is a `TaylorDoor`, and whose detector is known, take its steps by power
+/// series. Quiet runs are of one guard at most, which the detector would check at every step.
+template <class System, class X, std::size_t n>
+void step_by_series(RunSetup<CoreState<X>>& setup)
+{
+    using Method = TaylorOf<n>;
+    using Kernel = KernelOf<System, X, Method>;
+    setup.kernel = &kernel_of<System, X, Method>;
+    setup.quiet_on_series = true;
+    setup.quiet = nullptr;
+    const auto& detector = setup.detector;
+    const bool proves =
+        detector.screening == Screening::extremum || detector.screening == Screening::every;
+    const bool alone = Kernel::on_series && proves && !detector.clears && !detector.puts_off &&
+                       setup.system->guard_count(setup.door) == 1;
+    if (!setup.system->guarded || alone) {
+        setup.quiet = setup.error_controlled ? Kernel::template quiet<true>()
+                                             : Kernel::template quiet<false>();
+    }
+}
 
 }  // namespace detail
 

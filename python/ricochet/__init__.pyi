@@ -112,6 +112,7 @@ class System:
     time_events: Optional[Iterable[float]]
     changes_dimension: bool
     parameters: Optional[Mapping[str, float]]
+    formula: Optional[int]
     def __init__(self, flow: Optional[Union[Callable[..., Any], Compiled]] = None,
                  guards: Optional[Sequence[Any]] = None, **members: Any) -> None: ...
 

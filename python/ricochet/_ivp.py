@@ -12,7 +12,7 @@ from ._ready import Ready
 from ._run import Kind, numbers_from, set_mode, set_tolerance, source_of, state_from
 from ._system import Guard, System
 
-_METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78"}
+_METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
 _WITHOUT = {
     "RK23": "it has no method of order 3; take 'RK45'",
     "Radau": "it has no implicit method",
@@ -108,7 +108,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     unchanged. What differs:
 
     - ``method``: ``'RK45'`` (Dormand and Prince, as SciPy's) or ``'DOP853'``, for which a method
-      of order 8 by Fehlberg stands in. There are no others.
+      of order 8 by Fehlberg stands in; for ready systems and formulas also ``'Taylor'``. There
+      are no others.
     - ``fun`` may also be a `System`, whose guards then are the events.
     - An event may have, besides ``terminal`` (also a number of events) and ``direction``:
 

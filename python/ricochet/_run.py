@@ -123,8 +123,9 @@ def integrate(system, x0, t_end, **options):
     mode
         The mode at the start; by default the first, or that of the ready system.
     method : str
-        ``"dopri5"`` (default), ``"fehlberg78"``, ``"cash-karp54"``, ``"rk4"``, ``"euler"``; the
-        last two have no error estimate and need ``fixed=True``.
+        ``"dopri5"`` (default), ``"fehlberg78"``, ``"taylor"`` (ready systems and formulas),
+        ``"cash-karp54"``, ``"rk4"``, ``"euler"``; the last two have no error estimate and need
+        ``fixed=True``.
     fixed : bool
         Steps of length ``step`` instead of error control.
     rtol, atol : float

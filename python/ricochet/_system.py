@@ -6,6 +6,7 @@ from types import MethodType
 
 from . import _ricochet
 from ._compiled import Compiled
+from ._formula import Formula
 
 
 class Guard:
@@ -135,7 +136,7 @@ def guard(value=None, **options):
 
 _KNOWN = ("flow", "guard", "reset", "rest", "guard_rate", "unilateral", "direction", "modes",
           "name", "guards", "guard_values", "reset_set", "time_events", "next_time_event",
-          "previous_time_event", "time_reset", "changes_dimension", "parameters")
+          "previous_time_event", "time_reset", "changes_dimension", "parameters", "formula")
 
 
 class System:
@@ -163,6 +164,11 @@ class System:
         What happens at these times.
     changes_dimension
         Whether resets may shorten the state without a change of mode.
+    formula : int
+        The number of components of a state whose flow and guards are formulas: they are called
+        once with symbols, in each mode, and then computed without Python, also by
+        ``method="taylor"``. They use arithmetic and functions of NumPy (np.sin, ...), and neither
+        compare nor branch on what they are given but the mode.
     name, parameters
         What a network is trained for: a text, and a dictionary of numbers.
     """
@@ -179,6 +185,7 @@ class System:
     time_reset = None
     changes_dimension = False
     parameters = None
+    formula = None
 
     def __init__(self, flow=None, guards=None, **members):
         if flow is not None:
@@ -236,6 +243,29 @@ class System:
             out.append(member._specification(len(out)))
         return out
 
+    def _formulas(self, args, guards):
+        """The flow as a formula; those of the guards are put into their specifications."""
+        components, modes = self.formula, self._mode_list()
+        if type(components) is not int or components < 1:
+            raise ValueError(f"formula: found {components!r}, expected the number of components of "
+                             "the state")
+        for what in ("guard_values", "changes_dimension"):
+            if getattr(self, what):
+                raise ValueError(f"{what}: found one beside formula, expected guards by "
+                                 "themselves, and a state that keeps its size")
+        for guard in guards:
+            function, within = guard["value"], guard["in_modes"]
+            if isinstance(function, Compiled):
+                raise TypeError(f"guard {guard['name']}: found a compiled function beside formula")
+
+            def value(*given, function=function, within=within):
+                return 1.0 if within is not None and given[0] not in within else function(*given)
+            title = f"guard {guard['name']}"
+            guard["value"] = Formula(value, components, modes, args, title, False)
+        if isinstance(self.flow, Compiled):
+            raise TypeError("flow: found a compiled function beside formula")
+        return Formula(self.flow, components, modes, args, "flow", True)
+
     def _source(self, args=None):
         if not callable(self.flow) and not isinstance(self.flow, Compiled):
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
@@ -250,9 +280,11 @@ class System:
                 def preceding(t, *_):
                     k = bisect_left(times, t)
                     return times[k - 1] if k > 0 else -inf
+        guards = self._guard_list()
+        flow = self.flow if self.formula is None else self._formulas(args, guards)
         source = _ricochet.callback_system(dict(
-            name=self.name or type(self).__name__, flow=self.flow, args=args,
-            modes=self._mode_list(), guards=self._guard_list(),
+            name=self.name or type(self).__name__, flow=flow, args=args,
+            modes=self._mode_list(), guards=guards,
             guard_values=self.guard_values, reset_set=self.reset_set,
             next_time_event=following, previous_time_event=preceding,
             time_reset=self.time_reset, changes_dimension=self.changes_dimension))

@@ -64,7 +64,7 @@ struct Method {
     Timing timing{};
 };
 
-/// Every detector in fixed steps and under error control.
+/// Every detector in fixed steps and under error control, and Taylor series where there are any.
 class MethodList {
 public:
     MethodList(const SystemEntry& system, const std::vector<std::string>& set)
@@ -72,9 +72,11 @@ public:
     {
     }
 
-    void add(DetectorKind detector, bool fixed_step, bool in_table, const OwnModel* model = nullptr)
+    void add(DetectorKind detector, bool fixed_step, bool in_table, const OwnModel* model = nullptr,
+             std::optional<StepperKind> with = {})
     {
         RunRequest request{.set = set_, .detector = std::string(name(detector))};
+        if (with) request.stepper = std::string(name(*with));
         if (fixed_step) request.step = system_.comparison_step;
         if (model != nullptr) request.model = find_model(*model).string();
         RunSettings settings = resolve(system_, request);
@@ -113,6 +115,9 @@ std::vector<Method> methods(const SystemEntry& system, const std::vector<std::st
         list.add(DetectorKind::ends, fixed, fixed);
         list.add(DetectorKind::extremum, fixed, fixed);
         list.add(DetectorKind::bernstein, fixed, false);
+    }
+    if (system.series) {
+        list.add(DetectorKind::extremum, false, false, nullptr, StepperKind::taylor);
     }
     return list.take();
 }

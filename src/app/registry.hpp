@@ -103,6 +103,9 @@ struct SystemEntry {
     /// Runs it `repeats` times over; the runs are alike and the last is returned.
     TimedRun (*run)(const RunSettings& settings, int repeats);
 
+    /// Whether its flow can be a power series, as the stepper taylor needs it.
+    bool series = false;
+
     /// The mode that these parameters start in; mode 0: null.
     Mode (*start_mode)(const std::vector<double>& parameters) = nullptr;
 

@@ -32,11 +32,12 @@ constexpr Names<DetectorKind, 8> detectors{{{"ends", DetectorKind::ends},
 constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
                                           {"bisection", LocatorKind::bisection},
                                           {"toms748", LocatorKind::toms748}}};
-constexpr Names<MethodName, 5> steppers{{{"rk4", MethodName::rk4},
-                                         {"dopri5", MethodName::dopri5},
-                                         {"fehlberg78", MethodName::fehlberg78},
-                                         {"cash-karp54", MethodName::cash_karp54},
-                                         {"euler", MethodName::euler}}};
+constexpr Names<StepperKind, 6> steppers{{{"rk4", StepperKind::rk4},
+                                          {"dopri5", StepperKind::dopri5},
+                                          {"fehlberg78", StepperKind::fehlberg78},
+                                          {"cash-karp54", StepperKind::cash_karp54},
+                                          {"euler", StepperKind::euler},
+                                          {"taylor", StepperKind::taylor}}};
 
 template <class Kind, std::size_t n>
 std::string_view name_in(const Names<Kind, n>& names, Kind kind)
@@ -70,11 +71,17 @@ void require_not_negative(std::string_view option, double value)
     }
 }
 
-void choose_stepping(const RunRequest& request, RunSettings& settings)
+void choose_stepping(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
 {
     settings.fixed_step = request.step.has_value();
-    settings.stepper = settings.fixed_step ? MethodName::rk4 : MethodName::dopri5;
+    settings.stepper = settings.fixed_step ? StepperKind::rk4 : StepperKind::dopri5;
     if (request.stepper) settings.stepper = named("stepper", steppers, *request.stepper);
+    if (settings.stepper == StepperKind::taylor && !system.series) {
+        throw BadInput(fmt::format(
+            "stepper taylor needs a flow that is one formula for numbers and for power series, "
+            "and that of {} is none; expected dopri5, fehlberg78 or cash-karp54",
+            system.name));
+    }
 
     Options& options = settings.options;
     if (settings.fixed_step) {
@@ -87,11 +94,11 @@ void choose_stepping(const RunRequest& request, RunSettings& settings)
         options.step = *request.step;
         return;
     }
-    if (settings.stepper == MethodName::rk4 || settings.stepper == MethodName::euler) {
+    if (settings.stepper == StepperKind::rk4 || settings.stepper == StepperKind::euler) {
         throw BadInput(
             fmt::format("stepper {} has no error estimate and needs --step; "
                         "steppers with error control are dopri5, fehlberg78, "
-                        "cash-karp54",
+                        "cash-karp54 and, for some systems, taylor",
                         app::name(settings.stepper)));
     }
     options.rtol = request.rtol.value_or(options.rtol);
@@ -228,7 +235,7 @@ std::string_view name(LocatorKind kind) noexcept
 {
     return name_in(locators, kind);
 }
-std::string_view name(MethodName kind) noexcept
+std::string_view name(StepperKind kind) noexcept
 {
     return name_in(steppers, kind);
 }
@@ -285,7 +292,7 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     } else {
         refuse_integrator(system, request);
     }
-    choose_stepping(request, settings);
+    choose_stepping(system, request, settings);
     if (request.locator) settings.locator = named("locator", locators, *request.locator);
     choose_detector(system, request, settings);
     return settings;

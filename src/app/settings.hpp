@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "ricochet/detect/network.hpp"
-#include "ricochet/integrate/methods.hpp"
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet {
@@ -33,10 +32,12 @@ enum class DetectorKind {
     calibrated
 };
 enum class LocatorKind { newton, bisection, toms748 };
+/// Those of `MethodName`, and Taylor series.
+enum class StepperKind { euler, rk4, cash_karp54, dopri5, fehlberg78, taylor };
 
 [[nodiscard]] std::string_view name(DetectorKind kind) noexcept;
 [[nodiscard]] std::string_view name(LocatorKind kind) noexcept;
-[[nodiscard]] std::string_view name(MethodName kind) noexcept;
+[[nodiscard]] std::string_view name(StepperKind kind) noexcept;
 
 /// How a system that is a differential inclusion is integrated.
 struct SetValuedSettings {
@@ -52,7 +53,7 @@ struct RunSettings {
     std::vector<double> parameters;  ///< in the order of the system's
     std::vector<double> start{};     ///< in place of what the parameters give; empty: not given
     Options options;
-    MethodName stepper = MethodName::dopri5;
+    StepperKind stepper = StepperKind::dopri5;
     bool fixed_step = false;  ///< else error control
     DetectorKind detector = DetectorKind::extremum;
     LocatorKind locator = LocatorKind::newton;

@@ -45,7 +45,7 @@ Json json(const SystemEntry& system)
             {"source", system.source}, {"parameters", parameters},
             {"state", state},          {"guards", guards},
             {"modes", system.modes},   {"t_start", system.t_start},
-            {"t_end", system.t_end}};
+            {"t_end", system.t_end},   {"taylor", system.series}};
 }
 
 std::string text(const SystemEntry& system)
@@ -59,6 +59,7 @@ std::string text(const SystemEntry& system)
     if (!system.modes.empty()) {
         out += fmt::format("    {:<15} {}\n", "modes", joined(system.modes, ", "));
     }
+    if (system.series) out += fmt::format("    {:<15} taylor, too\n", "steppers");
     if (system.t_start != 0) {
         out += fmt::format("    {:<15} {:>6} s     default start of a run\n", "t-start",
                            system.t_start);
@@ -100,6 +101,7 @@ std::string markdown(const SystemEntry& system)
     if (!system.integrators.empty()) {
         out += fmt::format("- integrators: {}\n", joined(system.integrators, ", "));
     }
+    if (system.series) out += "- steppers: `taylor`, too\n";
     if (const std::string known = known_solution(system); !known.empty()) {
         out += fmt::format("- known: {}\n", known);
     }

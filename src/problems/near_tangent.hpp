@@ -38,7 +38,7 @@ public:
         double touch = 0;
     };
 
-    NearTangent() : NearTangent(Parameters{}) {}
+    constexpr NearTangent() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit NearTangent(const Parameters& parameters);
@@ -72,7 +72,7 @@ public:
     [[nodiscard]] std::vector<double> events(double t_end) const;
 
 private:
-    Parameters parameters_;
+    Parameters parameters_{};
 };
 
 }  // namespace ricochet

@@ -109,8 +109,9 @@ static void refuses_options_that_are_none(void)
     CHECK_OPTION(options.event_tolerance = NAN, "event_tolerance");
     CHECK_OPTION(options.event_rtol = -1, "event_rtol");
     CHECK_OPTION(options.event_window = NAN, "event_window");
-    CHECK_OPTION(options.method = 5, "method");
+    CHECK_OPTION(options.method = 6, "method");
     CHECK_OPTION(options.method = -1, "method");
+    CHECK_OPTION(options.method = RC_TAYLOR, "expected RC_FEHLBERG78");
     CHECK_OPTION(options.method = RC_RK4, "error");
     CHECK_OPTION(options.detector = 7, "detector");
     CHECK_OPTION(options.detector = INT_MIN, "detector");

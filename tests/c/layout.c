@@ -185,6 +185,7 @@ int main(void)
     IS(RC_CASH_KARP54);
     IS(RC_RK4);
     IS(RC_EULER);
+    IS(RC_TAYLOR);
     SIZE(rc_detector);
     IS(RC_EXTREMUM);
     IS(RC_ENDS);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/taylor.hpp"
@@ -36,8 +37,6 @@ struct Rubbing {
 
 // CASE 5: found no flow that takes Taylor series; expected template <class S>
 // CASE 6: found a number wanted of a Taylor series
-// CASE 7: found a flow that no constant expression can evaluate; expected constexpr on the flow
-// CASE 8: found a system without a default constructor for Taylor
 struct Falling {
 #if CASE == 5
     void flow(double, const X& x, X& dxdt) const
@@ -51,13 +50,6 @@ struct Falling {
         dxdt[0] = x[1];
         dxdt[1] = -t;
     }
-#elif CASE == 7
-    template <class S>
-    void flow(const S&, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
-    {
-        dxdt[0] = x[1];
-        dxdt[1] = -9.81;
-    }
 #else
     template <class S>
     constexpr void flow(const S&, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
@@ -66,12 +58,30 @@ struct Falling {
         dxdt[1] = -gravity;
     }
 #endif
-#if CASE == 8
-    explicit constexpr Falling(double g) : gravity(g) {}
-    double gravity;
-#else
     explicit constexpr Falling(double g = 9.81) : gravity(g) {}
     double gravity = 0;
+};
+
+// CASE 7: found no flow that takes Taylor series; expected template <class S> void flow([Mode,]
+// CASE 8: found a comparison of a Taylor series, or a function with a kink or a jump
+struct Hanging {  // as many weights as the state has
+#if CASE == 7
+    void flow(double, const std::vector<double>& x, std::vector<double>& dxdt) const
+    {
+        for (std::size_t i = 0; i < x.size(); ++i) dxdt[i] = -x[i];
+    }
+#else
+    template <class S>
+    void flow(const S&, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        using std::abs;
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            dxdt[i] = -x[i];
+#if CASE == 8
+            dxdt[i] += abs(x[i]);
+#endif
+        }
+    }
 #endif
 };
 
@@ -80,4 +90,6 @@ int main()
     const Options options{.t_end = 1};
     static_cast<void>(integrate(Rubbing{}, X{1, 0}, options, ErrorControlled<Taylor>{}));
     static_cast<void>(integrate(Falling(9.81), X{1, 0}, options, ErrorControlled<Taylor>{}));
+    static_cast<void>(
+        integrate(Hanging{}, std::vector<double>{1, 0}, options, ErrorControlled<Taylor>{}));
 }

@@ -226,6 +226,48 @@ def test_ready_systems_agree_with_what_is_known():
     assert repr(pickle.loads(pickle.dumps(slip))) == repr(slip)
 
 
+@pytest.mark.parametrize("system", [
+    ricochet.BouncingBall(restitution=0.8), ricochet.Pendulum(length=2.0),
+    ricochet.ImpactOscillator(frequency=0.8), ricochet.CoulombOscillator(),
+    ricochet.StickSlip(), ricochet.Thermostat()], ids=lambda system: type(system).__name__)
+def test_ready_systems_run_by_taylor_series(system):
+    options = dict(rtol=1e-12, atol=1e-13)
+    run = ricochet.integrate(system, system.start, 15.0, method="taylor", **options)
+    expected = ricochet.integrate(system, system.start, 15.0, method="fehlberg78", **options)
+    assert run.success and len(run.events) == len(expected.events) > 1
+    np.testing.assert_allclose(run.events["t"], expected.events["t"], atol=1e-10)
+    assert run.statistics.flow_calls < expected.statistics.flow_calls
+    # With everything kept, by hand, and saved on the way: the same bits.
+    kept = ricochet.integrate(system, system.start, 15.0, method="taylor", record_steps=True,
+                              **options)
+    assert np.array_equal(kept.events["t"], run.events["t"])
+    np.testing.assert_allclose(kept.solution(7.0), ricochet.integrate(
+        system, system.start, 7.0, method="taylor", **options).x, atol=1e-11)
+    driven = ricochet.Simulation(system, system.start, 15.0, method="taylor", **options)
+    driven.advance()
+    snapshot = driven.save()
+    assert np.array_equal(driven.run_to_end().events["t"], run.events["t"])
+    again = ricochet.Simulation(system, system.start, 15.0, method="taylor", **options)
+    again.restore(snapshot)
+    assert np.array_equal(again.run_to_end().x, run.x)
+    other = ricochet.Simulation(system, system.start, 15.0, method="fehlberg78", **options)
+    with pytest.raises(ValueError):
+        other.restore(snapshot)
+    fixed = ricochet.integrate(system, system.start, 15.0, method="taylor", fixed=True, step=0.05)
+    np.testing.assert_allclose(fixed.events["t"], expected.events["t"], atol=1e-10)
+    solved = ricochet.solve_ivp(system, (0, 15), system.start, method="Taylor", **options)
+    assert np.array_equal(solved.y[:, -1], run.x)
+
+
+def test_taylor_series_have_the_bits_of_a_run_in_an_ensemble():
+    lengths = {"length": [0.5, 1.0, 2.0]}
+    all = ricochet.ensemble(ricochet.Pendulum, lengths, 9.0, method="taylor", rtol=1e-13)
+    for i, length in enumerate(lengths["length"]):
+        run = ricochet.integrate(ricochet.Pendulum(length=length), ricochet.Pendulum.start, 9.0,
+                                 method="taylor", rtol=1e-13)
+        assert np.array_equal(np.asarray(all.x)[i], run.x)
+
+
 def test_results_are_views_and_survive_what_they_came_from():
     run = ricochet.integrate(ricochet.BouncingBall(), [10.0, 0.0], 20.5, record_steps=True)
     events = run.events

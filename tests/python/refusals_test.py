@@ -267,6 +267,20 @@ def test_numbers_that_are_none():
         ricochet.solve_ivp(decay, (0, 1), [1.0], events=lambda t, y: math.nan)
 
 
+def test_taylor_series_of_functions_of_python_are_refused():
+    decay = ricochet.System(lambda t, x: [-x[0]])
+    with pytest.raises(ValueError, match="taylor.*formula.*ready system.*fehlberg78"):
+        ricochet.integrate(decay, [1.0], 1.0, method="taylor")
+    with pytest.raises(ValueError, match="formula"):
+        ricochet.Simulation(decay, [1.0], 1.0, method="taylor")
+    with pytest.raises(ValueError, match="formula"):
+        ricochet.solve_ivp(lambda t, y: -y, (0, 1), [1.0], method="Taylor")
+    with pytest.raises(ValueError, match="components"):
+        ricochet.integrate(ricochet.Pendulum(), [1.0], 1.0, method="taylor")
+    with pytest.raises(ValueError, match="taylor"):
+        ricochet.integrate(ricochet.Pendulum(), [1.0, 0.0], 1.0, method="tailor")
+
+
 # --- exceptions ---
 
 class Mine(Exception):

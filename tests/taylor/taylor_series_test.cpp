@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <vector>
 
+#include "ricochet/detail/lazy_tape.hpp"
 #include "ricochet/detail/taylor_series.hpp"
 #include "taylor/series_reference.hpp"
 
@@ -34,6 +36,22 @@ template <bool unrolled, class System, std::size_t n>
     return out;
 }
 
+/// The same from operations that are recorded at run time.
+template <class System, std::size_t n>
+[[nodiscard]] std::array<std::array<double, n>, order + 1> lazy_series_of(
+    const System& system, double t, const std::array<double, n>& x)
+{
+    detail::Recording recording;
+    std::array<detail::Recorded, n> at{}, rates{};
+    std::vector<int> outputs(n);
+    record_into(system, 0, recording, at, rates, 0, outputs);
+    detail::LazyTape tape(n, recording, outputs);
+    EXPECT_LE(tape.operations(), (taylor_tape<System, n, 0>.ops.size() - n - 1));
+    std::array<std::array<double, n>, order + 1> out{};
+    EXPECT_EQ(tape.compute(t, x.data(), order, out[0].data(), nullptr), order);
+    return out;
+}
+
 /// Each coefficient is a sum of some k products of earlier ones, so that errors may grow a little
 /// with k; 2e-14 of the largest coefficient of its order, or of what a unit radius of convergence
 /// would give it, is 100 roundings.
@@ -43,6 +61,7 @@ void expect_reference_series(const System& system, double t, const std::array<do
     const auto expected = reference_series<order>(system, t, x);
     const auto unrolled = series_of<true>(system, t, x);
     const auto looped = series_of<false>(system, t, x);
+    const auto lazy = lazy_series_of(system, t, x);
     for (int k = 0; k <= order; ++k) {
         const auto row = static_cast<std::size_t>(k);
         double largest = 0;
@@ -53,6 +72,7 @@ void expect_reference_series(const System& system, double t, const std::array<do
             const auto c = static_cast<double>(expected[i][k]);
             EXPECT_NEAR(unrolled[row][i], c, 2e-14 * largest) << "k = " << k << ", i = " << i;
             EXPECT_NEAR(looped[row][i], c, 2e-14 * largest) << "k = " << k << ", i = " << i;
+            EXPECT_NEAR(lazy[row][i], c, 2e-14 * largest) << "k = " << k << ", i = " << i;
         }
     }
 }

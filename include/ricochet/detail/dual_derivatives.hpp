@@ -79,6 +79,22 @@ void flow_by_duals(const System& system, Mode mode, double t, double dt, const X
     for_each_component(x, [&](auto i) { ds[i] = room[1][static_cast<std::size_t>(i)].slope[0]; });
 }
 
+/// ds = (df/dx) s for states of any scalar S.
+template <class System, class S, class Xs>
+void flow_along_by_duals(const System& system, Mode mode, const S& t, const Xs& x, const Xs& s,
+                         Xs& ds)
+{
+    using D = Dual<1, S>;
+    WithScalar<Xs, D> state{}, rate{};
+    if constexpr (fixed_size<Xs>() == 0) {
+        state.resize(x.size());
+        rate.resize(x.size());
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) state[i] = {x[i], {s[i]}};
+    flow_of_scalar(system, mode, D(t, {S(0.0)}), state, rate);
+    for (std::size_t i = 0; i < x.size(); ++i) ds[i] = rate[i].slope[0];
+}
+
 /// The state x, which moves with s.
 template <class X>
 [[nodiscard]] WithScalar<X, Dual<1>> dual_state(const X& x, const X& s)

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <string_view>
+#include <type_traits>
 
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/scalar.hpp"
@@ -51,6 +52,8 @@ public:
         double static_friction = 1;  ///< [N] that sticking bears, at least `friction`
         double weakening = 0;        ///< [s/m], zero or positive
     };
+
+    constexpr FrictionOscillator() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     /// `self` is what the sentence calls the system.
@@ -115,6 +118,14 @@ public:
         }
     }
 
+protected:
+    struct Unchecked {};
+    /// With parameters that are known to lie in their ranges.
+    constexpr FrictionOscillator(const Parameters& parameters, Unchecked /*are*/) noexcept
+        : p_(parameters)
+    {
+    }
+
 private:
     /// Force of the spring [N], to the right.
     template <class S>
@@ -126,11 +137,13 @@ private:
     template <class S>
     [[nodiscard]] constexpr S kinetic(const S& sliding) const noexcept
     {
-        using std::max;
-        return p_.friction / max(1 + p_.weakening * sliding, S(0.5));
+        const S softening = 1 + p_.weakening * sliding;
+        // Stages are numbers; derivatives and power series are those at states of the motion.
+        if constexpr (std::is_same_v<S, double>) return p_.friction / std::max(softening, 0.5);
+        return p_.friction / softening;
     }
 
-    Parameters p_;
+    Parameters p_{};
 };
 
 }  // namespace ricochet

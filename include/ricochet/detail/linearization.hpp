@@ -329,6 +329,34 @@ public:
         differentiate_into(df, around.stencil, around.h, flow_at, room[0], room[1]);
     }
 
+    /// The flow at states of any scalar, which it takes.
+    template <class S, class Xs>
+    void flow_of(Mode mode, const S& t, const Xs& x, Xs& f) const
+    {
+        flow_of_scalar(system_, mode, t, x, f);
+    }
+    /// As `flow_along`.
+    template <class S, class Xs>
+    void flow_along_of(Mode mode, const S& t, const Xs& x, const Xs& s, Xs& ds) const
+    {
+        flow_along_by_duals(system_, mode, t, x, s, ds);
+    }
+    /// As `flow_by`.
+    template <class S, class Xs>
+    void flow_by_of(std::size_t j, Mode mode, const S& t, const Xs& x, Xs& df) const
+    {
+        const Neighbours<System>& around = parameters_[j];
+        Xs first = x, value = x;
+        flow_of_scalar(around.systems[0], mode, t, x, first);
+        for (S& sum : df) sum = S(0.0);
+        for (std::size_t k = 1; k < around.stencil.points; ++k) {
+            flow_of_scalar(around.systems[k], mode, t, x, value);
+            for (std::size_t i = 0; i < x.size(); ++i) {
+                df[i] += around.stencil.weight[k] / around.h * (value[i] - first[i]);
+            }
+        }
+    }
+
     // --- guards ---
 
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const X& x) const

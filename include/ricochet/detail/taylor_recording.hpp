@@ -17,9 +17,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 
+#include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 
@@ -82,7 +85,7 @@ public:
     constexpr int push_back(const T& item)
     {
         if (size_ == capacity_) {
-            capacity_ = capacity_ == 0 ? 64 : 2 * capacity_;
+            capacity_ = capacity_ == 0 ? 16 : 2 * capacity_;
             T* const items = new T[static_cast<std::size_t>(capacity_)]{};
             for (int i = 0; i < size_; ++i) items[i] = items_[i];
             delete[] items_;
@@ -432,10 +435,10 @@ concept ModedScalarFlow = requires(const System& system, Mode mode, const Record
 };
 
 /// A guard, number `which` of those in `mode`, that takes any scalar.
-template <class System, std::size_t n>
+template <class System, class Xs>
 [[nodiscard]] constexpr auto scalar_guard(const System& system, [[maybe_unused]] std::size_t which,
                                           [[maybe_unused]] Mode mode, const Recorded& t,
-                                          const std::array<Recorded, n>& x)
+                                          const Xs& x)
 {
     if constexpr (requires { system.guard(which, mode, t, x); }) {
         return system.guard(which, mode, t, x);
@@ -451,49 +454,67 @@ template <class System, std::size_t n>
     }
 }
 
+/// Whether guards take any scalar, in states Xs of it.
+template <class System, class Xs>
+concept ScalarGuardsOn = GuardReturns<System, Recorded, Xs, Recorded>;
+
 /// Whether all guards take any scalar, and there is a constant number of them.
 template <class System, std::size_t n>
 concept ScalarGuards = fixed_guard_count<System, std::array<double, n>>()
-> 0 && std::is_same_v<Recorded, decltype(scalar_guard<System, n>(
-                                    std::declval<const System&>(), std::size_t{}, Mode{},
-                                    std::declval<const Recorded&>(),
-                                    std::declval<const std::array<Recorded, n>&>()))>;
+> 0 && ScalarGuardsOn<System, std::array<Recorded, n>>;
 
-/// Records the flow of `system`, and its first m guards; inputs are the n components and the time,
-/// in this order, outputs the n rates and the guards.
-template <class System, std::size_t n, std::size_t m>
-constexpr void record_flow(const System& system, Mode mode, Recording& recording,
-                           std::array<int, n + m>& outputs)
+[[noreturn]] inline void throw_rates_differ(std::size_t found, std::size_t expected)
 {
-    std::array<Recorded, n> x{};
-    std::array<Recorded, n> dxdt{};
+    throw std::invalid_argument("a flow gives rates of " + std::to_string(found) +
+                                " components, expected " + std::to_string(expected));
+}
+
+/// Records the flow of `system`, and its first `guards` guards; inputs are the components and the
+/// time, in this order, outputs the rates and the guards. `x` and `dxdt` are of the size of the
+/// state, `outputs` of all.
+template <class System, class Xs, class Outputs>
+constexpr void record_into(const System& system, Mode mode, Recording& recording, Xs& x, Xs& dxdt,
+                           [[maybe_unused]] std::size_t guards, Outputs& outputs)
+{
+    const std::size_t n = x.size();
     for (std::size_t i = 0; i < n; ++i) x[i] = {recording, recording.push_back({})};
     const Recorded t(recording, recording.push_back({}));
-    if constexpr (ModedScalarFlow<System, n>) {
+    if constexpr (requires { system.flow(mode, t, x, dxdt); }) {
         system.flow(mode, t, x, dxdt);
     } else {
         system.flow(t, x, dxdt);
     }
+    if (dxdt.size() != n) throw_rates_differ(dxdt.size(), n);
     const auto index_of = [&](const Recorded& out) {
         if (!out.is_constant()) return out.index();
         return recording.push_back(
             {.op = TaylorOp::constant, .value = out.value(), .from = out.from()});
     };
     for (std::size_t i = 0; i < n; ++i) outputs[i] = index_of(dxdt[i]);
-    if constexpr (m > 0) {
-        for (std::size_t i = 0; i < m; ++i) {
-            outputs[n + i] = index_of(scalar_guard<System, n>(system, i, mode, t, x));
+    if constexpr (ScalarGuardsOn<System, Xs>) {
+        for (std::size_t i = 0; i < guards; ++i) {
+            outputs[n + i] = index_of(scalar_guard(system, i, mode, t, std::as_const(x)));
         }
     }
 }
 
+/// The same for arrays.
+template <class System, std::size_t n, std::size_t m>
+constexpr void record_flow(const System& system, Mode mode, Recording& recording,
+                           std::array<int, n + m>& outputs)
+{
+    std::array<Recorded, n> x{};
+    std::array<Recorded, n> dxdt{};
+    record_into(system, mode, recording, x, dxdt, m, outputs);
+}
+
 /// The operations that the outputs depend on, numbered from the first one: operands before results,
 /// left before right. Inputs keep their numbers; `outputs` are renumbered.
-template <std::size_t n, std::size_t outputs_count>
-constexpr void put_in_order(const Recording& from, Recording& to,
-                            std::array<int, outputs_count>& outputs)
+template <class Outputs>
+constexpr void put_in_order(std::size_t states, const Recording& from, Recording& to,
+                            Outputs& outputs)
 {
-    const int inputs = static_cast<int>(n) + 1;
+    const int inputs = static_cast<int>(states) + 1;
     GrowingArray<int> number;  // in `to`, or -1
     for (int i = 0; i < from.size(); ++i) number.push_back(i < inputs ? i : -1);
     for (int i = 0; i < inputs; ++i) to.push_back(from[i]);

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/hybrid/guard.hpp"
@@ -52,14 +53,16 @@ inline constexpr int least_taylor_order = 12;
 
 /// The largest h at which the last two terms stay within atol + rtol |x|.
 /// @param each  absolute tolerances of the components in the place of `atol`, or null
-template <std::size_t n, class X>
+/// @param size  scratch, of the size of the state
+template <class X, class Array>
 [[nodiscard, gnu::always_inline]] inline double find_reach(const X& x0, const double* each,
                                                            const double* c, int order, double rtol,
-                                                           double atol)
+                                                           double atol, Array& size)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
+    const std::size_t n = size.size();
     const double by_last = -1.0 / order, by_before = -1.0 / (order - 1);
-    const auto longest = [&](const std::array<double, n>& size) {
+    const auto longest = [&] {
         double last = 0, before = 0;
         const double* const cp = c + static_cast<std::size_t>(order) * n;
         for (std::size_t i = 0; i < n; ++i) {
@@ -74,9 +77,8 @@ template <std::size_t n, class X>
         return rough_exp2(std::min(rough_log2(std::clamp(last, least, most)) * by_last,
                                    rough_log2(std::clamp(before, least, most)) * by_before));
     };
-    std::array<double, n> size;
     for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(x0[i]);
-    double h = longest(size);
+    double h = longest();
     // What begins near zero and moves away has the size of its end, as with other methods.
     // A length grows with a twelfth power of the size at most: less is not worth another root.
     for (int again = 0; again < 3; ++again) {
@@ -87,37 +89,64 @@ template <std::size_t n, class X>
             size[i] = std::max(size[i], end);
         }
         if (!larger || !(h < infinity)) break;
-        h = longest(size);
+        h = longest();
     }
     return h;
 }
 
-/// The coefficients of the current step, and what they were computed from.
-template <std::size_t n, std::size_t m>
-struct TaylorStep {
-    alignas(16) std::array<double, (most_taylor_order + 1) * n> coefficients{};
-    std::array<double, (most_taylor_order + 1) * m> guards{};
-    std::array<double, n> x{};
+/// What the coefficients of the current step were computed from.
+struct TaylorStepOrigin {
     Instant start;
     Mode mode = 0;
     bool backward = false;
-    int order = 0;  ///< of what is known; 0: nothing
-    int asked = 0;  ///< of the run; larger where the motion is a polynomial
+    int order = 0;           ///< of what is known; 0: nothing
+    int asked = 0;           ///< of the run; larger where the motion is a polynomial
+    bool is_motion = false;  ///< a polynomial in time, not a series that was cut
     double reach = std::numeric_limits<double>::quiet_NaN();  ///< [s]; see `StepKernel::reach`
 };
 
+/// The coefficients of the current step.
+template <std::size_t n, std::size_t m>
+struct TaylorStep : TaylorStepOrigin {
+    alignas(16) std::array<double, (most_taylor_order + 1) * n> coefficients{};
+    std::array<double, (most_taylor_order + 1) * m> guards{};
+    std::array<double, n> x{};
+
+    [[nodiscard]] static constexpr std::size_t size() noexcept { return n; }
+    [[nodiscard]] static constexpr std::size_t guard_count() noexcept { return m; }
+};
+/// The same for states sized at run time.
+struct LargeTaylorStep : TaylorStepOrigin {
+    std::vector<double> coefficients, guards, x;
+
+    /// Forgets the current step.
+    void resize(std::size_t n, std::size_t m)
+    {
+        coefficients.assign((most_taylor_order + 1) * n, 0);
+        guards.assign((most_taylor_order + 1) * m, 0);
+        x.assign(n, 0);
+        guard_count_ = m;
+        order = 0;
+    }
+    [[nodiscard]] std::size_t size() const noexcept { return x.size(); }
+    [[nodiscard]] std::size_t guard_count() const noexcept { return guard_count_; }
+
+private:
+    std::size_t guard_count_ = 0;
+};
+
 /// w(s) = sum of coefficients k of degree 2 and more, and its derivative.
-template <bool with_rate, std::size_t n>
+template <bool with_rate, class Array>
 [[gnu::always_inline]] inline void evaluate_departure(const double* c, int order, double s,
-                                                      std::array<double, n>& w,
-                                                      std::array<double, n>& rate)
+                                                      Array& w, Array& rate)
 {
+    const std::size_t n = w.size();
     // Four coefficients at a time: a quarter of Horner's additions wait for each other.
     const double s2 = s * s;
     const double s4 = s2 * s2;
-    const auto at = [c](int k, std::size_t i) { return c[static_cast<std::size_t>(k) * n + i]; };
+    const auto at = [c, n](int k, std::size_t i) { return c[static_cast<std::size_t>(k) * n + i]; };
     for (std::size_t i = 0; i < n; ++i) w[i] = at(order, i);
-    if constexpr (with_rate) rate.fill(0);
+    if constexpr (with_rate) std::fill(rate.begin(), rate.end(), 0);
     for (int k = order - 4; k > 0; k -= 4) {
         for (std::size_t i = 0; i < n; ++i) {
             w[i] = w[i] * s4 +

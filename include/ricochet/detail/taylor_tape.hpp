@@ -103,7 +103,7 @@ constexpr void draft_tape(const System& system, Mode mode, TapeDraft<n, m>& draf
 {
     Recording as_called;
     record_flow<System, n, m>(system, mode, as_called, draft.outputs);
-    put_in_order<n>(as_called, draft.recording, draft.outputs);
+    put_in_order(n, as_called, draft.recording, draft.outputs);
     for (int i = 0; i < draft.recording.size(); ++i) {
         RecordedOp op = draft.recording[i];
         if (op.op == TaylorOp::input) {
@@ -155,11 +155,11 @@ template <class Tape>
 constexpr void find_degrees(Tape& tape) noexcept
 {
     constexpr int most = 32;
-    constexpr std::size_t n = Tape::states;
+    const std::size_t n = tape.states;
     for (bool changed = true; changed;) {
         changed = false;
         tape.degree[n] = 1;
-        for (std::size_t i = n + 1; i < Tape::ops_count; ++i) {
+        for (std::size_t i = n + 1; i < tape.ops_count; ++i) {
             tape.degree[i] = degree_of_op(tape, tape.ops[i]);
         }
         for (std::size_t i = 0; i < n; ++i) {
@@ -178,11 +178,11 @@ template <class Tape>
 [[nodiscard]] constexpr int polynomial_order(const Tape& tape) noexcept
 {
     int most = 1;
-    for (std::size_t i = 0; i < Tape::states; ++i) {
+    for (std::size_t i = 0; i < tape.states; ++i) {
         most = most > tape.degree[i] ? most : tape.degree[i];
     }
-    for (std::size_t i = 0; i < Tape::guards; ++i) {
-        const int degree = tape.degree[static_cast<std::size_t>(tape.outputs[Tape::states + i])];
+    for (std::size_t i = 0; i < tape.guards; ++i) {
+        const int degree = tape.degree[static_cast<std::size_t>(tape.outputs[tape.states + i])];
         most = most > degree ? most : degree;
     }
     return (most + 3) / 4 * 4;
@@ -192,12 +192,12 @@ template <class Tape>
 template <class Tape>
 constexpr void mark_for_guards(Tape& tape) noexcept
 {
-    for (std::size_t i = 0; i < Tape::guards; ++i) {
-        tape.for_guards[static_cast<std::size_t>(tape.outputs[Tape::states + i])] = true;
+    for (std::size_t i = 0; i < tape.guards; ++i) {
+        tape.for_guards[static_cast<std::size_t>(tape.outputs[tape.states + i])] = true;
     }
     for (bool changed = true; changed;) {
         changed = false;
-        for (std::size_t i = 0; i < Tape::ops_count; ++i) {
+        for (std::size_t i = tape.ops_count; i-- > 0;) {
             if (!tape.for_guards[i]) continue;
             for (const int operand : {tape.ops[i].a, tape.ops[i].b, tape.ops[i].c}) {
                 if (operand < 0 || tape.for_guards[static_cast<std::size_t>(operand)]) continue;
@@ -282,7 +282,7 @@ template <class System, std::size_t n, Mode mode, class Constants>
     constexpr std::size_t m = tape.guards;
     std::array<int, n + m> outputs{};
     record_flow<System, n, m>(system, mode, as_called, outputs);
-    put_in_order<n>(as_called, recording, outputs);
+    put_in_order(n, as_called, recording, outputs);
     if (static_cast<std::size_t>(recording.size()) != tape.as_recorded.size()) {
         return TapeMatch::differs;
     }

@@ -16,6 +16,7 @@
 #include <limits>
 #include <span>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -31,6 +32,8 @@
 namespace ricochet {
 
 namespace detail {
+
+class Recorded;  // the scalar of Taylor's method (detail/taylor_recording.hpp)
 
 /// `guard_count` as the system declares it: not at all, a constant, or a number.
 template <std::size_t fixed>
@@ -162,6 +165,21 @@ public:
     void flow(double t, const State& y, State& dydt) const requires(!Moded<System, X>)
     {
         variational_flow(0, t, y, dydt);
+    }
+    /// The same for power series, where the flow of the system takes any scalar.
+    template <class S>
+    requires std::is_same_v<S, detail::Recorded> && detail::flow_takes_duals<System, X>
+    void flow(Mode mode, const S& t, const std::vector<S>& y,
+              std::vector<S>& dydt) const requires Moded<System, X>
+    {
+        variational_series(mode, t, y, dydt);
+    }
+    template <class S>
+    requires std::is_same_v<S, detail::Recorded> && detail::flow_takes_duals<System, X>
+    void flow(const S& t, const std::vector<S>& y, std::vector<S>& dydt) const
+        requires(!Moded<System, X>)
+    {
+        variational_series(0, t, y, dydt);
     }
 
     template <class V>
@@ -429,6 +447,36 @@ private:
         }
         dydt[y.size() - 2] = 0;
         dydt[y.size() - 1] = 0;
+    }
+
+    /// Once a derivative is undefined, what is computed here is not shown.
+    template <class S>
+    void variational_series(Mode mode, const S& t, const std::vector<S>& y,
+                            std::vector<S>& dydt) const
+    {
+        const std::size_t n = components_of(y);
+        detail::WithScalar<X, S> x{};
+        if constexpr (fixed == 0) x.resize(n);
+        for (std::size_t i = 0; i < n; ++i) x[i] = y[i];
+        auto s = x, ds = x, by = x;
+        const auto put_rates = [&](std::size_t column) {
+            for (std::size_t i = 0; i < n; ++i) dydt[column + i] = ds[i];
+            dydt[column + n] = S(0.0);
+        };
+        linearization().flow_of(mode, t, x, ds);
+        put_rates(0);
+        for (std::size_t j = 0; j < columns(); ++j) {
+            const std::size_t column = (j + 1) * (n + 1);
+            for (std::size_t i = 0; i < n; ++i) s[i] = y[column + i];
+            linearization().flow_along_of(mode, t, x, s, ds);
+            if (const auto parameter = saltation_.parameter_of(j)) {
+                linearization().flow_by_of(*parameter, mode, t, x, by);
+                for (std::size_t i = 0; i < n; ++i) ds[i] += by[i];
+            }
+            put_rates(column);
+        }
+        dydt[y.size() - 2] = S(0.0);
+        dydt[y.size() - 1] = S(0.0);
     }
 
     [[nodiscard]] Motion motion_at(Mode mode, double t, const State& y) const

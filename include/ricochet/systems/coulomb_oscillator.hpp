@@ -1,6 +1,7 @@
 // An oscillator with dry friction comes to rest after finitely many turns.
 #pragma once
 
+#include <numbers>
 #include <string_view>
 
 #include "ricochet/detail/friction_oscillator.hpp"
@@ -28,7 +29,12 @@ public:
         double static_friction = 0.3;  ///< [N] that sticking bears, at least `friction`
     };
 
-    CoulombOscillator() : CoulombOscillator(Parameters{}) {}
+    constexpr CoulombOscillator()
+        : FrictionOscillator(
+              {.friction = Parameters{}.friction, .static_friction = Parameters{}.static_friction},
+              Unchecked{})
+    {
+    }
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit CoulombOscillator(const Parameters& parameters);
@@ -49,9 +55,9 @@ public:
     [[nodiscard]] int stops(double from = start[0]) const noexcept;
 
 private:
-    double half_period_;  ///< [s]
-    double loss_;         ///< of amplitude at each turn [m]
-    double reach_;        ///< [m] within which it sticks
+    double half_period_ = std::numbers::pi;        ///< [s]
+    double loss_ = 2 * Parameters{}.friction;      ///< of amplitude at each turn [m]
+    double reach_ = Parameters{}.static_friction;  ///< [m] within which it sticks
 };
 
 }  // namespace ricochet

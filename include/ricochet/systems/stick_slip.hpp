@@ -30,17 +30,11 @@ public:
         double weakening = 3;     ///< [s/m], zero or positive
     };
 
-    StickSlip() : StickSlip(Parameters{}) {}
+    constexpr StickSlip() : FrictionOscillator(as_oscillator(Parameters{}), Unchecked{}) {}
 
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit StickSlip(const Parameters& parameters)
-        : FrictionOscillator({.mass = parameters.mass,
-                              .stiffness = parameters.stiffness,
-                              .belt_speed = parameters.belt_speed,
-                              .friction = parameters.friction,
-                              .static_friction = parameters.friction,
-                              .weakening = parameters.weakening},
-                             "StickSlip")
+        : FrictionOscillator(as_oscillator(parameters), "StickSlip")
     {
     }
 
@@ -53,6 +47,18 @@ public:
     static constexpr double stick_time = 4.2959995254801548834;     ///< [s]
     static constexpr double stick_position = -0.54100635387008475;  ///< [m]
     static constexpr double period = 12.001031294830578647;         ///< [s]
+
+private:
+    [[nodiscard]] static constexpr FrictionOscillator::Parameters as_oscillator(
+        const Parameters& parameters) noexcept
+    {
+        return {.mass = parameters.mass,
+                .stiffness = parameters.stiffness,
+                .belt_speed = parameters.belt_speed,
+                .friction = parameters.friction,
+                .static_friction = parameters.friction,
+                .weakening = parameters.weakening};
+    }
 };
 
 }  // namespace ricochet

@@ -99,6 +99,7 @@ SystemEntry bouncing_ball_entry()
         .t_end = 20.5,
         .start = start,
         .run = run,
+        .series = has_series<BouncingBall>,
         .models = {{.file = "bouncing-ball-step-0.01.safetensors",
                     .kind = "fixed-step",
                     .any_step = false},

@@ -42,6 +42,7 @@ SystemEntry entry(std::string_view description)
         .t_end = Problem::t_end,
         .start = start<Problem>,
         .run = run<Problem>,
+        .series = has_series<Problem>,
     };
     if (Problem::start.size() == 2) {
         out.state.push_back({.name = "v", .unit = "1", .meaning = "rate"});

@@ -1,5 +1,6 @@
 // Descriptions of differential inclusions; `ricochet-nonsmooth` runs them.
 #include "entries.hpp"
+#include "has_series.hpp"
 #include "labels.hpp"
 #include "problems/super_twisting.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
@@ -54,6 +55,7 @@ SystemEntry coulomb_oscillator_entry()
         .t_end = 10,
         .start = nullptr,
         .run = nullptr,
+        .series = has_series<CoulombOscillator>,
         .comparison_step = 0.01,
         .integrators = {"event", "handover", "bathe", "time-stepping"},
         .set_valued_step = 0.01,
@@ -180,6 +182,7 @@ SystemEntry stick_slip_entry()
         .t_end = 40,
         .start = nullptr,
         .run = nullptr,
+        .series = has_series<StickSlip>,
         .any_parameters = false,
         .comparison_step = 0.01,
         .integrators = {"event", "handover", "bathe", "time-stepping"},

@@ -78,6 +78,7 @@ SystemEntry impact_oscillator_entry()
         .t_end = 100,
         .start = start,
         .run = run,
+        .series = has_series<ImpactOscillator>,
         .exact_events = exact_events,
         .comparison_step = 0.01,
     };
@@ -153,6 +154,7 @@ SystemEntry pendulum_entry()
         .t_end = 10,
         .start = start,
         .run = run,
+        .series = has_series<Pendulum>,
         .exact_events = exact_events,
         .comparison_step = 0.01,
     };
@@ -242,6 +244,7 @@ SystemEntry thermostat_entry()
         .t_end = 20,
         .start = start,
         .run = run,
+        .series = has_series<Thermostat>,
         .exact_events = exact_events,
         .comparison_step = 0.1,
     };

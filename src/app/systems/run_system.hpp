@@ -10,6 +10,7 @@
 
 #include "../input.hpp"
 #include "../registry.hpp"
+#include "has_series.hpp"
 #include "ricochet/detail/ballistic_line.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/detect/bernstein.hpp"
@@ -18,6 +19,7 @@
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/locate/locators.hpp"
+#include "ricochet/taylor.hpp"
 
 namespace ricochet::app {
 
@@ -144,33 +146,80 @@ template <class X>
     return out;
 }
 
-/// Runs `system` from x0 `repeats` times as `integrate` does, and returns the last run.
-///
-/// The loop takes its method, detector and locator as tables: one run is compiled for each system,
-/// whatever the settings.
-template <class System, class X>
-[[nodiscard]] TimedRun run_system(const System& system, const X& x0, const RunSettings& settings,
-                                  int repeats)
+[[nodiscard]] inline MethodName method_of(StepperKind stepper)
 {
+    switch (stepper) {
+        case StepperKind::euler: return MethodName::euler;
+        case StepperKind::rk4: return MethodName::rk4;
+        case StepperKind::cash_karp54: return MethodName::cash_karp54;
+        case StepperKind::dopri5: return MethodName::dopri5;
+        case StepperKind::fehlberg78: return MethodName::fehlberg78;
+        case StepperKind::taylor: break;
+    }
+    throw std::logic_error("the flow of this system has no series");
+}
+
+/// Steps of methods that are compiled in the library.
+struct NamedSteps {
+    using Method = MethodByName;
+
+    template <class Setup>
+    static void take(Setup& /*setup*/)
+    {
+    }
+};
+template <class System, class X>
+struct SeriesSteps {
+    static constexpr std::size_t n = detail::fixed_size<typename System::State>();
+    using Method = detail::TaylorOf<n>;
+
+    static void take(detail::RunSetup<detail::CoreState<X>>& setup)
+    {
+        detail::step_by_series<System, X, n>(setup);
+    }
+};
+
+/// `run_system` with steps by `method`.
+template <class Steps, class System, class X>
+[[nodiscard]] TimedRun run_by(const typename Steps::Method& method, const System& system,
+                              const X& x0, const RunSettings& settings, int repeats)
+{
+    using Method = typename Steps::Method;
     using Core = detail::CoreState<X>;
-    using Parts =
-        detail::PartsOfRun<System, X, ErrorControlled<MethodByName>, Extremum, ChosenLocator>;
+    using Parts = detail::PartsOfRun<System, X, ErrorControlled<Method>, Extremum, ChosenLocator>;
     return with_detector<System, X>(settings, [&](const ChosenDetector<Core>& chosen) {
         Run<Core> run;
         const X from = chosen_start(x0, settings);
         const auto start = std::chrono::steady_clock::now();
         for (int i = 0; i < repeats; ++i) {
-            Parts parts(system, from, {{settings.stepper}}, {}, {settings.locator});
+            Parts parts(system, from, {method}, {}, {settings.locator});
             detail::RunSetup<Core> setup = parts.setup();
             setup.error_controlled = !settings.fixed_step;
             setup.detector = chosen.table;
             setup.detecting = chosen.detector;
+            Steps::take(setup);
             run = detail::run_whole(setup, detail::core_state(from), settings.options);
         }
         const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
         return TimedRun{.run = with_plain_states(std::move(run)),
                         .seconds = spent.count() / repeats};
     });
+}
+
+/// Runs `system` from x0 `repeats` times as `integrate` does, and returns the last run.
+///
+/// The loop takes its method, detector and locator as tables: one run is compiled for each system,
+/// whatever the settings, and one more where its flow can be a power series.
+template <class System, class X>
+[[nodiscard]] TimedRun run_system(const System& system, const X& x0, const RunSettings& settings,
+                                  int repeats)
+{
+    if constexpr (has_series<System>) {
+        if (settings.stepper == StepperKind::taylor) {
+            return run_by<SeriesSteps<System, X>>({}, system, x0, settings, repeats);
+        }
+    }
+    return run_by<NamedSteps>({method_of(settings.stepper)}, system, x0, settings, repeats);
 }
 
 }  // namespace ricochet::app

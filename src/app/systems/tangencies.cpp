@@ -64,6 +64,7 @@ SystemEntry near_tangent_entry()
         .t_end = 20,
         .start = start,
         .run = run,
+        .series = has_series<NearTangent>,
         .exact_events = exact_events,
         .comparison_step = 0.05,
     };
@@ -111,6 +112,7 @@ SystemEntry hidden_pair_entry()
         .t_end = HiddenPair::t_end,
         .start = start,
         .run = run,
+        .series = has_series<HiddenPair>,
         .exact_events = exact_events,
         .any_parameters = false,
         .comparison_step = 0.1,
@@ -157,6 +159,7 @@ SystemEntry grow_decay_entry()
         .t_end = 10,
         .start = start,
         .run = run,
+        .series = has_series<GrowDecay>,
         .exact_events = exact_events,
         .any_parameters = false,
         .comparison_step = 0.1,

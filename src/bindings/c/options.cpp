@@ -134,7 +134,12 @@ RunOptions read_options(const rc_options* given)
     const Reader reader("rc_options");
     const auto from = read_struct<rc_options>(given, "rc_options", defaults<rc_options>());
     RunOptions run;
-    run.method = reader.one_of("method", from.method, RC_EULER);
+    run.method = reader.one_of("method", from.method, RC_TAYLOR);
+    if (run.method == RC_TAYLOR) {
+        reader.refuse(
+            "method: found RC_TAYLOR, whose power series need the flow as a formula, for "
+            "callbacks; expected RC_FEHLBERG78, or the system in C++ with ricochet/taylor.hpp");
+    }
     run.fixed_step = reader.flag("fixed_step", from.fixed_step);
     run.finders = reader.finders(from);
     if (from.sample_count > 0 && !from.sample_times) {

@@ -116,6 +116,7 @@ private:
             case RC_CASH_KARP54: set_method<CashKarp54>(setup, options.fixed_step); break;
             case RC_RK4: set_method<Rk4>(setup, options.fixed_step); break;
             case RC_EULER: set_method<Euler>(setup, options.fixed_step); break;
+            case RC_TAYLOR: break;  // refused with the options
         }
         return setup;
     }

@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "callbacks.hpp"
+#include "formula_door.hpp"
 #include "numbers.hpp"
 
 namespace ricochet::python {
@@ -396,9 +398,29 @@ void CallbackSource::fill_table()
     CallbackDoor::fill(table_, *this);
 }
 
-std::unique_ptr<RunDoor> CallbackSource::open(const State& /*x0*/) const
+std::unique_ptr<RunDoor> CallbackSource::open(const State& x0) const
 {
+    if (flow_.is_formula) {
+        const std::size_t expected =
+            static_cast<const ModedFormula*>(flow_.user)->in(0).components();
+        if (x0.size() != expected) {
+            throw std::invalid_argument("x0: found " + std::to_string(x0.size()) +
+                                        " components for a formula of " + std::to_string(expected));
+        }
+    }
     return std::make_unique<CallbackDoor>(*this);
+}
+
+std::unique_ptr<RunDoor> CallbackSource::open_by_series(const State& x0) const
+{
+    if (!flow_.is_formula) return Source::open_by_series(x0);
+    std::vector<const ModedFormula*> guards;
+    for (const CallbackGuard& guard : guards_) {
+        if (!guard.value.is_formula) return Source::open_by_series(x0);
+        guards.push_back(static_cast<const ModedFormula*>(guard.value.user));
+    }
+    return std::make_unique<FormulaDoor>(open(x0), *static_cast<const ModedFormula*>(flow_.user),
+                                         std::move(guards), x0);
 }
 
 }  // namespace ricochet::python

@@ -52,6 +52,7 @@ Function::Function(PyObject* given, const std::string& who)
         address = PyLong_AsVoidPtr(at.get());
         user = PyLong_AsVoidPtr(with.get());
         if (PyErr_Occurred()) throw PythonError();
+        is_formula = PyObject_HasAttrString(given, "_ricochet_formula") != 0;
         object = Ref::share(given);  // keeps what it was made from
         return;
     }

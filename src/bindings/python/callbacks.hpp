@@ -19,9 +19,11 @@ struct Function {
     Ref object;
     void* address = nullptr;
     void* user = nullptr;
+    bool is_formula = false;  ///< `user` is a `ModedFormula`
 
     Function() = default;
-    /// None is no function. An object that has `_ricochet_address` is a compiled one.
+    /// None is no function. An object that has `_ricochet_address` is a compiled one, one that has
+    /// `_ricochet_formula` a formula.
     /// @throws PythonError naming `who` is something else
     Function(PyObject* given, const std::string& who);
 
@@ -58,7 +60,9 @@ public:
     /// @throws PythonError if something in it is missing, or of another type
     explicit CallbackSource(PyObject* specification);
 
+    /// @throws std::invalid_argument for a start that does not fit its formulas
     [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunDoor> open_by_series(const State& x0) const override;
     [[nodiscard]] std::vector<std::string> mode_names() const override;
     [[nodiscard]] std::vector<std::string> guard_names() const override;
 

@@ -3,14 +3,19 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <bit>
+#include <cstdint>
 #include <exception>
 #include <map>
 #include <memory>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "bindings.hpp"
 #include "callbacks.hpp"
+#include "formula.hpp"
 #include "ready.hpp"
 #include "ricochet/nn/model.hpp"
 #include "source.hpp"
@@ -53,6 +58,24 @@ PYBIND11_MODULE(_ricochet, module)
     module.def("callback_system", [](const py::dict& specification) {
         return std::shared_ptr<Source>(std::make_shared<CallbackSource>(specification.ptr()));
     });
+    using Formulas = std::vector<
+        std::pair<std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>,
+                  std::vector<std::size_t>>>;
+    py::class_<ModedFormula, std::shared_ptr<ModedFormula>>(module, "Formula")
+        .def(py::init([](std::size_t components, const Formulas& modes) {
+            auto out = std::make_shared<ModedFormula>();
+            for (const auto& [ops, outputs] : modes)
+                out->by_mode.emplace_back(components, ops, outputs);
+            return out;
+        }))
+        .def_property_readonly(
+            "address", [](ModedFormula& self) { return std::bit_cast<std::uintptr_t>(&self); })
+        .def_property_readonly_static(
+            "flow_address",
+            [](const py::object&) { return std::bit_cast<std::uintptr_t>(&formula_flow); })
+        .def_property_readonly_static("guard_address", [](const py::object&) {
+            return std::bit_cast<std::uintptr_t>(&formula_guard);
+        });
     bind_network(module);
     bind_runs(module);
     bind_monitor(module);

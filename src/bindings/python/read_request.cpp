@@ -26,7 +26,8 @@ namespace {
     if (name == "rk4") return MethodName::rk4;
     if (name == "euler") return MethodName::euler;
     throw py::value_error("found '" + name +
-                          "', expected 'dopri5', 'fehlberg78', 'cash-karp54', 'rk4' or 'euler'");
+                          "', expected 'dopri5', 'fehlberg78', 'taylor', 'cash-karp54', 'rk4' or "
+                          "'euler'");
 }
 
 [[nodiscard]] std::string_view one_of(const std::string& name,
@@ -75,7 +76,9 @@ void set(Request& request, const py::handle& value)
         {"stall_steps", &set<&Options::stall_steps>},
         {"method",
          [](Request& request, const py::handle& value) {
-             request.method = method_named(py::cast<std::string>(value));
+             const auto name = py::cast<std::string>(value);
+             request.by_series = name == "taylor";
+             if (!request.by_series) request.method = method_named(name);
          }},
         {"fixed",
          [](Request& request, const py::handle& value) { request.fixed = py::cast<bool>(value); }},

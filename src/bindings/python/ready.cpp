@@ -16,6 +16,7 @@
 #include "ricochet/systems/pendulum.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
+#include "ricochet/taylor.hpp"
 
 namespace ricochet::python {
 
@@ -26,6 +27,7 @@ template <class System>
 struct Watched : System {
     static constexpr bool unchecked_names = true;
 
+    constexpr Watched() = default;  // from which Taylor's method reads the operations
     Watched(const System& system, SignalWatch& watch) : System(system), watch_(&watch) {}
 
     template <class... Arguments>
@@ -33,31 +35,44 @@ struct Watched : System {
     {
         system.guard(arguments...);
     }
-    [[nodiscard]] auto guard(const Arguments&... arguments) const noexcept
+    [[nodiscard]] constexpr auto guard(const Arguments&... arguments) const noexcept
     {
-        watch_->tick();
+        if (watch_) watch_->tick();
         return System::guard(arguments...);
     }
 
 private:
-    SignalWatch* watch_;
+    SignalWatch* watch_ = nullptr;
 };
 
-template <class System>
+/// @tparam Method  of the steps
+template <class System, class Method>
 class ReadyDoor final : public RunDoor {
 public:
     explicit ReadyDoor(const System& system) : system_(system, watch_), door_(system_, State{}) {}
+
+    void step_by_series(detail::RunSetup<State>& setup) override
+    {
+        if constexpr (std::is_same_v<Method, MethodByName>) {
+            RunDoor::step_by_series(setup);
+        } else {
+            detail::step_by_series<Watched<System>, State, Method::components>(setup);
+        }
+    }
 
     [[nodiscard]] const detail::SystemTable<State>& table() const noexcept override
     {
         return detail::system_table<Watched<System>, State>;
     }
-    [[nodiscard]] void* door() noexcept override { return &door_; }
+    [[nodiscard]] void* door() noexcept override
+    {
+        return static_cast<detail::Door<Watched<System>, State>*>(&door_);
+    }
     [[nodiscard]] bool is_free() const noexcept override { return true; }
 
 private:
     Watched<System> system_;
-    detail::Door<Watched<System>, State> door_;
+    detail::StepperDoor<Watched<System>, State, Method> door_;
 };
 
 /// A whole run by the loop for `System`. Both friction oscillators share one.
@@ -89,7 +104,14 @@ public:
     [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override
     {
         require_size(x0);
-        return std::make_unique<ReadyDoor<System>>(system_);
+        return std::make_unique<ReadyDoor<System, MethodByName>>(system_);
+    }
+
+    [[nodiscard]] std::unique_ptr<RunDoor> open_by_series(const State& x0) const override
+    {
+        require_size(x0);
+        constexpr std::size_t components = detail::fixed_size<X>();
+        return std::make_unique<ReadyDoor<System, detail::TaylorOf<components>>>(system_);
     }
 
     [[nodiscard]] std::optional<Record> run_whole(const State& x0, const Request& request,

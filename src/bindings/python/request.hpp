@@ -17,7 +17,8 @@ using State = std::vector<double>;
 struct Request {
     Options options;
     MethodName method = MethodName::dopri5;
-    bool fixed = false;  ///< steps of `options.step`
+    bool by_series = false;  ///< by Taylor's method instead
+    bool fixed = false;      ///< steps of `options.step`
     std::string_view detector = "extremum";
     std::string_view locator = "newton";
     std::shared_ptr<const Model> gate{};  ///< for the detectors that ask one
@@ -27,7 +28,8 @@ struct Request {
     /// Everything by default, so that a loop made for its system at compile time may serve.
     [[nodiscard]] bool is_plain() const noexcept
     {
-        return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense;
+        return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense &&
+               !by_series;
     }
 };
 

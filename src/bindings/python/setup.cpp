@@ -10,6 +10,7 @@
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/locate/locators.hpp"
+#include "ricochet/taylor.hpp"
 
 namespace ricochet::python {
 
@@ -67,18 +68,29 @@ void detect_without_gate(detail::RunSetup<State>& setup, const Request& request)
 
 }  // namespace
 
+std::unique_ptr<RunDoor> open_for(const Request& request, const Source& source, const State& x0)
+{
+    return request.by_series ? source.open_by_series(x0) : source.open(x0);
+}
+
 OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door)
 {
     OwnedSetup out;
     detail::RunSetup<State>& setup = out.setup;
     setup.system = &door.table();
     setup.door = door.door();
-    setup.kernel = &detail::kernel_by_name<State>(request.method);
-    setup.method_by_name = true;
     setup.error_controlled = !request.fixed;
-    setup.stepping = request.fixed ? detail::written_type<FixedStep<MethodByName>>()
-                                   : detail::written_type<ErrorControlled<MethodByName>>();
     if (!detect_by_gate(out, request, source, door)) detect_without_gate(setup, request);
+    if (request.by_series) {
+        door.step_by_series(setup);
+        setup.stepping = request.fixed ? detail::written_type<FixedStep<Taylor>>()
+                                       : detail::written_type<ErrorControlled<Taylor>>();
+    } else {
+        setup.kernel = &detail::kernel_by_name<State>(request.method);
+        setup.method_by_name = true;
+        setup.stepping = request.fixed ? detail::written_type<FixedStep<MethodByName>>()
+                                       : detail::written_type<ErrorControlled<MethodByName>>();
+    }
     const std::string_view locator = request.locator;
     if (locator == "newton") {
         locate_by<Newton>(setup);

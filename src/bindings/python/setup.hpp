@@ -15,6 +15,11 @@ struct OwnedSetup {
     std::shared_ptr<const void> detector;
 };
 
+/// Opens the door of a run.
+/// @throws std::invalid_argument for a start, or a method, that the source cannot serve.
+[[nodiscard]] std::unique_ptr<RunDoor> open_for(const Request& request, const Source& source,
+                                                const State& x0);
+
 /// The setup of a run of `source` at `door`, which must outlive it.
 /// @throws std::invalid_argument for a detector or locator that there is not, or a gate that is not
 /// what the detector asks.

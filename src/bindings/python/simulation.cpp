@@ -96,7 +96,7 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
         return out;
     }
 
-    const std::unique_ptr<RunDoor> door = source->open(x0);
+    const std::unique_ptr<RunDoor> door = open_for(request, *source, x0);
     request.options.cancelled = door->watch().cancelled();
     const OwnedSetup owned = setup_for(request, *source, *door);
     Trajectory<State> steps;
@@ -126,7 +126,7 @@ public:
     {
         Request request = request_from(given);
         if (!given.contains("mode")) request.options.mode = source_->start_mode();
-        door_ = source_->open(x0);
+        door_ = open_for(request, *source_, x0);
         request.options.cancelled = door_->watch().cancelled();
         setup_ = setup_for(request, *source_, *door_);
         try {

@@ -10,12 +10,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "record.hpp"
 #include "request.hpp"
+#include "ricochet/detail/core.hpp"
 
 namespace ricochet::python {
 
@@ -67,7 +69,13 @@ public:
     /// Whether no function of it needs the interpreter.
     [[nodiscard]] virtual bool is_free() const noexcept = 0;
 
-    [[nodiscard]] SignalWatch& watch() noexcept { return watch_; }
+    /// Lets a run at this door, whose detector is known, take its steps by Taylor's method.
+    virtual void step_by_series(detail::RunSetup<State>& /*setup*/)
+    {
+        throw std::logic_error("a door that is not opened for steps by series");
+    }
+
+    [[nodiscard]] virtual SignalWatch& watch() noexcept { return watch_; }
 
 protected:
     SignalWatch watch_;
@@ -83,6 +91,16 @@ public:
     /// The system at the door of a run, which the source outlives.
     /// @throws std::invalid_argument for a start that it cannot serve.
     [[nodiscard]] virtual std::unique_ptr<RunDoor> open(const State& x0) const = 0;
+
+    /// The same for steps by Taylor's method.
+    /// @throws std::invalid_argument where the flow is no formula
+    [[nodiscard]] virtual std::unique_ptr<RunDoor> open_by_series(const State& /*x0*/) const
+    {
+        throw std::invalid_argument(
+            "method: found 'taylor', which needs the flow as a formula, for functions of Python; "
+            "expected a ready system, a system with formula=n, or another method, such as "
+            "'fehlberg78'");
+    }
 
     /// The whole run by a loop made for this system, if there is one for such a request. Does not
     /// need the interpreter.

@@ -1,0 +1,123 @@
+"""Functions as formulas: called once with symbols, then computed without Python."""
+
+import numpy as np
+
+from . import _ricochet
+
+
+def _refused(what, expected):
+    def refuse(self, *_):
+        raise TypeError(f"formula: found {what}; expected {expected}")
+    return refuse
+
+
+_a_kink = _refused("a comparison or a kink (abs, min, max, if, ...) of its symbols",
+                   "a guard at the kink and a mode on each side of it, or no formula")
+_a_number = _refused("a number wanted of a symbol, as by functions of math",
+                     "functions of NumPy, such as np.sin")
+
+
+class Symbol:
+    """The time, a component of the state, or what a formula makes of them."""
+
+    __slots__ = ("_tape", "_index")
+    __hash__ = None
+
+    def __init__(self, tape, index):
+        self._tape = tape
+        self._index = index
+
+    def __repr__(self):
+        return f"<symbol {self._index} of a formula>"
+
+    def __pos__(self):
+        return self
+
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __abs__ = _a_kink
+    __floor__ = __ceil__ = __round__ = __trunc__ = __mod__ = __rmod__ = __floordiv__ = _a_kink
+    rint = floor = ceil = trunc = sign = _a_kink
+    __float__ = __int__ = __complex__ = __index__ = _a_number
+
+
+def _binary(name, swapped=False):
+    def operation(self, other):
+        a, b = self._index, self._tape.operand(other)
+        if b is None:
+            return NotImplemented
+        return self._tape.add(name, b, a) if swapped else self._tape.add(name, a, b)
+    return operation
+
+
+def _unary(name):
+    def operation(self):
+        return self._tape.add(name, self._index)
+    return operation
+
+
+for _method, _name in dict(add="add", sub="subtract", mul="multiply", truediv="divide",
+                           pow="power").items():
+    setattr(Symbol, f"__{_method}__", _binary(_name))
+    setattr(Symbol, f"__r{_method}__", _binary(_name, swapped=True))
+setattr(Symbol, "__neg__", _unary("negate"))
+for _name in ("sqrt", "cbrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh"):
+    setattr(Symbol, _name, _unary(_name))  # which functions of NumPy call
+for _method, _name in dict(arcsin="asin", arccos="acos", arctan="atan").items():
+    setattr(Symbol, _method, _unary(_name))
+for _method, _name in dict(arctan2="atan2", hypot="hypot").items():
+    setattr(Symbol, _method, _binary(_name))
+
+
+class _Tape:
+    def __init__(self):
+        self.ops = []
+
+    def add(self, name, a=0, b=0, value=0.0):
+        self.ops.append((name, a, b, value))
+        return Symbol(self, len(self.ops) - 1)
+
+    def operand(self, given):
+        """The number of an operation, or None."""
+        if isinstance(given, Symbol):
+            if given._tape is not self:
+                raise ValueError("formula: found a symbol of another one")
+            return given._index
+        if isinstance(given, np.ndarray) and given.ndim > 0:
+            return None
+        try:
+            return self.add("constant", value=float(given))._index
+        except (TypeError, ValueError):
+            return None
+
+
+class Formula:
+    """A function of Python that was called with symbols, once for each mode.
+
+    function([mode,] t, x, *args) with ``x`` an array of ``components`` symbols.
+    """
+
+    def __init__(self, function, components, modes, args, title, is_flow):
+        tapes = []
+        for mode in [None] if modes is None else modes:
+            tape = _Tape()
+            x = np.empty(components, dtype=object)
+            for i in range(components):
+                x[i] = tape.add("component", i)
+            t = tape.add("time")
+            result = function(*(() if modes is None else (mode,)), t, x, *(args or ()))
+            tapes.append((tape.ops, self._outputs(tape, result, components, title, is_flow)))
+        self._ricochet_formula = _ricochet.Formula(components, tapes)
+        address = "flow_address" if is_flow else "guard_address"
+        self._ricochet_address = getattr(_ricochet.Formula, address)
+        self._ricochet_user = self._ricochet_formula.address
+
+    @staticmethod
+    def _outputs(tape, result, components, title, is_flow):
+        results = np.asarray(result, dtype=object).ravel()
+        if len(results) != (components if is_flow else 1):
+            raise ValueError(f"{title} returned {len(results)} numbers, expected "
+                             f"{components if is_flow else 1}")
+        out = [tape.operand(value) for value in results]
+        if None in out:
+            found = results[out.index(None)]
+            raise TypeError(f"{title} returned {found!r}, expected formulas and numbers")
+        return out

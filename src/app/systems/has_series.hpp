@@ -1,0 +1,14 @@
+// Which systems the stepper taylor takes.
+#pragma once
+
+#include "ricochet/detail/components.hpp"
+#include "ricochet/detail/taylor_door.hpp"
+
+namespace ricochet::app {
+
+/// Whether the flow of a system can be a power series.
+template <class System>
+inline constexpr bool has_series =
+    detail::HasSeries<System, detail::fixed_size<typename System::State>()>;
+
+}  // namespace ricochet::app

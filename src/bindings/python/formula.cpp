@@ -1,0 +1,77 @@
+#include "formula.hpp"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <string_view>
+#include <tuple>
+#include <utility>
+
+namespace ricochet::python {
+
+namespace {
+
+/// In the order of `FormulaCode`.
+constexpr std::array<std::string_view, 24> names{
+    "component", "time",  "constant", "add",  "subtract", "multiply", "divide", "power",
+    "atan2",     "hypot", "negate",   "sqrt", "cbrt",     "exp",      "log",    "sin",
+    "cos",       "tan",   "asin",     "acos", "atan",     "sinh",     "cosh",   "tanh"};
+
+}  // namespace
+
+Formula::Formula(std::size_t components,
+                 const std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>& ops,
+                 std::vector<std::size_t> outputs)
+    : components_(components), outputs_(std::move(outputs))
+{
+    for (const auto& [name, a, b, value] : ops) {
+        const auto found = std::find(names.begin(), names.end(), name);
+        if (found == names.end()) {
+            throw std::invalid_argument("formula: found no operation '" + name + "'");
+        }
+        const auto code = static_cast<FormulaCode>(found - names.begin());
+        const bool is_leaf = code <= FormulaCode::constant;
+        const std::size_t before = code == FormulaCode::component ? components
+                                   : is_leaf                      ? 1
+                                                                  : ops_.size();
+        if (std::max(a, b) >= before) {
+            throw std::invalid_argument("formula: found an operand " +
+                                        std::to_string(std::max(a, b)) + " of '" + name +
+                                        "', expected one below " + std::to_string(before));
+        }
+        ops_.push_back({.code = code, .a = a, .b = b, .value = value});
+    }
+    for (const std::size_t output : outputs_) {
+        if (output >= ops_.size()) {
+            throw std::invalid_argument("formula: found a result " + std::to_string(output) +
+                                        " of " + std::to_string(ops_.size()) + " operations");
+        }
+    }
+}
+
+namespace {
+
+std::vector<double>& scratch()
+{
+    thread_local std::vector<double> values;
+    return values;
+}
+
+}  // namespace
+
+void formula_flow(std::uint32_t mode, double t, const double* x, double* dxdt, std::size_t /*n*/,
+                  void* user)
+{
+    const auto& formulas = *static_cast<const ModedFormula*>(user);
+    formulas.in(mode).evaluate(t, x, dxdt, scratch());
+}
+
+double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t /*n*/, void* user)
+{
+    const auto& formulas = *static_cast<const ModedFormula*>(user);
+    double value = 0;
+    formulas.in(mode).evaluate(t, x, &value, scratch());
+    return value;
+}
+
+}  // namespace ricochet::python

@@ -1,0 +1,141 @@
+"""Systems whose flow and guards are formulas."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ricochet
+
+METHODS = ["dopri5", "fehlberg78", "taylor"]
+
+
+def pendulum(**members):
+    return ricochet.System(
+        lambda t, x: [x[1], -9.81 * np.sin(x[0]) + 0.1 * np.cos(2 * t)],
+        guards=[ricochet.Guard(lambda t, x: x[0], name="wall", direction=-1, unilateral=True,
+                               reset=lambda t, x: [0.0, -0.8 * x[1]])], **members)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_formula_gives_what_its_function_gives(method):
+    # The tolerance is that of the method; the functions are evaluated to the last bit or two.
+    options = dict(rtol=1e-12, atol=1e-12, record_steps=True)
+    by_calls = ricochet.integrate(pendulum(), [1.0, 0.0], 8.0, method="fehlberg78", **options)
+    run = ricochet.integrate(pendulum(formula=2), [1.0, 0.0], 8.0, method=method, **options)
+    assert run.success and len(run.events) == len(by_calls.events) > 5
+    np.testing.assert_allclose(run.events["t"], by_calls.events["t"], atol=1e-9)
+    np.testing.assert_allclose(run.solution(3.0), by_calls.solution(3.0), atol=1e-9)
+
+
+def test_taylor_series_prove_steps_of_formulas_and_go_backward():
+    swing = ricochet.System(lambda t, x: [x[1], -np.sin(x[0])], formula=2,
+                            guards=[ricochet.Guard(lambda t, x: x[1], direction=0)])
+    options = dict(method="taylor", rtol=1e-14, atol=1e-14)
+    run = ricochet.integrate(swing, [1.0, 0.0], 50.0, **options)
+    half = ricochet.Pendulum(gravity=1.0).half_period(1.0)
+    np.testing.assert_allclose(run.events["t"], half * np.arange(1, len(run.events) + 1),
+                               atol=1e-12)
+    assert run.statistics.evidence.proved > 20
+    home = ricochet.integrate(swing, run.x, 0.0, t_start=50.0, **options)
+    np.testing.assert_allclose(home.x, [1.0, 0.0], atol=1e-11)
+    free = ricochet.System(lambda t, x: [x[1], -np.sin(x[0])], formula=2)
+    np.testing.assert_allclose(ricochet.integrate(free, [1.0, 0.0], 50.0, **options).x, run.x,
+                               atol=1e-12)
+
+
+def test_every_operation_of_a_formula():
+    def everything(t, x):
+        u, v = x
+        return [np.sqrt(1.5 + v * v) - np.cbrt(2 + u) + (1.2 + u**2) ** 1.7 / 9 - u / 2.0**v,
+                np.exp(-v * v) + np.sinh(0.5 * u) - np.cosh(0.4 * v) + np.log(3 + u * u) / 3
+                + np.tanh(v) / (1 + t * t) - np.arcsin(0.1 * u) + np.arccos(0.1 * v)
+                + np.arctan(u) * v - np.tan(0.1 * u) + np.arctan2(v, 2 + u * u)
+                - np.hypot(1 + u, v) + +np.pi - np.sin(t) * np.cos(u) + (-v) * np.square(u)
+                - x.sum() / 3 + np.array([0.1, 0.2]) @ x]
+
+    expected = ricochet.integrate(ricochet.System(everything), [0.3, 0.2], 1.0,
+                                  method="fehlberg78", rtol=1e-13, atol=1e-13)
+    assert expected.success
+    for method in METHODS:
+        run = ricochet.integrate(ricochet.System(everything, formula=2), [0.3, 0.2], 1.0,
+                                 method=method, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(run.x, expected.x, rtol=1e-9)
+
+
+def test_modes_arguments_and_times_of_formulas():
+    # From 2 down to 1 in log 2 / decay, and up again in log(3 / 2) / growth.
+    def flow(mode, t, x, decay, growth):
+        return [-decay * x[0] if mode == "off" else growth * (4.0 - x[0])]
+
+    heater = ricochet.System(flow, modes=["off", "on"], formula=1, guards=[
+        ricochet.Guard(lambda mode, t, x, *args: x[0] - 1, name="cold", in_modes="off",
+                       reset=lambda mode, t, x, *args: "on"),
+        ricochet.Guard(lambda mode, t, x, *args: 2 - x[0], name="warm", in_modes="on",
+                       reset=lambda mode, t, x, *args: "off")])
+    for method in ("Taylor", "DOP853"):
+        found = ricochet.solve_ivp(heater, (0, 5), [2.0], method=method, args=(2.0, 0.25),
+                                   rtol=1e-12, atol=1e-12)
+        down, up = math.log(2) / 2, math.log(1.5) / 0.25
+        assert found.t_events[0][0] == pytest.approx(down, abs=1e-11)
+        assert found.t_events[1][0] == pytest.approx(down + up, abs=1e-11)
+    kicked = ricochet.System(lambda t, x: [x[1], -x[0]], formula=2, time_events=[1.0, 2.5],
+                             time_reset=lambda t, x: [x[0], x[1] + 1])
+    by_series, by_stages = (ricochet.integrate(kicked, [1.0, 0.0], 4.0, method=method, rtol=1e-12,
+                                               atol=1e-12) for method in ("taylor", "fehlberg78"))
+    np.testing.assert_allclose(by_series.x, by_stages.x, atol=1e-10)
+    assert len(by_series.events) == 2
+
+
+def test_runs_of_formulas_can_be_saved():
+    options = dict(method="taylor", rtol=1e-13, atol=1e-13)
+    whole = ricochet.integrate(pendulum(formula=2), [1.0, 0.0], 8.0, **options)
+    first = ricochet.Simulation(pendulum(formula=2), [1.0, 0.0], 8.0, **options)
+    for _ in range(5):
+        first.step()
+    second = ricochet.Simulation(pendulum(formula=2), [1.0, 0.0], 8.0, **options)
+    second.restore(first.save())
+    assert np.array_equal(second.run_to_end().x, whole.x)
+
+
+def test_an_exception_of_a_reset_arrives_as_it_is():
+    def fail(t, x):
+        raise KeyError("mine")
+
+    falling = ricochet.System(lambda t, x: [x[1], -9.81], formula=2,
+                              guards=[ricochet.Guard(lambda t, x: x[0], reset=fail)])
+    for method in METHODS:
+        with pytest.raises(KeyError, match="mine") as raised:
+            ricochet.integrate(falling, [1.0, 0.0], 5.0, method=method)
+        assert raised.value.ricochet_run.t <= math.sqrt(2 / 9.81)
+
+
+@pytest.mark.parametrize("flow, message", [
+    (lambda t, x: [abs(x[0])], "kink"),
+    (lambda t, x: [np.maximum(x[0], 0)], "kink"),
+    (lambda t, x: [1.0 if x[0] > 0 else 2.0], "comparison"),
+    (lambda t, x: [1.0 if x[0] else 2.0], "comparison"),
+    (lambda t, x: [math.sin(x[0])], "np.sin"),
+    (lambda t, x: [x[0] % 2], "kink"),
+    (lambda t, x: [np.floor(x[0])], "kink"),
+    (lambda t, x: [x[0], x[0]], "returned 2 numbers, expected 1"),
+    (lambda t, x: ["a"], "expected formulas and numbers"),
+])
+def test_what_is_no_formula_is_refused(flow, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        ricochet.integrate(ricochet.System(flow, formula=1), [1.0], 1.0)
+
+
+def test_formulas_of_another_size_are_refused():
+    with pytest.raises(ValueError, match="found 3 components for a formula of 2"):
+        ricochet.integrate(pendulum(formula=2), [1.0, 0.0, 0.0], 1.0)
+    with pytest.raises(ValueError, match="found 3 components for a formula of 2"):
+        ricochet.integrate(pendulum(formula=2), [1.0, 0.0, 0.0], 1.0, method="taylor")
+    for wrong in (0, -1, 1.5, "two", True):
+        with pytest.raises(ValueError, match="formula"):
+            ricochet.integrate(pendulum(formula=wrong), [1.0, 0.0], 1.0)
+    with pytest.raises(ValueError, match="guard_values"):
+        ricochet.integrate(pendulum(formula=2, guard_values=lambda t, x: [x[0]]), [1.0, 0.0], 1.0)
+    with pytest.raises(ValueError, match="not finite"):
+        ricochet.integrate(ricochet.System(lambda t, x: [math.nan * x[0]], formula=1), [1.0], 1.0,
+                           method="taylor")

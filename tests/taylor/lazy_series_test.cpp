@@ -1,0 +1,355 @@
+// Taylor series of flows whose operations the compiler cannot know.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/systems/impact_oscillator.hpp"
+#include "ricochet/systems/thermostat.hpp"
+#include "ricochet/taylor.hpp"
+
+namespace ricochet::lazy_series_test {
+namespace {
+
+using Two = std::array<double, 2>;
+using Vector = std::vector<double>;
+constexpr double pi = std::numbers::pi;
+using ByTaylor = ErrorControlled<Taylor>;
+
+/// A system that the compiler cannot construct: its operations are recorded at run time.
+template <class System>
+struct Unknown : System {
+    explicit Unknown(const System& system) : System(system) {}
+};
+
+template <class Expected, class Found>
+void expect_same_events(const Expected& expected, const Found& found, double tolerance)
+{
+    ASSERT_EQ(found.outcome, expected.outcome);
+    ASSERT_EQ(found.events.size(), expected.events.size());
+    for (std::size_t i = 0; i < found.events.size(); ++i) {
+        EXPECT_EQ(found.events[i].guard, expected.events[i].guard);
+        EXPECT_NEAR(found.events[i].t, expected.events[i].t, tolerance) << i;
+    }
+    EXPECT_EQ(found.statistics.evidence.proved > 0, expected.statistics.evidence.proved > 0);
+}
+
+TEST(LazySeries, RunsAreThoseOfTheUnrolledSeriesToTheRoundingOfTheTime)
+{
+    const Options options{.t_end = 60, .rtol = 1e-13, .atol = 1e-13};
+    const ImpactOscillator impact({.frequency = 0.8, .wall = 1.2});
+    const auto compiled = integrate(impact, Two{0, 0}, options, ByTaylor{});
+    const auto lazy = integrate(Unknown(impact), Two{0, 0}, options, ByTaylor{});
+    ASSERT_GT(compiled.events.size(), 5U);
+    // Two units in the last place of 60 for each of the impacts.
+    expect_same_events(compiled, lazy, 1e-13);
+    EXPECT_EQ(lazy.statistics.steps, compiled.statistics.steps);
+
+    const Thermostat thermostat({.rate = 0.2});
+    expect_same_events(integrate(thermostat, Thermostat::start, options, ByTaylor{}),
+                       integrate(Unknown(thermostat), Thermostat::start, options, ByTaylor{}),
+                       1e-13);
+}
+
+/// A pendulum whose damping is left out where it is zero, with a function that is not constexpr.
+struct Damped {
+    using State = Two;
+    double damping = 0;
+
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        using std::sin;
+        dxdt[0] = x[1];
+        dxdt[1] = -sin(x[0]);
+        if (damping != 0) dxdt[1] -= damping * x[1];
+    }
+    template <class S>
+    [[nodiscard]] constexpr S guard(const S& /*t*/, const std::array<S, 2>& x) const
+    {
+        return x[0];
+    }
+};
+/// The same operations whatever the damping is.
+struct AlwaysDamped : Damped {
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        using std::sin;
+        dxdt[0] = x[1];
+        dxdt[1] = -sin(x[0]) - damping * x[1];
+    }
+};
+
+TEST(LazySeries, ABranchOnAParameterIsThatOfTheObject)
+{
+    const Options options{.t_end = 30, .rtol = 1e-14, .atol = 1e-14};
+    const auto branching = integrate(Damped{0.1}, Two{1, 0}, options, ByTaylor{});
+    const auto always = integrate(AlwaysDamped{{0.1}}, Two{1, 0}, options, ByTaylor{});
+    ASSERT_GT(always.events.size(), 4U);
+    expect_same_events(always, branching, 1e-13);
+    // An object like the one that the compiler knows is not slowed down by the other one.
+    const detail::StepperDoor<Damped, Two, Taylor> plain(Damped{}, Two{});
+    EXPECT_TRUE(plain.as_compiled());
+    const detail::StepperDoor<Damped, Two, Taylor> damped(Damped{0.1}, Two{});
+    EXPECT_FALSE(damped.as_compiled());
+}
+
+/// Oscillators in a row, beside each other, as many as there are frequencies.
+struct Row {
+    using State = Vector;
+    static constexpr Crossing crossing = Crossing::falling;
+    Vector frequencies;
+
+    template <class S>
+    void flow(const S& /*t*/, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        for (std::size_t i = 0; i < frequencies.size(); ++i) {
+            dxdt[2 * i] = frequencies[i] * x[2 * i + 1];
+            dxdt[2 * i + 1] = -frequencies[i] * x[2 * i];
+        }
+    }
+    template <class S>
+    [[nodiscard]] S guard(const S& /*t*/, const std::vector<S>& x) const
+    {
+        return x[0];
+    }
+};
+
+[[nodiscard]] Vector row_start(std::size_t oscillators)
+{
+    Vector x(2 * oscillators);
+    for (std::size_t i = 0; i < oscillators; ++i) x[2 * i] = 1;
+    return x;
+}
+
+TEST(LazySeries, StatesSizedAtRunTimeAreIntegratedRecordedAndProved)
+{
+    for (const std::size_t oscillators : {1, 3, 30}) {
+        Row row;
+        for (std::size_t i = 0; i < oscillators; ++i) {
+            row.frequencies.push_back(2.25 - 0.05 * static_cast<double>(i));
+        }
+        const auto run = integrate(
+            row, row_start(oscillators),
+            {.t_end = 10, .rtol = 1e-14, .atol = 1e-14, .record_steps = true}, ByTaylor{});
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
+        for (const double t : {0.0, 0.1, 3.3, 7.7, 10.0}) {
+            const Vector x = run.solution(t);
+            for (std::size_t i = 0; i < oscillators; ++i) {
+                EXPECT_NEAR(x[2 * i], std::cos(row.frequencies[i] * t), 1e-13) << t;
+                EXPECT_NEAR(x[2 * i + 1], -std::sin(row.frequencies[i] * t), 1e-13) << t;
+            }
+        }
+        // cos(2.25 t) falls through 0 at (pi / 2 + 2 pi k) / 2.25.
+        ASSERT_EQ(run.events.size(), 4U);
+        for (std::size_t k = 0; k < 4; ++k) {
+            EXPECT_NEAR(run.events[k].t, (pi / 2 + 2 * pi * static_cast<double>(k)) / 2.25, 1e-13);
+        }
+        EXPECT_GT(run.statistics.evidence.proved, 5U);
+    }
+}
+
+TEST(LazySeries, VectorsBackwardSavedAndInSingleStepsHaveTheBitsOfARunInAPiece)
+{
+    const Row row{.frequencies = {1.1, 0.7}};
+    const Options options{.t_end = 25, .rtol = 1e-13, .atol = 1e-13};
+    const auto whole = integrate(row, row_start(2), options, ByTaylor{});
+    Simulation first(row, row_start(2), options, ByTaylor{});
+    for (int i = 0; i < 5; ++i) first.step();
+    const Snapshot saved = first.save();
+    Simulation second(row, row_start(2), options, ByTaylor{});
+    second.restore(saved);
+    while (second.step()) {
+    }
+    EXPECT_EQ(second.take().x, whole.x);
+    Options back = options;
+    back.t_start = 25;
+    back.t_end = 0;
+    const auto home = integrate(row, whole.x, back, ByTaylor{});
+    for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(home.x[i], row_start(2)[i], 1e-11);
+}
+
+/// A weight on each of two springs, the second of which falls off at the first rise through zero.
+struct Dropping {
+    using State = Vector;
+    static constexpr bool changes_dimension = true;
+
+    template <class S>
+    void flow(const S& /*t*/, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        for (std::size_t i = 0; i < x.size(); i += 2) {
+            dxdt[i] = x[i + 1];
+            dxdt[i + 1] = -x[i];
+        }
+    }
+    template <class S>
+    [[nodiscard]] S guard(const S& /*t*/, const std::vector<S>& x) const
+    {
+        return x[0];
+    }
+    void reset(double /*t*/, Vector& x) const
+    {
+        if (x.size() > 2) x.resize(2);
+        x[1] = -x[1];
+    }
+};
+
+TEST(LazySeries, AResetMayChangeTheSizeOfTheState)
+{
+    const auto run = integrate(Dropping{}, Vector{1, 0, 0.5, 0.5},
+                               {.t_end = 5, .rtol = 1e-14, .atol = 1e-14}, ByTaylor{});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.events.size(), 2U);
+    EXPECT_NEAR(run.events[0].t, pi / 2, 1e-14);
+    EXPECT_NEAR(run.events[1].t, 3 * pi / 2, 1e-14 * 4);
+    ASSERT_EQ(run.x.size(), 2U);
+    EXPECT_NEAR(run.x[0], std::fabs(std::cos(5.0)), 1e-13);
+}
+
+/// Gears whose number is known at run time.
+struct Gears {
+    using State = Vector;
+    Vector rates;
+
+    [[nodiscard]] std::size_t mode_count() const { return rates.size(); }
+    [[nodiscard]] static constexpr std::size_t guard_count() { return 1; }
+    template <class S>
+    void flow(Mode mode, const S& t, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        dxdt[0] = rates[mode] * x[0];
+        dxdt[1] = 3.0 * t * t;
+    }
+    template <class S>
+    [[nodiscard]] S guard(std::size_t /*which*/, Mode mode, const S& /*t*/,
+                          const std::vector<S>& x) const
+    {
+        return (2.0 + static_cast<double>(mode)) - x[0];
+    }
+    Mode reset(std::size_t /*which*/, Mode mode, double /*t*/, Vector& /*x*/) const
+    {
+        return mode + 1 < rates.size() ? mode + 1 : mode;
+    }
+};
+
+TEST(LazySeries, EachModeIsRecordedByItself)
+{
+    // From 1 to 2 in log 2 / 1, to 3 in log(3 / 2) / 2, to 4 in log(4 / 3) / 4.
+    const Gears gears{.rates = {1, 2, 4, -1}};
+    const auto run =
+        integrate(gears, Vector{1, 0}, {.t_end = 1.5, .rtol = 1e-14, .atol = 1e-14}, ByTaylor{});
+    ASSERT_EQ(run.events.size(), 3U);
+    double t = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto from = static_cast<double>(i + 1);
+        t += std::log((from + 1) / from) / gears.rates[i];
+        EXPECT_NEAR(run.events[i].t, t, 1e-14);
+    }
+    EXPECT_EQ(run.mode, 3U);
+    EXPECT_NEAR(run.x[0], 4 * std::exp(-(1.5 - t)), 1e-13);
+    EXPECT_NEAR(run.x[1], 1.5 * 1.5 * 1.5, 1e-14 * 4);
+}
+
+/// A motion of degree 2, of which a step ends at events alone.
+struct Thrown {
+    using State = Vector;
+    double gravity = 9.81;
+    template <class S>
+    void flow(const S& /*t*/, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -gravity;
+    }
+    template <class S>
+    [[nodiscard]] S guard(const S& /*t*/, const std::vector<S>& x) const
+    {
+        return x[0];
+    }
+    void reset(double /*t*/, Vector& x) const
+    {
+        x[0] = 0;
+        x[1] *= -0.9;
+    }
+};
+
+TEST(LazySeries, PolynomialsInTimeAreKnownAsSuch)
+{
+    const auto run = integrate(Thrown{}, Vector{10, 0}, {.t_end = 20.5, .rtol = 1e-12}, ByTaylor{});
+    ASSERT_EQ(run.events.size(), 13U);
+    EXPECT_LE(run.statistics.steps, 18U);
+    const double fall = std::sqrt(20 / 9.81);
+    double t = fall, flight = 2 * fall;
+    for (const auto& event : run.events) {
+        EXPECT_NEAR(event.t, t, 2e-14);
+        t += flight *= 0.9;
+    }
+}
+
+/// As many guards as there are walls.
+struct Walled {
+    using State = Vector;
+    Vector walls;
+    [[nodiscard]] std::size_t guard_count() const { return walls.size(); }
+    template <class S>
+    void flow(const S& /*t*/, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+    template <class S>
+    [[nodiscard]] S guard(std::size_t which, const S& /*t*/, const std::vector<S>& x) const
+    {
+        return walls[which] - x[0];
+    }
+};
+
+TEST(LazySeries, GuardsMayBeAsManyAsARunHasOrNone)
+{
+    const Options options{.t_end = 2 * pi, .rtol = 1e-14, .atol = 1e-14};
+    for (const Vector& walls : {Vector{}, Vector{0.5}, Vector{0.5, 0.9, 2}}) {
+        const auto run = integrate(Walled{walls}, Vector{0, 1}, options, ByTaylor{});
+        EXPECT_NEAR(run.x[1], 1, 1e-13);
+        ASSERT_EQ(run.events.size(), std::min(walls.size(), std::size_t{2}));
+        for (std::size_t i = 0; i < run.events.size(); ++i) {
+            EXPECT_NEAR(run.events[i].t, std::asin(walls[i]), 1e-14);
+        }
+    }
+}
+
+/// Gives a rate of another size.
+struct Misshapen {
+    using State = Vector;
+    template <class S>
+    void flow(const S& /*t*/, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        dxdt.assign(x.size() + 1, S(0.0));
+    }
+};
+
+TEST(LazySeries, WhatCannotBeExpandedIsRefusedBeforeTheRun)
+{
+    const auto message = [](const auto& system) -> std::string {
+        try {
+            static_cast<void>(integrate(system, Vector{1, 0}, {.t_end = 1}, ByTaylor{}));
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "nothing is refused";
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_NE(message(Thrown{nan}).find("not finite"), std::string::npos);
+    EXPECT_NE(message(Row{.frequencies = {nan}}).find("not finite"), std::string::npos);
+    EXPECT_NE(message(Misshapen{}).find("3 components, expected 2"), std::string::npos)
+        << message(Misshapen{});
+}
+
+}  // namespace
+}  // namespace ricochet::lazy_series_test
