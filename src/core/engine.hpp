@@ -443,7 +443,7 @@ protected:
     bool predicts_;
     bool on_series_ = false;  ///< guards are power series over each step
     Options options_;
-    Metering meter_;
+    MeterOfRun meter_;
     EventResolution resolution_;
     bool backward_;
     Step<X> step_;

@@ -9,9 +9,9 @@
 namespace ricochet::detail {
 
 /// Interface of `Meter`; without one, the network is always asked and planning always done.
-class Metering {
+class MeterOfRun {
 public:
-    explicit Metering(const MeterOptions* options, std::size_t planned_guards = 0)
+    explicit MeterOfRun(const MeterOptions* options, std::size_t planned_guards = 0)
     {
         if (options) meter_.emplace(*options, planned_guards);
     }

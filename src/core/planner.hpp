@@ -567,7 +567,7 @@ private:
     const void* self_;
     bool bounded_;  ///< defers by declared bounds
     bool gated_;    ///< defers nothing but what a gate clears
-    Metering meter_;
+    MeterOfRun meter_;
     bool backward_;
     Steps steps_;
     GuardList<LastCheck, single> checks_;

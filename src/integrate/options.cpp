@@ -11,7 +11,7 @@ namespace ricochet {
 
 namespace {
 
-constexpr detail::Refuse refuse{"integrate"};
+constexpr detail::Refuse refuse_options{"integrate"};
 constexpr detail::Require require{"integrate"};
 
 }  // namespace
@@ -22,7 +22,8 @@ void validate(const Options& options, bool step_required)
     require(std::isfinite(o.t_start), "t_start must be a finite time", o.t_start);
     require(std::isfinite(o.t_end), "t_end must be a finite time", o.t_end);
     if (!std::isfinite(o.t_end - o.t_start)) {
-        refuse(fmt::format("t_end - t_start must be finite, got {} - {}", o.t_end, o.t_start));
+        refuse_options(
+            fmt::format("t_end - t_start must be finite, got {} - {}", o.t_end, o.t_start));
     }
     if (step_required) {
         require(std::isfinite(o.step) && o.step > 0,
@@ -54,12 +55,12 @@ void validate(const Options& options, bool step_required)
     double previous = o.t_start;
     for (const double t : o.sample_times) {
         if (backward ? t < o.t_end : t > o.t_end) {
-            refuse(fmt::format("sample time {} lies beyond the end of the run, t_end = {}", t,
-                               o.t_end));
+            refuse_options(fmt::format("sample time {} lies beyond the end of the run, t_end = {}",
+                                       t, o.t_end));
         }
         if (!(backward ? t <= previous : t >= previous)) {
-            refuse(fmt::format("sample_times must go from {} towards {}, got {} after {}",
-                               o.t_start, o.t_end, t, previous));
+            refuse_options(fmt::format("sample_times must go from {} towards {}, got {} after {}",
+                                       o.t_start, o.t_end, t, previous));
         }
         previous = t;
     }

@@ -26,7 +26,7 @@ namespace ricochet::app {
 
 namespace {
 
-constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr double unbounded = std::numeric_limits<double>::infinity();
 constexpr int samples = 600;
 
 /// One way of integrating.
@@ -44,7 +44,7 @@ struct WayTaken {
     double velocity_error = 0;  ///< of all elements over all time, relative L2
 };
 
-RuptureOptions sampled(double t_end, double step, double rtol = inf)
+RuptureOptions sampled(double t_end, double step, double rtol = unbounded)
 {
     RuptureOptions out{.t_end = t_end, .step = step, .rtol = rtol};
     out.progress = [](double) { return !Interrupts::any(); };
