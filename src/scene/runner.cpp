@@ -381,6 +381,13 @@ void Runner::cross(std::uint32_t i)
     put_in_calendar(i);
 }
 
+std::string Runner::presses_on(std::uint32_t i, const Face& face) const
+{
+    return fmt::format("{} presses on {}{}", called(i),
+                       face.kind == Face::Kind::vertex ? "a corner or an end of " : "",
+                       world_.scene.name_of(SurfaceId{face.surface}));
+}
+
 void Runner::happen(std::uint32_t i)
 {
     const Pending& pending = pending_[i];
@@ -392,10 +399,7 @@ void Runner::happen(std::uint32_t i)
         case Kind::face: return impact(i);
         case Kind::presses_face:
             if (rests_on_face(i)) return predict(i);
-            return press(
-                i,
-                fmt::format("{} presses on {}", called(i),
-                            world_.scene.name_of(SurfaceId{world_.faces[pending.other].surface})));
+            return press(i, presses_on(i, world_.faces[pending.other]));
         case Kind::pair:
         case Kind::presses: break;
     }

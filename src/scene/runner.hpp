@@ -70,6 +70,7 @@ private:
     void cross(std::uint32_t i);
     void step_island(std::uint32_t island);
     void happen(std::uint32_t i);
+    [[nodiscard]] std::string presses_on(std::uint32_t i, const Face& face) const;
     void impact(std::uint32_t i);
     void resolve_cluster(std::uint32_t i);
     void press(std::uint32_t i, const std::string& sentence);
@@ -103,6 +104,7 @@ private:
                                const std::vector<Side>& sides);
     void bounce(std::uint32_t i);
     bool collapses(std::uint32_t i);
+    bool hops_below_rounding(std::uint32_t slot);
     void restart_island(std::uint32_t island);
     void settle(std::uint32_t i, std::uint32_t was);
     bool rests_on_face(std::uint32_t i);
@@ -142,6 +144,7 @@ private:
         Instant since{};
         Instant last{-never, 0};
         std::uint32_t count = 0;
+        std::uint32_t low = 0;  ///< hops in a row that rise by less than rounding
     };
     std::vector<Series> series_;  ///< of impacts of a body
     Instant now_{};

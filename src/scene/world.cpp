@@ -70,6 +70,7 @@ World::World(const Scene& from, const SceneOptions& with)
         }
         if (walls) wall_count = static_cast<std::uint32_t>(faces.size());
     }
+    join_chains(from, wall_count, faces);
     islands = std::make_unique<Islands>(*this);
     if (islands->count() > 0) bends.resize(bodies.size());
     put_to_sleep();

@@ -70,6 +70,10 @@ struct Face {
     std::uint32_t previous = none, next = none;  ///< segments of the same chain
 };
 
+/// Links the segments of open terrain whose ends are the same point, of two and no more, and turns
+/// them so that the end of one is the start of the next.
+void join_chains(const Scene& scene, std::uint32_t wall_count, std::vector<Face>& faces);
+
 /// On which side of a segment a point is that touches it.
 struct Side {
     std::uint32_t face = none;
