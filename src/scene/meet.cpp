@@ -52,6 +52,8 @@ template <class Gap>
         const auto [value, rate] = gap(after);
         if (!(rate < 0)) break;
         const double change = -value / rate;
+        // The map differs from the polynomial by the error of a step.
+        if (std::fabs(change) > 0.1 * until) break;
         after = std::clamp(after + change, 0.0, until);
         if (std::fabs(change) <= 4 * epsilon * after) break;
     }
@@ -104,6 +106,11 @@ Vector2 World::velocity(std::uint32_t i, const Instant& t) const
     return speed(b, seconds(b.t, t));
 }
 
+Vector2 World::heading(std::uint32_t i, const Instant& t) const
+{
+    return bodies[i].contact != none ? bodies[i].v : velocity(i, t);
+}
+
 Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
 {
     const Body& a = world.bodies[i];
@@ -135,7 +142,7 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
             const Vector2 apart = world.position(i, t) - world.position(j, t);
             const double distance = norm(apart);
             return GapAndRate{distance - reach,
-                              dot(apart, world.velocity(i, t) - world.velocity(j, t)) / distance};
+                              dot(apart, world.heading(i, t) - world.heading(j, t)) / distance};
         });
     }
     return meeting;

@@ -103,7 +103,7 @@ private:
     std::uint32_t begin_record(std::uint32_t i, const Vector2& velocity,
                                const std::vector<Side>& sides);
     void bounce(std::uint32_t i);
-    bool collapses(std::uint32_t i);
+    bool collapses(std::uint32_t slot);
     bool hops_below_rounding(std::uint32_t slot);
     void restart_island(std::uint32_t island);
     void settle(std::uint32_t i, std::uint32_t was);

@@ -181,14 +181,29 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     cluster_.contacts.push_back(contact);
 }
 
-/// Whether impacts of a body follow each other more closely than the time tells.
-bool Runner::collapses(std::uint32_t i)
+/// Whether impacts of a body follow each other more closely than the time tells or, where groups in
+/// lasting contact can take it, than its place tells.
+bool Runner::collapses(std::uint32_t slot)
 {
+    const std::uint32_t i = cluster_.bodies[slot];
     Series& series = series_[i];
     if (series.count++ == 0) series.since = now_;
     if (series.count <= crowded) return false;
     series.count = 0;
-    return seconds(series.since, now_) <= crowded * resolution(now_);
+    const double s = seconds(series.since, now_);
+    if (s <= crowded * resolution(now_)) return true;
+    if (!contacts_.available()) return false;
+    double fastest = 0;
+    bool meets_body = false;
+    for (const Contact& contact : cluster_.contacts) {
+        if (contact.a != i && (contact.surface || contact.b != i)) continue;
+        meets_body = meets_body || !contact.surface;
+        const Vector2& a = cluster_.before[contact.slot_a];
+        const Vector2 v = contact.surface ? a : a - cluster_.before[contact.slot_b];
+        fastest = std::max(fastest, std::fabs(dot(v, contact.normal)));
+    }
+    return meets_body &&
+           s * fastest <= World::rounding(world_.position(i, now_), world_.bodies[i].radius);
 }
 
 /// Whether an elastic body with friction hops on surfaces, again and again, without the energy to
@@ -242,7 +257,7 @@ void Runner::resolve_cluster(std::uint32_t i)
     bool spend = false;
     if (within == 0) {
         for (std::uint32_t slot = 0; slot < cluster_.bodies.size(); ++slot) {
-            spend = collapses(cluster_.bodies[slot]) || spend;
+            spend = collapses(slot) || spend;
             spend = hops_below_rounding(slot) || spend;
         }
     }
@@ -255,9 +270,14 @@ void Runner::resolve_cluster(std::uint32_t i)
         result_.events[k].number = result_.event_count;
     }
     apply();
-    if (left && !result_.failure) {
+    // Bodies whose restitution is spent stay together: what else keeps them apart is the rounding
+    // of their velocities, by which they would meet again and again.
+    const bool together =
+        spend && contacts_.available() &&
+        std::ranges::any_of(cluster_.contacts, [](const Contact& c) { return !c.surface; });
+    if ((left || together) && !result_.failure) {
         ++result_.event_count;
-        ++world_.statistics.collapses;
+        world_.statistics.collapses += left;
         return hand_over(std::vector(cluster_.bodies), "");
     }
     if (changed_.empty()) {

@@ -113,6 +113,8 @@ struct World {
     /// By its record; by the method's own map where it advances by steps.
     [[nodiscard]] Vector2 position(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Vector2 velocity(std::uint32_t i, const Instant& t) const;
+    /// Derivative of the position: in lasting contact that is the chord of the step.
+    [[nodiscard]] Vector2 heading(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Path path(std::uint32_t i, const Instant& t) const;
 
     [[nodiscard]] double restitution(std::uint32_t a, std::uint32_t b) const noexcept
