@@ -100,8 +100,7 @@ void by_speed(const World& world, const Body& body, double fastest, Reach& reach
 
 /// Bodies that meet exchange speeds. With V^2 the sum of m v^2, impacts let V not grow, and gravity
 /// by |g| sqrt(mass of all) a second at most; no speed is above V / sqrt(m).
-void by_energy(const World& world, const std::vector<std::uint32_t>& group,
-               std::vector<Reach>& boxes)
+void by_energy(const World& world, std::span<const std::uint32_t> group, std::vector<Reach>& boxes)
 {
     const double until = world.options.t_end - world.options.t_start;
     double square = 0;
@@ -136,9 +135,10 @@ public:
         if (end - begin <= 1) return close(begin, end);
         const auto first = order_.begin() + static_cast<std::ptrdiff_t>(begin);
         const auto last = order_.begin() + static_cast<std::ptrdiff_t>(end);
-        std::sort(first, last, [&](std::uint32_t a, std::uint32_t b) {
+        const auto precedes = [&](std::uint32_t a, std::uint32_t b) {
             return reaches_[a].low[axis] < reaches_[b].low[axis];
-        });
+        };
+        if (!std::is_sorted(first, last, precedes)) std::sort(first, last, precedes);
         std::vector<std::size_t> cuts;
         double top = reaches_[order_[begin]].high[axis];
         for (std::size_t k = begin + 1; k < end; ++k) {
@@ -155,15 +155,15 @@ public:
         }
     }
 
-    std::vector<std::vector<std::uint32_t>> parts;
+    std::vector<std::size_t> ends;  ///< of parts, ascending
 
 private:
     void close(std::size_t begin, std::size_t end)
     {
         const auto first = order_.begin() + static_cast<std::ptrdiff_t>(begin);
         const auto last = order_.begin() + static_cast<std::ptrdiff_t>(end);
-        parts.emplace_back(first, last);
-        std::ranges::sort(parts.back());
+        std::sort(first, last);
+        ends.push_back(end);
     }
 
     const std::vector<Reach>& reaches_;
@@ -192,25 +192,27 @@ std::vector<Reach> reaches(const World& world)
 
 }  // namespace
 
-std::vector<std::vector<std::uint32_t>> groups_of(const World& world)
+Groups groups_of(const World& world)
 {
-    if (world.bodies.empty()) return {};
+    Groups groups;
+    if (world.bodies.empty()) return groups;
+    groups.order_.resize(world.bodies.size());
+    std::iota(groups.order_.begin(), groups.order_.end(), 0U);
     if (world.faces.size() > world.wall_count) {
         // Terrain lies in the cells of a group: one group for all.
-        std::vector<std::uint32_t> all(world.bodies.size());
-        std::iota(all.begin(), all.end(), 0U);
-        return {all};
+        groups.ends_ = {world.bodies.size()};
+        return groups;
     }
     std::vector<Reach> boxes = reaches(world);
-    std::vector<std::uint32_t> order(world.bodies.size());
-    std::iota(order.begin(), order.end(), 0U);
-    for (std::size_t before = 0;;) {
-        Divider divider(boxes, order);
-        divider.divide(0, order.size(), 0, false);
-        if (divider.parts.size() == before) return std::move(divider.parts);
-        before = divider.parts.size();
-        for (const auto& part : divider.parts) {
-            if (part.size() > 1) by_energy(world, part, boxes);
+    for (;;) {
+        Divider divider(boxes, groups.order_);
+        divider.divide(0, groups.order_.size(), 0, false);
+        const bool all_apart = divider.ends.size() == groups.order_.size();
+        const bool as_before = divider.ends.size() == groups.size();
+        groups.ends_ = std::move(divider.ends);
+        if (all_apart || as_before) return groups;
+        for (std::size_t k = 0; k < groups.size(); ++k) {
+            if (groups[k].size() > 1) by_energy(world, groups[k], boxes);
         }
     }
 }

@@ -7,6 +7,8 @@
 #include <bit>
 #include <cmath>
 
+#include "scene/large_pages.hpp"
+
 namespace ricochet::detail {
 
 namespace {
@@ -25,17 +27,19 @@ Runner::Runner(World& world, double t_end)
       t_end_{t_end, 0},
       calendar_(world.bodies.size() + world.islands->count() +
                 (world.options.contacts ? world.bodies.size() : 0)),
-      pending_(world.bodies.size()),
       slots_(world.bodies.size(), none),
       impacts_(world),
-      contacts_(world),
-      series_(world.bodies.size())
+      contacts_(world)
 {
+    reserve_large(pending_, world.bodies.size());
+    pending_.resize(world.bodies.size());
+    reserve_large(series_, world.bodies.size());
+    series_.resize(world.bodies.size());
 }
 
-void Runner::begin(std::vector<std::uint32_t> bodies)
+void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events)
 {
-    members_ = std::move(bodies);
+    members_.assign(bodies.begin(), bodies.end());
     islands_.clear();
     for (const std::uint32_t i : members_) {
         if (world_.bodies[i].island != none) islands_.push_back(world_.bodies[i].island);
@@ -49,6 +53,7 @@ void Runner::begin(std::vector<std::uint32_t> bodies)
     idle_ = 0;
     next_sample_ = 0;
     result_ = {};
+    result_.events = std::move(events);
 }
 
 /// Cells as large as two of the largest discs, or as leave some 0.4 bodies in each: by trial, 1.2
@@ -117,9 +122,10 @@ void Runner::place_faces()
     }
 }
 
-GroupResult Runner::run(std::vector<std::uint32_t> bodies_of_group, Samples& samples)
+GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
+                        std::vector<SceneEvent> events, Samples& samples)
 {
-    begin(std::move(bodies_of_group));
+    begin(bodies_of_group, std::move(events));
     place_all();
     settle_at_start();
     for (const std::uint32_t island : islands_) step_island(island);

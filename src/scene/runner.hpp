@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,12 +38,14 @@ class Runner {
 public:
     Runner(World& world, double t_end);
 
+    /// @param events   to which those of this group are appended
     /// @param samples  a row for each of the options' sample times, whose bodies of this group are
     ///                 filled in as far as the group comes
-    GroupResult run(std::vector<std::uint32_t> bodies, Samples& samples);
+    GroupResult run(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events,
+                    Samples& samples);
 
 private:
-    void begin(std::vector<std::uint32_t> bodies);
+    void begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events);
     struct Pending {
         enum class Kind : std::uint8_t { nothing, pair, face, presses, presses_face, stop, edge };
         Instant t = no_instant;

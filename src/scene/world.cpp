@@ -1,6 +1,7 @@
 #include "scene/world.hpp"
 
 #include "scene/islands.hpp"
+#include "scene/large_pages.hpp"
 
 namespace ricochet::detail {
 
@@ -50,7 +51,7 @@ World::World(const Scene& from, const SceneOptions& with)
     : scene(from), options(with), gravity(from.settings().gravity)
 {
     const Instant start{with.t_start, 0};
-    bodies.reserve(from.bodies().size());
+    reserve_large(bodies, from.bodies().size());
     for (const Disc& disc : from.bodies()) {
         Body body;
         body.p = disc.at;
