@@ -75,6 +75,7 @@ private:
     void join(World& world);
     void flow(const Island& island, const State& x, State& rate) const;
     void depart(const Island& island, double h, bool with_error) const;
+    void depart_alone(const Island& island, double h, bool with_error) const;
     [[nodiscard]] double error_of(const Island& island, double h) const;
     void look_at(const Island& island, const Instant& t) const;
     [[nodiscard]] double first_step(const Island& island) const;

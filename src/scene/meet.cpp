@@ -33,6 +33,19 @@ namespace {
     return sum;
 }
 
+/// Whether one coordinate alone keeps the path farther than `reach` from the origin.
+[[nodiscard]] bool stays_beyond(const Path& path, double reach) noexcept
+{
+    for (std::size_t c = 0; c < 2; ++c) {
+        double sum = 0;
+        for (int k = path.degree; k > 0; --k) {
+            sum = (sum + std::fabs(path.c[static_cast<std::size_t>(k)][c])) * path.until;
+        }
+        if (std::fabs(path.c[0][c]) - sum > reach) return true;
+    }
+    return false;
+}
+
 [[nodiscard]] Path difference(const Path& a, const Path& b) noexcept
 {
     Path out;
@@ -55,7 +68,8 @@ template <class Gap>
         // The map differs from the polynomial by the error of a step.
         if (std::fabs(change) > 0.1 * until) break;
         after = std::clamp(after + change, 0.0, until);
-        if (std::fabs(change) <= 4 * epsilon * after) break;
+        // Newton's method doubles the digits: the next change would be below rounding.
+        if (std::fabs(change) <= 1e-9 * after) break;
     }
     return after;
 }
@@ -125,6 +139,7 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
     Squares now = squares(path.c[0], path.c[1], reach, rounding);
     Meeting meeting{.from = from};
     const bool steps = std::isfinite(path.until);
+    if (steps && stays_beyond(path, (1 + 1e-9) * reach)) return meeting;
     if (steps && norm(path.c[0]) - reach > reach_of(path)) return meeting;
     if (now.at_once <= now.tolerance) {
         const double slowest = noise(first.c[1], second.c[1]);

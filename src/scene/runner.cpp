@@ -319,17 +319,19 @@ void Runner::predict_crossing(std::uint32_t i)
     pending.crossing = no_instant;
     if (body.quartic) {
         const Path path = world_.path(i, now_);
-        double room = never;
-        double speed = 0;
-        for (int k = 4; k > 0; --k) {
-            speed = speed * path.until + k * norm(path.c[static_cast<std::size_t>(k)]);
-        }
+        // A tenth of a cell outside of it.
+        double first = path.until;
         for (std::size_t c = 0; c < 2; ++c) {
             const double into = path.c[0][c] - corner[c];
-            room = std::min({room, into, side - into});
+            Polynomial gap{};
+            for (std::size_t k = 1; k < 5; ++k) gap[k] = path.c[k][c];
+            for (const double way : {into, side - into}) {
+                gap[0] = std::max(way, 0.0) + 0.1 * side;
+                first = std::min(first, falls_within(gap, 4, first, 0));
+                for (std::size_t k = 1; k < 5; ++k) gap[k] = -gap[k];
+            }
         }
-        const double s = (std::max(room, 0.0) + 0.1 * side) / speed;
-        if (s < path.until) pending.crossing = now_.after(s);
+        if (first < path.until) pending.crossing = now_.after(first);
         return;
     }
     double first = never;
