@@ -46,6 +46,9 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
         }
     }
     const double pull = dot(world.gravity, normal);
+    // Drag may turn a body back sooner, to where without it there was no time to come.
+    const bool slowed = body.island != none;
+    if (slowed && dot(world.gravity, along) != 0) return false;
     const double height = dot(body.p, normal);
     const double rise = dot(body.v, normal);
     Interval across = swept(height, rise, pull, until);
@@ -54,6 +57,8 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
         const double top = height - rise * rise / (2 * pull);
         (pull < 0 ? across.high : across.low) =
             pull < 0 ? std::max(across.high, top) : std::min(across.low, top);
+        const double fallen = height + (slowed ? 0.5 * pull * until * until : 0);
+        across = {std::min(across.low, fallen), std::max(across.high, fallen)};
     } else if (rise != 0) {
         across = {-infinite, infinite};
     }
@@ -117,7 +122,8 @@ void by_energy(const World& world, std::span<const std::uint32_t> group, std::ve
     const double v = std::sqrt(square) + norm(world.gravity) * std::sqrt(mass) * until;
     for (const std::uint32_t i : group) {
         const Body& body = world.bodies[i];
-        if (body.island == none) by_speed(world, body, v * std::sqrt(body.inverse_mass), boxes[i]);
+        const bool driven = body.island != none && world.islands->members(body.island).size() > 1;
+        if (!driven) by_speed(world, body, v * std::sqrt(body.inverse_mass), boxes[i]);
     }
 }
 
@@ -179,7 +185,8 @@ std::vector<Reach> reaches(const World& world)
     const bool terrain = world.faces.size() > world.wall_count;
     for (std::size_t i = 0; i < out.size(); ++i) {
         const Body& body = world.bodies[i];
-        if (body.island != none) {
+        // Springs may drive their bodies anywhere; drag alone only slows.
+        if (body.island != none && world.islands->members(body.island).size() > 1) {
             out[i] = {{-infinite, -infinite}, {infinite, infinite}};
         } else if (body.asleep) {
             by_speed(world, body, 0, out[i]);

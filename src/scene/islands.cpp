@@ -146,7 +146,7 @@ void Islands::depart_alone(const Island& island, double h, bool with_error) cons
     std::ranges::copy(w, w_.begin());
     std::ranges::copy(end_rate, end_rate_.begin());
     std::ranges::copy(error, error_.begin());
-    for (std::size_t k = 0; k < stages.size(); ++k)
+    for (std::size_t k = 0; k < stages.size() && !island.unseen; ++k)
         std::ranges::copy(stages[k], stages_[k].begin());
     seen_ = nullptr;
 }
@@ -154,8 +154,10 @@ void Islands::depart_alone(const Island& island, double h, bool with_error) cons
 void Islands::depart(const Island& island, double h, bool with_error) const
 {
     const std::size_t n = island.x.size();
-    for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_}) state->resize(n);
-    for (State& stage : stages_) stage.resize(n);
+    if (w_.size() != n) {
+        for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_}) state->resize(n);
+        for (State& stage : stages_) stage.resize(n);
+    }
     if (n == 4) return depart_alone(island, h, with_error);
     State point(n);
     const auto departure = [&](const auto& w, State& rate, double s) {
@@ -247,6 +249,13 @@ void Islands::record(Island& island)
         island.x_end[i] = sum.value;
         island.remainder_end[i] = sum.remainder;
         island.rate_end[i] = island.rate[i] + end_rate_[i];
+    }
+    if (island.unseen) {
+        Body& body = world_.bodies[island.members[0]];
+        ++body.version;
+        body.t = island.start;
+        body.quartic = true;
+        return;
     }
     Dopri5::dense(0.5 * h, h, stages_.data(), end_rate_, middle_);
     for (std::size_t m = 0; m < island.members.size(); ++m) {

@@ -47,6 +47,9 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
     std::ranges::sort(islands_);
     const auto repeated = std::ranges::unique(islands_);
     islands_.erase(repeated.begin(), repeated.end());
+    if (members_.size() == 1 && world_.faces.empty()) {
+        for (const std::uint32_t island : islands_) world_.islands->set_unseen(island);
+    }
     calendar_.clear();
     now_ = {world_.options.t_start, 0};
     fruitless_ = 0;
