@@ -100,14 +100,33 @@ bool ContactIsland::solve_touches(double h)
     });
     problem_.contacts.clear();
     for (const Touch& c : touches_) problem_.contacts.push_back(law_contact(c, h));
+    const bool overlaps = std::ranges::any_of(touches_, [](const Touch& c) { return c.gap < 0; });
+    if (solve_law(h, !overlaps)) return true;
+    if (!overlaps) return false;
+    // Discs that friction has wedged cannot part by what rounding lets them overlap: it stays.
+    for (std::size_t k = 0; k < touches_.size(); ++k) {
+        Touch closed = touches_[k];
+        closed.gap = std::max(0.0, closed.gap);
+        problem_.contacts[k] = law_contact(closed, h);
+    }
+    ++statistics_.wedged;
+    return solve_law(h, true);
+}
+
+/// The contacts that there are, from the impulses of the last step. Without last resorts nothing
+/// but a solution will do.
+bool ContactIsland::solve_law(double h, bool last_resorts)
+{
     impulses_ = warm_impulses(h);
-    failure_ = law_.solve(problem_, impulses_, v_next_);
+    failure_ = law_.solve(problem_, impulses_, v_next_, last_resorts);
     ++statistics_.problems;
     statistics_.iterations += static_cast<std::uint64_t>(failure_.iterations);
     statistics_.factors += static_cast<std::uint64_t>(failure_.factors);
     statistics_.sweeps += static_cast<std::uint64_t>(failure_.sweeps);
     statistics_.dense += failure_.dense;
-    return failure_.converged && v_next_.allFinite();
+    const double most = last_resorts ? options_.largest_defect : 0;
+    const bool solved = failure_.converged || failure_.residual <= most;
+    return solved && v_next_.allFinite();
 }
 
 bool ContactIsland::stays_within(const std::vector<double>& reach, double h) const

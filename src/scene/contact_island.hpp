@@ -44,6 +44,7 @@ struct IslandStatistics {
     std::uint64_t factors = 0;
     std::uint64_t sweeps = 0;
     std::uint64_t dense = 0;     ///< problems that only the dense solver could solve
+    std::uint64_t wedged = 0;    ///< problems solved with overlaps by rounding left as they are
     std::uint64_t halvings = 0;  ///< steps tried again at half the length
     std::uint64_t spent = 0;     ///< arrivals whose rebound would have been shorter than a step
     std::uint64_t slept = 0;
@@ -152,6 +153,7 @@ private:
     void couple_springs(double h);
     [[nodiscard]] LawContact law_contact(const Touch& touch, double h) const;
     bool solve_touches(double h);
+    bool solve_law(double h, bool last_resorts);
     [[nodiscard]] bool stays_within(const std::vector<double>& reach, double h) const;
     [[nodiscard]] Eigen::VectorXd warm_impulses(double h) const;
     [[nodiscard]] double relative_normal(const Touch& touch, const Eigen::VectorXd& v) const;

@@ -17,8 +17,11 @@ namespace {
 constexpr double stiff = 1e5;
 constexpr double less_stiff = 1e3;
 
-/// Up to this many unknowns a dense matrix is factored faster than a sparse one.
-constexpr Eigen::Index few_unknowns = 24;
+/// [contacts] The dense solver's time grows with the cube.
+constexpr std::size_t most_dense = 100;
+
+/// A larger defect is worth the last resorts.
+constexpr double loose = 1e-7;
 
 /// Where a defect no longer halves, rounding has been reached.
 constexpr double rounding = 1e-14;
@@ -70,56 +73,87 @@ double ContactLaw::unit(const LawContact& c) const
     return first * second / (first + second);
 }
 
-void ContactLaw::add_block(int row, int column, const Eigen::Matrix2d& block)
+/// Adds what couples `a` with `b`, or belongs to `a` alone, to a list of entries.
+void ContactLaw::add_entries(int a, int b, const BlockLu::Block& block)
 {
-    for (int i = 0; i < 2; ++i) {
-        for (int j = 0; j < 2; ++j) {
-            if (small_) {
-                dense_(2 * row + i, 2 * column + j) += block(i, j);
-            } else {
-                triplets_.emplace_back(2 * row + i, 2 * column + j, block(i, j));
-            }
+    const auto add = [&](int row, int column, double sign) {
+        for (int k = 0; k < 4; ++k) {
+            triplets_.emplace_back(2 * row + k / 2, 2 * column + k % 2,
+                                   sign * block[static_cast<std::size_t>(k)]);
         }
+    };
+    add(a, a, 1);
+    if (b < 0) return;
+    add(b, b, 1);
+    add(a, b, -1);
+    add(b, a, -1);
+}
+
+/// A, in blocks: add(a, b, pair, block) for what couples a and b, the place of their pair in the
+/// pattern; b is -1 for what belongs to a alone.
+template <class Add>
+std::size_t ContactLaw::assemble_inertia(const Add& add) const
+{
+    for (std::size_t b = 0; b < problem_->inertia.size(); ++b) {
+        const double m = problem_->inertia[b];
+        add(static_cast<int>(b), -1, 0, {m, 0, 0, m});
+    }
+    std::size_t pair = 0;
+    for (const LawCoupling& k : problem_->couplings) {
+        add(k.first, k.second, pair++, {k.xx, k.xy, k.xy, k.yy});
+    }
+    return pair;
+}
+
+/// A + G' D G, with D = -dp/du of what is active.
+template <class Add>
+void ContactLaw::assemble(const Add& add) const
+{
+    std::size_t pair = assemble_inertia(add);
+    for (std::size_t k = 0; k < problem_->contacts.size(); ++k) {
+        const LawContact& c = problem_->contacts[k];
+        const std::size_t own = c.second >= 0 ? pair++ : 0;
+        if (active_[k] == Active::open) continue;
+        const double rho = stiffness_ * unit(c);
+        if (active_[k] == Active::sticks) {
+            add(c.first, c.second, own, {rho, 0, 0, rho});
+            continue;
+        }
+        const double slope = active_[k] == Active::slips_forward ? c.friction : -c.friction;
+        const auto [nx, ny] = c.normal;
+        const double x = rho * (nx - slope * ny);
+        const double y = rho * (ny + slope * nx);
+        add(c.first, c.second, own, {x * nx, x * ny, y * nx, y * ny});
     }
 }
 
 void ContactLaw::factor_inertia()
 {
     if (problem_->couplings.empty()) return;
-    const bool small = small_;
-    small_ = false;
     triplets_.clear();
-    for (std::size_t i = 0; i < problem_->inertia.size(); ++i) {
-        add_block(static_cast<int>(i), static_cast<int>(i),
-                  problem_->inertia[i] * Eigen::Matrix2d::Identity());
-    }
-    for (const LawCoupling& k : problem_->couplings) {
-        const Eigen::Matrix2d block{{k.xx, k.xy}, {k.xy, k.yy}};
-        add_block(k.first, k.first, block);
-        add_block(k.second, k.second, block);
-        add_block(k.first, k.second, -block);
-        add_block(k.second, k.first, -block);
-    }
+    assemble_inertia([this](int a, int b, std::size_t /*pair*/, const BlockLu::Block& block) {
+        add_entries(a, b, block);
+    });
     const Eigen::Index n = problem_->momentum.size();
     sparse_.resize(n, n);
     sparse_.setFromTriplets(triplets_.begin(), triplets_.end());
     inertia_factor_.compute(sparse_);
-    small_ = small;
 }
 
 /// The order of elimination belongs to the pairs in contact, and is kept while they stay.
 void ContactLaw::compare_pattern()
 {
     std::vector<std::array<int, 2>> pattern;
-    pattern.reserve(problem_->contacts.size() + problem_->couplings.size() + 1);
-    pattern.push_back({static_cast<int>(problem_->inertia.size()), -2});
+    pattern.reserve(problem_->contacts.size() + problem_->couplings.size());
     for (const LawCoupling& k : problem_->couplings) pattern.push_back({k.first, k.second});
     for (const LawContact& c : problem_->contacts) {
         if (c.second >= 0) pattern.push_back({c.first, c.second});
     }
-    if (pattern == pattern_) return;
+    const auto count = static_cast<int>(problem_->inertia.size());
+    if (count == pattern_count_ && pattern == pattern_) return;
+    pattern_count_ = count;
     pattern_.swap(pattern);
-    ldlt_analyzed_ = lu_analyzed_ = false;
+    block_lu_.analyze(count, pattern_);
 }
 
 /// v = A^-1 (b + G' p)
@@ -141,7 +175,8 @@ void ContactLaw::follow(const Eigen::VectorXd& p, Eigen::VectorXd& v)
 }
 
 /// The largest relative velocity without impulses, in units of equal mass: gaps that are open
-/// count where they would close alone.
+/// count where they would close alone. Two bodies that move together have none, but for the
+/// rounding of their velocities, which no solution can be told from.
 void ContactLaw::set_scale(const Eigen::VectorXd& free)
 {
     scale_ = 0;
@@ -150,7 +185,10 @@ void ContactLaw::set_scale(const Eigen::VectorXd& free)
         const double normal = u.normal < 0 ? std::max(-u.normal, std::abs(u.normal - c.offset[0]))
                                            : std::abs(u.normal - c.offset[0]);
         const double largest = std::max(normal, std::abs(u.tangential));
-        scale_ = std::max(scale_, largest * std::sqrt(unit(c)));
+        double speed = free.segment<2>(2 * c.first).norm();
+        if (c.second >= 0) speed = std::max(speed, free.segment<2>(2 * c.second).norm());
+        const double told = 8 * std::numeric_limits<double>::epsilon() / tolerance_ * speed;
+        scale_ = std::max(scale_, std::max(largest, told) * std::sqrt(unit(c)));
     }
 }
 
@@ -172,27 +210,24 @@ double ContactLaw::residual(const Eigen::VectorXd& p, const Eigen::VectorXd& v) 
     return scale_ > 0 ? worst / scale_ : worst;
 }
 
-/// What is active at (p, v); false where nothing has changed.
-bool ContactLaw::choose(const Eigen::VectorXd& p, const Eigen::VectorXd& v)
+/// What is active at p and the relative velocities u; false where nothing has changed.
+bool ContactLaw::choose(const Eigen::VectorXd& p, const Eigen::VectorXd& u)
 {
     const auto& contacts = problem_->contacts;
     chosen_.resize(contacts.size());
-    symmetric_ = true;
     for (std::size_t k = 0; k < contacts.size(); ++k) {
         const LawContact& c = contacts[k];
         const auto i = 2 * static_cast<Eigen::Index>(k);
-        const Pair u = relative(c, v);
         const double rho = stiffness_ * unit(c);
-        const double normal = p[i] - rho * u.normal;
+        const double normal = p[i] - rho * u[i];
         chosen_[k] = Active::open;
         if (!(normal > 0)) continue;
-        const double tangential = p[i + 1] - rho * u.tangential;
+        const double tangential = p[i + 1] - rho * u[i + 1];
         const double bound = c.friction * normal;
         if (c.friction == 0) {
             chosen_[k] = Active::slips_forward;
         } else if (std::abs(tangential) > bound) {
             chosen_[k] = tangential > 0 ? Active::slips_forward : Active::slips_backward;
-            symmetric_ = false;
         } else {
             chosen_[k] = Active::sticks;
         }
@@ -202,97 +237,79 @@ bool ContactLaw::choose(const Eigen::VectorXd& p, const Eigen::VectorXd& v)
     return changed;
 }
 
-/// A + G' D G, with D = -dp/du of what is active.
+/// A + G' D G by blocks or, where pivots between blocks are needed, with those.
 bool ContactLaw::factor()
 {
-    const Eigen::Index n = problem_->momentum.size();
-    small_ = n <= few_unknowns;
-    if (small_) {
-        dense_.setZero(n, n);
-    } else {
-        triplets_.clear();
-    }
-    for (std::size_t b = 0; b < problem_->inertia.size(); ++b) {
-        add_block(static_cast<int>(b), static_cast<int>(b),
-                  problem_->inertia[b] * Eigen::Matrix2d::Identity());
-    }
-    const auto couple = [this](int a, int b, const Eigen::Matrix2d& block) {
-        add_block(a, a, block);
+    block_lu_.clear();
+    assemble([this](int a, int b, std::size_t pair, const BlockLu::Block& block) {
+        block_lu_.add(a, block);
         if (b < 0) return;
-        add_block(b, b, block);
-        add_block(a, b, -block);
-        add_block(b, a, -block);
-    };
-    for (const LawCoupling& k : problem_->couplings) {
-        couple(k.first, k.second, Eigen::Matrix2d{{k.xx, k.xy}, {k.xy, k.yy}});
-    }
-    for (std::size_t k = 0; k < problem_->contacts.size(); ++k) {
-        const LawContact& c = problem_->contacts[k];
-        const Eigen::Vector2d normal(c.normal[0], c.normal[1]);
-        const Eigen::Vector2d tangent(-c.normal[1], c.normal[0]);
-        const double rho = stiffness_ * unit(c);
-        // Open contacts keep their places, so that the pattern of the matrix is the contacts'.
-        Eigen::Matrix2d block = Eigen::Matrix2d::Zero();
-        if (active_[k] == Active::sticks) {
-            block = rho * Eigen::Matrix2d::Identity();
-        } else if (active_[k] != Active::open) {
-            const double slope = active_[k] == Active::slips_forward ? c.friction : -c.friction;
-            block = rho * (normal + slope * tangent) * normal.transpose();
-        }
-        couple(c.first, c.second, block);
-    }
-    if (small_) {
-        dense_lu_.compute(dense_);
-        return true;
-    }
+        block_lu_.add(b, block);
+        block_lu_.subtract(pair, block);
+    });
+    blocked_ = block_lu_.factor();
+    if (blocked_) return true;
+    triplets_.clear();
+    assemble([this](int a, int b, std::size_t /*pair*/, const BlockLu::Block& block) {
+        add_entries(a, b, block);
+    });
+    const Eigen::Index n = problem_->momentum.size();
     sparse_.resize(n, n);
     sparse_.setFromTriplets(triplets_.begin(), triplets_.end());
-    if (symmetric_) {
-        if (!std::exchange(ldlt_analyzed_, true)) sparse_ldlt_.analyzePattern(sparse_);
-        sparse_ldlt_.factorize(sparse_);
-        return sparse_ldlt_.info() == Eigen::Success;
-    }
-    if (!std::exchange(lu_analyzed_, true)) sparse_lu_.analyzePattern(sparse_);
-    sparse_lu_.factorize(sparse_);
+    sparse_lu_.compute(sparse_);
     return sparse_lu_.info() == Eigen::Success;
 }
 
-/// The impulses of the active contacts with the velocities that follow from them.
-void ContactLaw::improve(Eigen::VectorXd& p)
+/// The impulses of the active contacts, and the relative velocities u that go with them. Only the
+/// change of velocities is solved for: what rounding makes of velocities themselves would be
+/// magnified by rho, and that is more than the forces of a short step leave of bodies in motion.
+void ContactLaw::improve(Eigen::VectorXd& p, Eigen::VectorXd& u)
 {
     const auto& contacts = problem_->contacts;
-    right_ = problem_->momentum;
+    follow(p, trial_v_);
+    right_.setZero(trial_v_.size());
     const auto slope = [&](std::size_t k) {
         return active_[k] == Active::slips_forward ? contacts[k].friction : -contacts[k].friction;
     };
     for (std::size_t k = 0; k < contacts.size(); ++k) {
-        if (active_[k] == Active::open) continue;
         const LawContact& c = contacts[k];
         const auto i = 2 * static_cast<Eigen::Index>(k);
+        const Pair now = relative(c, trial_v_);
+        u.segment<2>(i) << now.normal, now.tangential;
+        if (active_[k] == Active::open) {
+            if (p[i] != 0 || p[i + 1] != 0) push(c, -p[i], -p[i + 1], right_);
+            continue;
+        }
         const double rho = stiffness_ * unit(c);
-        const double normal = p[i] - rho * c.offset[0];
+        const double normal = -rho * u[i];
         const bool sticks = active_[k] == Active::sticks;
-        push(c, normal, sticks ? p[i + 1] - rho * c.offset[1] : slope(k) * normal, right_);
+        push(c, normal, sticks ? -rho * u[i + 1] : slope(k) * (p[i] + normal) - p[i + 1], right_);
     }
-    linear_ = small_       ? Eigen::VectorXd(dense_lu_.solve(right_))
-              : symmetric_ ? Eigen::VectorXd(sparse_ldlt_.solve(right_))
-                           : Eigen::VectorXd(sparse_lu_.solve(right_));
+    linear_ = solve_factored(right_);
     for (std::size_t k = 0; k < contacts.size(); ++k) {
         const LawContact& c = contacts[k];
         const auto i = 2 * static_cast<Eigen::Index>(k);
+        const Pair change = relative(c, linear_);
+        u[i] += change.normal - c.offset[0];
+        u[i + 1] += change.tangential - c.offset[1];
         if (active_[k] == Active::open) {
             p[i] = p[i + 1] = 0;
             continue;
         }
-        const Pair u = relative(c, linear_);
         const double rho = stiffness_ * unit(c);
-        p[i] -= rho * u.normal;
+        p[i] -= rho * u[i];
         if (active_[k] == Active::sticks) {
-            p[i + 1] -= rho * u.tangential;
+            p[i + 1] -= rho * u[i + 1];
         } else {
             p[i + 1] = slope(k) * p[i];
         }
     }
+}
+
+Eigen::VectorXd ContactLaw::solve_factored(const Eigen::VectorXd& right) const
+{
+    if (blocked_) return block_lu_.solve(right);
+    return sparse_lu_.solve(right);
 }
 
 /// The nearest impulses within the law's bounds.
@@ -307,22 +324,25 @@ void ContactLaw::confine(Eigen::VectorXd& p) const
 }
 
 /// From (p, v); true and there the solution, or false and there the best that was found.
-bool ContactLaw::newton(Eigen::VectorXd& p, Eigen::VectorXd& v, int most, LawReport& report)
+bool ContactLaw::newton(Eigen::VectorXd& p, Eigen::VectorXd& v, int most, LawReport& report,
+                        bool active_given)
 {
     Eigen::VectorXd multiplier = p;
-    linear_ = v;
+    Eigen::VectorXd u(p.size());
+    for (Eigen::Index i = 0; i < p.size(); i += 2) {
+        const Pair now = relative(problem_->contacts[static_cast<std::size_t>(i / 2)], v);
+        u.segment<2>(i) << now.normal, now.tangential;
+    }
     double last = std::numeric_limits<double>::infinity();
-    active_.clear();
+    if (!active_given) active_.clear();
     for (int iteration = 0; iteration < most; ++iteration) {
-        // The set follows from the velocities of the linear equations: those of the impulses
-        // carry their rounding, which rho would magnify.
-        const bool changed = choose(multiplier, linear_);
+        const bool changed = iteration == 0 && active_given ? true : choose(multiplier, u);
         if (changed || iteration == 0) {
             ++report.factors;
             if (!factor()) break;
         }
         ++report.iterations;
-        improve(multiplier);
+        improve(multiplier, u);
         if (!multiplier.allFinite()) break;
         trial_p_ = multiplier;
         confine(trial_p_);
@@ -432,9 +452,11 @@ void ContactLaw::solve_densely(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport
     }
 }
 
-LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v)
+LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
+                            bool last_resorts)
 {
     problem_ = &problem;
+    stiffness_ = stiff;
     const auto n = 2 * static_cast<Eigen::Index>(problem.contacts.size());
     factor_inertia();
     LawReport report;
@@ -455,24 +477,33 @@ LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen
         relax(p, v, 1);
         report.residual = residual(p, v);
     }
-    report.converged = report.residual <= rounding || iterate(p, v, report);
-    if (!report.converged && std::isfinite(report.residual) && problem.contacts.size() <= 100) {
+    report.converged = report.residual <= rounding || iterate(p, v, last_resorts, report);
+    const bool small = problem.contacts.size() <= most_dense;
+    if (report.residual > loose && std::isfinite(report.residual) && last_resorts && small) {
         solve_densely(p, v, report);
         report.converged = report.residual <= tolerance_;
     }
     return report;
 }
 
-/// Newton's method and, where it runs in circles, ever more sweeps between its attempts.
-bool ContactLaw::iterate(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& report)
+/// Newton's method; where it runs in circles, paths with friction; then ever more sweeps between
+/// attempts.
+bool ContactLaw::iterate(Eigen::VectorXd& p, Eigen::VectorXd& v, bool last_resorts,
+                         LawReport& report)
 {
     compare_pattern();
     const bool rubs =
         std::ranges::any_of(problem_->contacts, [](const LawContact& c) { return c.friction > 0; });
     const int most = rubs ? iterations_with_friction : iterations_without;
     bool converged = newton(p, v, most, report);
+    if (!converged) {
+        converged = along_paths(p, v, report);
+    }
+    stiffness_ = stiff;
     int batch = first_batch;
-    for (int round = 0; !converged && round < most_rounds; ++round, batch *= 2) {
+    for (int round = 0;
+         !converged && last_resorts && report.residual > loose && round < most_rounds;
+         ++round, batch *= 2) {
         relax(p, v, batch);
         report.sweeps += batch;
         // What Newton's method finds replaces the sweeps' only where nothing better has been seen.

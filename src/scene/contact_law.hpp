@@ -16,6 +16,8 @@
 #include <array>
 #include <vector>
 
+#include "scene/block_lu.hpp"
+
 namespace ricochet::detail {
 
 struct LawContact {
@@ -48,6 +50,7 @@ struct LawReport {
     int iterations = 0;  ///< of Newton's method
     int factors = 0;     ///< matrices factored
     int sweeps = 0;      ///< over the contacts
+    int switches = 0;    ///< of contacts along paths
     bool dense = false;  ///< whether `ContactSolver` had to help
 };
 
@@ -55,16 +58,21 @@ struct LawReport {
 /// of friction, with a large rho. What is active enters the matrix A + G' D G, which is regular
 /// however redundant the contacts are, and is factored once for a set of active contacts; then p is
 /// improved with the same factor. Without friction the matrix is symmetric, and the active set ends
-/// the iteration: its solution is exact to rounding. Where sets run in circles, sweeps over the
-/// contacts find another start, and after them the dense `ContactSolver`, for no more than 100
-/// contacts.
+/// the iteration: its solution is exact to rounding. Where sets run in circles, paths lead to a
+/// solution: p = P(p - rho u + s c) with a shift c for which the start solves the law at s = 1, and
+/// s going to 0. The path is a polygon, at whose corners one contact changes; it is that of Lemke's
+/// method, in which s may grow for a while (R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear
+/// Complementarity Problem, 1992, section 4.4), from a start that is near. After them come sweeps
+/// over the contacts, and the dense `ContactSolver`, for no more than 100 contacts.
 class ContactLaw {
 public:
     explicit ContactLaw(double tolerance = 1e-10) : tolerance_(tolerance) {}
 
     /// `p`, two for each contact, normal first, is the start and the result, as is `v`, which
-    /// satisfies the first equation to rounding whatever the outcome.
-    LawReport solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v);
+    /// satisfies the first equation to rounding whatever the outcome. `last_resorts`: whether
+    /// sweeps and the dense solver are tried where paths do not lead to a solution.
+    LawReport solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
+                    bool last_resorts = true);
 
 private:
     enum class Active : unsigned char { open, sticks, slips_forward, slips_backward };
@@ -83,16 +91,35 @@ private:
     void set_scale(const Eigen::VectorXd& free);
     [[nodiscard]] double residual(const Eigen::VectorXd& p, const Eigen::VectorXd& v) const;
 
-    bool iterate(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& report);
-    bool newton(Eigen::VectorXd& p, Eigen::VectorXd& v, int most, LawReport& report);
+    bool iterate(Eigen::VectorXd& p, Eigen::VectorXd& v, bool last_resorts, LawReport& report);
+    bool newton(Eigen::VectorXd& p, Eigen::VectorXd& v, int most, LawReport& report,
+                bool active_given = false);
     void relax(Eigen::VectorXd& p, Eigen::VectorXd& v, int times);
-    bool choose(const Eigen::VectorXd& p, const Eigen::VectorXd& v);
+    bool choose(const Eigen::VectorXd& p, const Eigen::VectorXd& u);
     [[nodiscard]] bool factor();
-    void improve(Eigen::VectorXd& p);
+    [[nodiscard]] Eigen::VectorXd solve_factored(const Eigen::VectorXd& right) const;
+    void improve(Eigen::VectorXd& p, Eigen::VectorXd& u);
     void confine(Eigen::VectorXd& p) const;
     void sweep(Eigen::VectorXd& p, Eigen::VectorXd& v);
+    bool along_paths(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& report);
+    void begin_path(const Eigen::VectorXd& p, const Eigen::VectorXd& v);
+    void begin_path_afar();
+    bool follow_path(LawReport& report);
+    struct Switch {
+        double after = 0;
+        std::size_t contact = 0;
+        Active to = Active::open;
+    };
+    void turn_path();
+    [[nodiscard]] Switch next_switch() const;
+    void pass(const Switch& next);
+    void impulses_of_path(Eigen::VectorXd& p) const;
     void solve_densely(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& report);
-    void add_block(int row, int column, const Eigen::Matrix2d& block);
+    void add_entries(int a, int b, const BlockLu::Block& block);
+    template <class Add>
+    std::size_t assemble_inertia(const Add& add) const;
+    template <class Add>
+    void assemble(const Add& add) const;
 
     double tolerance_;
     const LawProblem* problem_ = nullptr;
@@ -101,15 +128,18 @@ private:
     Eigen::SimplicialLDLT<Sparse> inertia_factor_;
     std::vector<Active> active_, chosen_;
     std::vector<Eigen::Triplet<double>> triplets_;
-    bool small_ = true, symmetric_ = true;
     std::vector<std::array<int, 2>> pattern_;
-    bool ldlt_analyzed_ = false, lu_analyzed_ = false;
-    Eigen::MatrixXd dense_;
-    Eigen::PartialPivLU<Eigen::MatrixXd> dense_lu_;
+    int pattern_count_ = 0;
+    BlockLu block_lu_;
+    bool blocked_ = true;
     Sparse sparse_;
-    Eigen::SimplicialLDLT<Sparse> sparse_ldlt_;
     Eigen::SparseLU<Sparse> sparse_lu_;
     Eigen::VectorXd right_, linear_, trial_p_, trial_v_;
+    struct Path {
+        Eigen::VectorXd w, w_rate;  ///< p - rho u + left shift, of which p is the projection
+        Eigen::VectorXd shift;
+        double left = 1, left_rate = -1;
+    } path_;
 };
 
 }  // namespace ricochet::detail

@@ -60,6 +60,7 @@ struct IslandSetup {
 struct IslandOptions {
     double step = 1e-3;             ///< [s]
     double tolerance = 1e-10;       ///< of the contact law, as a fraction
+    double largest_defect = 1e-7;   ///< of a problem in which bodies are wedged, as a fraction
     double sleep_speed = 0;         ///< [m/s] islands slower than this for `sleep_after` sleep
     double sleep_after = 0.5;       ///< [s]
     bool estimate_error = false;    ///< takes every step of `advance` by halves, too

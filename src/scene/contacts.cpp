@@ -120,9 +120,11 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
 {
     Group& group = *groups_[which];
     const double left = seconds(now, t_end);
-    const auto [outcome, length, step] =
+    const auto [outcome, length, step, defect] =
         group.motion->plan(std::min(world_.options.contact_step, left));
     group.outcome = outcome;
+    double& largest = world_.statistics.contact_defect;
+    if (step > 0) largest = std::max(largest, defect);
     group.length = length;
     group.planned = true;
     group.start = now;

@@ -24,7 +24,7 @@ std::string plural(std::size_t n, std::string_view one)
     return fmt::format("{} {}{}", n, one, n == 1 ? "" : "s");
 }
 
-std::string motion_of(const World& world, const std::vector<std::uint32_t>& group)
+std::string motion_of(const World& world, std::span<const std::uint32_t> group)
 {
     const Body& body = world.bodies[group[0]];
     if (body.asleep) return "at rest";
@@ -33,7 +33,7 @@ std::string motion_of(const World& world, const std::vector<std::uint32_t>& grou
 }
 
 /// The first meeting of two of a group as they move now, if they had no surfaces before.
-std::string first_meeting(const World& world, const std::vector<std::uint32_t>& group)
+std::string first_meeting(const World& world, std::span<const std::uint32_t> group)
 {
     if (group.size() * group.size() > most_pairs) return "";
     Instant first = no_instant;
@@ -58,7 +58,7 @@ std::string first_meeting(const World& world, const std::vector<std::uint32_t>& 
                        world.scene.name_of(BodyId{a}), world.scene.name_of(BodyId{b}), first.value);
 }
 
-std::string names(const World& world, const std::vector<std::uint32_t>& group)
+std::string names(const World& world, std::span<const std::uint32_t> group)
 {
     std::string text = fmt::format("\"{}\"", world.scene.name_of(BodyId{group[0]}));
     for (std::size_t k = 1; k < std::min<std::size_t>(group.size(), 3); ++k) {
@@ -106,7 +106,8 @@ std::string explain(const Scene& scene, const SceneOptions& options)
     std::size_t alone = 0;
     double pairs = 0;
     std::size_t lines = 0;
-    for (const auto& group : groups) {
+    for (std::size_t number = 0; number < groups.size(); ++number) {
+        const auto group = groups[number];
         const auto size = static_cast<double>(group.size());
         pairs += 0.5 * size * (size - 1);
         const bool sleeps = group.size() == 1 && world.bodies[group[0]].asleep;

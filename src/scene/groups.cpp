@@ -46,6 +46,9 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
         }
     }
     const double pull = dot(world.gravity, normal);
+    // Drag may turn a body back sooner, to where without it there was no time to come.
+    const bool slowed = body.island != none;
+    if (slowed && dot(world.gravity, along) != 0) return false;
     const double height = dot(body.p, normal);
     const double rise = dot(body.v, normal);
     Interval across = swept(height, rise, pull, until);
@@ -54,6 +57,8 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
         const double top = height - rise * rise / (2 * pull);
         (pull < 0 ? across.high : across.low) =
             pull < 0 ? std::max(across.high, top) : std::min(across.low, top);
+        const double fallen = height + (slowed ? 0.5 * pull * until * until : 0);
+        across = {std::min(across.low, fallen), std::max(across.high, fallen)};
     } else if (rise != 0) {
         across = {-infinite, infinite};
     }
@@ -100,8 +105,7 @@ void by_speed(const World& world, const Body& body, double fastest, Reach& reach
 
 /// Bodies that meet exchange speeds. With V^2 the sum of m v^2, impacts let V not grow, and gravity
 /// by |g| sqrt(mass of all) a second at most; no speed is above V / sqrt(m).
-void by_energy(const World& world, const std::vector<std::uint32_t>& group,
-               std::vector<Reach>& boxes)
+void by_energy(const World& world, std::span<const std::uint32_t> group, std::vector<Reach>& boxes)
 {
     const double until = world.options.t_end - world.options.t_start;
     double square = 0;
@@ -118,7 +122,8 @@ void by_energy(const World& world, const std::vector<std::uint32_t>& group,
     const double v = std::sqrt(square) + norm(world.gravity) * std::sqrt(mass) * until;
     for (const std::uint32_t i : group) {
         const Body& body = world.bodies[i];
-        if (body.island == none) by_speed(world, body, v * std::sqrt(body.inverse_mass), boxes[i]);
+        const bool driven = body.island != none && world.islands->members(body.island).size() > 1;
+        if (!driven) by_speed(world, body, v * std::sqrt(body.inverse_mass), boxes[i]);
     }
 }
 
@@ -136,9 +141,10 @@ public:
         if (end - begin <= 1) return close(begin, end);
         const auto first = order_.begin() + static_cast<std::ptrdiff_t>(begin);
         const auto last = order_.begin() + static_cast<std::ptrdiff_t>(end);
-        std::sort(first, last, [&](std::uint32_t a, std::uint32_t b) {
+        const auto precedes = [&](std::uint32_t a, std::uint32_t b) {
             return reaches_[a].low[axis] < reaches_[b].low[axis];
-        });
+        };
+        if (!std::is_sorted(first, last, precedes)) std::sort(first, last, precedes);
         std::vector<std::size_t> cuts;
         double top = reaches_[order_[begin]].high[axis];
         for (std::size_t k = begin + 1; k < end; ++k) {
@@ -155,15 +161,15 @@ public:
         }
     }
 
-    std::vector<std::vector<std::uint32_t>> parts;
+    std::vector<std::size_t> ends;  ///< of parts, ascending
 
 private:
     void close(std::size_t begin, std::size_t end)
     {
         const auto first = order_.begin() + static_cast<std::ptrdiff_t>(begin);
         const auto last = order_.begin() + static_cast<std::ptrdiff_t>(end);
-        parts.emplace_back(first, last);
-        std::ranges::sort(parts.back());
+        std::sort(first, last);
+        ends.push_back(end);
     }
 
     const std::vector<Reach>& reaches_;
@@ -179,7 +185,8 @@ std::vector<Reach> reaches(const World& world)
     const bool terrain = world.faces.size() > world.wall_count;
     for (std::size_t i = 0; i < out.size(); ++i) {
         const Body& body = world.bodies[i];
-        if (body.island != none) {
+        // Springs may drive their bodies anywhere; drag alone only slows.
+        if (body.island != none && world.islands->members(body.island).size() > 1) {
             out[i] = {{-infinite, -infinite}, {infinite, infinite}};
         } else if (body.asleep) {
             by_speed(world, body, 0, out[i]);
@@ -192,25 +199,27 @@ std::vector<Reach> reaches(const World& world)
 
 }  // namespace
 
-std::vector<std::vector<std::uint32_t>> groups_of(const World& world)
+Groups groups_of(const World& world)
 {
-    if (world.bodies.empty()) return {};
+    Groups groups;
+    if (world.bodies.empty()) return groups;
+    groups.order_.resize(world.bodies.size());
+    std::iota(groups.order_.begin(), groups.order_.end(), 0U);
     if (world.faces.size() > world.wall_count) {
         // Terrain lies in the cells of a group: one group for all.
-        std::vector<std::uint32_t> all(world.bodies.size());
-        std::iota(all.begin(), all.end(), 0U);
-        return {all};
+        groups.ends_ = {world.bodies.size()};
+        return groups;
     }
     std::vector<Reach> boxes = reaches(world);
-    std::vector<std::uint32_t> order(world.bodies.size());
-    std::iota(order.begin(), order.end(), 0U);
-    for (std::size_t before = 0;;) {
-        Divider divider(boxes, order);
-        divider.divide(0, order.size(), 0, false);
-        if (divider.parts.size() == before) return std::move(divider.parts);
-        before = divider.parts.size();
-        for (const auto& part : divider.parts) {
-            if (part.size() > 1) by_energy(world, part, boxes);
+    for (;;) {
+        Divider divider(boxes, groups.order_);
+        divider.divide(0, groups.order_.size(), 0, false);
+        const bool all_apart = divider.ends.size() == groups.order_.size();
+        const bool as_before = divider.ends.size() == groups.size();
+        groups.ends_ = std::move(divider.ends);
+        if (all_apart || as_before) return groups;
+        for (std::size_t k = 0; k < groups.size(); ++k) {
+            if (groups[k].size() > 1) by_energy(world, groups[k], boxes);
         }
     }
 }

@@ -112,11 +112,53 @@ void Islands::flow(const Island& island, const State& x, State& rate) const
     }
 }
 
+/// One body without springs, in registers; the bits are those of `depart`.
+void Islands::depart_alone(const Island& island, double h, bool with_error) const
+{
+    using Alone = std::array<double, 4>;
+    using Method = RungeKutta<Dopri5Tableau, Alone>;
+    const double damping = island.drag[0] * island.inverse_mass[0];
+    const auto four = [](const State& state) {
+        return Alone{state[0], state[1], state[2], state[3]};
+    };
+    const Alone x = four(island.x);
+    const Alone remainder = four(island.remainder);
+    const Alone start = four(island.rate);
+    const Vector2 pull = world_.gravity;
+    const auto departure = [&](const auto& w, Alone& rate, double s) {
+        ++world_.statistics.flow_calls;
+        Alone point;
+        for (std::size_t i = 0; i < 4; ++i) {
+            point[i] = x[i] + (s * start[i] + (w[i] + remainder[i]));
+        }
+        rate = {point[2], point[3], pull[0] - damping * point[2], pull[1] - damping * point[3]};
+        for (std::size_t i = 0; i < 4; ++i) rate[i] -= start[i];
+    };
+    std::array<Alone, Method::kept_stages> stages;
+    Alone w;
+    Alone end_rate;
+    Alone error{};
+    if (with_error) {
+        Method::depart<true>(departure, x, h, stages.data(), w, end_rate, error);
+    } else {
+        Method::depart<false>(departure, x, h, stages.data(), w, end_rate, error);
+    }
+    std::ranges::copy(w, w_.begin());
+    std::ranges::copy(end_rate, end_rate_.begin());
+    std::ranges::copy(error, error_.begin());
+    for (std::size_t k = 0; k < stages.size() && !island.unseen; ++k)
+        std::ranges::copy(stages[k], stages_[k].begin());
+    seen_ = nullptr;
+}
+
 void Islands::depart(const Island& island, double h, bool with_error) const
 {
     const std::size_t n = island.x.size();
-    for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_}) state->resize(n);
-    for (State& stage : stages_) stage.resize(n);
+    if (w_.size() != n) {
+        for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_}) state->resize(n);
+        for (State& stage : stages_) stage.resize(n);
+    }
+    if (n == 4) return depart_alone(island, h, with_error);
     State point(n);
     const auto departure = [&](const auto& w, State& rate, double s) {
         for (std::size_t i = 0; i < n; ++i) {
@@ -207,6 +249,13 @@ void Islands::record(Island& island)
         island.x_end[i] = sum.value;
         island.remainder_end[i] = sum.remainder;
         island.rate_end[i] = island.rate[i] + end_rate_[i];
+    }
+    if (island.unseen) {
+        Body& body = world_.bodies[island.members[0]];
+        ++body.version;
+        body.t = island.start;
+        body.quartic = true;
+        return;
     }
     Dopri5::dense(0.5 * h, h, stages_.data(), end_rate_, middle_);
     for (std::size_t m = 0; m < island.members.size(); ++m) {

@@ -53,6 +53,9 @@ public:
     /// Springs of an island.
     [[nodiscard]] std::vector<Join> springs(std::uint32_t island) const;
 
+    /// The island of one body that neither a body nor a surface can meet.
+    void set_unseen(std::uint32_t island) { islands_[island].unseen = true; }
+
 private:
     using State = std::vector<double>;
     struct Link {
@@ -67,6 +70,7 @@ private:
         double h = 0;     ///< of the current step
         double next = 0;  ///< length that the error allows
         bool begun = false;
+        bool unseen = false;  ///< one body that nothing can meet: its record has no polynomial
         std::uint32_t short_steps = 0;         ///< in a row
         State x, remainder, rate;              ///< at the start of the current step
         State x_end, remainder_end, rate_end;  ///< at its end
@@ -75,6 +79,7 @@ private:
     void join(World& world);
     void flow(const Island& island, const State& x, State& rate) const;
     void depart(const Island& island, double h, bool with_error) const;
+    void depart_alone(const Island& island, double h, bool with_error) const;
     [[nodiscard]] double error_of(const Island& island, double h) const;
     void look_at(const Island& island, const Instant& t) const;
     [[nodiscard]] double first_step(const Island& island) const;

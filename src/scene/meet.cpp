@@ -33,6 +33,19 @@ namespace {
     return sum;
 }
 
+/// Whether one coordinate alone keeps the path farther than `reach` from the origin.
+[[nodiscard]] bool stays_beyond(const Path& path, double reach) noexcept
+{
+    for (std::size_t c = 0; c < 2; ++c) {
+        double sum = 0;
+        for (int k = path.degree; k > 0; --k) {
+            sum = (sum + std::fabs(path.c[static_cast<std::size_t>(k)][c])) * path.until;
+        }
+        if (std::fabs(path.c[0][c]) - sum > reach) return true;
+    }
+    return false;
+}
+
 [[nodiscard]] Path difference(const Path& a, const Path& b) noexcept
 {
     Path out;
@@ -52,8 +65,11 @@ template <class Gap>
         const auto [value, rate] = gap(after);
         if (!(rate < 0)) break;
         const double change = -value / rate;
+        // The map differs from the polynomial by the error of a step.
+        if (std::fabs(change) > 0.1 * until) break;
         after = std::clamp(after + change, 0.0, until);
-        if (std::fabs(change) <= 4 * epsilon * after) break;
+        // Newton's method doubles the digits: the next change would be below rounding.
+        if (std::fabs(change) <= 1e-9 * after) break;
     }
     return after;
 }
@@ -104,6 +120,11 @@ Vector2 World::velocity(std::uint32_t i, const Instant& t) const
     return speed(b, seconds(b.t, t));
 }
 
+Vector2 World::heading(std::uint32_t i, const Instant& t) const
+{
+    return bodies[i].contact != none ? bodies[i].v : velocity(i, t);
+}
+
 Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
 {
     const Body& a = world.bodies[i];
@@ -118,6 +139,7 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
     Squares now = squares(path.c[0], path.c[1], reach, rounding);
     Meeting meeting{.from = from};
     const bool steps = std::isfinite(path.until);
+    if (steps && stays_beyond(path, (1 + 1e-9) * reach)) return meeting;
     if (steps && norm(path.c[0]) - reach > reach_of(path)) return meeting;
     if (now.at_once <= now.tolerance) {
         const double slowest = noise(first.c[1], second.c[1]);
@@ -135,7 +157,7 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
             const Vector2 apart = world.position(i, t) - world.position(j, t);
             const double distance = norm(apart);
             return GapAndRate{distance - reach,
-                              dot(apart, world.velocity(i, t) - world.velocity(j, t)) / distance};
+                              dot(apart, world.heading(i, t) - world.heading(j, t)) / distance};
         });
     }
     return meeting;

@@ -7,6 +7,8 @@
 #include <bit>
 #include <cmath>
 
+#include "scene/large_pages.hpp"
+
 namespace ricochet::detail {
 
 namespace {
@@ -25,17 +27,19 @@ Runner::Runner(World& world, double t_end)
       t_end_{t_end, 0},
       calendar_(world.bodies.size() + world.islands->count() +
                 (world.options.contacts ? world.bodies.size() : 0)),
-      pending_(world.bodies.size()),
       slots_(world.bodies.size(), none),
       impacts_(world),
-      contacts_(world),
-      series_(world.bodies.size())
+      contacts_(world)
 {
+    reserve_large(pending_, world.bodies.size());
+    pending_.resize(world.bodies.size());
+    reserve_large(series_, world.bodies.size());
+    series_.resize(world.bodies.size());
 }
 
-void Runner::begin(std::vector<std::uint32_t> bodies)
+void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events)
 {
-    members_ = std::move(bodies);
+    members_.assign(bodies.begin(), bodies.end());
     islands_.clear();
     for (const std::uint32_t i : members_) {
         if (world_.bodies[i].island != none) islands_.push_back(world_.bodies[i].island);
@@ -43,12 +47,16 @@ void Runner::begin(std::vector<std::uint32_t> bodies)
     std::ranges::sort(islands_);
     const auto repeated = std::ranges::unique(islands_);
     islands_.erase(repeated.begin(), repeated.end());
+    if (members_.size() == 1 && world_.faces.empty()) {
+        for (const std::uint32_t island : islands_) world_.islands->set_unseen(island);
+    }
     calendar_.clear();
     now_ = {world_.options.t_start, 0};
     fruitless_ = 0;
     idle_ = 0;
     next_sample_ = 0;
     result_ = {};
+    result_.events = std::move(events);
 }
 
 /// Cells as large as two of the largest discs, or as leave some 0.4 bodies in each: by trial, 1.2
@@ -117,9 +125,10 @@ void Runner::place_faces()
     }
 }
 
-GroupResult Runner::run(std::vector<std::uint32_t> bodies_of_group, Samples& samples)
+GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
+                        std::vector<SceneEvent> events, Samples& samples)
 {
-    begin(std::move(bodies_of_group));
+    begin(bodies_of_group, std::move(events));
     place_all();
     settle_at_start();
     for (const std::uint32_t island : islands_) step_island(island);
@@ -313,17 +322,19 @@ void Runner::predict_crossing(std::uint32_t i)
     pending.crossing = no_instant;
     if (body.quartic) {
         const Path path = world_.path(i, now_);
-        double room = never;
-        double speed = 0;
-        for (int k = 4; k > 0; --k) {
-            speed = speed * path.until + k * norm(path.c[static_cast<std::size_t>(k)]);
-        }
+        // A tenth of a cell outside of it.
+        double first = path.until;
         for (std::size_t c = 0; c < 2; ++c) {
             const double into = path.c[0][c] - corner[c];
-            room = std::min({room, into, side - into});
+            Polynomial gap{};
+            for (std::size_t k = 1; k < 5; ++k) gap[k] = path.c[k][c];
+            for (const double way : {into, side - into}) {
+                gap[0] = std::max(way, 0.0) + 0.1 * side;
+                first = std::min(first, falls_within(gap, 4, first, 0));
+                for (std::size_t k = 1; k < 5; ++k) gap[k] = -gap[k];
+            }
         }
-        const double s = (std::max(room, 0.0) + 0.1 * side) / speed;
-        if (s < path.until) pending.crossing = now_.after(s);
+        if (first < path.until) pending.crossing = now_.after(first);
         return;
     }
     double first = never;
@@ -381,6 +392,13 @@ void Runner::cross(std::uint32_t i)
     put_in_calendar(i);
 }
 
+std::string Runner::presses_on(std::uint32_t i, const Face& face) const
+{
+    return fmt::format("{} presses on {}{}", called(i),
+                       face.kind == Face::Kind::vertex ? "a corner or an end of " : "",
+                       world_.scene.name_of(SurfaceId{face.surface}));
+}
+
 void Runner::happen(std::uint32_t i)
 {
     const Pending& pending = pending_[i];
@@ -392,10 +410,7 @@ void Runner::happen(std::uint32_t i)
         case Kind::face: return impact(i);
         case Kind::presses_face:
             if (rests_on_face(i)) return predict(i);
-            return press(
-                i,
-                fmt::format("{} presses on {}", called(i),
-                            world_.scene.name_of(SurfaceId{world_.faces[pending.other].surface})));
+            return press(i, presses_on(i, world_.faces[pending.other]));
         case Kind::pair:
         case Kind::presses: break;
     }

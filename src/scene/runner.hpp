@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,12 +38,14 @@ class Runner {
 public:
     Runner(World& world, double t_end);
 
+    /// @param events   to which those of this group are appended
     /// @param samples  a row for each of the options' sample times, whose bodies of this group are
     ///                 filled in as far as the group comes
-    GroupResult run(std::vector<std::uint32_t> bodies, Samples& samples);
+    GroupResult run(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events,
+                    Samples& samples);
 
 private:
-    void begin(std::vector<std::uint32_t> bodies);
+    void begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events);
     struct Pending {
         enum class Kind : std::uint8_t { nothing, pair, face, presses, presses_face, stop, edge };
         Instant t = no_instant;
@@ -70,6 +73,7 @@ private:
     void cross(std::uint32_t i);
     void step_island(std::uint32_t island);
     void happen(std::uint32_t i);
+    [[nodiscard]] std::string presses_on(std::uint32_t i, const Face& face) const;
     void impact(std::uint32_t i);
     void resolve_cluster(std::uint32_t i);
     void press(std::uint32_t i, const std::string& sentence);
@@ -102,7 +106,8 @@ private:
     std::uint32_t begin_record(std::uint32_t i, const Vector2& velocity,
                                const std::vector<Side>& sides);
     void bounce(std::uint32_t i);
-    bool collapses(std::uint32_t i);
+    bool collapses(std::uint32_t slot);
+    bool hops_below_rounding(std::uint32_t slot);
     void restart_island(std::uint32_t island);
     void settle(std::uint32_t i, std::uint32_t was);
     bool rests_on_face(std::uint32_t i);
@@ -142,6 +147,7 @@ private:
         Instant since{};
         Instant last{-never, 0};
         std::uint32_t count = 0;
+        std::uint32_t low = 0;  ///< hops in a row that rise by less than rounding
     };
     std::vector<Series> series_;  ///< of impacts of a body
     Instant now_{};

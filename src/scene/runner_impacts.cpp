@@ -1,4 +1,4 @@
-// What a group does at one instant: impacts, sliding and rest on surfaces.
+// Impacts: the cluster that is struck at one instant, and what becomes of its bodies.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,6 +13,10 @@ namespace {
 
 /// So many impacts of a body within the resolution of the time each, and its cluster collapses.
 constexpr std::uint32_t crowded = 64;
+
+/// Hops lower than so many roundings of the place, and how many of them in a row are the last ones.
+constexpr double low = 1024;
+constexpr std::uint32_t most_low = 1024;
 
 /// Predicted impacts in a row that change nothing.
 constexpr std::uint32_t most_fruitless = 1000;
@@ -177,14 +181,52 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     cluster_.contacts.push_back(contact);
 }
 
-/// Whether impacts of a body follow each other more closely than the time tells.
-bool Runner::collapses(std::uint32_t i)
+/// Whether impacts of a body follow each other more closely than the time tells or, where groups in
+/// lasting contact can take it, than its place tells.
+bool Runner::collapses(std::uint32_t slot)
 {
+    const std::uint32_t i = cluster_.bodies[slot];
     Series& series = series_[i];
     if (series.count++ == 0) series.since = now_;
     if (series.count <= crowded) return false;
     series.count = 0;
-    return seconds(series.since, now_) <= crowded * resolution(now_);
+    const double s = seconds(series.since, now_);
+    if (s <= crowded * resolution(now_)) return true;
+    if (!contacts_.available()) return false;
+    double fastest = 0;
+    bool meets_body = false;
+    for (const Contact& contact : cluster_.contacts) {
+        if (contact.a != i && (contact.surface || contact.b != i)) continue;
+        meets_body = meets_body || !contact.surface;
+        const Vector2& a = cluster_.before[contact.slot_a];
+        const Vector2 v = contact.surface ? a : a - cluster_.before[contact.slot_b];
+        fastest = std::max(fastest, std::fabs(dot(v, contact.normal)));
+    }
+    return meets_body &&
+           s * fastest <= World::rounding(world_.position(i, now_), world_.bodies[i].radius);
+}
+
+/// Whether an elastic body with friction hops on surfaces, again and again, without the energy to
+/// rise by more than rounding makes of its place. Friction leads into such hops, for instance
+/// between the two sides of a corner, both of which it strikes at a right angle; there it takes
+/// nothing away any more.
+bool Runner::hops_below_rounding(std::uint32_t slot)
+{
+    const std::uint32_t i = cluster_.bodies[slot];
+    const Body& body = world_.bodies[i];
+    Series& series = series_[i];
+    const bool may_last = std::ranges::any_of(cluster_.contacts, [&](const Contact& c) {
+        return c.a == i && c.surface && c.friction > 0 && c.restitution == 1;
+    });
+    const double height = low * World::rounding(world_.position(i, now_), body.radius);
+    const Vector2& v = cluster_.before[slot];
+    if (!may_last || !(dot(v, v) <= 2 * norm(world_.gravity) * height)) {
+        series.low = 0;
+        return false;
+    }
+    if (++series.low < most_low) return false;
+    series.low = 0;
+    return true;
 }
 
 void Runner::impact(std::uint32_t i)
@@ -214,7 +256,10 @@ void Runner::resolve_cluster(std::uint32_t i)
     if (const auto bodies = joining(0, slow); !bodies.empty()) return hand_over(bodies, "");
     bool spend = false;
     if (within == 0) {
-        for (const std::uint32_t body : cluster_.bodies) spend = collapses(body) || spend;
+        for (std::uint32_t slot = 0; slot < cluster_.bodies.size(); ++slot) {
+            spend = collapses(slot) || spend;
+            spend = hops_below_rounding(slot) || spend;
+        }
     }
     std::vector<SceneEvent>* events = world_.options.record_events ? &result_.events : nullptr;
     const std::size_t known = result_.events.size();
@@ -225,9 +270,14 @@ void Runner::resolve_cluster(std::uint32_t i)
         result_.events[k].number = result_.event_count;
     }
     apply();
-    if (left && !result_.failure) {
+    // Bodies whose restitution is spent stay together: what else keeps them apart is the rounding
+    // of their velocities, by which they would meet again and again.
+    const bool together =
+        spend && contacts_.available() &&
+        std::ranges::any_of(cluster_.contacts, [](const Contact& c) { return !c.surface; });
+    if ((left || together) && !result_.failure) {
         ++result_.event_count;
-        ++world_.statistics.collapses;
+        world_.statistics.collapses += left;
         return hand_over(std::vector(cluster_.bodies), "");
     }
     if (changed_.empty()) {
@@ -396,204 +446,6 @@ void Runner::restart_island(std::uint32_t island)
     const Instant& end = islands.end(island);
     calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + island,
                   before(end, t_end_) ? end : no_instant);
-}
-
-std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
-{
-    const Body& body = world_.bodies[i];
-    std::vector<std::uint32_t> faces;
-    const auto look = [&](std::uint32_t f) {
-        const Face& face = world_.faces[f];
-        if (face.kind == Face::Kind::vertex) return;
-        const bool above = face.kind == Face::Kind::segment && world_.begins_above(body, f);
-        const double gap = face_gap(face, body, body.p, above).gap;
-        const double rounding = World::rounding(body.p, body.radius) + World::rounding(face.at, 0);
-        const bool known =
-            std::ranges::any_of(body.sides, [&](std::uint32_t side) { return side / 2 == f; });
-        if (known || gap <= rounding) {
-            faces.push_back(f);
-        }
-    };
-    for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
-    if (celled_ && cells_.any_faces()) {
-        for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
-    }
-    return faces;
-}
-
-/// A body whose bounces on surfaces are shorter than the time resolves stays on them: at rest, or
-/// sliding on one of them. `was` is the face on which it slid before.
-void Runner::settle(std::uint32_t i, std::uint32_t was)
-{
-    Body& body = world_.bodies[i];
-    const Vector2 velocity = body.v;
-    const std::vector<std::uint32_t> faces = touching_faces(i);
-    // In a corner, what rises by less than the rounding of its place does not move.
-    const double pull_of_all = norm(world_.gravity);
-    const double rise = faces.size() > 1 ? 4 * World::rounding(body.p, body.radius) : 0;
-    const double gained =
-        std::max(resolution(body.t) * pull_of_all, std::sqrt(2 * pull_of_all * rise));
-    if (norm(body.v) <= gained) body.v = {};
-    const double still = std::max(8 * epsilon * norm(body.v), 0.5 * gained);
-    const double rounding = 8 * epsilon * pull_of_all;
-    std::vector<std::uint32_t> holding;
-    std::vector<Vector2> blocking;  // by what it cannot be pulled into, overhanging faces included
-    for (const std::uint32_t f : faces) {
-        const Vector2 n = world_.push_of(body, f);
-        const double pull = dot(world_.gravity, n);
-        const double leaves = dot(body.v, n);
-        if (leaves < -still) continue;
-        if (leaves <= still) blocking.push_back(n);
-        if (pull >= 0) continue;
-        if (2 * leaves <= resolution(body.t) * -pull || leaves <= 8 * epsilon * norm(body.v)) {
-            holding.push_back(f);
-        }
-    }
-    if (holding.empty()) {
-        body.v = velocity;
-        return;
-    }
-    for (const std::uint32_t f : holding) {
-        const Vector2 n = world_.push_of(body, f);
-        body.v = body.v - dot(body.v, n) * n;
-    }
-    std::uint32_t chosen = none;
-    bool leaves = false;
-    const Vector2 flight = body.v;
-    for (std::size_t k = 0; k < holding.size() && chosen == none; ++k) {
-        body.v = flight;
-        world_.slide(i, holding[k]);
-        const bool stays = std::ranges::all_of(
-            blocking, [&](const Vector2& n) { return dot(body.a, n) >= -rounding; });
-        if (!stays) continue;
-        const Vector2& heading = is_zero(body.v) ? body.a : body.v;
-        if (world_.leads_off(world_.faces[holding[k]], body.p, heading)) {
-            leaves = true;
-        } else {
-            chosen = holding[k];
-        }
-    }
-    if (chosen == none && leaves) {
-        body.v = flight;
-        body.a = world_.gravity;
-        body.held = none;
-        body.asleep = false;
-        return;
-    }
-    if (chosen == none) {
-        // No single one carries it, so it lies in the corner of two.
-        body.v = body.a = {};
-        body.asleep = true;
-        body.held = chosen = holding[0];
-    }
-    if (chosen != was) note(SceneEvent::Kind::held, i, chosen, velocity);
-}
-
-/// Whether surfaces alone hold from now on what presses on one of them.
-bool Runner::rests_on_face(std::uint32_t i)
-{
-    Body& body = world_.bodies[i];
-    if (body.island != none || body.contact != none) return false;
-    begin_record(i, speed(body, seconds(body.t, now_)), sides_of(i, none));
-    settle(i, none);
-    return body.held != none;
-}
-
-/// When friction stops it, or its face ends.
-void Runner::consider_own(std::uint32_t i)
-{
-    const Body& body = world_.bodies[i];
-    if (body.held == none) return;
-    const Face& face = world_.faces[body.held];
-    Pending& pending = pending_[i];
-    const auto add = [&](double after, Pending::Kind kind) {
-        if (!(after < never)) return;
-        const Instant t = body.t.after(after);
-        if (!before(t, pending.t)) return;
-        pending.t = t;
-        pending.kind = kind;
-        pending.other = body.held;
-    };
-    const double slowing = dot(body.v, body.a);
-    if (slowing < 0 && world_.friction(body.material, face.material) > 0) {
-        add(-dot(body.v, body.v) / slowing, Pending::Kind::stop);
-    }
-    if (face.kind == Face::Kind::segment) {
-        const Vector2 along = -1.0 * turned(face.normal);
-        const double s = dot(body.p - face.at, along);
-        const double v = dot(body.v, along);
-        const double a = dot(body.a, along);
-        add(falls_after(s, v, a, 0), Pending::Kind::edge);
-        add(falls_after(face.length - s, -v, -a, 0), Pending::Kind::edge);
-    }
-}
-
-void Runner::halt(std::uint32_t i)
-{
-    Body& body = world_.bodies[i];
-    const Vector2 velocity = speed(body, seconds(body.t, now_));
-    const std::uint32_t face = begin_record(i, {}, sides_of(i, body.held));
-    world_.slide(i, face);
-    if (body.asleep) {
-        note(SceneEvent::Kind::stopped, i, face, velocity);
-        ++result_.event_count;
-    }
-    predict(i);
-}
-
-void Runner::leave_edge(std::uint32_t i)
-{
-    Body& body = world_.bodies[i];
-    const Vector2 velocity = speed(body, seconds(body.t, now_));
-    begin_record(i, velocity, sides_of(i, body.held));
-    if (is_zero(velocity)) {
-        settle(i, none);
-        return predict(i);
-    }
-    for (const std::uint32_t f : touching_faces(i)) {
-        const Face& face = world_.faces[f];
-        if (face.kind != Face::Kind::segment) continue;
-        // The face that goes on from here, in the direction of the motion.
-        const Vector2 n = world_.push_of(body, f);
-        if (!world_.leads_off(face, body.p, velocity) &&
-            std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) && dot(world_.gravity, n) < 0) {
-            world_.slide(i, f);
-            break;
-        }
-    }
-    predict(i);
-}
-
-void Runner::settle_at_start()
-{
-    for (const std::uint32_t i : members_) {
-        Body& body = world_.bodies[i];
-        const bool fixed = body.island != none || body.asleep || is_zero(world_.gravity);
-        if (fixed && body.radius > 0) continue;
-        const std::vector<std::uint32_t> faces = touching_faces(i);
-        if (body.radius == 0) {
-            std::vector<Side> sides;
-            for (const std::uint32_t f : faces) {
-                if (world_.faces[f].kind != Face::Kind::segment) continue;
-                sides.push_back({f, world_.begins_above(body, f)});
-            }
-            world_.make_one(sides);
-            world_.remember(body, sides);
-        }
-        if (!fixed && !faces.empty()) settle(i, faces.size() == 1 ? faces[0] : none);
-    }
-}
-
-void Runner::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
-                  const Vector2& velocity)
-{
-    if (before(Instant{world_.options.t_start, 0}, now_) && world_.options.record_events) {
-        SceneEvent event{.t = now_.value, .number = result_.event_count, .kind = kind, .body = i};
-        event.other = {true, world_.faces[face].surface};
-        event.before[0] = velocity;
-        event.after[0] = world_.bodies[i].v;
-        result_.events.push_back(event);
-    }
 }
 
 }  // namespace ricochet::detail

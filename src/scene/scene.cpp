@@ -244,7 +244,7 @@ void Scene::check() const
     std::vector<std::uint32_t> order(bodies_.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
     const auto left = [&](std::uint32_t i) { return bodies_[i].at[0] - bodies_[i].radius; };
-    std::ranges::sort(order, {}, left);
+    if (!std::ranges::is_sorted(order, {}, left)) std::ranges::sort(order, {}, left);
     std::vector<std::uint32_t> open;
     for (const std::uint32_t i : order) {
         const Disc& a = bodies_[i];

@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
+#include <numeric>
 #include <optional>
+#include <ranges>
 #include <utility>
 
 #include "checks/require.hpp"
 #include "scene/groups.hpp"
+#include "scene/large_pages.hpp"
 #include "scene/options.hpp"
 #include "scene/runner.hpp"
 
@@ -48,17 +52,22 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
     run.samples.assign(world.options.sample_times.size(),
                        std::vector<BodyState>(world.bodies.size()));
     Runner runner(world, t_end);
-    for (const auto& group : groups) {
-        GroupResult result = runner.run(group, run.samples);
+    for (std::size_t number = 0; number < groups.size(); ++number) {
+        const auto group = groups[number];
+        const std::size_t known = run.events.size();
+        // What one group adds is seldom more than half of what there is.
+        if (2 * known > run.events.capacity()) {
+            const std::size_t alike = known / number * groups.size();
+            reserve_large(run.events, std::clamp(alike + alike / 8, 4 * known, 64 * known));
+        }
+        GroupResult result = runner.run(group, std::move(run.events), run.samples);
+        run.events = std::move(result.events);
         world.statistics.groups += group.size() > 1;
         world.statistics.alone += group.size() == 1;
-        for (SceneEvent& event : result.events) event.number += world.statistics.events;
-        world.statistics.events += result.event_count;
-        if (run.events.empty()) {
-            run.events = std::move(result.events);
-        } else {
-            run.events.insert(run.events.end(), result.events.begin(), result.events.end());
+        for (std::size_t k = known; k < run.events.size(); ++k) {
+            run.events[k].number += world.statistics.events;
         }
+        world.statistics.events += result.event_count;
         if (result.failure && (!failure || before(result.failure->t, failure->t))) {
             failure = std::move(result.failure);
         }
@@ -86,6 +95,7 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, double t_end
     if (failure) *first = *failure;
     const Instant end = failure ? failure->t : Instant{t_end, 0};
     run.t = end.value;
+    reserve_large(run.bodies, world.bodies.size());
     run.bodies.resize(world.bodies.size());
     for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
         run.bodies[i] = {world.position(i, end), world.velocity(i, end), world.bodies[i].asleep};
@@ -94,27 +104,59 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, double t_end
     return run;
 }
 
+struct Key {
+    double t;
+    std::size_t index;
+    friend auto operator<=>(const Key&, const Key&) = default;
+};
+
+/// Events by time and, at one time, as they stand: first into some 8 to each interval of the run,
+/// as their times are spread, and then within each.
+std::vector<Key> keys_in_order(const std::vector<SceneEvent>& events)
+{
+    const auto [first, last] = std::ranges::minmax(events | std::views::transform(&SceneEvent::t));
+    const std::size_t count = events.size() / 8 + 1;
+    const double scale = last > first ? static_cast<double>(count - 1) / (last - first) : 0;
+    const auto bin_of = [&](double t) { return static_cast<std::size_t>((t - first) * scale); };
+    std::vector<std::size_t> ends(count + 1, 0);
+    for (const SceneEvent& event : events) ++ends[bin_of(event.t) + 1];
+    std::partial_sum(ends.begin(), ends.end(), ends.begin());
+    std::vector<Key> keys;
+    reserve_large(keys, events.size());
+    keys.resize(events.size());
+    for (std::size_t k = 0; k < events.size(); ++k) {
+        const double t = events[k].t;
+        keys[ends[bin_of(t)]++] = {t, k};
+    }
+    std::size_t begin = 0;
+    for (std::size_t bin = 0; bin < count; ++bin) {
+        const auto at = keys.begin();
+        std::sort(at + static_cast<std::ptrdiff_t>(begin),
+                  at + static_cast<std::ptrdiff_t>(ends[bin]));
+        begin = ends[bin];
+    }
+    return keys;
+}
+
 /// Events of all groups in the order of time; those of one group at one time keep theirs.
 void sort_events(SceneRun& run)
 {
-    struct Key {
-        double t;
-        std::size_t index;
-    };
-    std::vector<Key> keys(run.events.size());
-    for (std::size_t k = 0; k < keys.size(); ++k) keys[k] = {run.events[k].t, k};
-    const auto precedes = [](const Key& a, const Key& b) {
-        return a.t != b.t ? a.t < b.t : a.index < b.index;
-    };
-    if (!std::ranges::is_sorted(keys, precedes)) std::ranges::sort(keys, precedes);
-    std::vector<SceneEvent> sorted;
-    sorted.reserve(keys.size());
     std::uint64_t last = ~0ULL;
     std::uint64_t number = ~0ULL;
+    const auto count = [&](SceneEvent& event) {
+        number += event.number != last;
+        last = std::exchange(event.number, number);
+    };
+    if (std::ranges::is_sorted(run.events, {}, &SceneEvent::t)) {
+        std::ranges::for_each(run.events, count);
+        return;
+    }
+    const std::vector<Key> keys = keys_in_order(run.events);
+    std::vector<SceneEvent> sorted;
+    reserve_large(sorted, run.events.size());
     for (const Key& key : keys) {
         sorted.push_back(run.events[key.index]);
-        number += sorted.back().number != last;
-        last = std::exchange(sorted.back().number, number);
+        count(sorted.back());
     }
     run.events = std::move(sorted);
 }

@@ -1,6 +1,7 @@
 #include "scene/world.hpp"
 
 #include "scene/islands.hpp"
+#include "scene/large_pages.hpp"
 
 namespace ricochet::detail {
 
@@ -50,7 +51,7 @@ World::World(const Scene& from, const SceneOptions& with)
     : scene(from), options(with), gravity(from.settings().gravity)
 {
     const Instant start{with.t_start, 0};
-    bodies.reserve(from.bodies().size());
+    reserve_large(bodies, from.bodies().size());
     for (const Disc& disc : from.bodies()) {
         Body body;
         body.p = disc.at;
@@ -70,6 +71,7 @@ World::World(const Scene& from, const SceneOptions& with)
         }
         if (walls) wall_count = static_cast<std::uint32_t>(faces.size());
     }
+    join_chains(from, wall_count, faces);
     islands = std::make_unique<Islands>(*this);
     if (islands->count() > 0) bends.resize(bodies.size());
     put_to_sleep();

@@ -70,6 +70,10 @@ struct Face {
     std::uint32_t previous = none, next = none;  ///< segments of the same chain
 };
 
+/// Links the segments of open terrain whose ends are the same point, of two and no more, and turns
+/// them so that the end of one is the start of the next.
+void join_chains(const Scene& scene, std::uint32_t wall_count, std::vector<Face>& faces);
+
 /// On which side of a segment a point is that touches it.
 struct Side {
     std::uint32_t face = none;
@@ -109,6 +113,8 @@ struct World {
     /// By its record; by the method's own map where it advances by steps.
     [[nodiscard]] Vector2 position(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Vector2 velocity(std::uint32_t i, const Instant& t) const;
+    /// Derivative of the position: in lasting contact that is the chord of the step.
+    [[nodiscard]] Vector2 heading(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Path path(std::uint32_t i, const Instant& t) const;
 
     [[nodiscard]] double restitution(std::uint32_t a, std::uint32_t b) const noexcept

@@ -68,6 +68,18 @@ struct Check {
 /// Many bodies with a clock each.
 [[nodiscard]] std::vector<Check> scene_checks();
 
+/// Scenes: cost by dopri5, beside common steps and plain runs; labels, reversal, brute force,
+/// cradles, rest, piles.
+[[nodiscard]] Measured time_slowed_balls();
+[[nodiscard]] Measured compare_common_steps();
+[[nodiscard]] Measured compare_plain_run();
+[[nodiscard]] Measured relabel_bodies();
+[[nodiscard]] Measured reverse_gases();
+[[nodiscard]] Measured compare_brute_force();
+[[nodiscard]] Measured swing_cradles();
+[[nodiscard]] Measured rest_for_long();
+[[nodiscard]] Measured time_piles();
+
 /// Saved runs, potential files, runs that cannot continue.
 [[nodiscard]] std::vector<Check> file_checks();
 

@@ -97,6 +97,53 @@ Defect defect_of(const LawProblem& problem, const Eigen::VectorXd& p, const Eige
     return worst;
 }
 
+TEST(BlockLu, SolvesRandomSparseSystemsOfBlocks)
+{
+    // Diagonally dominant, so that no pivots between blocks are needed; against a dense solver.
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> part(-1, 1);
+    for (const int count : {1, 2, 7, 40}) {
+        std::vector<std::array<int, 2>> pairs;
+        for (int i = 0; i < 2 * count && count > 1; ++i) {
+            const int a = static_cast<int>(random() % static_cast<unsigned>(count));
+            const int b = static_cast<int>(random() % static_cast<unsigned>(count));
+            if (a != b) pairs.push_back({a, b});
+        }
+        BlockLu lu;
+        lu.analyze(count, pairs);
+        lu.clear();
+        Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(2 * count, 2 * count);
+        const auto add = [&](int i, int j, double sign, const BlockLu::Block& b) {
+            dense.block<2, 2>(2 * i, 2 * j) += sign * Eigen::Matrix2d{{b[0], b[1]}, {b[2], b[3]}};
+        };
+        for (int i = 0; i < count; ++i) {
+            const BlockLu::Block block{20 + part(random), part(random), part(random), 20};
+            lu.add(i, block);
+            add(i, i, 1, block);
+        }
+        for (std::size_t k = 0; k < pairs.size(); ++k) {
+            const BlockLu::Block block{part(random), part(random), part(random), part(random)};
+            lu.subtract(k, block);
+            add(pairs[k][0], pairs[k][1], -1, block);
+            add(pairs[k][1], pairs[k][0], -1, block);
+        }
+        const Eigen::VectorXd right = Eigen::VectorXd::Random(2 * count);
+        ASSERT_TRUE(lu.factor());
+        EXPECT_LE((lu.solve(right) - dense.lu().solve(right)).norm(), 1e-13 * right.norm());
+    }
+}
+
+TEST(BlockLu, RefusesASingularBlock)
+{
+    BlockLu lu;
+    lu.analyze(2, {{0, 1}});
+    lu.clear();
+    lu.add(0, {1, 0, 0, 1});
+    lu.add(1, {1, 0, 0, 1});
+    lu.subtract(0, {1, 0, 0, 1});  // the second pivot is 1 - 1
+    EXPECT_FALSE(lu.factor());
+}
+
 TEST(ContactLaw, RandomProblemsAreSolvedOrReported)
 {
     RandomLaw random(1);

@@ -61,7 +61,7 @@ inline std::vector<BodyState> start_of(const Scene& scene)
 /// The largest overlap of two discs, or of a disc with the box.
 inline double overlap(const Scene& scene, const std::vector<BodyState>& states)
 {
-    double largest = 0;
+    double largest = -1;
     for (std::size_t i = 0; i < states.size(); ++i) {
         const double r = scene.bodies()[i].radius;
         for (const double x : states[i].at) largest = std::max({largest, r - x, x + r - 1});

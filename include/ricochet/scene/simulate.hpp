@@ -97,6 +97,8 @@ struct SceneStatistics {
     std::uint64_t flow_calls = 0;
     std::uint64_t joins = 0;          ///< hand-overs of bodies to groups in lasting contact
     std::uint64_t contact_steps = 0;  ///< of such groups
+    double contact_defect = 0;        ///< largest of their contact laws, as a fraction of the
+                                      ///< velocities: 1e-10, or 1e-7 where bodies are wedged
     std::uint64_t alone = 0;          ///< bodies that could meet none, and had no calendar
     std::uint64_t groups = 0;         ///< of bodies that could meet
 };

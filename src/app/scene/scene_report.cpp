@@ -128,6 +128,7 @@ std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples)
                          {"predictions", s.predictions},
                          {"steps", s.steps},
                          {"contact_steps", s.contact_steps},
+                         {"contact_defect", s.contact_defect},
                          {"joins", s.joins},
                          {"alone", s.alone},
                          {"groups", s.groups}};

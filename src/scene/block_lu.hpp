@@ -1,0 +1,56 @@
+// Elimination of sparse matrices of 2 x 2 blocks whose pattern is symmetric and known before.
+//
+// Factors A = L U in an order of least degree, pivots within the diagonal blocks alone. Matrices of
+// contacts are small and are factored again and again with other numbers in the same places:
+// what a general sparse elimination spends on finding those places is most of its time.
+#pragma once
+
+#include <Eigen/Dense>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace ricochet::detail {
+
+class BlockLu {
+public:
+    /// Row-major: xx, xy, yx, yy.
+    using Block = std::array<double, 4>;
+
+    /// For `count` diagonal blocks, and others at (i, j) and (j, i) of each pair.
+    void analyze(int count, const std::vector<std::array<int, 2>>& pairs);
+
+    void clear();
+    /// Adds to the diagonal block i; subtracts from the blocks (i, j) and (j, i) of a pair.
+    void add(int i, const Block& block)
+    {
+        add_to(static_cast<std::size_t>(place_[static_cast<std::size_t>(i)]), 1, block);
+    }
+    void subtract(std::size_t pair, const Block& block)
+    {
+        for (const std::size_t at : pairs_[pair]) add_to(at, -1, block);
+    }
+
+    /// False where a diagonal block is singular, or so small beside what it was that digits are
+    /// lost.
+    [[nodiscard]] bool factor();
+    [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
+
+private:
+    void add_to(std::size_t at, double sign, const Block& block)
+    {
+        for (std::size_t k = 0; k < 4; ++k) blocks_[at][k] += sign * block[k];
+    }
+    void order(int count, const std::vector<std::array<int, 2>>& pairs);
+
+    std::vector<int> place_;               ///< of a block's row in the elimination
+    std::vector<std::vector<int>> later_;  ///< rows that a row is coupled with, when its turn comes
+    std::vector<std::size_t> upper_;       ///< where a row's blocks to the right begin
+    std::vector<std::size_t> lower_;       ///< and those below the diagonal
+    std::vector<std::uint32_t> targets_;   ///< of the products, in the order of their use
+    std::vector<std::array<std::size_t, 2>> pairs_;
+    std::vector<Block> blocks_;  ///< diagonal ones first; inverted by `factor`
+};
+
+}  // namespace ricochet::detail

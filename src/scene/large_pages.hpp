@@ -1,0 +1,31 @@
+// Memory of many bodies and events in large pages, where the system has them to give: a million of
+// them touch 100 000 small pages, each of which costs the system more than the arithmetic.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
+namespace ricochet::detail {
+
+/// Room for `count` more elements at least, in large pages where it is large. It changes no result.
+template <class T>
+void reserve_large(std::vector<T>& list, std::size_t count)
+{
+    if (count <= list.capacity()) return;
+    list.reserve(count);
+#if defined(__linux__) && defined(MADV_HUGEPAGE)
+    constexpr std::uintptr_t page = 1U << 21;
+    const auto begin = (reinterpret_cast<std::uintptr_t>(list.data()) + page - 1) & ~(page - 1);
+    const auto end = reinterpret_cast<std::uintptr_t>(list.data() + list.capacity()) & ~(page - 1);
+    if (begin < end) {
+        // Where it is refused the memory is as good, and slower.
+        static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
+    }
+#endif
+}
+
+}  // namespace ricochet::detail

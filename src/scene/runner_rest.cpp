@@ -1,0 +1,207 @@
+// Sliding and rest of a body on surfaces.
+#include <algorithm>
+#include <cmath>
+
+#include "scene/runner.hpp"
+
+namespace ricochet::detail {
+
+std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
+{
+    const Body& body = world_.bodies[i];
+    std::vector<std::uint32_t> faces;
+    const auto look = [&](std::uint32_t f) {
+        const Face& face = world_.faces[f];
+        if (face.kind == Face::Kind::vertex) return;
+        const bool above = face.kind == Face::Kind::segment && world_.begins_above(body, f);
+        const double gap = face_gap(face, body, body.p, above).gap;
+        const double rounding = World::rounding(body.p, body.radius) + World::rounding(face.at, 0);
+        const bool known =
+            std::ranges::any_of(body.sides, [&](std::uint32_t side) { return side / 2 == f; });
+        if (known || gap <= rounding) {
+            faces.push_back(f);
+        }
+    };
+    for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
+    if (celled_ && cells_.any_faces()) {
+        for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
+    }
+    return faces;
+}
+
+/// A body whose bounces on surfaces are shorter than the time resolves stays on them: at rest, or
+/// sliding on one of them. `was` is the face on which it slid before.
+void Runner::settle(std::uint32_t i, std::uint32_t was)
+{
+    Body& body = world_.bodies[i];
+    const Vector2 velocity = body.v;
+    const std::vector<std::uint32_t> faces = touching_faces(i);
+    // In a corner, what rises by less than the rounding of its place does not move.
+    const double pull_of_all = norm(world_.gravity);
+    const double rise = faces.size() > 1 ? 4 * World::rounding(body.p, body.radius) : 0;
+    const double gained =
+        std::max(resolution(body.t) * pull_of_all, std::sqrt(2 * pull_of_all * rise));
+    if (norm(body.v) <= gained) body.v = {};
+    const double still = std::max(8 * epsilon * norm(body.v), 0.5 * gained);
+    const double rounding = 8 * epsilon * pull_of_all;
+    std::vector<std::uint32_t> holding;
+    std::vector<Vector2> blocking;  // by what it cannot be pulled into, overhanging faces included
+    for (const std::uint32_t f : faces) {
+        const Vector2 n = world_.push_of(body, f);
+        const double pull = dot(world_.gravity, n);
+        const double leaves = dot(body.v, n);
+        if (leaves < -still) continue;
+        if (leaves <= still) blocking.push_back(n);
+        if (pull >= 0) continue;
+        if (2 * leaves <= resolution(body.t) * -pull || leaves <= 8 * epsilon * norm(body.v)) {
+            holding.push_back(f);
+        }
+    }
+    if (holding.empty()) {
+        body.v = velocity;
+        return;
+    }
+    for (const std::uint32_t f : holding) {
+        const Vector2 n = world_.push_of(body, f);
+        body.v = body.v - dot(body.v, n) * n;
+    }
+    std::uint32_t chosen = none;
+    bool leaves = false;
+    const Vector2 flight = body.v;
+    for (std::size_t k = 0; k < holding.size() && chosen == none; ++k) {
+        body.v = flight;
+        world_.slide(i, holding[k]);
+        const bool stays = std::ranges::all_of(
+            blocking, [&](const Vector2& n) { return dot(body.a, n) >= -rounding; });
+        if (!stays) continue;
+        const Vector2& heading = is_zero(body.v) ? body.a : body.v;
+        if (world_.leads_off(world_.faces[holding[k]], body.p, heading)) {
+            leaves = true;
+        } else {
+            chosen = holding[k];
+        }
+    }
+    if (chosen == none && leaves) {
+        body.v = flight;
+        body.a = world_.gravity;
+        body.held = none;
+        body.asleep = false;
+        return;
+    }
+    if (chosen == none) {
+        // No single one carries it, so it lies in the corner of two.
+        body.v = body.a = {};
+        body.asleep = true;
+        body.held = chosen = holding[0];
+    }
+    if (chosen != was) note(SceneEvent::Kind::held, i, chosen, velocity);
+}
+
+/// Whether surfaces alone hold from now on what presses on one of them.
+bool Runner::rests_on_face(std::uint32_t i)
+{
+    Body& body = world_.bodies[i];
+    if (body.island != none || body.contact != none) return false;
+    begin_record(i, speed(body, seconds(body.t, now_)), sides_of(i, none));
+    settle(i, none);
+    return body.held != none;
+}
+
+/// When friction stops it, or its face ends.
+void Runner::consider_own(std::uint32_t i)
+{
+    const Body& body = world_.bodies[i];
+    if (body.held == none) return;
+    const Face& face = world_.faces[body.held];
+    Pending& pending = pending_[i];
+    const auto add = [&](double after, Pending::Kind kind) {
+        if (!(after < never)) return;
+        const Instant t = body.t.after(after);
+        if (!before(t, pending.t)) return;
+        pending.t = t;
+        pending.kind = kind;
+        pending.other = body.held;
+    };
+    const double slowing = dot(body.v, body.a);
+    if (slowing < 0 && world_.friction(body.material, face.material) > 0) {
+        add(-dot(body.v, body.v) / slowing, Pending::Kind::stop);
+    }
+    if (face.kind == Face::Kind::segment) {
+        const Vector2 along = -1.0 * turned(face.normal);
+        const double s = dot(body.p - face.at, along);
+        const double v = dot(body.v, along);
+        const double a = dot(body.a, along);
+        add(falls_after(s, v, a, 0), Pending::Kind::edge);
+        add(falls_after(face.length - s, -v, -a, 0), Pending::Kind::edge);
+    }
+}
+
+void Runner::halt(std::uint32_t i)
+{
+    Body& body = world_.bodies[i];
+    const Vector2 velocity = speed(body, seconds(body.t, now_));
+    const std::uint32_t face = begin_record(i, {}, sides_of(i, body.held));
+    world_.slide(i, face);
+    if (body.asleep) {
+        note(SceneEvent::Kind::stopped, i, face, velocity);
+        ++result_.event_count;
+    }
+    predict(i);
+}
+
+void Runner::leave_edge(std::uint32_t i)
+{
+    Body& body = world_.bodies[i];
+    const Vector2 velocity = speed(body, seconds(body.t, now_));
+    begin_record(i, velocity, sides_of(i, body.held));
+    if (is_zero(velocity)) {
+        settle(i, none);
+        return predict(i);
+    }
+    for (const std::uint32_t f : touching_faces(i)) {
+        const Face& face = world_.faces[f];
+        if (face.kind != Face::Kind::segment) continue;
+        // The face that goes on from here, in the direction of the motion.
+        const Vector2 n = world_.push_of(body, f);
+        if (!world_.leads_off(face, body.p, velocity) &&
+            std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) && dot(world_.gravity, n) < 0) {
+            world_.slide(i, f);
+            break;
+        }
+    }
+    predict(i);
+}
+
+void Runner::settle_at_start()
+{
+    for (const std::uint32_t i : members_) {
+        Body& body = world_.bodies[i];
+        const bool fixed = body.island != none || body.asleep || is_zero(world_.gravity);
+        if (fixed && body.radius > 0) continue;
+        const std::vector<std::uint32_t> faces = touching_faces(i);
+        if (body.radius == 0) {
+            std::vector<Side> sides;
+            for (const std::uint32_t f : faces) {
+                if (world_.faces[f].kind != Face::Kind::segment) continue;
+                sides.push_back({f, world_.begins_above(body, f)});
+            }
+            world_.make_one(sides);
+            world_.remember(body, sides);
+        }
+        if (!fixed && !faces.empty()) settle(i, faces.size() == 1 ? faces[0] : none);
+    }
+}
+
+void Runner::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
+                  const Vector2& velocity)
+{
+    if (before(Instant{world_.options.t_start, 0}, now_) && world_.options.record_events) {
+        SceneEvent event{.t = now_.value, .number = result_.event_count, .kind = kind, .body = i};
+        event.other = {true, world_.faces[face].surface};
+        event.before[0] = velocity;
+        event.after[0] = world_.bodies[i].v;
+        result_.events.push_back(event);
+    }
+}
+
+}  // namespace ricochet::detail
