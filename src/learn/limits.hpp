@@ -1,4 +1,4 @@
-// Doubles that are no numbers of a motion.
+// Infinity and NaN, by short names.
 #pragma once
 
 #include <limits>
