@@ -222,6 +222,8 @@ public:
     }
 
     /// Looks for events in the next step.
+    /// @throws std::domain_error where an event is located on states of the host's `restep` or
+    /// `interpolate` that are not finite
     /// @throws std::logic_error for a step out of turn: not where the last one ended, beyond a time
     /// event, or before `resume`; nothing has changed then.
     template <HostStep S>

@@ -46,6 +46,14 @@ void throw_not_quiet(double until, double found)
                     found, until));
 }
 
+void throw_host_not_finite(std::size_t component, double found, double s, bool by_restep)
+{
+    throw std::domain_error(fmt::format(
+        "EventMonitor: found x[{}] = {} from the host's `{}` at {:.17g} s of its step; expected "
+        "finite numbers, since an event is located there",
+        component, found, by_restep ? "restep" : "interpolate", s));
+}
+
 void throw_no_length(std::string_view what, double found)
 {
     throw std::invalid_argument(

@@ -21,6 +21,10 @@
 
 namespace ricochet::detail {
 
+/// An event must not be placed by what is no state. @throws std::domain_error
+[[noreturn]] void throw_host_not_finite(std::size_t component, double found, double s,
+                                        bool by_restep);
+
 /// Fulfils `DenseStep`.
 template <class X>
 class Step {
@@ -450,8 +454,14 @@ private:
     void restep_on_host(double s, X& x) const
     {
         const HostStepTable& host = *state_.host;
-        if (!host.restep) return interpolate_on_host(s, x);
-        host.restep(host.host, s, x.data(), state_.x0.size());
+        if (!host.restep) {
+            interpolate_on_host(s, x);
+        } else {
+            host.restep(host.host, s, x.data(), state_.x0.size());
+        }
+        for (std::size_t i = 0; i < state_.x0.size(); ++i) {
+            if (!std::isfinite(x[i])) throw_host_not_finite(i, x[i], s, host.restep != nullptr);
+        }
     }
 
     /// Over a ten-thousandth of the step the errors of rounding and of curvature of a difference

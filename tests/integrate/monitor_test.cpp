@@ -774,6 +774,41 @@ TEST(MonitorRefusals, AfterAnExceptionTheGuardsAreArmedAnew)
     }
 }
 
+/// A step whose map is broken: its states inside are infinite.
+template <bool by_restep>
+struct BrokenStep {
+    X x0_{0.5, 0}, x1_{-0.5, 0}, rate_{-1, 0};
+    [[nodiscard]] Instant t0() const { return {0}; }
+    [[nodiscard]] double h() const { return 1; }
+    [[nodiscard]] std::span<const double> x0() const { return x0_; }
+    [[nodiscard]] std::span<const double> x1() const { return x1_; }
+    [[nodiscard]] std::span<const double> rate0() const { return rate_; }
+    [[nodiscard]] std::span<const double> rate1() const { return rate_; }
+    void interpolate(double s, std::span<double> x) const
+    {
+        x[0] = by_restep ? 0.5 - s : std::numeric_limits<double>::infinity();
+        x[1] = 0;
+    }
+    void restep(double /*s*/, std::span<double> x) const requires by_restep
+    {
+        x[0] = std::numeric_limits<double>::infinity();
+        x[1] = 0;
+    }
+};
+
+TEST(MonitorRefusals, StatesInsideAStepThatAreNotFinite)
+{
+    // Taken for values far above the surface, they would place the event at the end of the step.
+    const auto examined = [](const auto& step) {
+        const BouncingBall ball;
+        EventMonitor monitor(ball, X{});
+        EXPECT_EQ(monitor.start(step.t0(), step.x0_, step.rate_, 1), Verdict::stands);
+        return monitor.examine(step);
+    };
+    EXPECT_THROW((void)examined(BrokenStep<true>{}), std::domain_error);
+    EXPECT_THROW((void)examined(BrokenStep<false>{}), std::domain_error);
+}
+
 TEST(MonitorRefusals, ASkipThatGoesNowhere)
 {
     const BouncingBall ball;
