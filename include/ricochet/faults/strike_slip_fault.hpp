@@ -158,7 +158,7 @@ struct RuptureSnapshot {
 /// Counts over one run of the fault.
 struct RuptureStatistics {
     std::uint64_t steps = 0;        ///< accepted
-    std::uint64_t rejected = 0;     ///< by the error or for want of a solution
+    std::uint64_t rejected = 0;     ///< by the error test, or because no solution was found
     std::uint64_t evaluations = 0;  ///< of forces
     std::uint64_t products = 0;     ///< with K
     std::uint64_t arrests = 0;
