@@ -7,6 +7,7 @@
 
 namespace ricochet::app {
 
+namespace coulomb_oscillator {
 namespace {
 
 enum : std::size_t {
@@ -67,9 +68,11 @@ std::vector<double> exact_events(const std::vector<double>& p, double t_end)
 }
 
 }  // namespace
+}  // namespace coulomb_oscillator
 
 void complete_coulomb_oscillator(SystemEntry& entry)
 {
+    using namespace coulomb_oscillator;
     entry.start = start;
     entry.run = run;
     entry.start_mode = start_mode;

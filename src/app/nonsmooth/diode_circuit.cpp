@@ -5,6 +5,7 @@
 
 namespace ricochet::app {
 
+namespace diode_circuit {
 namespace {
 
 enum : std::size_t {
@@ -40,9 +41,11 @@ TimedRun run(const RunSettings& settings, int repeats)
 }
 
 }  // namespace
+}  // namespace diode_circuit
 
 void complete_diode_circuit(SystemEntry& entry)
 {
+    using namespace diode_circuit;
     entry.start = start;
     entry.run = run;
 }

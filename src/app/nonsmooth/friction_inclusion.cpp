@@ -9,6 +9,7 @@
 
 namespace ricochet::app {
 
+namespace friction_inclusion {
 namespace {
 
 enum : std::size_t {
@@ -63,6 +64,7 @@ Mode oscillator_mode(Mode branch)
 }
 
 }  // namespace
+}  // namespace friction_inclusion
 
 TimedRun run_friction(const FrictionInclusion& system, const FrictionInclusion::Vector& w0,
                       const RunSettings& settings, int repeats)
@@ -73,6 +75,7 @@ TimedRun run_friction(const FrictionInclusion& system, const FrictionInclusion::
 TimedRun run_oscillator(const FrictionInclusion& system, const FrictionInclusion::Vector& w0,
                         const RunSettings& settings, int repeats)
 {
+    using namespace friction_inclusion;
     TimedRun timed = run_friction(system, w0, settings, repeats);
     timed.run.mode = oscillator_mode(timed.run.mode);
     for (auto& event : timed.run.events) {
@@ -84,6 +87,7 @@ TimedRun run_oscillator(const FrictionInclusion& system, const FrictionInclusion
 
 void complete_friction_inclusion(SystemEntry& entry)
 {
+    using namespace friction_inclusion;
     entry.start = start;
     entry.run = run;
 }

@@ -5,6 +5,7 @@
 
 namespace ricochet::app {
 
+namespace incline_block {
 namespace {
 
 enum : std::size_t { slope, friction, gravity, vx, vy };  // the order of parameters
@@ -26,9 +27,11 @@ TimedRun run(const RunSettings& settings, int repeats)
 }
 
 }  // namespace
+}  // namespace incline_block
 
 void complete_incline_block(SystemEntry& entry)
 {
+    using namespace incline_block;
     entry.start = start;
     entry.run = run;
 }

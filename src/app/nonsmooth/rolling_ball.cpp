@@ -5,6 +5,7 @@
 
 namespace ricochet::app {
 
+namespace rolling_ball {
 namespace {
 
 enum : std::size_t {
@@ -42,9 +43,11 @@ TimedRun run(const RunSettings& settings, int repeats)
 }
 
 }  // namespace
+}  // namespace rolling_ball
 
 void complete_rolling_ball(SystemEntry& entry)
 {
+    using namespace rolling_ball;
     entry.start = start;
     entry.run = run;
 }

@@ -5,6 +5,7 @@
 
 namespace ricochet::app {
 
+namespace sliding_mode {
 namespace {
 
 enum : std::size_t { amplitude, frequency, gain, from };  // the order of parameters
@@ -33,9 +34,11 @@ std::vector<double> exact_state(const std::vector<double>& p, double t)
 }
 
 }  // namespace
+}  // namespace sliding_mode
 
 void complete_sliding_mode(SystemEntry& entry)
 {
+    using namespace sliding_mode;
     entry.start = start;
     entry.run = run;
     entry.exact_state = exact_state;

@@ -6,6 +6,7 @@
 
 namespace ricochet::app {
 
+namespace stick_slip {
 namespace {
 
 enum : std::size_t {
@@ -64,9 +65,11 @@ std::vector<double> exact_events(const std::vector<double>& /*p*/, double t_end)
 }
 
 }  // namespace
+}  // namespace stick_slip
 
 void complete_stick_slip(SystemEntry& entry)
 {
+    using namespace stick_slip;
     entry.start = start;
     entry.run = run;
     entry.start_mode = start_mode;

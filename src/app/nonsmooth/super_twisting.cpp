@@ -5,6 +5,7 @@
 
 namespace ricochet::app {
 
+namespace super_twisting {
 namespace {
 
 enum : std::size_t { gain_1, gain_2, amplitude, frequency, x1, x2 };  // the order of parameters
@@ -29,9 +30,11 @@ TimedRun run(const RunSettings& settings, int repeats)
 }
 
 }  // namespace
+}  // namespace super_twisting
 
 void complete_super_twisting(SystemEntry& entry)
 {
+    using namespace super_twisting;
     entry.start = start;
     entry.run = run;
 }

@@ -5,6 +5,7 @@
 
 namespace ricochet::app {
 
+namespace two_contact_block {
 namespace {
 
 enum : std::size_t {
@@ -42,9 +43,11 @@ TimedRun run(const RunSettings& settings, int repeats)
 }
 
 }  // namespace
+}  // namespace two_contact_block
 
 void complete_two_contact_block(SystemEntry& entry)
 {
+    using namespace two_contact_block;
     entry.start = start;
     entry.run = run;
 }

@@ -5,6 +5,7 @@
 
 namespace ricochet::app {
 
+namespace woodpecker {
 namespace {
 
 enum : std::size_t { friction, beak_restitution, spring, gravity };  // the order of parameters
@@ -33,9 +34,11 @@ TimedRun run(const RunSettings& settings, int repeats)
 }
 
 }  // namespace
+}  // namespace woodpecker
 
 void complete_woodpecker(SystemEntry& entry)
 {
+    using namespace woodpecker;
     entry.start = start;
     entry.run = run;
 }
