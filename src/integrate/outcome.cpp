@@ -82,7 +82,7 @@ std::string_view describe(Outcome outcome) noexcept
                    "kept, and the next call continues from the last completed step";
         case Outcome::at_rest: return "every element came to rest for good";
         case Outcome::not_handed_over:
-            return "events alone do not lead on from here; allow set-valued steps";
+            return "events alone cannot continue the motion; allow set-valued steps";
         case Outcome::released: return "every reaction is at a bound, as was asked for";
         case Outcome::law_violated:
             return "a step ended with a reaction that contradicts its law; check reaction_set, "
