@@ -258,9 +258,9 @@ public:
     }
 
     /// An interpolant need not begin at the start state to the last bit, and one that is
-    /// evaluated at times is a staircase for offsets shorter than the resolution of the time. For a
-    /// could put a guard that starts on its surface behind it. So the difference is subtracted,
-    /// all of it at the start and none at the end, and over the first unit in the last place of the
+    /// evaluated at times is a staircase for offsets shorter than the time resolves. Either could
+    /// put a guard that starts on its surface behind it. So the difference is subtracted, all
+    /// of it at the start and none at the end, and over the first unit in the last place of the
     /// time the path is straight.
     void align_start() const
     {
