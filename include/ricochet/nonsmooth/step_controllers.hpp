@@ -181,7 +181,7 @@ struct LearnedStep {
     StepRanges* seen = nullptr;  ///< widened by every input, unless null
 
     [[nodiscard]] StepVerdict judge(double error, double h, const StepView& view) noexcept;
-    /// As `plain`, for callers without a view.
+    /// Verdict of `plain`, for callers without a view.
     [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
     [[nodiscard]] double failed() const noexcept { return plain.failed(); }
     void reset() const noexcept {}
