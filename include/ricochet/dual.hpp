@@ -3,11 +3,11 @@
 //     Dual<2> x{3.0, {1, 0}}, y{4.0, {0, 1}};
 //     const auto r = sqrt(x * x + y * y);    // r.value = 5, r.slope = {0.6, 0.8}
 //
-// (A. Griewank and A. Walther, Evaluating Derivatives, 2nd edition, SIAM, 2008, chapter 3.) With
-// duals of duals, Dual<1, Dual<1>>, second derivatives come along.
+// (A. Griewank and A. Walther, Evaluating Derivatives, 2nd edition, SIAM, 2008, chapter 3.) Duals
+// of duals, Dual<1, Dual<1>>, have second derivatives.
 //
-// Functions are found by argument-dependent lookup: `using std::cos; cos(x)`. Comparisons are those
-// of the values; where a function has a kink, its derivative is that of the branch that the value
+// Functions are found by argument-dependent lookup: `using std::cos; cos(x)`. Comparisons compare
+// the values; where a function has a kink, its derivative is that of the branch that the value
 // takes.
 #pragma once
 
@@ -23,7 +23,7 @@ template <class>
 inline constexpr bool is_never_number = false;
 }  // namespace detail
 
-/// @tparam T  of value and derivatives: double, or a dual again
+/// @tparam T  type of the value and of the derivatives: double, or a dual again
 template <std::size_t N, class T = double>
 struct Dual {
     T value{};
@@ -40,8 +40,8 @@ struct Dual {
     {
     }
 
-    /// A double is wanted of a dual where a function was not found for duals, or a parameter is
-    /// declared as double.
+    /// Rejects the conversion of a dual to double: a function was not found for duals, or a
+    /// parameter is declared as double.
     template <class U>
     requires std::is_same_v<U, double>
     constexpr operator U() const  // NOLINT(google-explicit-constructor)
@@ -77,7 +77,7 @@ struct Dual {
         return a.with(b, f, [&](const T& d, const T& e) { return (d - f * e) / b.value; });
     }
 
-    // Numbers of any type, without a conversion that competes with that of a dual to a number.
+    // Numbers of any type, without a conversion that competes with the one from dual to number.
     template <class U>
     requires std::is_arithmetic_v<U>
     friend constexpr Dual operator+(const Dual& a, const U& b)
@@ -165,7 +165,7 @@ struct Dual {
     RICOCHET_DUAL_COMPARISON(!=)
 #undef RICOCHET_DUAL_COMPARISON
 
-    // Each with its derivative.
+    // Functions, each with its derivative.
     friend constexpr Dual sqrt(const Dual& a)
     {
         using std::sqrt;
@@ -244,7 +244,7 @@ struct Dual {
     {
         return fabs(a);
     }
-    /// A step: its derivative is 0 wherever there is one.
+    /// A step function: its derivative is 0 wherever there is one.
     friend constexpr Dual floor(const Dual& a)
     {
         using std::floor;
@@ -256,7 +256,7 @@ struct Dual {
         return a.chain(ceil(a.value), T(0.0));
     }
 
-    // Of two, either of which may be a number.
+    // Functions of two arguments, either of which may be a number.
     friend constexpr Dual atan2(const Dual& y, const Dual& x)
     {
         using std::atan2;
@@ -318,7 +318,7 @@ private:
     {
         return static_cast<double>(constant);
     }
-    /// The value f, and every derivative d of this one as `of(d)`.
+    /// A dual with the value f, and with `of(d)` for every derivative d of this dual.
     template <class Of>
     [[nodiscard]] constexpr Dual to(const T& f, const Of& of) const
     {
@@ -335,8 +335,8 @@ private:
         for (std::size_t i = 0; i < N; ++i) out.slope[i] = of(slope[i], b.slope[i]);
         return out;
     }
-    /// f of this one, with f' = `rate`. What does not move has the derivative 0 even where the
-    /// rate is infinite.
+    /// f of this dual, with f' = `rate`. A derivative of 0 stays 0 even if the rate is
+    /// infinite.
     [[nodiscard]] constexpr Dual chain(const T& f, const T& rate) const
     {
         return to(f, [&](const T& d) {

@@ -8,7 +8,7 @@
 //     });
 //
 // A table has `size()` and `[i]`, such as a vector of structures or of states, or is a number of
-// rows. What is done with a row is a function of the row and of its seed alone, so that the results
+// rows. The result of a row is a function of the row and of its seed alone, so that the results
 // have the same bits for any number of threads; the function is called from several threads at a
 // time.
 #pragma once
@@ -28,7 +28,7 @@ namespace ricochet {
 
 /// Place of a run in an ensemble.
 struct EnsembleRow {
-    std::size_t index = 0;   ///< in the table, from 0
+    std::size_t index = 0;   ///< row of the table, from 0
     std::uint64_t seed = 0;  ///< the `row_seed` of this row
 };
 
@@ -36,27 +36,27 @@ struct EnsembleRow {
 /// ensemble have different seeds.
 [[nodiscard]] std::uint64_t row_seed(std::uint64_t seed, std::size_t index) noexcept;
 
-/// Rows that one thread runs one after another before it takes others.
+/// Number of rows that one thread runs in sequence before it takes the next chunk.
 inline constexpr std::size_t ensemble_chunk = 64;
 
-/// How far an ensemble is, after a chunk of rows.
+/// Progress of an ensemble, after a chunk of rows.
 struct EnsembleProgress {
-    std::size_t first = 0;  ///< row of the chunk that has just ended
+    std::size_t first = 0;  ///< first row of the chunk that has just ended
     std::size_t count = 0;  ///< number of its rows
     std::size_t done = 0;   ///< rows in all chunks that have ended
-    std::size_t rows = 0;   ///< of the table
+    std::size_t rows = 0;   ///< number of rows of the table
 };
 
 /// Options of `ensemble`.
 struct EnsembleOptions {
     unsigned threads = 0;    ///< at most 1024; 0: one for each core that the process may use
-    std::uint64_t seed = 0;  ///< of all rows
+    std::uint64_t seed = 0;  ///< seed of the ensemble, from which those of all rows follow
 
     /// Called after every chunk, by one thread at a time. If it returns false, no further chunk is
-    /// begun. What it throws is thrown by `ensemble`.
+    /// started. Exceptions that it throws are thrown by `ensemble`.
     std::function<bool(const EnsembleProgress&)> progress{};
 
-    /// Set from another thread or a signal handler: no further row is begun. Runs in progress end
+    /// Set from another thread or a signal handler: no further row is started. Runs in progress end
     /// early if their `Options::cancelled` is the same flag.
     const std::atomic<bool>* cancelled = nullptr;
 };
@@ -65,7 +65,7 @@ struct EnsembleOptions {
 struct RowFailure {
     std::size_t row = 0;
     std::exception_ptr exception;
-    std::string message;  ///< `what()` of it, where it is a std::exception
+    std::string message;  ///< its `what()`, if it is a std::exception
 };
 
 /// Results of an ensemble, row by row.
@@ -100,7 +100,7 @@ concept RowTable = requires(const Table& table)
 
 /// Calls `run(table[i], EnsembleRow)`, or `run(table[i])`, for every row i of `table`.
 ///
-/// An exception that a row throws is kept in `failures`; the other rows are run all the same.
+/// An exception that a row throws is kept in `failures`; the other rows are still run.
 /// @throws std::invalid_argument for options out of range.
 template <RowTable Table, class Run>
 [[nodiscard]] auto ensemble(const Table& table, const Run& run, const EnsembleOptions& options = {})
@@ -124,7 +124,7 @@ template <RowTable Table, class Run>
     return out;
 }
 
-/// The same without a table: calls `run(EnsembleRow)` for so many rows.
+/// The same without a table: calls `run(EnsembleRow)` for the given number of rows.
 template <class Run>
 requires std::is_invocable_v<const Run&, const EnsembleRow&>
 [[nodiscard]] auto ensemble(std::size_t rows, const Run& run, const EnsembleOptions& options = {})

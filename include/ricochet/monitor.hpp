@@ -12,8 +12,8 @@
 //     }
 //
 // A host shows every step that it has accepted, in order, each beginning where the last one ended;
-// steps that it rejects are never shown. Steps are half-open, (t, t + h]. The monitor changes
-// nothing of the host. What happens on the way is what `Simulation` does with the same steps: the
+// steps that it rejects are never shown. Steps are half-open, (t, t + h]. The monitor does not
+// change the host. It finds the events that `Simulation` would find with the same steps: the
 // first set of events, its resets, the arming of all guards with the flow after them.
 #pragma once
 
@@ -39,7 +39,7 @@ namespace ricochet {
 template <class S>
 concept HostStep = requires(const S& step, double s, std::span<double> x)
 {
-    Instant{step.t0()};  // [s]; or an Instant, of a host that keeps what its sum of times loses
+    Instant{step.t0()};  // [s]; or an Instant, from a host that keeps what its sum of times loses
     {
         step.h()
         } -> std::convertible_to<double>;  // [s]
@@ -55,11 +55,11 @@ concept HostStep = requires(const S& step, double s, std::span<double> x)
     {
         step.rate1()
         } -> std::convertible_to<std::span<const double>>;
-    step.interpolate(s, x);  // x(t0 + s)
+    step.interpolate(s, x);  // x becomes x(t0 + s)
 };
 
 /// A host that knows the derivative of its interpolant; otherwise it is a difference over 1e-4 h,
-/// and events near tangency are found less finely.
+/// and events near tangency are located less precisely.
 template <class S>
 concept RatedHostStep = HostStep<S> && requires(const S& step, double s, std::span<double> dxdt)
 {
@@ -139,14 +139,14 @@ private:
 
 /// Options of a monitor.
 struct MonitorOptions {
-    double event_tolerance = 0;  ///< as in `Options`
+    double event_tolerance = 0;  ///< [s] as in `Options`
     double event_rtol = 0;
     double event_window = 0;
     bool look_inside = true;
-    bool record_events = true;  ///< keep them, for `events`; off: they are counted
-    bool event_states = true;   ///< of events that change nothing, too
+    bool record_events = true;  ///< keep them, for `events`; off: they are only counted
+    bool event_states = true;   ///< keep the states of events that change nothing, too
     bool backward = false;      ///< the host's time runs backward
-    /// Every crossing ends its step, whether the system has a reset for it or not: for hosts that
+    /// Every crossing ends its step, whether or not the system has a reset for it: for hosts that
     /// change the state themselves.
     bool cut_at_all = false;
 };
@@ -171,15 +171,15 @@ struct MonitorOptions {
 /// the last cut, to the bit; t0 + h does not lie beyond `must_stop_at`; between `cut` and `resume`
 /// no step is shown. A call that violates this throws std::logic_error and changes nothing.
 ///
-/// The system is one for `Simulation`; its flow is asked for where a guard starts on its surface
-/// without a rate, and where the host does not give the rate after an event.
+/// The system is one for `Simulation`; its flow is called if a guard starts on its surface
+/// without a rate, and if the host does not give the rate after an event.
 ///
 /// An exception from a function of the system or from a host's interpolant passes through
-/// unchanged. The monitor then waits for `start` or `restore`, and refuses all else: what it had
-/// found in the current step is half done.
+/// unchanged. The monitor then accepts only `start` or `restore`, because its search in the
+/// current step is incomplete.
 ///
-/// After construction nothing is allocated for up to 8 guards and states of fixed size, but what is
-/// recorded, and the merged state of a reset of several guards.
+/// After construction nothing is allocated for up to 8 guards and states of fixed size, except for
+/// recorded events, and the merged state of a reset of several guards.
 template <class System, class X, class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>
 class EventMonitor {
@@ -204,10 +204,10 @@ public:
     explicit EventMonitor(System&&, const X&, const MonitorOptions& = {}, const Detector& = {},
                           const Locator& = {}) = delete;
 
-    /// Arms all guards at a state that no event has led to: at the start, and after a change that a
-    /// host makes to the state. May return a cut immediately: a guard that is about to be crossed.
+    /// Arms all guards at a state that no event has led to: at the start, and after the host has
+    /// changed the state. May return a cut immediately: a guard that is about to be crossed.
     /// @param dxdt   the rate at x in offsets, n doubles
-    /// @param scale  [s] length of the next step, roughly
+    /// @param scale  [s] approximate length of the next step
     /// @throws std::invalid_argument naming a guard that is not finite, or behind a surface that
     /// bounds the motion.
     Verdict start(const Instant& t, std::span<const double> x, std::span<const double> dxdt,
@@ -215,7 +215,7 @@ public:
     {
         return monitor_->start(t, taken(x), checked(dxdt, x.size()), mode, scale);
     }
-    /// Same, with the rate of the system's flow.
+    /// The same, with the rate of the system's flow.
     Verdict start(const Instant& t, std::span<const double> x, double scale, Mode mode = 0)
     {
         return monitor_->start(t, taken(x), nullptr, mode, scale);
@@ -224,8 +224,8 @@ public:
     /// Looks for events in the next step.
     /// @throws std::domain_error where an event is located on states of the host's `restep` or
     /// `interpolate` that are not finite
-    /// @throws std::logic_error for a step out of turn: not where the last one ended, beyond a time
-    /// event, or before `resume`; nothing has changed then.
+    /// @throws std::logic_error for a step out of turn: one that does not start where the last one
+    /// ended, goes beyond a time event, or comes before `resume`; nothing has changed then.
     template <HostStep S>
     [[nodiscard]] Verdict examine(const S& step)
     {
@@ -247,15 +247,15 @@ public:
     }
 
     /// After a cut, once the host has gone to `cut().after`: arms all guards with the rate there.
-    /// May be a cut again: guards that a reset has carried across their surfaces, at the same
+    /// May return another cut: guards that a reset has carried across their surfaces, at the same
     /// instant, or a motion that comes to rest.
     [[nodiscard]] Verdict resume(std::span<const double> dxdt, double scale)
     {
         return monitor_->resume(checked(dxdt, monitor_->x().size()), scale);
     }
-    /// Same, with the rate of the system's flow.
+    /// The same, with the rate of the system's flow.
     [[nodiscard]] Verdict resume(double scale) { return monitor_->resume(nullptr, scale); }
-    /// After a cut, from a state of the host's own making in place of `cut().after`.
+    /// After a cut, from a state that the host chooses instead of `cut().after`.
     [[nodiscard]] Verdict resume(std::span<const double> after, Mode mode,
                                  std::span<const double> dxdt, double scale)
     {
@@ -273,7 +273,7 @@ public:
     [[nodiscard]] std::span<const double> x() const noexcept { return monitor_->x(); }
     [[nodiscard]] Mode mode() const noexcept { return monitor_->mode(); }
 
-    /// The next time event [s], beyond which no step goes; infinite where there is none.
+    /// The next time event [s], which no step may pass; infinite if there is none.
     [[nodiscard]] double must_stop_at() const noexcept { return monitor_->must_stop_at(); }
 
     /// Time [s] up to which no guard needs a check, by the bounds that the system declares or a
@@ -284,14 +284,14 @@ public:
 
     /// Tells the monitor that the host has continued to t, at most `quiet_until` and before the
     /// next time event, in one step or several; x and its rate are those at t.
-    /// @throws std::logic_error beyond that
+    /// @throws std::logic_error if t lies beyond that
     void skip_to(const Instant& t, std::span<const double> x, std::span<const double> dxdt)
     {
         monitor_->skip_to(t, taken(x), checked(dxdt, x.size()));
     }
 
     /// The side of its surface that a guard is on.
-    /// @throws std::out_of_range
+    /// @throws std::out_of_range naming the guard asked for and the number of guards.
     [[nodiscard]] Side side(std::size_t guard) const { return monitor_->side(guard); }
 
     [[nodiscard]] Outcome outcome() const noexcept { return monitor_->run().outcome; }
@@ -308,10 +308,10 @@ public:
     }
     void clear_events() noexcept { monitor_->clear_events(); }
 
-    /// State of the monitor between two steps: everything that its future depends on.
+    /// State of the monitor between two steps, on which its future depends.
     [[nodiscard]] Snapshot save() const { return monitor_->save(); }
-    /// @throws std::invalid_argument if the snapshot is of another system, or no state of one;
-    /// then nothing has changed.
+    /// @throws std::invalid_argument if the snapshot is of another system, or does not hold a valid
+    /// state; then nothing has changed.
     void restore(const Snapshot& snapshot) { monitor_->restore(snapshot); }
 
 private:
@@ -336,7 +336,7 @@ private:
         }
 
     private:
-        /// Guards see whole states: a host's interpolant need be no polynomial.
+        /// Guards see whole states, because a host's interpolant need not be a polynomial.
         [[nodiscard]] static constexpr detail::SystemTable<State> of_whole_states() noexcept
         {
             detail::SystemTable<State> table = detail::system_table<System, X>;

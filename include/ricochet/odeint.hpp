@@ -59,7 +59,7 @@ struct Elementwise {
     template <class X, class... Rest>
     static void for_each(X& x, Rest&&... rest)
     {
-        // Odeint puts the operation last.
+        // Odeint's convention puts the operation last.
         constexpr std::size_t n = sizeof...(Rest);
         apply(x, std::forward_as_tuple(rest...), std::make_index_sequence<n - 1>{});
     }

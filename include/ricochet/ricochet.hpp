@@ -1,4 +1,4 @@
-// The core: hybrid systems, their events, their integration, networks that spare checks.
+// The core: hybrid systems, their events, their integration, networks that replace checks.
 //
 // Ready systems are in `ricochet/systems/`, set-valued motion in `ricochet/nonsmooth/`,
 // derivatives in `ricochet/sensitivity/`, friction in `ricochet/faults/`, training in

@@ -35,9 +35,9 @@ namespace ricochet {
 /// II, 2nd edition, section IV.7). Steps are those of odeint's rosenbrock4 where the flow does not
 /// depend on the time; there odeint's is of order 1, by the sign of one coefficient (d4).
 ///
-/// The polynomial of a step is its cubic interpolant; samples and events that act are on steps of
-/// their own. Rates at the ends of a step are those of the interpolant: where motion is stiff, the
-/// flow at a computed state is its error times the fastest rate.
+/// The polynomial of a step is its cubic interpolant; samples and acting events are computed by
+/// steps of their own. Rates at the ends of a step are those of the interpolant: in stiff motion
+/// the flow at a computed state is its error times the fastest rate.
 struct Rosenbrock4 {
     template <class State>
     struct Stepper {
@@ -61,7 +61,7 @@ struct RodasTableau {
          {0.3314825187068521e+01, 0.2896124015972201e+01, 0.9986419139977817e+00},
          {0.1221224509226641e+01, 0.6019134481288629e+01, 0.1253708332932087e+02,
           -0.6878860361058950e+00}}};
-    static constexpr std::array<Row, 6> m = {  // of stages over h
+    static constexpr std::array<Row, 6> m = {  // coefficients of the stages over h
         {{},
          {-0.5668800000000000e+01},
          {-0.2430093356833875e+01, -0.2063599157091915e+00},
@@ -78,7 +78,7 @@ struct RodasTableau {
           0.2476722511418386e+02, -0.6594389125716872e+01}}};
 };
 
-/// The system writes its Jacobian.
+/// Whether the system writes its Jacobian.
 template <class System, class X>
 concept JacobianWritten = requires(const System& system, Mode mode, double t, const X& x,
                                    std::span<double> rows)
@@ -90,14 +90,14 @@ concept JacobianWritten = requires(const System& system, Mode mode, double t, co
     system.jacobian(t, x, rows);
 };
 
-/// There is a function of that name, which nothing calls.
+/// Whether the system has a function `jacobian` that no form of call fits.
 template <class System, class X>
 concept JacobianMisfits = !JacobianWritten<System, X> && requires
 {
     &System::jacobian;
 };
 
-/// Fixed or sized at run time, as C is.
+/// Storage of fixed size, or sized at run time, as C is.
 template <class C>
 using MatrixLike =
     std::conditional_t<(fixed_size<C>() > 0), std::array<double, fixed_size<C>() * fixed_size<C>()>,
@@ -138,7 +138,7 @@ void substitute(std::size_t n, const double* a, const std::size_t* rows, C& b) n
     }
 }
 
-/// What a step of Rosenbrock's method keeps.
+/// Work space of Rosenbrock's method between calls.
 template <class C>
 struct RosenbrockRoom {
     explicit RosenbrockRoom(const C& like)
@@ -154,7 +154,7 @@ struct RosenbrockRoom {
         }
     }
 
-    // The start of the steps: what is known there serves all their lengths.
+    // The start of the steps: values here serve steps of any length.
     Instant start;
     Mode mode = 0;
     bool backward = false;
@@ -162,7 +162,7 @@ struct RosenbrockRoom {
     C x, rate, by_time;  ///< f and df/ds
     MatrixLike<C> jacobian{};
 
-    // One step from there.
+    // One step from that start.
     C at, flow, increment, error;
     std::array<C, 5> stages;
     MatrixLike<C> factors{};
@@ -207,7 +207,7 @@ class KernelOf<System, X, Rosenbrock4> {
         return *static_cast<D*>(static_cast<Door<System, X>*>(door));
     }
 
-    /// dx/ds at offset s and state x.
+    /// Writes dx/ds at offset s and state x into `rate`.
     static void flow(D& door, State& state, double s, const C& x, C& rate)
     {
         ++state.flow_calls;
@@ -275,7 +275,7 @@ class KernelOf<System, X, Rosenbrock4> {
         }
     }
 
-    /// Ahead of the start, where the flow exists.
+    /// df/ds by a difference forward from the start, where the flow exists.
     static void by_time_by_differences(D& door, State& state)
     {
         Room& room = door.room;
@@ -291,7 +291,7 @@ class KernelOf<System, X, Rosenbrock4> {
         return std::sqrt(std::numeric_limits<double>::epsilon() * std::max(1e-5, std::fabs(x)));
     }
 
-    /// f, df/ds and J at the start, if they are not those already.
+    /// Computes f, df/ds and J at the start, unless they are already those of this start.
     static void prepare(D& door, State& state)
     {
         Room& room = door.room;
@@ -302,7 +302,7 @@ class KernelOf<System, X, Rosenbrock4> {
             for_each_component(state.x0, [&](auto i) { same = same && room.x[i] == state.x0[i]; });
         if (same) return;
         if (room.x.size() != state.x0.size()) room = Room(state.x0);
-        room.known = false;  // until all is known, whatever the flow throws
+        room.known = false;  // until everything is known, even if the flow throws
         room.h = std::numeric_limits<double>::quiet_NaN();
         flow(door, state, 0, state.x0, room.rate);
         const double sign = state.backward ? -1 : 1;
@@ -329,7 +329,7 @@ class KernelOf<System, X, Rosenbrock4> {
 
     // --- steps ---
 
-    /// Increment and error of a step of length h; false where it cannot be solved.
+    /// Computes increment and error of a step of length h; false if it cannot be solved.
     static bool solve(D& door, State& state, double h)
     {
         prepare(door, state);
@@ -384,7 +384,7 @@ class KernelOf<System, X, Rosenbrock4> {
         for_each_component(to, [&](auto i) { to[i] += factor * what[i]; });
     }
 
-    /// The current step; false where it is not finite.
+    /// Takes the current step; false if it is not finite.
     static bool go(void* door, State& state, double h)
     {
         D& of = at(door);
@@ -423,7 +423,7 @@ class KernelOf<System, X, Rosenbrock4> {
         return largest_ratio(state, at(door).room.error, rtol, atol);
     }
 
-    /// The largest component of an error over its tolerance.
+    /// The largest ratio of a component's error to its tolerance.
     [[nodiscard]] static double largest_ratio(const State& state, const C& error, double rtol,
                                               double atol)
     {
@@ -441,8 +441,8 @@ class KernelOf<System, X, Rosenbrock4> {
     }
 
     /// The step damps a transient that is faster than itself, and its error estimate with it, but
-    /// the interpolant swings through as far to the other side. What the flow at the start has over
-    /// the slope of the interpolant, damped as in a stage, is the size of that transient.
+    /// the interpolant overshoots as far to the other side. The difference between the flow at the
+    /// start and the slope of the interpolant, damped as in a stage, is the size of that transient.
     static double roughness(void* door, State& state, double rtol, double atol)
     {
         D& of = at(door);

@@ -36,7 +36,7 @@
 
 namespace ricochet::detail {
 
-/// Stands for `false` as a constant of the compiler.
+/// Converts to `false` as a compile-time constant.
 struct Never {
     constexpr explicit Never(bool) noexcept {}
     constexpr operator bool() const noexcept { return false; }
@@ -48,7 +48,7 @@ protected:
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
     /// Places the current step at the start. Keeps a reference to `setup`.
-    /// @param options  valid ones
+    /// @param options  options that have been validated
     EventEngine(const RunSetup<X>& setup, const X& x0, const Options& options)
         : setup_(setup),
           system_(*setup.system, setup.door),
@@ -91,8 +91,8 @@ protected:
     /// rounding.
     [[nodiscard]] bool is_flipped_by_rounding(std::size_t i, Side before);
 
-    /// Change of guard i at the start of the step that rounding of the time and of the state, 8
-    /// units in the last place of each component, may cause.
+    /// Change of guard i at the start of the step that may come from rounding of the time and of
+    /// the state, by 8 units in the last place of each component.
     [[nodiscard]] double rounding_of(std::size_t i);
     [[nodiscard]] double rounding_of(std::size_t i, double t, const X& x);
 
@@ -109,7 +109,7 @@ protected:
 
     // --- time events ---
 
-    /// A time event that is not ahead would be lost, with all time events that follow it.
+    /// A time event that does not lie ahead would be lost, with all time events after it.
     void find_time_event(bool at_start = false);
 
     /// Applies a time event at the start of the step; `settle` deals with its consequences.
@@ -117,12 +117,12 @@ protected:
 
     // --- finding ---
 
-    /// Examines the step as the detector does every step. False: it holds no event.
+    /// Lets the detector examine the step as it does every step. False: it holds no event.
     /// @param cleared  whether a network has predicted that it holds none
     [[nodiscard]] bool deserves_search(bool& cleared);
 
     /// Whether any guard needs a search. For detectors that ask for it, guards are evaluated inside
-    /// the step, too, and a second time where the first leaves doubts.
+    /// the step as well, and a second time if the first evaluation leaves doubts.
     [[nodiscard]] bool any_suspicious()
     {
         if (bank_.on_series() || !bank_.looks() || !options_.look_inside)
@@ -132,11 +132,11 @@ protected:
         return is_suspicious(error_controlled_ && hardly_moves());
     }
 
-    /// Same after an evaluation inside the step, if there is one; at several more places where the
-    /// state hardly `moves`.
+    /// The same, after an evaluation inside the step if there is one; guards are evaluated at
+    /// several more places if the state hardly moves.
     [[nodiscard]] bool is_suspicious(bool hardly_moves);
 
-    /// On series no rates are needed until a search asks for them.
+    /// Guards with power series need no rates until a search asks for them.
     void sample_end()
     {
         if (!on_series_) return bank_.sample_end(step_, calls());
@@ -147,7 +147,7 @@ protected:
 
     void look_inside();
 
-    /// Whether the state hardly changes in the step, which error control then does not limit.
+    /// Whether the state hardly changes in the step: error control then does not limit the step.
     [[nodiscard]] bool hardly_moves() const noexcept;
 
     /// Whether the network predicts that the step is free of events.
@@ -165,7 +165,7 @@ protected:
     }
 
     /// Finds the first set that cuts the step short, and the state after its resets. False:
-    /// the step stands, and its other events are recorded.
+    /// the step stands, and the other events in it are recorded.
     [[nodiscard]] bool find(bool cleared);
 
     void count_refined() noexcept
@@ -181,7 +181,7 @@ protected:
         }
     }
 
-    /// Whether guard i counts at the start of the step; it is about to fire there.
+    /// Whether an event of guard i, which is about to fire at the start of the step, counts.
     [[nodiscard]] bool counts_here(std::size_t i);
 
     /// Removes guards from the fired set whose crossing is no event: those that `enabled`
@@ -220,7 +220,7 @@ protected:
 
     void go_on_past_members();
 
-    // --- checks that are deferred ---
+    // --- deferred checks ---
 
     void name_wrong_bound()
     {
@@ -234,7 +234,7 @@ protected:
         add_evidence(finders_.detector.put_off, steps);
     }
 
-    /// Samples all guards at the start of the current step, every one of which is examined.
+    /// Samples all guards at the start of the current step, in which every guard is examined.
     void watch_all()
     {
         if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
@@ -299,10 +299,10 @@ protected:
     /// Work that is due once the flow at the start of the step is known.
     enum class Pending : std::uint8_t {
         nothing,
-        settle,     ///< guards have fired: their accumulations, then all guards
-        arm,        ///< a fired guard has come to rest: all guards
-        arm_stuck,  ///< same, a guard that its reset did not turn back
-        hold,       ///< the whole system has
+        settle,     ///< guards have fired: handle their accumulations, then arm all guards
+        arm,        ///< a fired guard has come to rest: arm all guards
+        arm_stuck,  ///< the same, for a guard that its reset did not turn back
+        hold,       ///< the whole system has come to rest
     };
 
     /// Arms the guards with the flow at x⁺. True: another set has been applied at the same
@@ -324,27 +324,27 @@ protected:
     /// ends.
     [[nodiscard]] bool rest_fired();
 
-    /// Keeps the rate at which guard i leaves its surface after its reset. True if the guard will
+    /// Stores the rate at which guard i leaves its surface after its reset. True if the guard will
     /// not rise above its rounding any more.
     [[nodiscard]] bool fades(std::size_t i);
 
-    /// Whether the reset has put guard i farther from its surface, on the side it came from, than
-    /// an error of location explains, so that it need not rise.
+    /// Whether the reset has put guard i farther from its surface, on the side that it came from,
+    /// than an error of location explains, so that the guard need not rise.
     [[nodiscard]] bool is_away(std::size_t i, double rounding);
 
-    /// The rate [1/s] of guard i at the start of the step; where it is a difference quotient,
-    /// over 1e-5 of `scale` [s].
+    /// The rate [1/s] of guard i at the start of the step; a difference quotient, if it has to
+    /// be one, is taken over 1e-5 of `scale` [s].
     [[nodiscard]] double departure(std::size_t i, double scale)
     {
         return bank_.view(i, step_.mode(), calls())
             .rate(step_.time(0), step_.x0(), step_.rate0(), scale);
     }
 
-    /// The limit of the events of guard i is `ahead` [s] from here, give or take `error`.
+    /// The events of guard i accumulate `ahead` [s] from here; `error` [s] is the uncertainty.
     void come_to_rest(std::size_t i, double ahead, double error);
 
-    /// Whether guard i stays where it is while the state stands still, because its surface does not
-    /// move; tested from a thousandth of the remaining time to all of it.
+    /// Whether guard i keeps its value while the state stands still, because its surface does not
+    /// move; tested at times from a thousandth of the remaining time to all of it.
     [[nodiscard]] bool stays_on_surface(std::size_t i);
 
     void enable_guards();
@@ -354,10 +354,10 @@ protected:
     /// resets have carried across their surface become the new fired set.
     void arm_all();
 
-    /// False: the run has ended.
+    /// Returns false if the run has ended.
     [[nodiscard]] bool arm_one(std::size_t i, double widest);
 
-    /// Side from which a departure counts; `else_side` where both do.
+    /// Side from which a departure counts; `else_side` if a departure from either side does.
     [[nodiscard]] static constexpr Side side_left_by(Crossing crossing, Side else_side) noexcept
     {
         return crossing == Crossing::falling  ? Side::above
@@ -381,8 +381,8 @@ protected:
 
     void note_crossings(double s);
 
-    /// Records the crossings of other guards before the fired set, after which a guard is on its
-    /// other side, and the crossings with it.
+    /// Records the crossings of other guards before the fired set that leave a guard on its other
+    /// side, and the crossings that coincide with the set.
     void note_crossings_to_set();
 
     [[nodiscard]] bool counts_at_set(std::size_t i);
@@ -399,7 +399,7 @@ protected:
     void record(Event<X>&& event)
     {
         if (!options_.record_events) return;
-        if (run_.events.empty()) run_.events.reserve(16);  // most runs grow no further
+        if (run_.events.empty()) run_.events.reserve(16);  // most runs have no more events
         run_.events.push_back(std::move(event));
     }
 
@@ -407,7 +407,7 @@ protected:
 
     void record_time_event(double t);
 
-    /// Records a fired guard, found inside the step or carried across at its start.
+    /// Records a fired guard that was found inside the step or carried across at its start.
     void record_crossing(std::size_t i, double t, bool located);
 
     /// Records a guard without effect that a reset has carried across its surface.
@@ -418,14 +418,14 @@ protected:
 
     // --- saving ---
 
-    /// State of the guards that their future depends on.
+    /// State of the guards on which their future depends.
     template <class Visitor>
     void visit_guards(Visitor&& visit)
     {
         if (guarded_) bank_.visit(visit);
     }
 
-    static constexpr int most_levels = 100;  ///< of sets at one instant
+    static constexpr int most_levels = 100;  ///< largest number of sets at one instant
     static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
     /// Fraction of the last flight of a guard over which a difference quotient is taken: over this
     /// length the rounding of its small excursions is magnified less than over the usual 1e-5 of a
@@ -436,10 +436,10 @@ protected:
     SystemAt<X> system_;
     Finders<X> finders_;
     bool error_controlled_;
-    bool guarded_;     ///< has guards, if only none of them yet
+    bool guarded_;     ///< has guards, even if their number is zero so far
     bool resets_any_;  ///< has resets
     bool timed_;
-    std::conditional_t<single, Never, bool> puts_off_;  ///< a plan is for the loop of any number
+    std::conditional_t<single, Never, bool> puts_off_;  ///< only the loop of any number plans
     bool predicts_;
     bool on_series_ = false;  ///< guards are power series over each step
     Options options_;
@@ -450,28 +450,28 @@ protected:
     GuardBank<X, single> bank_;
     EventSearch<X, single> search_;
     std::optional<Planner<X, single>> planner_;
-    double h_next_ = 0;        ///< [s] length of the next step, roughly
-    double last_h_ = 0;        ///< [s] the step before, or the scale at which guards were armed
+    double h_next_ = 0;        ///< [s] approximate length of the next step
+    double last_h_ = 0;        ///< [s] the previous step, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
-    bool watching_ = false;    ///< with their rates: every step is checked
+    bool watching_ = false;    ///< and their rates, too: every step is checked
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
-    bool asked_ = false;        ///< a network, about the current step
+    bool asked_ = false;        ///< the network has been asked about the current step
     bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
-    /// [s] of the current set. Time and remainder lie apart: copied together, right after they have
-    /// been written one by one, they would have the processor wait.
+    /// Time [s] of the current set. Time and remainder are kept apart in memory: a copy of both as
+    /// a pair, right after each has been written by itself, would stall the processor.
     double set_time_ = 0;
     Mode mode_before_ = 0;
-    bool located_ = false;  ///< the current set lies inside the step, else at its start
-    bool on_time_ = false;  ///< and happens with a time event
+    bool located_ = false;  ///< the current set lies inside the step, not at its start
+    bool on_time_ = false;  ///< the current set coincides with a time event
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;
     double set_remainder_ = 0;
-    int level_ = 0;  ///< of sets at this instant
+    int level_ = 0;  ///< number of sets so far at this instant
     Run<X> run_;
 };
 

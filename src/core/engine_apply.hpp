@@ -46,7 +46,7 @@ inline void EventEngine<X, single>::find_band(std::size_t i, double t)
     GuardRecord& record = bank_[i];
     const Location& where = search_.where(i);
     record.jumped = where.jump;
-    if (where.jump) {  // the state is beyond, and the guard anything but small
+    if (where.jump) {  // the state is beyond the jump, and the guard is not small there
         record.estimated = false;
         record.band = 0;
         return;

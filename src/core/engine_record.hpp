@@ -24,14 +24,14 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         GuardRecord& record = bank_[i];
         if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
         const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
-        const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays
+        const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays there
         const bool may_cross = !record.info.boolean && !rests && at.s > record.from;
         const bool with_set =
             may_cross && (search_.crosses_with_set(step_, bank_, i, at, resolution_) ||
                           is_rounding_at_set(i, at));
         GuardSample last = at;
-        // The guard is on the side that it comes from until it crosses. The time of the set is a
-        // double.
+        // Until it crosses, the guard is on the side that it comes from. The time of the set is
+        // rounded to a double.
         if (with_set) {
             constexpr double epsilon = std::numeric_limits<double>::epsilon();
             const double ulp = epsilon * std::fabs(step_.time(at.s));
@@ -42,7 +42,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
             search_.note_crossings(step_, bank_, i, last, resolution_, calls());
         }
         // An acting guard that has left its side, but was located behind the set, has left it by
-        // rounding of its value: its own event is still to come.
+        // rounding of its value only: its own event is still to come.
         const bool to_come = record.acting && counts(record.side, record.info.crossing);
         if (!to_come && has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
         const Side side = record.side;
@@ -108,7 +108,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, bool located)
 {
     stops_ = (stops_ && i != first_fired()) || ends_run(i);
-    // At the start of a step the guard has been armed on the side that it has been carried to.
+    // At the start of a step the guard has been armed on the side to which it has been carried.
     const Side side = bank_[i].side;
     count_event(i, t, located ? side : opposite(side));
     if (!options_.record_events) return;

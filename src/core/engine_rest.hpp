@@ -78,8 +78,8 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     const Mode mode = step_.mode();
     ahead = std::min(ahead, step_.until(options_.t_end));
     if (timed_) ahead = std::min(ahead, step_.until(time_event_));
-    // The rest of the state stands still while the time jumps to the limit: a floor that moves
-    // would leave other bodies, or pass them.
+    // The rest of the state stands still while the time jumps to the limit of the events: a moving
+    // floor would separate from the other bodies, or pass through them.
     if (bank_.size() > 1 &&
         ahead > 4 * std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value)) {
         error += std::exchange(ahead, 0);
@@ -121,7 +121,7 @@ inline bool EventEngine<X, single>::stays_on_surface(std::size_t i)
 {
     const auto guard = bank_.view(i, step_.mode(), calls());
     const double left = step_.until(options_.t_end);
-    const double span = std::isfinite(left) ? left : 1e6 * h_next_;  // a host has no end
+    const double span = std::isfinite(left) ? left : 1e6 * h_next_;  // a host declares no end
     const double rounding = rounding_of(i);
     const double g = guard.value(step_.time(0), step_.x0());
     for (const double part : {0.001, 0.0381966, 0.381966, 1.0}) {

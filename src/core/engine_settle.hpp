@@ -209,8 +209,8 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
         if (bank_[i].fired && bank_[i].turned && bank_[i].intervals.is_low()) {
             rate = bank_[i].departure;
             if (rate == 0) {
-                // The guard is too slow for its rate to be known: its reset has sent it back, and
-                // its next event is on its way down.
+                // The guard is too slow for its rate to be known: its reset has sent it back,
+                // and its next event comes when it returns to the surface.
                 const Side back = bank_[i].last_side;
                 bank_.set_rate0(i, sign_of(back) * std::numeric_limits<double>::min());
                 return back;
@@ -224,8 +224,8 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
         return Side::plateau;
     }
     if (rate != 0 && bank_[i].fired) return side_of(rate);
-    // The second derivative has the sign that the rate has a little later. A rate that it
-    // cancels within rounding of the time counts as zero, as does a rate that is all rounding.
+    // The second derivative has the sign that the rate will have a little later. A rate that it
+    // cancels within the rounding of the time counts as zero, as does a rate that is only rounding.
     const double delta = 1e-6 * h_next_;
     X& later = resets_.after();
     X& rate_later = resets_.scratch();

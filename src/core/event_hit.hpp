@@ -33,13 +33,13 @@ public:
     /// Whether events are located to neighbouring doubles at any time.
     [[nodiscard]] bool is_finest() const noexcept { return absolute_ == 0 && relative_ == 0; }
 
-    /// Events no further apart [s] cannot be told apart.
+    /// Distance in time [s] up to which two events cannot be told apart.
     [[nodiscard]] double blur(double t) const noexcept
     {
         return std::max(tolerance(t), 4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
     }
 
-    /// Events no further apart [s] happen together.
+    /// Distance in time [s] up to which two events happen together.
     [[nodiscard]] double window(double t) const noexcept { return std::max(blur(t), window_); }
 
 private:
@@ -50,7 +50,7 @@ private:
 struct Note {
     std::size_t guard;
     EventKind kind;
-    Side side;  ///< that the guard left
+    Side side;  ///< the side that the guard left
     Location where;
 };
 
@@ -63,12 +63,12 @@ void sort_notes_until(double s, std::vector<Note>& notes);
     return where.jump ? EventKind::jump : EventKind::crossing;
 }
 
-/// An acting guard that leaves its side inside a step.
+/// A departure of an acting guard from its side inside a step.
 struct Hit {
     std::size_t guard = 0;
-    Side side = Side::plateau;  ///< that it leaves
+    Side side = Side::plateau;  ///< the side that the guard leaves
     Finding finding;
-    double guess = 0;  ///< [s] offset
+    double guess = 0;  ///< [s] estimated offset of the root
     bool located = false;
     Location where;
 };

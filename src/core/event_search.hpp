@@ -58,7 +58,7 @@ public:
         refined_ = unresolved_ = false;
     }
 
-    /// A state of the dimension of `like` to work with, when no search is continuing.
+    /// Work space for a state of the dimension of `like`, for use when no search is continuing.
     [[nodiscard]] X& space(const X& like)
     {
         fit(like);
@@ -76,7 +76,7 @@ public:
     }
     [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
 
-    /// Whether a guard was resolved by dividing the step, and whether that was not enough.
+    /// Whether the step was divided to resolve a guard, and whether that was not enough.
     [[nodiscard]] bool refined() const noexcept { return refined_; }
     [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
 
@@ -166,8 +166,8 @@ public:
                 record.next = side_of(end.value);
                 return;
             }
-            // The guard is zero by rounding at many neighbouring offsets, and its rates contradict
-            // it, as with a flow that jumps there: the search continues behind it.
+            // The guard is zero by rounding at many neighbouring offsets, and its rates
+            // contradict that, as with a flow that jumps there: the search continues behind it.
             if (creeping > 8) {
                 const double behind = where.root + reach;
                 reach *= 2;
@@ -193,7 +193,7 @@ public:
         notes_.push_back({.guard = i, .kind = kind_of(where(i)), .side = side, .where = where(i)});
     }
 
-    /// Continues the search behind a crossing that changes nothing.
+    /// Continues the search after a crossing that changes nothing.
     void pass(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
@@ -203,8 +203,8 @@ public:
         }
     }
 
-    /// A guard that leaves its plateau in the step, away from the side on which it is
-    /// awaited, is armed on that side from there on.
+    /// A guard that leaves its plateau in the step on the side away from the awaited one is
+    /// armed on the awaited side from there on.
     void end_plateau(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
         const Side awaited = bank[i].awaited;
@@ -234,8 +234,8 @@ public:
         return sample;
     }
 
-    /// Whether a guard crosses its surface with the set: it is within rounding of it
-    /// there. `sample` has its rate.
+    /// Whether a guard crosses its surface with the set, that is, lies within rounding of it
+    /// there. `sample` holds the rate of the guard.
     [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Bank& bank, std::size_t i,
                                         const GuardSample& sample,
                                         const EventResolution& resolution) const
@@ -307,13 +307,13 @@ private:
         return heed(bank, i, watch, next_in_parts(probe, watch, bank, i));
     }
 
-    /// What the power series of the guard says of an interval. Where that is not sure, or other
-    /// than its values at the ends, the detector is asked.
+    /// The next event in the interval, from the guard's power series. If the series is not sure,
+    /// or contradicts the values at the ends, the detector is asked.
     [[nodiscard]] Finding next_on_series(Probe& probe, Watch& watch, const Bank& bank,
                                          std::size_t i);
 
-    /// Where the guard turns between two samples on the same side, toward which it falls and from
-    /// which it rises; nothing where what it is there is a matter of rounding.
+    /// Where the guard turns between two samples on the same side, falling towards the surface at
+    /// the first and rising at the second; nothing where its sign there is a matter of rounding.
     [[nodiscard]] static std::optional<GuardSample> turn_between(Probe& probe,
                                                                  const GuardSample& lo,
                                                                  const GuardSample& hi);
@@ -345,7 +345,7 @@ private:
         return finders_->examine(probe, watch);
     }
 
-    /// The rounding of a guard that decays within the step is that of the part.
+    /// The rounding of a guard that decays within the step, in this part of the step.
     static void judge_by_its_own_size(Watch& watch, const Bank& bank, std::size_t i) noexcept
     {
         const double width = watch.end.s - watch.start.s;
@@ -356,7 +356,7 @@ private:
         watch.touch = bank.touch_of(i, look.size());
     }
 
-    /// Finding where nothing more can be decided: a remainder after an event at the end
+    /// Finding when no further evaluation can help: a remainder after an event at the end
     /// of a step belongs to the error of that event, and a plateau waits.
     [[nodiscard]] static bool is_over(Probe& probe, const Watch& watch, GuardRecord& record)
     {
@@ -372,7 +372,7 @@ private:
         return false;
     }
 
-    /// Whether a guard that has left its side by `node` does nothing else in what is left of
+    /// Whether a guard that has left its side by `node` has no other event in the rest of
     /// the interval, which then is a bracket as good as any part of it.
     [[nodiscard]] bool stays_beyond(const Watch& whole, GuardSample node) const noexcept
     {
@@ -489,7 +489,7 @@ private:
         hit.located = true;
     }
 
-    /// First set where guard i is the only one that needs a check. The code that nearly
+    /// First set if guard i is the only one that needs a check. The code that nearly
     /// every event needs is inlined here: handing samples from one function to another
     /// through memory takes as long as the location itself.
     [[gnu::flatten]] bool find_only(const CurrentStep& step, Bank& bank, std::size_t i,
@@ -513,7 +513,7 @@ private:
         return find_only_carefully(step, bank, i, resolution, calls);
     }
 
-    /// As `find_only`, of a guard with a series, where that says where it leaves its side first.
+    /// As `find_only`, for a guard with a power series that determines its first departure.
     [[nodiscard]] bool find_by_series(const CurrentStep& step, Bank& bank, std::size_t i,
                                       std::uint64_t& calls);
 

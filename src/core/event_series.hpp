@@ -1,4 +1,4 @@
-// What the power series of a guard says of a step.
+// Events that the power series of a guard finds in a step.
 #pragma once
 
 #include "core/event_search.hpp"
@@ -15,7 +15,7 @@ Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const
     bool from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch;
     const double ahead = from_surface ? watch.start.rate : watch.start.value;
     if (!(sign * ahead > 0)) return finders_->examine(probe, watch);
-    constexpr int most_doubts = 8;  // more of them, and the series tells nothing of the rest
+    constexpr int most_doubts = 8;  // with more, the series determines nothing about the rest
     for (int doubts = 0; doubts <= most_doubts;) {
         const SeriesStretch stretch =
             first_leaving(bank.series(), i, sign, probe.step().h(), watch.start, end,
@@ -63,12 +63,12 @@ std::optional<GuardSample> EventSearch<X, single>::turn_between(Probe& probe, co
 {
     if (!(lo.value * hi.value > 0 && lo.value * lo.rate < 0 && hi.value * hi.rate > 0)) return {};
     GuardSample a = lo, b = hi, turn = lo;
-    // On a parabola the secant of the rates is right at once.
+    // On a parabola the secant of the rates is exact after one iteration.
     for (int k = 0; k < 4; ++k) {
         const double s = a.s - a.rate * ((b.s - a.s) / (b.rate - a.rate));
         if (!(s > a.s && s < b.s)) break;
         turn = probe.value_and_rate(s);
-        if (turn.value * lo.value < 0) break;  // beyond the surface, wherever it turns
+        if (turn.value * lo.value < 0) break;  // beyond the surface, wherever exactly it turns
         ((turn.rate > 0) == (a.rate > 0) ? a : b) = turn;
     }
     if (turn.s == lo.s || !(std::fabs(turn.value) > probe.rounding(turn.s))) return {};

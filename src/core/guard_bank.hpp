@@ -62,7 +62,7 @@ public:
         if (rules_.puts_off) {
             sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
             for (std::size_t i = 0; i < size(); ++i) {
-                rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until somebody asks
+                rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until a rate is asked for
                 records_[i].deferred = false;
             }
         } else {
@@ -70,14 +70,14 @@ public:
         }
         if (rules_.keeps_sizes()) {
             for (std::size_t i = 0; i < size(); ++i) {
-                // The value beside a pole is no measure of the size of a guard.
+                // The value next to a pole is no measure of the size of a guard.
                 if (records_[i].fired && records_[i].jumped) continue;
                 sizes_[i] = std::fmax(std::fabs(g0_[i]), sizes_[i]);
             }
         }
     }
 
-    /// Wakes all guards for the next steps. `sampled`: their values are known.
+    /// Makes all guards examined again from the next step on. `sampled`: their values are known.
     void wake_all(const Step<X>& step, double scale, std::uint64_t& calls, bool sampled)
     {
         if (!sampled) sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
@@ -114,7 +114,7 @@ public:
         }
     }
 
-    /// Whether nothing but the values and rates of the guard decides whether a step holds events.
+    /// Whether the values and rates of the guard alone decide whether a step holds events.
     [[nodiscard]] bool is_steady() const noexcept
     {
         if (size() == 0) return true;
@@ -129,8 +129,8 @@ public:
         run.g0 = g0_[0];
         run.rate0 = rate0_[0];
     }
-    /// Takes over from a quiet run: the guard at the start of the current step, at its end and
-    /// inside.
+    /// Takes the guard over from a quiet run: its samples at the start of the current step, at the
+    /// end and inside.
     void take_back(const QuietRun& run, const Step<X>& step, std::uint64_t& calls)
     {
         if (size() == 0) return;
@@ -148,10 +148,10 @@ public:
         looked_ = Looked::inside;
     }
 
-    /// Starts a smooth phase at time t, with guards on their surfaces or not.
+    /// Starts a smooth phase at time t, whether or not guards are on their surfaces.
     void begin_phase(double t) noexcept { armed_at_ = t; }
 
-    /// As `take_back`, of a run on series: the guard has not been cleared.
+    /// As `take_back`, for a run on power series: the guard has not been cleared.
     void take_back_on_series(const QuietRun& run, const Step<X>& step)
     {
         if (size() == 0) return;
@@ -233,7 +233,7 @@ public:
         return width <= 1e-10 * h ? width : 1e-10 * h;
     }
 
-    /// Puts guard i to sleep: it is not examined until it is woken.
+    /// Defers guard i: it is not examined until it is woken.
     void put_to_sleep(std::size_t i) noexcept
     {
         records_[i].deferred = true;
@@ -252,7 +252,7 @@ public:
         arm(i, records_[i].side);
     }
 
-    /// Begins the search of a step. A search changes the guards of `suspects` only;
+    /// Starts the search of a step. A search changes the guards of `suspects` only;
     /// all other guards are at the end of the step as they were at its start.
     void begin_search(double h) noexcept
     {
@@ -304,7 +304,7 @@ public:
         pass_on();
     }
 
-    /// The rate of a guard at the start of a step.
+    /// Rate [1/s] of a guard at the start of the step.
     [[nodiscard]] double complete_rate0(std::size_t i, const Step<X>& step, double scale,
                                         std::uint64_t& calls)
     {
@@ -345,7 +345,7 @@ public:
         heed_enabled();
     }
 
-    /// Puts guard i on a plateau; leaving it away from `side` is its event.
+    /// Puts guard i on a plateau; its event is to leave the plateau away from `side`.
     void await(std::size_t i, Side side) noexcept
     {
         records_[i].awaited = side;
@@ -355,7 +355,7 @@ public:
     [[nodiscard]] bool waiting() const noexcept { return waiting_; }
 
 private:
-    /// std::fmax, which the compiler calls: the larger, or the one that is a number.
+    /// As std::fmax, but inlined: the larger of the two, or the one that is a number.
     [[nodiscard]] static double larger(double a, double b) noexcept
     {
         return a >= b || std::isnan(b) ? a : b;

@@ -18,14 +18,14 @@
 
 namespace ricochet::detail {
 
-/// A T for the one guard of a system that has one.
+/// Storage of one T, for systems that have a single guard.
 template <class T>
 class ForTheGuard : public std::array<T, 1> {
 public:
     explicit ForTheGuard(std::size_t /*guards*/ = 1) : std::array<T, 1>{} {}
     void resize(std::size_t /*guards*/) noexcept {}
     void swap(ForTheGuard& other) noexcept { std::swap((*this)[0], other[0]); }
-    /// The one element, whatever the number, which the compiler need not know.
+    /// Returns the only element for any index, so that the compiler need not know the index.
     [[nodiscard]] T& operator[](std::size_t /*guard*/) noexcept { return this->front(); }
     [[nodiscard]] const T& operator[](std::size_t /*guard*/) const noexcept
     {
@@ -33,12 +33,12 @@ public:
     }
 };
 
-/// A T for every guard; of a few guards without an allocation. Most systems have one guard, and
-/// for them the loop is compiled with that known.
+/// One T for every guard, without an allocation if there are few. Most systems have one guard,
+/// and for them the loop is compiled with that number as a constant.
 template <class T, bool single>
 using PerGuard = std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, 8>>;
 
-/// List of at most as many elements as there are guards.
+/// List with room for as many elements as there are guards.
 template <class T, bool single>
 class GuardList {
 public:
@@ -70,16 +70,16 @@ struct GuardRecord {
     bool fired = false;
     bool turned = false;   ///< its last reset has sent it back from the surface
     double departure = 0;  ///< [1/s] its rate after the last reset
-    /// [s] scale of that rate; NaN where it is not that of the current state.
+    /// [s] scale over which that rate was taken; NaN if it is not a rate of the current state.
     double rated_over = std::numeric_limits<double>::quiet_NaN();
-    bool again = false;            ///< it is back inside the window of its last event
+    bool again = false;            ///< it has returned inside the window of its last event
     Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
     bool acting = false;    ///< has a reset or may end the run; else events are only recorded
-    bool deferred = false;  ///< its check is deferred: nothing in the bank is of this step
+    bool deferred = false;  ///< its check is deferred: the bank holds nothing of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     bool jumped = false;        ///< its last event was a jump
-    bool departs = false;       ///< the smooth current phase started at its event, or enabled it
+    bool departs = false;       ///< the current smooth phase started at its event, or enabled it
     double band =
         0;  ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
     bool estimated = false;  ///< the tolerance is the error of location, not a value of the guard
@@ -95,8 +95,8 @@ struct GuardRecord {
     return side == Side::above ? 1 : side == Side::below ? -1 : 0;
 }
 
-/// Whether checks are deferred. Without bounds or a gate, a detector is the exact one that it
-/// wraps.
+/// Whether checks are deferred. Without bounds or a gate, a deferring detector is the exact
+/// detector that it wraps.
 template <class X>
 [[nodiscard]] bool puts_off(const DetectorTable<X>& detector, const SystemTable<X>& system)
 {
@@ -108,12 +108,12 @@ struct BankRules {
     Screening screening = Screening::ends;
     bool uses_rates = false;
     bool puts_off = false;
-    /// Whether the scale of a guard is that of its largest value so far: for detectors that do
-    /// not ask for the rounding of the state, so that neighbouring steps agree on what a touch
-    /// is.
+    /// Whether the scale of a guard is its largest value so far: for detectors that do
+    /// not ask for the rounding of the state, so that neighbouring steps agree on which minimum
+    /// counts as a touch.
     bool remembers = false;
-    /// Whether brackets are not narrowed below the rounding of the sizes that smooth phases
-    /// started with: those of guards with declared bounds, which may be expensive.
+    /// Whether brackets are not narrowed below the rounding of the sizes with which smooth phases
+    /// started, as for guards with declared bounds, which may be expensive.
     bool coarse = false;
     /// Whether guards can be examined inside a step.
     bool looks = false;

@@ -27,11 +27,11 @@ template <class CurrentStep>
     double size = 0;
     double speed = 0;
     for_each_component(x, [&](auto i) {
-        // A component of infinity, which means "never", has no size.
+        // An infinite component, which means "never", has no size.
         if (std::fabs(x[i]) < 1e300) size = std::max(size, std::fabs(x[i]) / scale(i));
         speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
     });
-    // The state has no time scale here, and the distance of the end is none either.
+    // The state has no time scale here, nor is the distance to the end one.
     const double least = 1e-6 * std::min(1.0, std::fabs(options.t_end - options.t_start));
     const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : least;
     auto moved = x;

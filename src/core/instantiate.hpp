@@ -28,7 +28,7 @@
 
 namespace ricochet::detail {
 
-/// Whether the run of a system is one of the loop for a single guard whose checks are never
+/// Whether the run of a system uses the loop for a single guard whose checks are never
 /// deferred.
 template <class X>
 [[nodiscard]] bool has_single_guard(const RunSetup<X>& setup)
@@ -37,7 +37,7 @@ template <class X>
            setup.system->guard_count(setup.door) == 1;
 }
 
-/// A loop with its setup, which continues after exceptions from the system.
+/// A loop together with its setup; it continues after exceptions from the system.
 template <class X>
 struct KeptSetup {
     RunSetup<X> kept;
@@ -97,8 +97,8 @@ template <class X, class Method, class Screen>
 inline constexpr QuietKernel<X> quiet_by_pointer =
     KernelOf<ByPointer, X, Method>::template quiet<true, Screen>();
 
-/// A kernel of ours that calls by pointer, with the quiet runs of systems without a guard and of
-/// those with one that `Extremum` screens.
+/// A kernel of this library that calls by pointer, with the quiet runs of systems without guards
+/// and of systems with one guard that `Extremum` screens.
 template <class X>
 struct NamedKernel {
     StepKernel<X> step;
@@ -139,7 +139,7 @@ const StepKernel<X>& kernel_by_name(MethodName name) noexcept
     return named_kernels<X>()[static_cast<std::size_t>(name)].step;
 }
 
-/// Kernel of the quiet runs of a set-up: its own, or that of a method of ours.
+/// Kernel of the quiet runs of a set-up: its own, or that of one of the library's methods.
 template <class X>
 QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
 {

@@ -1,9 +1,9 @@
-// Whole steps of states that do not fit the registers.
+// Whole steps for states that do not fit the registers.
 //
-// Such a step is bound by the traffic to and from memory: each stage is one pass over its
-// operands, in which the rate of the stage before becomes one of departures, too, and everything
-// that is computed at the end of a step is computed in one pass. The end and what rounding leaves
-// out of it lie in arrays of their own, which the acceptance of a step only exchanges.
+// Such a step is bound by memory traffic: each stage is one pass over its
+// operands, which also turns the rate of the previous stage into a departure, and everything
+// that is computed at the end of a step is computed in one pass. The end and its rounding error
+// lie in arrays of their own, which the acceptance of a step only exchanges.
 #pragma once
 
 #include <algorithm>
@@ -28,9 +28,9 @@ class LargeKernel {
     using X = std::vector<double>;
     using State = StepState<X>;
     using Method = RungeKutta<Tableau, X>;
-    static constexpr std::size_t last = Method::kept_stages;  ///< kept stage
+    static constexpr std::size_t last = Method::kept_stages;  ///< the stage that is kept
 
-    /// Four doubles, in one register or in two.
+    /// Four doubles, in one register or in two, by the instruction set.
     typedef double Four __attribute__((vector_size(32)));
 
     /// The flow at offset s and state `room`, as dx/ds.
@@ -43,8 +43,8 @@ class LargeKernel {
         }
     }
 
-    /// Computes the w of a row and the state there, at offset s. The rate of stage `raw`, unless
-    /// that is 0, is still that of the flow.
+    /// Computes w of a row and the state there, at offset s. The rate of stage `raw`, unless
+    /// `raw` is 0, is still that of the flow.
     template <class Row, std::size_t raw, bool keeps>
     RICOCHET_WIDE static void combine(State& step, double h, double s, X* kept, X& w)
     {
@@ -124,7 +124,7 @@ class LargeKernel {
         return reinterpret_cast<Four>(reinterpret_cast<Bits>(x) & all_but_sign);
     }
 
-    /// Takes a step. The largest ratio of error, 0 without an estimate; NaN if it is not finite.
+    /// Takes a step. Returns the largest ratio of error, 0 without an estimate; NaN if not finite.
     template <bool with_error>
     RICOCHET_WIDE static double go(void* door, State& step, double h, double rtol, double atol)
     {
@@ -175,7 +175,7 @@ class LargeKernel {
             } else {
                 rate_there = load<V>(rate1 + i);
             }
-            lost += 0 * end + 0 * rate_there;  // NaN where one is not finite
+            lost += 0 * end + 0 * rate_there;  // NaN if one of them is not finite
             if constexpr (with_error) {
                 const V error = magnitude(
                     Method::template sum_of<typename Method::Errors>(weights, [&](auto j) {

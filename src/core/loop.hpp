@@ -88,7 +88,7 @@ public:
         return showing_sample_ ? sample_mode_ : step_.mode();
     }
     [[nodiscard]] bool ended() const noexcept override { return ended_; }
-    /// Result so far; its time and state are brought up to date by `finish`.
+    /// Result so far; `finish` brings its time and state up to date.
     [[nodiscard]] const Run<X>& run() const noexcept override { return run_; }
 
     /// Cost and savings of the network of a `Metered` detector so far.
@@ -111,7 +111,7 @@ public:
     /// everything that has happened in it was shown.
     bool advance() override;
 
-    /// One step that may end in the middle of an interval of tentative steps if it looks ahead.
+    /// One step. If it looks ahead, it may end in the middle of an interval of tentative steps.
     void advance_once(bool look_ahead) override { advance_one({.look_ahead = look_ahead}); }
 
     void run_to_end() override;
@@ -139,7 +139,7 @@ public:
     /// it has ended.
     const Run<X>& bring_up_to_date() override;
 
-    /// A run that was cancelled may be continued.
+    /// Lets a run that was cancelled continue.
     void go_on() noexcept override
     {
         if (ended_ && run_.outcome == Outcome::cancelled) {
@@ -148,18 +148,18 @@ public:
         }
     }
 
-    /// State that the future of the run depends on. A simulation of the same system with the same
+    /// State on which the future of the run depends. A simulation of the same system with the same
     /// options, stepping, detector and locator that restores it continues with the same
-    /// bits; only its end, its sample times and what it records may be others. What was
-    /// recorded is not part of it.
+    /// bits; only its end, its sample times and what it records may differ. Recorded
+    /// results are not part of it.
     [[nodiscard]] Snapshot save() override;
 
     /// @throws std::invalid_argument naming what does not agree if the snapshot is of another
-    /// run, or no state of one; then nothing has changed.
+    /// run, or does not hold a valid state; then nothing has changed.
     void restore(const Snapshot& snapshot) override;
 
 protected:
-    /// Keeps the start of every step from here on, so that a run continues after exceptions.
+    /// Keeps the start of every step from here on, so that the run can continue after exceptions.
     void keep_resumable()
     {
         mark_ = std::make_unique<Mark>(bank_);
@@ -211,14 +211,14 @@ private:
 
     // --- steps ---
 
-    /// Freedom of a detector that defers checks.
+    /// What a detector that defers checks is allowed to do.
     struct Advance {
-        bool look_ahead = true;       ///< take steps that are closed only later
-        bool to_next_sample = false;  ///< but none beyond one with a sample time
+        bool look_ahead = true;       ///< take steps that are closed only by a later check
+        bool to_next_sample = false;  ///< but no step beyond one that holds a sample time
     };
 
-    /// One step, with whatever events it holds. Where a function of the system throws, all is
-    /// as it was at the start of the step if the run is kept resumable.
+    /// One step, with whatever events it holds. If a function of the system throws and the run is
+    /// kept resumable, everything is as it was at the start of the step.
     void advance_one(const Advance& how)
     {
         if (mark_) return advance_resumably(how);
@@ -227,7 +227,7 @@ private:
     [[gnu::noinline]] void advance_resumably(const Advance& how);
     [[gnu::always_inline]] void advance_from_here(const Advance& how);
 
-    // --- where exceptions lead back to ---
+    // --- return to after an exception ---
 
     struct Mark {
         explicit Mark(const GuardBank<X, single>& bank_) : bank(bank_) {}
@@ -235,17 +235,17 @@ private:
         double h_next = 0;
         Statistics counts{};
         std::size_t events = 0, samples = 0, pieces = 0, next_sample = 0;
-        std::size_t tentative = 0;  ///< steps that were not closed yet
+        std::size_t tentative = 0;  ///< number of steps that were not yet closed
         bool planned = false;       ///< the guards are left alone until their deadlines
         bool newly_armed = false;
-        bool everything = false;  ///< what follows, too
+        bool everything = false;  ///< the members below are kept, too
         StepStart<X> start{};
         GuardBank<X, single> bank;
         double flight_start = 0, longest_step = 0, last_h = 0, time_event = 0;
         bool resting = false, watching = false;
     };
 
-    /// Renews the deadlines of guards after an exception has left them half renewed.
+    /// Finds the deadlines of guards again after an exception has left them half renewed.
     void plan_anew()
     {
         if (!replans_) return;
@@ -263,8 +263,8 @@ private:
     [[gnu::noinline]] void copy_to_mark();
     void go_back_to_mark();
 
-    /// Keeps the state before a step that ends at a time event, or is recorded by further
-    /// evaluations.
+    /// Keeps the state before a step that ends at a time event, or that needs further evaluations
+    /// to be recorded.
     void mark_what_lasts()
     {
         if (mark_ && (time_event_due_ || options_.record_steps || holds_sample())) {
@@ -272,7 +272,7 @@ private:
         }
     }
 
-    // --- steps in a row in which nothing happens ---
+    // --- quiet runs: consecutive steps without events ---
 
     [[nodiscard]] bool may_run_quietly() const noexcept
     {
@@ -281,14 +281,14 @@ private:
                bank_.is_steady();
     }
 
-    /// Takes steps until one needs a check, and deals with it. False: there is none. An exception
-    /// leads back to the start of the quiet run.
+    /// Takes steps until one needs a check, and deals with it. False: none did. After an exception
+    /// the run returns to the start of the quiet run.
     bool run_quietly();
     [[gnu::noinline]] bool run_quietly_resumably();
     [[gnu::always_inline]] bool run_quietly_from_here();
     [[gnu::always_inline]] void end_quiet_run(const QuietRun& quiet);
 
-    /// Whether the limits of the options allow further steps; determines when it is asked next.
+    /// Whether the limits of the options allow further steps; also sets when to ask next.
     [[gnu::noinline]] bool may_take_more_steps();
 
     /// Whether time has hardly advanced since the last review.
@@ -376,11 +376,11 @@ private:
         return retry(h, proposed, rule_.largest, error);
     }
 
-    /// Repeats an attempt of `error`, shorter, until one is accepted; the next step is at most
-    /// `largest` times as long.
+    /// Repeats an attempt with the given `error`, shorter, until one is accepted; the next step is
+    /// at most `largest` times as long.
     [[nodiscard]] bool retry(double h, double proposed, double largest, double error);
 
-    /// A guard that acts or records, and when it reaches its surface at its present rate.
+    /// A guard that acts or records, and the time until it reaches its surface at its present rate.
     struct Approach {
         std::size_t guard = no_guard;
         double ahead = infinity;  ///< [s]
@@ -399,8 +399,8 @@ private:
         return ahead <= h ? 0.9 * ahead : 0.1 * h;
     }
 
-    /// Places an event at the start of the step where the flow cannot be evaluated a step of h
-    /// further on, and a guard reaches its surface no later.
+    /// Places an event at the start of the step if the flow cannot be evaluated a step of length h
+    /// ahead, and a guard reaches its surface no later than that.
     [[nodiscard]] bool happen_where_flow_ends(double h);
 
     [[nodiscard]] double smallest_step() const noexcept
@@ -421,19 +421,19 @@ private:
     /// Searches a step that may hold events, and deals with them.
     [[gnu::noinline]] bool search(bool cleared);
 
-    /// A guard is not a number at the end of the step: takes it again, shorter, until all are.
-    /// False: there is no such step, and the run has ended.
+    /// Deals with a guard that is NaN at the end of the step: repeats the step, shorter, until all
+    /// guards are numbers. False: there is no such step, and the run has ended.
     [[nodiscard]] bool return_to_domain();
 
-    /// Takes the step again, shorter, until its polynomial follows the motion inside: a swing that
-    /// the motion does not do holds no events. False: the run has ended.
+    /// Repeats the step, shorter, until its polynomial follows the motion inside: an oscillation of
+    /// the polynomial alone holds no events. False: the run has ended.
     [[nodiscard]] bool smooth_step();
 
-    /// A length at whose end a guard may be a number again: `beyond` a surface that lies within
-    /// the step by a little, where it can be seen to be crossed, else before it.
+    /// A length at whose end a guard may be a number again: just `beyond` a surface that lies in
+    /// the step, if the crossing can be seen there, else before it.
     [[nodiscard]] double shorten_into_domain(bool beyond);
 
-    /// The step after an event at `t` is at most twice the flight before it, or the first
+    /// Limits the step after an event at `t` to twice the flight before it, or to the first
     /// step, wherever the end lies. Events that follow immediately shorten it by no more than error
     /// control would at each of them.
     void limit_next_step(double t) noexcept;
@@ -455,7 +455,7 @@ private:
     /// Samples of the current step before its offset s.
     void emit_samples(double s);
 
-    /// Samples of a state that does not move, before the time `until`.
+    /// Samples of a state that stays constant, before the time `until`.
     void emit_held_samples(double until);
 
     void add_sample(X&& x);
@@ -465,13 +465,13 @@ private:
     template <class Visitor>
     void visit_state(Visitor&& visit);
 
-    /// The next sample is the first that is neither behind nor written already.
+    /// The next sample is the first that is neither in the past nor already written.
     template <class Visitor>
     void visit_samples(Visitor&& visit);
 
     static constexpr ErrorRule rule_{};
 
-    /// `rule_.factor`, for which the powers that it begins with are constants.
+    /// As `rule_.factor`, with the powers that it starts from as constants.
     [[nodiscard]] static double step_factor(double error, int order) noexcept
     {
         static constexpr auto floors = [] {
@@ -485,24 +485,24 @@ private:
         return k < floors.size() && error <= floors[k] ? rule_.largest : rule_.factor(error, order);
     }
 
-    std::size_t components_;         ///< of the state at the start
-    QuietKernel<X> quiet_;           ///< null: every step is one of the loop
-    double first_step_ = 0;          ///< [s]
+    std::size_t components_;         ///< number of components of the state at the start
+    QuietKernel<X> quiet_;           ///< null: the loop takes every step itself
+    double first_step_ = 0;          ///< [s] length of the first step
     double flight_start_ = 0;        ///< [s] time of the last event
-    double longest_step_ = 0;        ///< [s] after it
-    std::size_t careful_steps_ = 0;  ///< without looking ahead
-    std::uint64_t next_review_ = 0;  ///< of the number of steps, against the options
+    double longest_step_ = 0;        ///< [s] limit on the steps after it
+    std::size_t careful_steps_ = 0;  ///< number of steps still to take without looking ahead
+    std::uint64_t next_review_ = 0;  ///< number of steps at which to compare with the options
     double reviewed_ = 0;            ///< [s] time of the last review
     bool is_last_ = false;
-    int calm_steps_ = 0;  ///< in a row that held no event
+    int calm_steps_ = 0;  ///< number of consecutive steps without an event
     std::size_t next_sample_ = 0;
-    std::size_t shown_samples_ = 0;  ///< by `advance`
+    std::size_t shown_samples_ = 0;  ///< number of samples shown by `advance`
     std::uint64_t shown_events_ = 0;
     bool showing_sample_ = false;
     Mode sample_mode_ = 0;
     StepStart<X> place_;
     std::unique_ptr<Mark> mark_;  ///< null: the run does not continue after an exception
-    bool replans_ = false;        ///< all deadlines of guards are to be found again
+    bool replans_ = false;        ///< all deadlines of guards have to be found again
 };
 
 }  // namespace ricochet::detail

@@ -57,7 +57,7 @@ inline bool Loop<X, single>::return_to_domain()
 template <class X, bool single>
 bool Loop<X, single>::smooth_step()
 {
-    // Some errors of the state are as large as the tolerance, and more is not asked of the inside.
+    // Errors of the state may be as large as the tolerance, and the inside need not be better.
     constexpr double most = 4;
     while (step_.roughness(options_.rtol, options_.atol) > most) {
         const double h = 0.1 * step_.h();

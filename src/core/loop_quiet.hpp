@@ -1,4 +1,4 @@
-// Steps in a row in which nothing happens.
+// Quiet runs: consecutive steps without events.
 #pragma once
 
 #include "core/loop.hpp"

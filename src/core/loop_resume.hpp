@@ -1,8 +1,8 @@
 // Return to the start of the current step after an exception from a function of the system.
 //
-// Before a step stands it changes only its own length and what it has recorded; where it may hold
-// events, or ends at a time event, it changes nearly everything. Therefore the first two are kept
-// at every step, and the rest only where a search begins.
+// Until a step is accepted it changes only its own length and its records; where it may hold
+// events, or ends at a time event, it changes nearly everything. Therefore length and records are
+// kept at every step, and the rest only where a search starts.
 #pragma once
 
 #include "core/loop.hpp"
@@ -103,7 +103,7 @@ void Loop<X, single>::go_back_to_mark()
         mark.next_sample = first.samples;
     }
     if (mark.planned) {
-        // Deadlines may be half renewed: they are found again where the step starts.
+        // Deadlines may be half renewed: they are found again at the start of the step.
         planner_->steps().clear();
         replans_ = true;
     }

@@ -1,4 +1,4 @@
-// Validation of a run, and the properties that identify it.
+// Validation of a run's set-up, and the properties that identify a run.
 #pragma once
 
 #include "core/loop.hpp"

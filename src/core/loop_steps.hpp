@@ -1,4 +1,4 @@
-// Steps of the loop: their lengths, and what is done where one cannot be taken.
+// Steps of the loop: their lengths, and the handling of steps that cannot be taken.
 #pragma once
 
 #include "core/loop.hpp"

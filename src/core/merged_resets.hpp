@@ -1,7 +1,7 @@
 // The resets of guards that fired together, applied to one state.
 //
 // The reset of a single guard changes the state in place. Several resets all read the state
-// before, and their changes are merged: two that give one component, or the mode, two
+// before, and their changes are merged: two resets that give one component, or the mode, different
 // values are in conflict, unless the system takes the whole set.
 #pragma once
 
@@ -69,8 +69,8 @@ public:
     [[nodiscard]] X& scratch() noexcept { return single_; }
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
 
-    /// Two guards whose resets disagree, or a guard and `time_event_reset`; `no_guard` without a
-    /// conflict.
+    /// The two guards whose resets disagree, or a guard and `time_event_reset`; `no_guard` if none
+    /// disagree.
     [[nodiscard]] const std::pair<std::size_t, std::size_t>& conflict() const noexcept
     {
         return conflict_;

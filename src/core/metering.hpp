@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// Interface of `Meter`; without one, the network is always asked and planning always done.
+/// Interface of `Meter`; without one, the network is always asked and planning is always on.
 class MeterOfRun {
 public:
     explicit MeterOfRun(const MeterOptions* options, std::size_t planned_guards = 0)

@@ -1,4 +1,4 @@
-// The events of a host's steps.
+// The events in the steps of a host.
 #pragma once
 
 #include <algorithm>
@@ -12,27 +12,27 @@
 
 namespace ricochet::detail {
 
-/// @throws std::logic_error naming the call of the host and the expected one.
+/// @throws std::logic_error naming the call of the host and the call that was expected.
 [[noreturn]] void throw_out_of_turn(std::string_view call, std::string_view expected);
-/// @throws std::logic_error: a step that does not begin where the last one ended.
+/// @throws std::logic_error because a step does not begin where the last one ended.
 [[noreturn]] void throw_gap(double expected, double found);
-/// @throws std::logic_error: the state at the start of a step is not that at the end of the last.
+/// @throws std::logic_error because a step does not start at the state at the end of the last.
 [[noreturn]] void throw_state_moved(std::size_t component, double expected, double found);
-/// @throws std::logic_error: the step goes beyond a time event.
+/// @throws std::logic_error because the step goes beyond a time event.
 [[noreturn]] void throw_beyond_time_event(double event, double end);
-/// @throws std::logic_error: guards have to be examined before.
+/// @throws std::logic_error because guards have to be examined before that time.
 [[noreturn]] void throw_not_quiet(double until, double found);
 /// @throws std::invalid_argument for a length, time or scale that is not a positive or finite
 /// number.
 [[noreturn]] void throw_no_length(std::string_view what, double found);
 
-/// @throws std::invalid_argument
+/// @throws std::invalid_argument because the system has no events.
 [[noreturn]] void throw_without_events();
 
-/// @throws std::out_of_range
+/// @throws std::out_of_range naming the guard asked for and the number of guards.
 [[noreturn]] void throw_no_such_guard(std::size_t found, std::size_t guards);
 
-/// The kernel of a motion that is shown, not computed.
+/// The kernel of a motion that a host computes; it takes no steps itself.
 template <class X>
 inline constexpr StepKernel<X> host_kernel{};
 
@@ -284,7 +284,7 @@ private:
     // --- checks ---
 
     /// An exception from a function of the system, or from a host's interpolant, leaves guards half
-    /// examined or half armed: then no call but `start` and `restore` continues.
+    /// examined or half armed: afterwards only `start` and `restore` are accepted.
     template <class Function>
     Verdict or_start_anew(const Function& function)
     {
@@ -335,13 +335,13 @@ private:
     [[nodiscard]] bool finds(bool cleared)
     {
         std::size_t broken = bank_.first_not_finite();
-        if (broken == no_guard) broken = bank_.first_without_rate();  // the host has lost it
+        if (broken == no_guard) broken = bank_.first_without_rate();  // the host no longer has it
         if (broken == no_guard) return this->find(cleared);
         this->end(Outcome::non_finite, broken);
         return false;
     }
 
-    /// Plans with intervals of a single step, since a host does not go back.
+    /// Plans with intervals of a single step, since a host does not return to earlier steps.
     [[nodiscard]] bool holds_set_by_plan()
     {
         if (newly_armed_) this->begin_plan();
@@ -377,7 +377,7 @@ private:
         if (!step_.flow_fits()) throw_flow_does_not_fit(step_.x0().size());
     }
 
-    /// Arms the guards; a set that follows at the same instant is another cut.
+    /// Arms the guards; a set that follows at the same instant is returned as another cut.
     Verdict go_on()
     {
         departs_ = true;

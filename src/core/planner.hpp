@@ -1,6 +1,6 @@
 // Deadlines of the checks of guards.
 //
-// After a check every guard is deferred until its bound no longer covers it. The earliest
+// After a check every guard is deferred until its bound no longer excludes an event. The earliest
 // of these deadlines is compared with the end of every step; until it is reached no guard
 // costs anything. A guard whose deadline has passed is pending: the steps from there on are
 // tentative, and their starts are kept. The interval is closed by one check of its end; where
@@ -28,22 +28,22 @@
 
 namespace ricochet::detail {
 
-/// Last check of a guard and what follows from it.
+/// Last check of a guard and the deadlines that follow from it.
 struct LastCheck {
     double time = 0;                                         ///< [s]
-    double value = 0;                                        ///< g, or a lower bound of it
-    double rate = std::numeric_limits<double>::quiet_NaN();  ///< of g; NaN: not asked for
+    double value = 0;                                        ///< g, or a lower bound on it
+    double rate = std::numeric_limits<double>::quiet_NaN();  ///< rate of g; NaN: not evaluated
     GuardBound bound;
     bool exact = false;
-    double sure = 0;   ///< [s] the deadline
+    double sure = 0;   ///< [s] deadline, up to which the guard is covered
     double hoped = 0;  ///< [s] when a check is expected to close the interval; never before `sure`
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< of the distance, from two checks
     bool verify = false;  ///< the exact detector examines the next step
     bool unclear =
         false;  ///< a gate clears nothing, so that the exact detector examines the next step, too
     bool refused = false;   ///< a gate had no lower bound when it was last asked
-    std::size_t first = 0;  ///< of the tentative steps, the first beyond `sure`
-    double later_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] of another check
+    std::size_t first = 0;  ///< index of the first tentative step beyond `sure`
+    double later_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of another check
     double later_value = 0;
 
     template <class Visit>
@@ -146,8 +146,8 @@ public:
     /// Whether the interval is expected to be closed at the time `end`.
     [[nodiscard]] bool hopes(double end) const noexcept { return end <= hoped_; }
 
-    /// Checks every pending guard at the end of the current step, and wherever that leaves a
-    /// doubt. Returns the first step that could not be closed, or `none`; the guards
+    /// Checks every pending guard at the end of the current step, and at earlier starts if doubts
+    /// remain. Returns the first step that could not be closed, or `none`; the guards
     /// to be assessed in it, if it is the current step, are in `assessed`.
     [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts,
                                     double h_next)
@@ -161,7 +161,7 @@ public:
             checks_[i].first = failed;
             doubt = std::min(doubt, failed);
         }
-        // Beyond an event the flow is not the motion, and a bound need not hold.
+        // Beyond an event the flow is not the motion, and a bound may fail to hold.
         if (wrong_ && doubt != none && clock(wrong_->t) > place(doubt, step).time) wrong_.reset();
         judged_.clear();
         for (const std::size_t i : owing_) {
@@ -236,7 +236,7 @@ public:
         find_limit();
     }
 
-    /// Tests one of the deferred guards, in turn, at the end of every 64th step without a check, if
+    /// Tests one of the deferred guards, in rotation, at the end of every 64th unchecked step, if
     /// bounds are checked.
     void sample_sleeper(const Step<X>& step, Bank& bank, Statistics& counts)
     {
@@ -247,8 +247,8 @@ public:
         watch_sleeper(i, t, step.x1(), step.mode(), bank, counts);
     }
 
-    /// Checks the guards that are deferred when the run ends, at the start of the step: a guard
-    /// beyond its surface was covered by a wrong bound.
+    /// Checks the guards that are still deferred when the run ends, at the start of the step: a
+    /// guard beyond its surface was covered by a bound that was wrong.
     void look_last(const Step<X>& step, Bank& bank, Statistics& counts)
     {
         if (!bounded_) return;
@@ -257,7 +257,7 @@ public:
         }
     }
 
-    /// Adds the calls of gates since the last time.
+    /// Adds the calls of gates since the last such addition.
     void add_counts(Statistics& counts) noexcept
     {
         counts.network_calls += asked_;
@@ -265,10 +265,10 @@ public:
         asked_ = outside_ = 0;
     }
 
-    /// Whether asking the network pays.
+    /// Whether asking the network saves time.
     [[nodiscard]] const auto& meter() const noexcept { return meter_; }
 
-    /// Bound that a guard has broken.
+    /// The bound that a guard has violated.
     [[nodiscard]] const std::optional<WrongBound<X>>& wrong() const noexcept { return wrong_; }
 
     template <class Visit>
@@ -291,7 +291,7 @@ public:
     }
 
 private:
-    /// A guard at an instant.
+    /// A guard, and the bounds on it, at an instant.
     struct Check {
         double time = 0;  ///< [s] counted forward
         double value = 0;
@@ -341,8 +341,8 @@ private:
 
     // --- bounds ---
 
-    /// The guard's bounds at a check. One that is negative or no number covers nothing, and is
-    /// named if bounds are checked.
+    /// The guard's bounds at a check. A bound that is negative or NaN covers nothing, and is
+    /// reported as wrong if bounds are checked.
     [[nodiscard]] GuardBound bound(std::size_t i, const Check& check, Mode mode, Side side)
     {
         GuardBound at{.distance = sign_of(side) * check.value, .speed = 0, .acceleration = 0};
@@ -357,14 +357,14 @@ private:
         return at;
     }
 
-    /// Event tolerance that a guard must not have reached. Within an interval that
+    /// Event tolerance, which the guard must not have come within. In an interval that
     /// closes, the guard is no farther away than the sum of its distances at the ends.
     [[nodiscard]] static double band(const Bank& bank, std::size_t i, double a, double b) noexcept
     {
         return bank.touch_of(i, std::fabs(a) + std::fabs(b));
     }
 
-    /// Defers the guard from this check on.
+    /// Defers the guard, starting from this check.
     void rest_from(std::size_t i, const Check& at, Mode mode, const Bank& bank)
     {
         LastCheck& check = checks_[i];
@@ -373,10 +373,10 @@ private:
         plan_after(i, check, now, mode, bank);
     }
 
-    /// Time [s] without a check that a gate gives from here; 0 without a gate.
+    /// Time [s] from here that needs no check by a gate; 0 without a gate.
     [[nodiscard]] double horizon(const Check& at, Mode mode)
     {
-        // Gates predict the future, not the past.
+        // Gates predict the future only, not the past.
         if (!detector_->horizon || backward_ || !meter_.asks()) return 0;
         const GateAnswer answer = meter_.time_network(
             [&] { return detector_->horizon(self_, system_.door(), mode, at.t, *at.x); });
@@ -405,20 +405,20 @@ private:
             return;
         }
         const double reach = band(bank, i, at.value, at.value);
-        // Rounding of the time must not lengthen what is covered.
+        // Rounding of the time must not lengthen the covered interval.
         const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(at.time);
         check.sure = at.time + detector_->sure(self_, at.bound, reach) - ulps;
         const double cleared = horizon(at, mode);
         check.unclear = gated_ && !(cleared > 0);
         if (check.unclear) check.verify = true;
-        // Rounding may leave an interval open that would just close.
+        // Rounding may leave an interval open that would otherwise just close.
         const double hoped = (1 - 1e-12) * detector_->hoped(self_, at.bound, check.slope, reach);
         const double ahead = std::max(hoped, cleared);
         check.hoped =
             std::max(check.sure, at.time + (expects_level(check, bank[i].side) ? 0 : ahead));
     }
 
-    /// Whether a gate is likely to have a lower bound where the cover of this check ends; any bound
+    /// Whether a gate is likely to have a lower bound where the cover by this check ends; any bound
     /// suffices there, so that the gate is asked immediately.
     [[nodiscard]] bool expects_level(const LastCheck& check, Side side) const noexcept
     {
@@ -458,8 +458,8 @@ private:
             [&] { return bank.view(i, mode, counts.guard_calls).value(t, x); });
     }
 
-    /// An exact check of the start of tentative step k; past the last, at the end of the current
-    /// step.
+    /// An exact check at the start of tentative step k; for k past the last, at the end of the
+    /// current step.
     [[nodiscard]] Check check_at(std::size_t i, std::size_t k, const Step<X>& step,
                                  const Bank& bank, Statistics& counts)
     {
@@ -480,7 +480,7 @@ private:
         return {.time = clock(start.t.value), .t = start.t.value, .x = &start.x};
     }
 
-    /// Cover by a lower bound there, or by an upper bound below the surface; false: none.
+    /// Covers by a lower bound there, or by an upper bound below the surface; false: by neither.
     [[nodiscard]] bool bound_at(std::size_t i, std::size_t k, const Step<X>& step, const Bank& bank,
                                 Statistics& counts, Check& check)
     {
@@ -509,7 +509,7 @@ private:
         return check.value > 0;
     }
 
-    /// A lower bound of guard i by a gate; 0: none.
+    /// A lower bound of guard i from a gate; 0: none.
     [[nodiscard]] double ask_level(std::size_t i, const Check& at, Mode mode)
     {
         const GateAnswer answer = meter_.time_network(
@@ -544,19 +544,19 @@ private:
 
     void check_change(std::size_t i, const Check& from, const Check& to, const Bank& bank);
 
-    /// Reports a guard that is across its surface although it was covered from one check to the
-    /// other.
+    /// Reports a guard that is across its surface although it was covered all the way between
+    /// the two checks.
     void check_covered(std::size_t i, const Check& from, const Check& to, const Bank& bank);
 
     void blame_change(std::size_t i, const Check& from, const Check& to, const Bank& bank);
 
     void blame(std::size_t i, const Check& from, const Check& to, double allowed);
 
-    /// Reports a deferred guard that is beyond its surface, whatever its bounds are there.
+    /// Reports a deferred guard that is beyond its surface, whatever its bounds say there.
     void watch_sleeper(std::size_t i, double t, const X& x, Mode mode, const Bank& bank,
                        Statistics& counts);
 
-    /// Whether an exact value contradicts the bound that would have stood in for it. Beyond the
+    /// Whether an exact value contradicts the bound that would have replaced it. Beyond the
     /// surface a bound may have ended at 0.
     void check_bound(std::size_t i, const Check& check, Mode mode, const Bank& bank);
 
@@ -566,7 +566,7 @@ private:
     const DetectorTable<X>* detector_;
     const void* self_;
     bool bounded_;  ///< defers by declared bounds
-    bool gated_;    ///< defers nothing but what a gate clears
+    bool gated_;    ///< defers only by what a gate clears
     MeterOfRun meter_;
     bool backward_;
     Steps steps_;
@@ -578,9 +578,9 @@ private:
     double hoped_ = infinity;
     double failing_value_ = 0;
     std::uint64_t lower_bounds_used_ = 0;
-    std::uint64_t covered_ = 0;  ///< steps that no guard was examined in
+    std::uint64_t covered_ = 0;  ///< steps in which no guard was examined
     std::uint64_t asked_ = 0;    ///< calls of a gate
-    std::uint64_t outside_ = 0;  ///< of its domain
+    std::uint64_t outside_ = 0;  ///< of these, calls outside the gate's domain
     std::optional<WrongBound<X>> wrong_;
 };
 

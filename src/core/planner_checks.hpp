@@ -10,7 +10,7 @@ inline void Planner<X, single>::check_change(std::size_t i, const Check& from, c
                                              const Bank& bank)
 {
     if (!bounded_ || !detector_->checks_bounds || !from.exact || !to.exact) return;
-    if (bank[i].info.boolean) return;  // its values are those of a sign
+    if (bank[i].info.boolean) return;  // its values only carry a sign
     blame_change(i, from, to, bank);
 }
 

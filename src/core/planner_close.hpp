@@ -1,4 +1,4 @@
-// Closing of an interval of steps without a check.
+// Closing of an interval of steps that were taken without a check.
 #pragma once
 
 #include "core/planner.hpp"

@@ -1,4 +1,4 @@
-// Screening: the guards of a system that need a search in a step, by their values at its ends and
+// Screening: which guards of a system need a search in a step, by their values at its ends and
 // inside.
 //
 // What every step needs of every guard lies in plain arrays, so that a hundred guards
@@ -48,7 +48,7 @@ public:
     using Guards::size;
 
     /// Sets the power series of the guards over the current step, or none.
-    /// `starts`: a smooth phase starts with the step.
+    /// `starts`: whether a smooth phase starts with the step.
     void see(const SeriesTerms& series, bool starts) noexcept
     {
         series_ = series;
@@ -70,7 +70,7 @@ public:
     }
     [[nodiscard]] const SeriesTerms& series() const noexcept { return series_; }
 
-    /// Whether guard i, with a series, starts on its surface.
+    /// Whether guard i, which has a power series, starts on its surface.
     [[nodiscard]] bool starts_on_surface(std::size_t i) const noexcept
     {
         const bool departs = records_[i].departs && starts_phase_;
@@ -109,13 +109,13 @@ public:
 
     [[nodiscard]] bool looked_everywhere() const noexcept { return looked_ == Looked::everywhere; }
 
-    /// Whether all guards are the cubics of their ends, since they are of degree 1 on a path that
-    /// is a cubic, and have control points on their sides by more than rounding: then no evaluation
-    /// inside the step would tell more.
+    /// Whether all guards are the cubics through their ends, since they are of degree 1 on a path
+    /// that is a cubic, and have control points on their sides by more than rounding: then an
+    /// evaluation inside the step would add nothing.
     [[nodiscard]] bool clear_as_cubics(double h) const noexcept
     {
         if (!linear_ || waiting_) return false;
-        constexpr double rounding = 0x1p-20;  // of rates that are differences, and more
+        constexpr double rounding = 0x1p-20;  // of rates that are differences, with a reserve
         return !any_of([ this, h ](std::size_t i) __attribute__((always_inline)) {
             const CubicLook look = cubic(i, h);
             const bool known = is_finite(look.b1 + look.b2);
@@ -140,7 +140,7 @@ public:
         return suspicious(h);
     }
 
-    /// Whether a second evaluation inside the step can change the decision on a guard: not
+    /// Whether a second evaluation inside the step can change the decision on a guard: it cannot
     /// where the first agreed with the cubic to nine digits, which is no coincidence.
     [[nodiscard]] bool needs_second_look(double h) const noexcept
     {
@@ -166,7 +166,7 @@ public:
         return suspects_.span();
     }
 
-    /// Whether guard i may leave its side inside the step without its ends telling.
+    /// Whether guard i may leave its side inside the step without a trace at the ends.
     [[nodiscard]] bool hides(std::size_t i, double h) const noexcept
     {
         const CubicLook look = cubic(i, h);
@@ -186,7 +186,7 @@ public:
     /// Whether the guards have been evaluated inside the step.
     [[nodiscard]] bool looked() const noexcept { return looked_ != Looked::not_at_all; }
 
-    /// Whether one of the `suspects` still is one, after the findings of the search so far.
+    /// Whether one of the `suspects` remains suspect after the findings of the search so far.
     [[nodiscard]] bool still_suspicious(std::size_t i, double h) const noexcept
     {
         return as_screened_ || suspicious(i, h);
@@ -229,7 +229,7 @@ public:
         return no_guard;
     }
 
-    /// Whether guard i, on a plateau, has its event in the step, or is not a number at its end.
+    /// Whether guard i, on a plateau, has its event in the step, or is NaN at the end of the step.
     [[nodiscard]] bool leaves_plateau(std::size_t i) const noexcept
     {
         const GuardRecord& record = records_[i];
@@ -259,7 +259,7 @@ protected:
         bool (*suspects)(double, double, double, double, double, double);
     };
 
-    /// Calls `use` with the detector's own way of screening, inlined.
+    /// Calls `use` with the detector's own screening function, inlined.
     template <class Use>
     [[gnu::always_inline]] auto with_screen(const Use& use) const
     {
@@ -272,7 +272,7 @@ protected:
         return use(OwnScreen{rules_.suspects});
     }
 
-    /// Number of guards that are screened together: where one of them is suspected, each is
+    /// Number of guards that are screened together: if one of them is suspected, each of them is
     /// examined.
     static constexpr std::size_t block = 16;
     [[nodiscard]] bool are_few() const noexcept { return size() < block; }
@@ -328,7 +328,7 @@ protected:
         };
     }
 
-    /// Whether guard i may leave its side where a deviation is `factor` times as large as at
+    /// Whether guard i may leave its side if deviations are `factor` times as large as at
     /// the part `u`, where the guards are `values`.
     [[nodiscard, gnu::always_inline]] auto strays(double h, double u, double factor,
                                                   const Doubles& values) const noexcept
@@ -370,7 +370,7 @@ protected:
         });
     }
 
-    /// Every guard deserves a search, as is known.
+    /// Marks every guard for a search, if that is known to be needed.
     void suspect_all() noexcept
     {
         suspects_.clear();
@@ -378,7 +378,7 @@ protected:
         screened_ = as_screened_ = true;
     }
 
-    /// Finds the guards that deserve a search.
+    /// Finds the guards that need a search.
     [[gnu::noinline]] void screen(double h) noexcept
     {
         suspects_.clear();
@@ -388,7 +388,7 @@ protected:
             return;
         }
         if (looked()) {
-            // A guard that needs a search is in doubt, or deviates elsewhere.
+            // A guard that needs a search is in doubt already, or deviates elsewhere.
             if (!marked_) mark(h);
             if (looked_ == Looked::inside)
                 return screen_marked(h, [](std::size_t) { return false; });
@@ -441,7 +441,7 @@ protected:
         return std::fabs(g) <= std::numeric_limits<double>::max();
     }
 
-    /// Largest deviation of guard i from the cubic through its ends that was found.
+    /// Largest deviation found of guard i from the cubic through its ends.
     [[nodiscard]] double deviation(const CubicLook& look, std::size_t i) const noexcept
     {
         const double e = look.deviation(CubicLook::inside, inside_[i]);
@@ -451,7 +451,7 @@ protected:
         return other <= e ? e : other;  // NaN stays
     }
 
-    /// Whether the series of guard i proves that it stays on its side, as its end says.
+    /// Whether the series of guard i proves that the guard stays on the side that it ends on.
     [[nodiscard, gnu::noinline]] bool is_clear_of_series(std::size_t i, double h) const noexcept
     {
         const double touch = records_[i].info.touch;
@@ -466,16 +466,16 @@ protected:
     SeriesTerms series_;
     bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
-    bool bands_ = false;        ///< whether any guard declares a touch
-    bool linear_ = true;        ///< whether all guards are of degree 1, and screened so
-    bool screened_ = false;     ///< whether `suspects_` is of the current step
-    bool as_screened_ = false;  ///< and no guard has changed since
+    bool bands_ = false;        ///< whether any guard declares a tolerance for touches
+    bool linear_ = true;        ///< whether all guards are of degree 1, and are screened as such
+    bool screened_ = false;     ///< whether `suspects_` belongs to the current step
+    bool as_screened_ = false;  ///< and no guard has changed since then
     // A value does not lie beside its rate: both are written one by one, see `HostStepTable`.
     Doubles sign_{}, g0_{}, g1_{}, rate0_{}, rate1_{};
     Looked looked_ = Looked::not_at_all;
-    bool marked_ = false;  ///< whether `marks_` is of the current step
+    bool marked_ = false;  ///< whether `marks_` belongs to the current step
     Doubles inside_{}, further_{};
-    Doubles worst_{};  ///< of further evaluations
+    Doubles worst_{};  ///< deviations at further evaluations
     GuardList<std::size_t, single> suspects_;
     GuardList<std::size_t, single> marks_;  ///< guards in doubt
 };

@@ -21,18 +21,18 @@
 
 namespace ricochet::detail {
 
-/// An event must not be placed by what is no state. @throws std::domain_error
+/// Refuses to place an event by a state that is not finite. @throws std::domain_error
 [[noreturn]] void throw_host_not_finite(std::size_t component, double found, double s,
                                         bool by_restep);
 
-/// Fulfils `DenseStep`.
+/// The step in progress; models `DenseStep`.
 template <class X>
 class Step {
     using Dopri5 = RungeKutta<Dopri5Tableau, X>;
 
 public:
     /// Places the step at (t, x) in `mode` and evaluates the flow there. `backward`:
-    /// time runs backward, and offsets and rates with it.
+    /// time runs backward, and offsets and rates are counted backward as well.
     Step(const SystemAt<X>& system, const StepKernel<X>& kernel, double t, const X& x, Mode mode,
          bool backward)
         : system_(system),
@@ -51,7 +51,7 @@ public:
     }
 
     [[nodiscard]] const StepState<X>& state() const noexcept { return state_; }
-    /// State of the step for a quiet run, which continues from here and leaves its current step.
+    /// State of the step for a quiet run, which starts from here and leaves its current step here.
     [[nodiscard]] StepState<X>& lend() noexcept { return state_; }
     [[nodiscard]] double time(double s) const noexcept { return state_.time(s); }
     [[nodiscard]] const Instant& start() const noexcept { return state_.start; }
@@ -65,8 +65,8 @@ public:
         return remainder == 0 ? at : at.after(state_.in_time(remainder));
     }
 
-    /// @param each  absolute tolerances of the components, in place of one for all; or none
-    /// @param other  of components that a reset adds
+    /// @param each  absolute tolerances of the components, instead of a common one; may be empty
+    /// @param other  absolute tolerance of components that a reset adds
     void measure_with(std::vector<double> each, double other)
     {
         component_atol_ = std::move(each);
@@ -105,7 +105,7 @@ public:
     }
 
     /// Interpolates without further evaluations of the flow: on the cubic through both
-    /// ends where the method has no dense output of its own.
+    /// ends if the method has no dense output of its own.
     void peek(double s, X& x) const
     {
         if (kernel_->interpolates()) {
@@ -126,7 +126,7 @@ public:
         }
     }
 
-    /// Same as `peek` at the part `Part::u` of the step, for which the weights of the dense output
+    /// As `peek` at the fraction `Part::u` of the step, for which the weights of the dense output
     /// are constants.
     template <class Part>
     [[gnu::always_inline]] void peek(X& x) const
@@ -144,9 +144,9 @@ public:
         }
     }
 
-    /// The polynomial at offset s, or its derivative, a component at a time. Of a large state the
-    /// inner node is computed for the components that are asked for alone, until they are as many
-    /// as the state has.
+    /// The polynomial at offset s, or its derivative, one component at a time. For a large state
+    /// the inner node is computed only for the components that are asked for, until they are as
+    /// many as the components of the state.
     template <bool derivative>
     [[nodiscard]] PolynomialView<X, derivative> component_view(double s) const
     {
@@ -159,8 +159,8 @@ public:
         return {dense(), s};
     }
 
-    /// The step as a polynomial of the order that the method reaches over many steps.
-    /// Its inner nodes are computed when it is first asked for.
+    /// The step as a polynomial of the order that the method attains over many steps.
+    /// Its inner nodes are computed on first use.
     [[nodiscard]] DenseParts<X> dense() const
     {
         if (kernel_->series) return dense_series();
@@ -189,8 +189,8 @@ public:
         add_tangent(s, x);
     }
 
-    /// x(t0 + s) as precisely as is cheap: dense output of the method's own order,
-    /// or a step of its own.
+    /// x(t0 + s) as precisely as is cheap: by dense output of the method's own order,
+    /// or by a step of its own.
     void sample(double s, X& x) const
     {
         if (kernel_->interpolates()) {
@@ -217,7 +217,7 @@ public:
         }
     }
 
-    /// x' = f(t0 + s, x); in a step of a host, where x lies on its path, the rate of that.
+    /// x' = f(t0 + s, x); in a step of a host, for x on its path, the rate of the path.
     void flow(double s, const X& x, X& dxdt) const
     {
         if (state_.host) return rate_on_host(s, dxdt);
@@ -241,7 +241,7 @@ public:
         return state_.host && state_.host->is_cubic;
     }
 
-    /// Makes a step that a host has taken from the current state the current one.
+    /// Makes a step that a host has taken from the current state the current step.
     void show(const HostStepTable& host) noexcept
     {
         StepState<X>& of = state_;
@@ -257,11 +257,11 @@ public:
         });
     }
 
-    /// An interpolant need not begin at the state of the start to the last bit, and one that is
-    /// asked for times is a staircase where offsets are shorter than the time resolves. Where a
-    /// guard starts on its surface either would put it behind. So the difference is taken out, all
-    /// of it at the start and none at the end, and the first unit in the last place of the time
-    /// is straight.
+    /// An interpolant need not begin at the start state to the last bit, and one that is
+    /// evaluated at times is a staircase for offsets shorter than the time resolves. Either could
+    /// put a guard that starts on its surface behind it. So the difference is subtracted, all
+    /// of it at the start and none at the end, and over the first unit in the last place of the
+    /// time the path is straight.
     void align_start() const
     {
         StepState<X>& of = state_;
@@ -287,7 +287,7 @@ public:
         of.host = nullptr;
     }
 
-    /// The flow at the start, as a host has computed it.
+    /// Sets the flow at the start to the rate that a host has computed.
     void set_rate(const double* dxdt) noexcept
     {
         for_components([&](auto i) { state_.rate0[i] = dxdt[static_cast<std::size_t>(i)]; });
@@ -297,14 +297,14 @@ public:
     /// flow there is not finite.
     bool attempt(double h) { return kernel_->take(system_.door(), state_, h); }
 
-    /// Takes a step of length h and returns its largest estimated error over
+    /// Takes a step of length h and returns the largest ratio of its estimated error to
     /// atol + rtol max(|x0|, |x1|); NaN if anything is not finite.
     [[nodiscard]] double attempt(double h, double rtol, double atol)
     {
         return kernel_->attempt(system_.door(), state_, h, rtol, atol);
     }
 
-    /// Whether the polynomial of the step may be worse than its end, and by how much: see
+    /// Whether the polynomial of the step may be less accurate than its end, and by how much: see
     /// `StepKernel::roughness`.
     [[nodiscard]] bool may_be_rough() const noexcept { return kernel_->roughness; }
     [[nodiscard]] double roughness(double rtol, double atol) const
@@ -319,7 +319,7 @@ public:
         return kernel_->guard_series(system_.door(), state_);
     }
 
-    /// See `StepKernel::cross`. @param before  the state at the root
+    /// See `StepKernel::cross`. @param before  receives the state at the root
     [[nodiscard]] bool cross(SeriesCrossing& crossing, X& before) const
     {
         if (!kernel_->cross(system_.door(), state_, crossing)) return false;
@@ -329,13 +329,13 @@ public:
 
     /// Whether the length of a step is known before it is taken.
     [[nodiscard]] bool knows_reach() const noexcept { return kernel_->reach; }
-    /// Length [s] of the step, where it is known before.
+    /// Length [s] of the step, if it is known in advance.
     [[nodiscard]] double reach(double rtol, double atol)
     {
         return kernel_->reach(system_.door(), state_, rtol, atol);
     }
 
-    /// The end of the step becomes the start of the next.
+    /// Makes the end of the step the start of the next.
     void accept() noexcept
     {
         StepState<X>& of = state_;
@@ -371,7 +371,7 @@ public:
         arrive();
     }
 
-    /// Same, to an instant.
+    /// The same, to an instant.
     void restart(const Instant& at, const X& x, Mode mode)
     {
         state_.start = at;
@@ -379,7 +379,7 @@ public:
         arrive();
     }
 
-    /// Moves the start of the step to where another one started.
+    /// Moves the start of the step to the start of another one.
     void restart(const StepStart<X>& at)
     {
         state_.start = at.t;
@@ -399,7 +399,7 @@ public:
         return {state_.start, state_.mode, state_.x0, state_.remainder, state_.rate0};
     }
 
-    /// Places the step like `place`, in memory that is there already.
+    /// Places the step as `place` does, in memory that is already allocated.
     void store(StepStart<X>& at) const
     {
         at.t = state_.start;
@@ -409,7 +409,7 @@ public:
         assign(at.rate, state_.rate0);
     }
 
-    /// Whether every call of the flow has given its rate the dimension of the state.
+    /// Whether every call of the flow has given its rate as many components as the state.
     [[nodiscard]] bool flow_fits() const noexcept { return state_.flow_fits; }
     [[nodiscard]] std::uint64_t flow_calls() const noexcept { return state_.flow_calls; }
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
@@ -434,7 +434,7 @@ private:
         for_each_component(state_.x0, function);
     }
 
-    /// The flow at the start; a host has it, and says so (`set_rate`).
+    /// The flow at the start; a host supplies it by `set_rate`.
     void arrive()
     {
         state_.host = nullptr;
@@ -464,8 +464,8 @@ private:
         }
     }
 
-    /// Over a ten-thousandth of the step the errors of rounding and of curvature of a difference
-    /// are alike.
+    /// Over a ten-thousandth of the step the rounding error and the curvature error of a difference
+    /// quotient are of similar size.
     void rate_on_host(double s, X& dxdt) const
     {
         const HostStepTable& host = *state_.host;
@@ -549,7 +549,7 @@ private:
         state_.has_middle = true;
     }
 
-    /// A node inside, from a step of its own.
+    /// An inner node, computed by a step of its own.
     void prepare_node(double s, X& w, X& slope) const
     {
         kernel_->depart(system_.door(), state_, s, w, unused_rate_);
@@ -574,11 +574,11 @@ private:
     std::vector<double> component_atol_;
     double atol_ = 0;
     mutable X unused_rate_, end_slope_;
-    mutable std::array<X, 2> inner_w_, inner_rate_;  ///< `middle` stands for the first
+    mutable std::array<X, 2> inner_w_, inner_rate_;  ///< `middle` replaces the first
     mutable std::uint64_t resteps_ = 0;
-    mutable X defect_{};  ///< of a host's interpolant at the start
+    mutable X defect_{};  ///< error of a host's interpolant at the start
     mutable bool aligned_ = false;
-    mutable double straight_ = 0;  ///< [s] from the start
+    mutable double straight_ = 0;  ///< [s] length of the straight part at the start
 };
 
 }  // namespace ricochet::detail

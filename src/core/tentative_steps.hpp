@@ -1,4 +1,4 @@
-// Starts of the steps that have been taken, but not yet been closed by a check.
+// Starts of the steps that have been taken, but not yet closed by a check.
 #pragma once
 
 #include <cstddef>
@@ -9,18 +9,18 @@
 
 namespace ricochet::detail {
 
-/// State that is needed to take a step again.
+/// State that is needed to repeat a step.
 template <class X>
 struct TentativeStep {
     StepStart<X> start;
     double h_next = 0;  ///< [s] proposed length of the step
-    double last_h = 0;  ///< [s] the step before it
+    double last_h = 0;  ///< [s] length of the step before it
     std::size_t samples = 0;
     std::size_t pieces = 0;
     std::uint64_t rejected = 0;
 };
 
-/// An interval of such steps, in memory that is allocated once.
+/// An interval of tentative steps, in memory that is allocated once.
 template <class X>
 class TentativeSteps {
 public:

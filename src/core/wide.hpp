@@ -1,7 +1,7 @@
 // Loops over many doubles, compiled for wider registers as well.
 //
-// Which of the two is called is settled when the program starts. Products and sums are rounded one
-// by one in both, so that they have the same bits.
+// Which version is called is decided when the program starts. Products and sums are rounded
+// separately in both, so that both return the same bits.
 #pragma once
 
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && \

@@ -13,8 +13,8 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-/// Samples of the degree-`sampled_degree` nodes that lie between those of half the degree,
-/// from the quartic through the others.
+/// Samples at the nodes of degree `sampled_degree` that lie between those of half the degree,
+/// from the quartic through the latter.
 struct QuarticCheck {
     static constexpr int half = sampled_degree / 2;
     std::array<std::array<double, half + 1>, half> weights{};
@@ -57,21 +57,21 @@ struct QuarticCheck {
     return result;
 }
 
-/// Error of a coefficient for samples no larger than `size`, with that of their times.
+/// Error of a coefficient for samples no larger than `size`, rounding of their times included.
 [[nodiscard]] double rounding(const BernsteinBasis& basis, double size, double clock,
                               double width) noexcept
 {
     return size * (basis.rounding + basis.norm * 2 * clock / width);
 }
 
-/// The interval begins at an event, or on the surface and heads for its side.
+/// Whether the interval begins at an event, or on the surface with the guard heading for its side.
 [[nodiscard]] bool starts_on_surface(const Watch& watch, double band) noexcept
 {
     const double sign = sign_of(watch.side);
     return watch.start.s > 0 || (sign * watch.start.value <= band && sign * watch.start.rate >= 0);
 }
 
-/// The least of n + 1 coefficients times `sign`, from the first that is asked for.
+/// The least of n + 1 coefficients times `sign`, starting from the index `first`.
 [[nodiscard]] double least(const double* c, int n, double sign, int first = 0) noexcept
 {
     double result = sign * c[first];
@@ -79,8 +79,8 @@ struct QuarticCheck {
     return result;
 }
 
-/// The largest difference between samples of a guard at the odd nodes of `sampled_degree`
-/// and the quartic through the others; NaN if there is one among them.
+/// Largest difference between the samples of a guard at the odd nodes of `sampled_degree`
+/// and the quartic through the other samples; NaN if one of the samples is NaN.
 [[nodiscard]] double misfit(const double* values, const double* even) noexcept
 {
     static const QuarticCheck check = make_quartic_check();
@@ -103,7 +103,7 @@ bool stays_on_side(const BernsteinTask& task, const Watch& watch, const double* 
     const int last = task.degree > 0 ? task.degree : sampled_degree;
     const double sign = sign_of(watch.side);
     if (!(sign * values[last] > watch.touch)) return false;
-    // A root at the start divides out: p(u) / u has the coefficients c_(i+1) n / (i+1).
+    // A root at the start is divided out: p(u) / u has the coefficients c_(i+1) n / (i+1).
     const int first = starts_on_surface(watch, watch.touch) ? 1 : 0;
     const double width = watch.end.s - watch.start.s;
     Coefficients c;
@@ -147,7 +147,7 @@ public:
             return Finding::clear(Evidence::proved);
         }
         if (task_.degree > 0 && !is_precise(whole_)) {
-            // Ill-conditioned, or not the polynomial that it was declared to be.
+            // Ill-conditioned, or not a polynomial of the declared degree.
             degree_ = sampled_degree;
             whole_ = fit(watch_.start.s, watch_.end.s);
         }
@@ -166,11 +166,11 @@ private:
         Coefficients values{};
         Coefficients c{};
         double size = 0;      ///< largest |sample|
-        double misfit = 0;    ///< largest difference from the guard that was seen
-        double error = 0;     ///< bound of that, for the coefficients too
-        bool finite = false;  ///< all samples are
+        double misfit = 0;    ///< largest difference from the guard at further samples
+        double error = 0;     ///< bound on the error of the fit and of its coefficients
+        bool finite = false;  ///< all samples are finite
         bool any = false;     ///< some sample is a number
-        bool fits = false;    ///< it is the guard, as far as its conditioning allows
+        bool fits = false;    ///< it agrees with the guard, as far as its conditioning allows
 
         [[nodiscard]] double width() const noexcept { return to - from; }  ///< [s]
         [[nodiscard]] double place(double u) const noexcept
@@ -212,7 +212,7 @@ private:
         basis.convert(fit.values.data(), fit.c.data());
         fit.size = largest(fit.values.data(), n);
         for (const int eighth : {0, 2, 5, 7}) {
-            // Between two nodes, where an error of interpolation is large.
+            // Between two nodes, where the interpolation error is large.
             const int j = eighth * n / 8;
             const double u = 0.5 * (basis.nodes[at(j)] + basis.nodes[at(j + 1)]);
             const double value = curve_(fit.place(u));
@@ -227,13 +227,13 @@ private:
         if (n != task_.degree) fit.error += 4 * fit.misfit;
     }
 
-    /// The fit knows on which side of the surface the guard turns.
+    /// Whether the fit resolves on which side of the surface the guard turns.
     [[nodiscard]] bool is_precise(const Fit& fit) const noexcept
     {
         return fit.finite && fit.misfit <= scales_.band / 2;
     }
 
-    /// Walks along a part of the interval, in halves where it takes more than one
+    /// Walks along a part of the interval, in halves if it takes more than one
     /// polynomial.
     void scan(const Fit& fit, int halvings)
     {
@@ -243,7 +243,7 @@ private:
             piece.c = fit.c;
             return cut(fit, piece);
         }
-        // What is small and stays as large on ever shorter parts is rounding in the guard.
+        // A misfit that is small and stays as large on ever shorter parts is rounding in the guard.
         misfits_[at(halvings)] = fit.misfit;
         const bool improves = halvings < 4 || fit.misfit > 1e-7 * whole_.size ||
                               fit.misfit <= 0.5 * misfits_[at(halvings - 4)];
@@ -263,7 +263,7 @@ private:
 
     // --- pieces of a fit ---
 
-    /// Whether the polynomial of the whole interval has no root and no touch in a piece.
+    /// Whether the polynomial of the whole interval has neither a root nor a touch in a piece.
     [[nodiscard]] bool excludes(Piece& piece, int halvings)
     {
         const double* c = piece.c.data();
@@ -278,7 +278,7 @@ private:
         return excludes(piece, halvings + 1) && excludes(right, halvings + 1);
     }
 
-    /// Cuts a fit until the guard is monotone on every piece, and walks along them.
+    /// Cuts a fit until the guard is monotone on every piece, and walks along the pieces.
     void cut(const Fit& fit, Piece& piece)
     {
         if (walk_.decided()) return;
@@ -296,7 +296,7 @@ private:
         cut(fit, right);
     }
 
-    /// The piece keeps its first half; the second is returned.
+    /// Halves a piece: it keeps its first half, and the second is returned.
     [[nodiscard]] Piece split(Piece& piece) const noexcept
     {
         Piece right;
@@ -306,14 +306,14 @@ private:
         return right;
     }
 
-    /// All coefficients are well off the surface, on the same side.
+    /// Whether all coefficients are well off the surface, on the same side.
     [[nodiscard]] bool keeps_off(const double* c, double error) const noexcept
     {
         const double margin = scales_.band + error;
         return least(c, degree_, 1) > margin || least(c, degree_, -1) > margin;
     }
 
-    /// All coefficients but the first are, and the first is where the interval starts.
+    /// Whether all coefficients but the first are, and the first belongs to the interval's start.
     [[nodiscard]] bool leaves_surface(const Fit& fit, const Piece& piece) const noexcept
     {
         if (piece.from > 0 || fit.from > watch_.start.s) return false;
@@ -321,7 +321,7 @@ private:
                least(piece.c.data(), degree_, sign_of(watch_.side), 1) > scales_.band + fit.error;
     }
 
-    /// Monotone, flat up to rounding, or too short to be cut.
+    /// Whether the piece is monotone, flat up to rounding, or too short to be cut.
     [[nodiscard]] bool is_settled(const Piece& piece)
     {
         const double* c = piece.c.data();
@@ -350,7 +350,7 @@ private:
         return is_monotone(slopes.data(), n - 1);
     }
 
-    /// Where the slope, monotone and of different signs at the ends, is zero.
+    /// Zero of the slope, which is monotone and has different signs at the ends.
     [[nodiscard]] static double turning_point(const double* c, int n) noexcept
     {
         Coefficients slopes;
@@ -370,7 +370,7 @@ private:
         return u;
     }
 
-    /// On to the guard itself at the end of a piece.
+    /// Passes on to the walk the value of the guard itself at the end of a piece.
     void step_to(const Fit& fit, const Piece& piece)
     {
         const double* last = piece.c.data() + degree_;
@@ -402,8 +402,8 @@ private:
         walk_.end(end, std::fabs(end.value) <= scales_.band ? heading(end) : 0);
     }
 
-    /// Where the guard, on its surface at the end, goes from there: 1, back to its side
-    /// without leaving the band across the surface; -1, across; 0, hard to tell.
+    /// Direction of the guard after the end, where it is on its surface: 1, back to its side
+    /// without leaving the band across the surface; -1, across; 0, not decidable.
     [[nodiscard]] int heading(const GuardSample& end) const
     {
         const double sign = sign_of(walk_.side());
@@ -423,7 +423,7 @@ private:
         return bend > 0 && turns ? 1 : 0;
     }
 
-    /// The guard a part u of the last fit after its end.
+    /// Value of the guard at a fraction u of the last fit's width after its end.
     [[nodiscard]] double beyond(const GuardSample& end, double u) const
     {
         if (task_.goes_on) return curve_(end.s + u * last_width_);
@@ -443,11 +443,11 @@ private:
     Fit whole_;
     GuardWalk::Scales scales_;
     GuardWalk walk_;
-    std::array<double, most_halvings + 1> misfits_{};  ///< of the fits being halved
-    Coefficients last_{};  ///< of the last fit, with its width and error
+    std::array<double, most_halvings + 1> misfits_{};  ///< misfits of the fits being halved
+    Coefficients last_{};  ///< coefficients of the last fit, with its width and error
     double last_width_ = 1;
     double last_error_ = 0;
-    Evidence evidence_ = Evidence::checked;  ///< of a clear interval
+    Evidence evidence_ = Evidence::checked;  ///< evidence for a clear interval
 };
 
 }  // namespace
@@ -470,7 +470,7 @@ Finding Bernstein::examine(GuardPath& path, Watch& watch) const
         return Finding::clear(Evidence::checked);
     }
     const int degree = path.degree();
-    // How far a time in the step may be rounded [s].
+    // Rounding [s] of a time in the step.
     const double clock =
         1.2e-16 * std::max(std::fabs(path.time(0)), std::fabs(path.time(path.h())));
     const detail::BernsteinTask task{.crossing = path.crossing(),

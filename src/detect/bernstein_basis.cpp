@@ -69,7 +69,7 @@ using Square = std::array<Coefficients, most_bernstein_degree + 1>;
     for (int k = 0; k <= n; ++k) {
         for (int i = 0; i <= n; ++i) chebyshev[at(k)][at(i)] = chebyshev_coefficient(n, k, i);
     }
-    double work = 0;  // largest sum of what is added up for a row
+    double work = 0;  // largest sum over a row of the sizes of its terms
     for (int i = 0; i <= n; ++i) {
         double row = 0;
         double row_work = 0;
@@ -87,8 +87,8 @@ using Square = std::array<Coefficients, most_bernstein_degree + 1>;
         basis.norm = std::max(basis.norm, row);
         work = std::max(work, row_work);
     }
-    // Samples, n + 1 products and sums of each row, and as many again, with four
-    // roundings for a term, in the matrix.
+    // Rounding comes from the samples, from n + 1 products and sums in each row, and from as many
+    // again, with four roundings per term, in the matrix.
     basis.rounding =
         epsilon * ((4 + 0.5 * (n + 2)) * basis.norm + 0.5 * (n + 5) * work) * (1 + 1e-9);
     return basis;
@@ -119,7 +119,7 @@ constexpr auto bases = all_bases(std::make_integer_sequence<int, most_bernstein_
     }
 }
 
-/// For the degrees of guards that are linear in the state, unrolled.
+/// Conversion for the degrees of guards that are linear in the state, unrolled.
 template <int n>
 void multiply(const double* matrix, const double* values, double* c) noexcept
 {

@@ -17,13 +17,13 @@ namespace ricochet::detail {
 
 using Coefficients = std::array<double, most_bernstein_degree + 1>;
 
-/// From samples at nodes to coefficients.
+/// Conversion from samples at nodes to Bernstein coefficients of one degree.
 struct BernsteinBasis {
     int degree = 0;
     Coefficients nodes{};  ///< extrema of the Chebyshev polynomial of that degree on [0, 1]
-    /// The coefficients of sample j alone begin at j (degree + 1).
+    /// Row by row; the coefficients that belong to sample j alone begin at j (degree + 1).
     std::array<double, (most_bernstein_degree + 1) * (most_bernstein_degree + 1)> matrix{};
-    double norm = 0;      ///< largest |coefficient| for samples in [-1, 1]
+    double norm = 0;      ///< largest |coefficient| over all samples in [-1, 1]
     double rounding = 0;  ///< largest error of a coefficient for such samples, where the
                           ///< samples themselves are rounded to four units in the last place
 
@@ -40,7 +40,7 @@ struct BernsteinBasis {
 /// p'(u).
 [[nodiscard]] double bernstein_slope(const double* c, int n, double u) noexcept;
 
-/// The coefficients of p on [0, 1/2] replace c, those on [1/2, 1] are `right`.
+/// Splits p at 1/2: its coefficients on [0, 1/2] replace c, those on [1/2, 1] go to `right`.
 void halve(double* c, int n, double* right) noexcept;
 
 }  // namespace ricochet::detail

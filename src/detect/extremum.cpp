@@ -24,7 +24,7 @@ struct GuardCubic {
     [[nodiscard]] double curvature0() const noexcept { return 6 * (v1 - v0) - 4 * r0 - 2 * r1; }
     [[nodiscard]] double curvature1() const noexcept { return 6 * (v0 - v1) + 2 * r0 + 4 * r1; }
 
-    /// Where the cubic has its minimum (or maximum), if inside (0, 1); else 0.5.
+    /// Place of the minimum (or maximum) of the cubic, if it lies in (0, 1); else 0.5.
     [[nodiscard]] double critical(bool minimum) const noexcept
     {
         // p'(u) = r0 + 2 b u + 3 c u^2
@@ -42,7 +42,7 @@ struct GuardCubic {
     }
 
 private:
-    /// A power of two, 1 as a rule, that brings values of this size to where their squares
+    /// A power of two, usually 1, that scales values of this size so that their squares
     /// neither underflow nor overflow. It changes no bit of a result.
     [[nodiscard]] static double unit(double largest) noexcept
     {
@@ -56,17 +56,17 @@ constexpr double near = 1e-3;
 
 constexpr int most_samples = 80;
 
-/// Fraction of a step below which a rate that is a difference over 1e-5 of it rounds a kink off.
+/// Fraction of a step below which a rate that is a difference over 1e-5 of it smooths a kink.
 constexpr double coarse_part = 1e-3;
 
-/// Clear, as far as could be seen: what is not a number is no evidence.
+/// Clear as far as can be seen: NaN is no evidence.
 Finding clear_if(bool known) noexcept
 {
     return Finding::clear(known ? Evidence::checked : Evidence::assumed);
 }
 
-/// Whether a sample cannot be told from zero: by the rounding of the guard's values, or
-/// of the terms that it is made of.
+/// Whether a sample cannot be distinguished from zero: because of the rounding of the guard's
+/// values, or of the terms that it is computed from.
 [[nodiscard]] bool is_on_surface(GuardPath& path, const Watch& watch, const GuardSample& sample)
 {
     const double size = std::fabs(sample.value);
@@ -75,17 +75,17 @@ Finding clear_if(bool known) noexcept
 }
 
 /// Whether a guard that is across its surface, or on it, and falls at this rate will turn
-/// at once: within the rounding of a rate. One that is not yet there may be overlooked
+/// immediately: within the rounding of its rate. A guard that is not yet there may be overlooked
 /// at the end of a step, and is examined from the start of the next.
 [[nodiscard]] bool turns_now(double value, double rate, double curvature) noexcept
 {
     return value <= 0 && (rate == 0 || (rate < 0 && -rate <= 1e-9 * curvature));
 }
 
-/// Whether a guard that is on its surface at the end is about to turn back there. Where
-/// it leaves the band beyond the step says so; a guard that stays where it is has
-/// arrived, and in a wide band its cubic has to tell. If it is still falling, the next
-/// step will see where it turns.
+/// Whether a guard that is on its surface at the end is about to turn back there. The sign with
+/// which it leaves the band beyond the step decides; a guard that does not change any more has
+/// arrived, and in a wide band the cubic decides. If the guard is still falling, the next
+/// step will find where it turns.
 [[nodiscard, gnu::noinline]] bool turns_back(GuardPath& path, const Watch& watch,
                                              const GuardCubic& cubic)
 {
@@ -108,15 +108,15 @@ Finding clear_if(bool known) noexcept
                     std::fabs((c.value - b.value) / (c.s - b.s)));
 }
 
-/// Where to look for the turn of the guard times `sign`, which falls at `lo` and rises at
-/// `hi`, as a fraction of the interval: the minimum of the cubic. Where that does not
-/// converge soon there is a kink or a flat place, and the interval is halved.
+/// Place to sample for the turn of the guard times `sign`, which falls at `lo` and rises at
+/// `hi`, as a fraction of the interval: the minimum of the cubic. If that does not
+/// converge soon the guard has a kink or a flat part, and the interval is halved.
 [[nodiscard]] double turn(double sign, const GuardSample& lo, const GuardSample& hi, int i) noexcept
 {
     return i < 7 ? GuardCubic(sign, lo, hi).critical(true) : 0.5;
 }
 
-/// The guard leaves its side before `beyond` and is back at the end.
+/// The event if the guard leaves its side before `beyond` and has returned at the end.
 [[nodiscard]] Finding pair(const GuardPath& path, const Watch& watch, const GuardSample& beyond)
 {
     if (counts(watch.side, path.crossing())) {
@@ -125,8 +125,8 @@ Finding clear_if(bool known) noexcept
     return Finding::leaving(opposite(watch.side), beyond, watch.end);
 }
 
-/// The guard has left its side at the end, but its cubic says that it may have left
-/// before, come back and left again.
+/// The event if the guard has left its side at the end, and by its cubic may also have left
+/// before, returned and left again.
 [[gnu::noinline]] Finding first_of_three(GuardPath& path, Watch watch, GuardCubic cubic)
 {
     const Side side = watch.side;
@@ -138,7 +138,7 @@ Finding clear_if(bool known) noexcept
     const GuardSample highest = path.value_and_rate(s2);
     const bool dips = s1 < s2 && !has_left(side, highest.value);
     const bool touches = dips && is_on_surface(path, watch, lowest);
-    // It has to rise again, by more than the rounding of a flat root.
+    // The guard has to rise again, by more than the rounding of a flat root.
     const bool rises =
         std::fabs(highest.value) > std::max(watch.touch, 2 * std::fabs(lowest.value));
     if (touches && rises && leaving_counts && std::fabs(cubic.v0) > watch.touch) {
@@ -152,24 +152,24 @@ Finding clear_if(bool known) noexcept
     return clear_if(!std::isnan(lowest.value) && !std::isnan(highest.value));
 }
 
-/// Both ends are on the armed side: is the extremum between them, too?
+/// Both ends are on the armed side: finds out whether the extremum between them is, too.
 [[gnu::noinline]] Finding look_for_pair(GuardPath& path, Watch watch, GuardCubic cubic)
 {
     GuardSample lo = watch.start;
     GuardSample hi = watch.end;
     if (std::fabs(cubic.v0) <= watch.touch && turns_now(cubic.v0, cubic.r0, cubic.curvature0())) {
-        return Finding::clear(Evidence::checked);  // the step before has seen it turn
+        return Finding::clear(Evidence::checked);  // the step before has found the turn
     }
     if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {
-        // No turn between the ends; a dip in a slope, if anything.
+        // No turn between the ends, but perhaps a dip in a slope.
         if (cubic.v0 + cubic.r0 / 3 > 0 && cubic.v1 - cubic.r1 / 3 > 0) {
             return Finding::clear(Evidence::checked);
         }
         const double width = hi.s - lo.s;
         const GuardSample dip = path.value_and_rate(lo.s + width * cubic.critical(true));
         if (is_on_surface(path, watch, dip)) {
-            // In the band at an end, it is there that the guard touches; and where it goes
-            // on falling it has not turned.
+            // If an end lies in the band, the guard touches there; and if it continues to
+            // fall, it has not turned.
             const double nearest = std::min(std::fabs(cubic.v0), std::fabs(cubic.v1));
             return nearest <= watch.touch || cubic.v1 <= std::fabs(dip.value) ||
                            !counts(watch.side, path.crossing())
@@ -180,7 +180,7 @@ Finding clear_if(bool known) noexcept
         return pair(path, watch, dip);
     }
     const double sign = watch.side == Side::above ? 1 : -1;
-    // A kink has its extremum in a point, which only the polynomial gives exactly.
+    // A kink has its extremum at a single point, which only the polynomial gives exactly.
     const double resolution = path.on_polynomial() ? path.finest(hi.s) : 1e-9 * (hi.s - lo.s);
     GuardSample lowest = hi;
     bool known = true;
@@ -198,7 +198,7 @@ Finding clear_if(bool known) noexcept
         known = std::isfinite(value) && std::isfinite(rate);
         if (!known) break;
         if (sign * lowest.value >= value) lowest = sample;
-        // What is still to come: a parabola falls by rate^2 / (2 curvature).
+        // Bound on the remaining fall: a parabola falls by rate^2 / (2 curvature).
         const double bend = std::min(rate - sign * lo.rate, sign * hi.rate - rate) / width;
         // The square of a rate may underflow.
         double fall = bend > 0 ? rate * (rate / (2 * bend)) : std::fabs(rate) * width;
@@ -215,7 +215,7 @@ Finding clear_if(bool known) noexcept
     if (!is_on_surface(path, watch, lowest)) {
         return has_left(watch.side, lowest.value) ? pair(path, watch, lowest) : clear_if(known);
     }
-    // One that falls from its surface to its surface has not been away.
+    // A guard that falls from its surface back to its surface has not been away from it.
     const bool stays = watch.departs && is_on_surface(path, watch, watch.start);
     if (stays || !counts(watch.side, path.crossing())) {
         return Finding::clear(Evidence::checked);
@@ -234,7 +234,7 @@ Finding Extremum::examine(GuardPath& path, Watch& watch) const
 
     const GuardCubic cubic(sign, watch.start, watch.end);
     const bool on_surface = is_on_surface(path, watch, watch.end);
-    // An interval that ends inside the step ends at an event, which others have examined.
+    // An interval that ends inside the step ends at an event, which has been examined already.
     const bool whole = watch.end.s == path.h();
     const bool returns = on_surface && whole && turns_back(path, watch, cubic);
     const bool left = has_left(side, watch.end.value) && !returns;

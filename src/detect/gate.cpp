@@ -31,7 +31,7 @@ constexpr std::array<std::pair<std::string_view, Kind>, 6> kinds{
         given));
 }
 
-/// "name(number)" taken apart; NaN without a number.
+/// Splits "name(number)" into its parts; the number is NaN if there is none.
 std::pair<std::string_view, double> call(std::string_view text, std::string_view whole)
 {
     const std::size_t open = text.find('(');

@@ -1,6 +1,6 @@
 // Behaviour of a guard between the ends of an interval, from samples in order of time.
 //
-// Between two samples in a row the guard is monotone, or away from its surface. A touch
+// Between two consecutive samples the guard is monotone, or away from its surface. A touch
 // is a minimum inside the band around the surface, on the way down and up again; a
 // minimum below the band is two crossings. Near a minimum that lies at an end of the
 // interval, the rate there decides on which side of the end it lies: it is the same
@@ -15,10 +15,10 @@ namespace ricochet::detail {
 
 class GuardWalk {
 public:
-    /// How near is on the surface, and what is rounding.
+    /// Tolerances of a walk: the event band, and the rounding of values.
     struct Scales {
         double band = 0;   ///< |g| that counts as being on the surface
-        double noise = 0;  ///< differences of g that mean nothing
+        double noise = 0;  ///< differences of g up to this are rounding
     };
 
     /// @param at_start the guard on the polynomial at the start of the interval, which may
@@ -41,7 +41,7 @@ public:
         if (leaving_start_ && sign_ * at_start > high_) low_.value = at_start;
     }
 
-    /// Whether an event has been found, and the bracket around it is as wide as can be.
+    /// Whether an event has been found, and the bracket around it cannot get wider.
     [[nodiscard]] bool decided() const noexcept { return decided_; }
     /// Whether a crossing has been found.
     [[nodiscard]] bool crossed() const noexcept { return crossed_; }
@@ -66,15 +66,15 @@ public:
         }
     }
 
-    /// No further samples before the end of the interval: the crossing is where it is.
+    /// Ends the bracket: there are no further samples before the end of the interval.
     void close() noexcept
     {
         decided_ = true;
         finding_ = Finding::leaving(side_, from_, low_);
     }
 
-    /// The end of the interval. @param heading where a guard that is on its surface there
-    /// goes: 1, to its side; -1, across; 0, not known
+    /// The end of the interval. @param heading direction of a guard that is on its surface there:
+    /// 1, to its side; -1, across; 0, not known
     void end(const GuardSample& at, int heading) noexcept
     {
         const double value = sign_ * at.value;
@@ -90,7 +90,7 @@ public:
     }
 
 private:
-    /// Out of the band by way of `value`.
+    /// Leaves the band upwards, with the value `value`.
     void rise(double value) noexcept
     {
         if (dips_ && !leaving_start_ && value > sign_ * low_.value + scales_.noise) touch(low_);
@@ -118,7 +118,7 @@ private:
         }
     }
 
-    /// The guard has left its side before this sample.
+    /// Takes a sample before which the guard has left its side.
     void cross(const GuardSample& at) noexcept
     {
         from_ = flipped_ || starts_flat(at.s) ? peak_ : watch_->start;
@@ -134,8 +134,8 @@ private:
         go_on_above(at);
     }
 
-    /// On the surface at the start, and not off it in a millionth of the way or across it:
-    /// no bound for a bracket around another root.
+    /// Whether the guard starts on its surface and is across it or takes more than a millionth of
+    /// the interval to leave it: then the start is no bound of a bracket around another root.
     [[nodiscard]] bool starts_flat(double until) const noexcept
     {
         const GuardSample& start = watch_->start;
@@ -151,8 +151,8 @@ private:
         finding_ = Finding::touching(side_, at);
     }
 
-    /// On the surface at the end: it crosses there, has turned, or will turn, which is for
-    /// the next step to tell.
+    /// Ends on the surface: the guard crosses there, has turned, or will turn, which the next
+    /// step will decide.
     void end_in_band(const GuardSample& at, int heading) noexcept
     {
         const double value = sign_ * at.value;
@@ -173,11 +173,11 @@ private:
     double sign_;
     double at_start_;
     double high_;                 ///< highest since the last dip into the band
-    GuardSample low_;             ///< of the dip; after a crossing, the lowest across
-    GuardSample peak_;            ///< the highest since the last change of side
-    GuardSample from_;            ///< on the side before the crossing
-    bool dips_ = false;           ///< in the band, and lower than before
-    bool leaving_start_ = false;  ///< on the surface at the start, and not yet off it
+    GuardSample low_;             ///< bottom of the dip; after a crossing, the lowest sample across
+    GuardSample peak_;            ///< highest sample since the last change of side
+    GuardSample from_;            ///< last sample on the side before the crossing
+    bool dips_ = false;           ///< whether the guard is in the band, and lower than before
+    bool leaving_start_ = false;  ///< whether it started on the surface, and has not left it yet
     bool start_is_across_ = false;
     bool flipped_ = false;
     bool crossed_ = false;

@@ -11,21 +11,21 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Weight of what is known, at every further piece: some 50 pieces are remembered.
+/// Weight that older pieces keep with every further piece: some 50 pieces are remembered.
 constexpr double memory = 0.98;
-/// Pieces of two ways before one is believed to be the better one.
+/// Pieces that two alternatives must each have before one of them counts as better.
 constexpr std::uint64_t fewest = 4;
-/// Pieces after which their noise is believed to a factor of two.
+/// Number of pieces at which the estimate of their noise is doubled for its own uncertainty.
 constexpr double unsure = 2;
-/// Least fraction of the cost of a planned step that a step without a plan has.
+/// Least cost of a step without a plan, as a fraction of the cost of a planned step.
 constexpr double least_step = 0.5;
-/// Excess cost, as a fraction of a piece in the best way, that each of the first pieces in which
-/// every step is checked may have. Events make pieces uneven: with less, most such pieces ended at
+/// Excess cost, as a fraction of a piece of the best mode, allowed to each of the first pieces in
+/// which every step is checked. Events make pieces uneven: with less, most such pieces ended at
 /// their first event.
 constexpr double first_excess = 0.25;
-/// Pieces between trials, at most.
+/// Largest number of pieces between trials.
 constexpr std::uint64_t longest_wait = 64;
-/// Answers that a run may spend before it is long enough to have a share for trials.
+/// Inferences that a run may use before it is long enough to have a budget for trials.
 constexpr double first_answers = 16;
 
 }  // namespace
@@ -94,7 +94,7 @@ SampledCost& Meter::step_of(Way way) noexcept
     return way == check || planned_guards_ == 0 ? checked_step_ : planned_step_;
 }
 
-/// Without planning a step may be cheaper, but not by any factor.
+/// Cost of a step. Without planning it may be lower, but not by any factor.
 double Meter::step_cost(Way way) const noexcept
 {
     if (way != check && planned_guards_ > 0) return planned_step_.value();
@@ -117,12 +117,12 @@ double Meter::allowance(Way way) const noexcept
     return known ? share : std::max(share, 0.0) + first_excess * piece;
 }
 
-/// Once it is known the cost of a useless piece of trial, the budget must cover it.
+/// Whether a trial is allowed: once the cost of a useless piece is known, the budget must cover it.
 bool Meter::may_try(Way way) const noexcept
 {
     const Account& account = of(way);
     if (way == check && account.pieces == 0) {
-        // The first pieces, before anything is in a cache, say little.
+        // The first pieces, before anything is in a cache, are not representative.
         const double least = planned_guards_ * guard_.value() + step_cost(way);
         return of(best_).pieces >= fewest && least < of(best_).mean();
     }
@@ -143,7 +143,7 @@ void Meter::consider(const Statistics& counts)
                        .asked = now.asked - then_.asked};
     next_check_ = counts.guard_calls + asked_ + 4;
     if (counts.steps < next_steps_) {
-        // A trial that has become too expensive ends here.
+        // A trial that has become too expensive ends early.
         const double excess = cost_of(piece) - of(best_).mean() * std::max(piece.steps, 0.0);
         if (excess <= allowance(way_) && asked_ < most_asked_) return;
     }
@@ -154,7 +154,7 @@ void Meter::consider(const Statistics& counts)
     next_steps_ = counts.steps + options_.piece;
 }
 
-/// Remaining time of a piece, per step.
+/// Adds the time of a piece per step, without its guard calls and inferences.
 void Meter::sample_step(const Counts& piece)
 {
     const double now = seconds();
@@ -171,7 +171,7 @@ void Meter::close_piece(const Counts& piece, double cost)
     if (way_ != best_) {
         spent_ = std::max(spent_ + cost - of(best_).mean() * std::max(piece.steps, 0.0), 0.0);
     }
-    // A trial that brought the run no further still has its cost.
+    // A trial that did not advance the run still has its cost.
     of(way_).add(std::max(piece.steps, 1.0), cost);
 }
 
@@ -182,7 +182,7 @@ double Meter::noise_between(Way a, Way b) const noexcept
     return (1 + unsure / pieces) * std::hypot(of(a).error(), of(b).error());
 }
 
-/// The cheapest way that is well enough known. To ask has to be better beyond doubt.
+/// The cheapest alternative with enough pieces. Asking has to be better beyond doubt.
 Meter::Way Meter::find_best() const noexcept
 {
     Way best = best_;
@@ -196,7 +196,7 @@ Meter::Way Meter::find_best() const noexcept
     return best;
 }
 
-/// The best way, or another one if it is its turn.
+/// The best alternative, or another one if its turn has come.
 Meter::Way Meter::next_way() noexcept
 {
     Way next = best_;

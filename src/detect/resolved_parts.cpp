@@ -52,18 +52,18 @@ void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const Guar
     if (look.stays_clear(deviation) || look.keeps_shape(deviation)) return;
     if (look.size() + deviation <= declared_touch_) return;
     if (width <= smallest) {
-        // A kink keeps its shape however short the part.
+        // A kink keeps its shape on any part, however short.
         unresolved_ = unresolved_ || !(deviation <= 0x1p-24 * look.size());
         return;
     }
-    // Rounding has none; that of a guard that decays is less here than where it was asked for.
+    // Rounding does not scale; if the guard decays, it is smaller here than where it was asked for.
     if (depth >= shallow && !(noise_ >= 0)) noise_ = path.blur(end.s);
     if (deviation <= noise_) noise_ = path.blur(end.s);
     if (deviation <= noise_) return;
     const GuardSample middle = path.dense_value_and_rate(start.s + cut * width);
     divided_ = true;
     divide(path, start, middle, smallest, depth + 1);
-    // A node that cannot be told from the surface is no end of a part.
+    // A node that cannot be distinguished from the surface is not used as the end of a part.
     constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
     const double touch = std::max(declared_touch_, ulps * look.size());
     if (std::fabs(middle.value) > std::max(noise_, touch)) keep(middle);

@@ -8,7 +8,7 @@ namespace ricochet::detail {
 namespace {
 
 constexpr int most_degree = 20;
-/// A part of 2^-10 of a step is a parabola to the last bit: it is not halved.
+/// A part of 2^-10 of a step is a parabola to the last bit: it is not halved further.
 constexpr double smallest_part = 0x1p-10;
 using Coefficients = std::array<double, most_degree + 1>;
 
@@ -25,7 +25,7 @@ inline constexpr auto inverse_binomials = [] {
     return out;
 }();
 
-/// The degree of the series of guard i without zeros at its end; at least 1.
+/// The degree of the series of guard i without trailing zeros; at least 1.
 [[nodiscard]] int degree_of(const SeriesTerms& terms, std::size_t i) noexcept
 {
     int degree = terms.order;
@@ -43,16 +43,16 @@ public:
     {
     }
 
-    /// Takes the difference from the values at both ends for an error.
+    /// Takes the difference from the values at both ends as an error estimate.
     void blur(const Coefficients& c, double start, double end) noexcept
     {
         error_ += 2 * std::max(std::fabs(c[0] - start), std::fabs(c[at(degree_)] - end));
     }
 
-    /// The sum of the sizes of all terms.
+    /// The sum of the absolute values of all terms.
     [[nodiscard]] double size() const noexcept { return size_; }
 
-    /// The coefficients in Bernstein form on [0, 1]; terms beyond the degree are errors.
+    /// The coefficients in Bernstein form on [0, 1]; terms beyond the degree are counted as errors.
     void convert(const SeriesTerms& terms, std::size_t i, double sign, Coefficients& c) noexcept
     {
         const Coefficients& inverse = inverse_binomials[at(degree_)];
@@ -73,7 +73,7 @@ public:
         for (int r = 1; r <= degree_; ++r) {
             for (int j = degree_; j >= r; --j) c[at(j)] += c[at(j - 1)];
         }
-        // Each coefficient is a sum of `degree` terms that are together no larger than the size,
+        // Each coefficient is a sum of `degree` terms with sizes that add up to at most the size,
         // with powers of as many roundings.
         size_ = size;
         error_ = tail + 4 * last_terms(terms, i, h_) +
@@ -94,8 +94,8 @@ public:
         }
     }
 
-    /// @param a, b  where the coefficients belong to, as offsets [s]
-    /// @param root  there is one at a, which does not count
+    /// @param a, b  the interval of the coefficients, as offsets [s]
+    /// @param root  whether there is a root at a, which does not count
     [[nodiscard]] SeriesStretch first(const Coefficients& c, double a, double b, bool root) noexcept
     {
         using Kind = SeriesStretch::Kind;
@@ -110,7 +110,7 @@ public:
             changes += (c[at(j)] < 0) != (before < 0);
             before = c[at(j)];
         }
-        // With a root at a, the others are coefficients of p(u) / u but for positive factors.
+        // With a root at a, the others are, up to positive factors, coefficients of p(u) / u.
         const bool ends_above = c[at(degree_)] - error_ > touch_;
         if (root ? least - error_ > 0 && ends_above : least - error_ > touch_) {
             return {Kind::clear, a, b};
@@ -149,7 +149,7 @@ bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign,
     using Kind = SeriesStretch::Kind;
     Coefficients c;
     const int degree = degree_of(terms, i);
-    // A root at the start is one of all terms, not of the first.
+    // A root at the start is a root of the sum of all terms, not of the first.
     constexpr int some = 8;
     if (degree > some && !from_surface) {
         SeriesSearch search(some, h, touch);

@@ -30,8 +30,8 @@ struct Bilinear {
     return std::max({-shares.first, shares.first - 1, -shares.second, shares.second - 1});
 }
 
-/// The zero of p and q by the quadratic that is left when the second unknown is
-/// eliminated. False: none.
+/// The common zero of p and q, from the quadratic that remains when the second unknown is
+/// eliminated. False: there is none.
 [[nodiscard]] bool eliminated_zero(const Bilinear& p, const Bilinear& q,
                                    SlidingShares& best) noexcept
 {
@@ -83,7 +83,7 @@ struct Linearised {
     }
 };
 
-/// A Newton step; of least norm where the equations are dependent. Returns its size.
+/// Takes a Newton step; of least norm if the equations are dependent. Returns its size.
 double improve(const RegionRates& rates, Shares& shares) noexcept
 {
     const Linearised at(rates, shares);
@@ -141,8 +141,8 @@ using Point = std::array<double, 2>;  ///< both shares
     return result;
 }
 
-/// Where the moving share comes to on the edge on which the other is held: the balance
-/// ahead of it, or the corner.
+/// End of the motion of the moving share on the edge on which the other is held: the next
+/// equilibrium, or the corner.
 [[nodiscard]] double end_of_edge(const RegionRates& r, Point at, std::size_t moving,
                                  double rate) noexcept
 {
@@ -156,8 +156,8 @@ using Point = std::array<double, 2>;  ///< both shares
     return std::clamp(balance, 1e-12, 1 - 1e-12);
 }
 
-/// Moves along an edge: true if the motion departs on it or at its end, else `at` is
-/// where it comes off the edge.
+/// Moves along an edge: true if the motion departs on it or at its end, else `at` is the place
+/// where it leaves the edge.
 [[nodiscard]] bool departs_on_edge(const RegionRates& r, Point& at, std::size_t held,
                                    Continuation& result) noexcept
 {
@@ -170,7 +170,7 @@ using Point = std::array<double, 2>;  ///< both shares
         result = departure(end, at_end);
         return true;
     }
-    // The rate of the held share changes its sign on the way: a little beyond.
+    // The rate of the held share changes its sign on the edge: a little beyond that place.
     const double turn = rate[held] / (rate[held] - at_end[held]);
     at[moving] += (turn + 1e-3 * (1 - turn)) * (end[moving] - at[moving]);
     return false;
@@ -182,7 +182,7 @@ using Point = std::array<double, 2>;  ///< both shares
     return linear.by_first[0] + linear.by_second[1] <= 0 && linear.determinant() >= 0;
 }
 
-/// A step of the midpoint rule, kept in the square.
+/// A step of the midpoint rule, restricted to the square.
 [[nodiscard]] Point advanced(const RegionRates& r, const Point& at, const Point& rate) noexcept
 {
     constexpr double step = 1.0 / 16;  // rates are at most 1, their derivatives 2
@@ -268,7 +268,7 @@ Continuation follow_shares(const RegionRates& normalised, Shares from) noexcept
 Elimination::Elimination(const std::array<std::array<double, 2>, 2>& normal,
                          const std::array<double, 2>& residue) noexcept
 {
-    // Twins are compared before mixed ones, so that surfaces may change their numbers.
+    // Pairs of the same kind are compared before mixed ones, so that surfaces may be renumbered.
     std::size_t k = 0;
     std::size_t m = 0;
     for (const auto& [surface, direction] :

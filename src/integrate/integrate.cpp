@@ -10,7 +10,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// "guard 0 (floor)", or without the name where it has none.
+/// "guard 0 (floor)", or "guard 0" if the guard has no name.
 std::string guard_called(std::size_t which, std::string_view name)
 {
     return name.empty() ? fmt::format("guard {}", which)

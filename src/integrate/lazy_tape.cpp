@@ -14,7 +14,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// What tells an operation from others: two with one key have one result.
+/// Key of an operation: two operations with the same key have the same result.
 using Key = std::tuple<TaylorOp, int, int, int, std::uint64_t, std::uint64_t>;
 
 Key key_of(const TapeOp& op, double constant)
@@ -64,8 +64,8 @@ LazyTape::LazyTape(std::size_t states, const Recording& as_called, std::vector<i
     inverses_.assign(tape_.ops_count, 0);
 }
 
-/// The operand that an operation only repeats, or -1. One that is always zero becomes a constant;
-/// derivatives by dual numbers are full of both.
+/// The operand that an operation merely repeats, or -1. An operation that is always zero becomes a
+/// constant; derivatives by dual numbers contain many of both.
 int LazyTape::repeated(TapeOp& op, double& constant) const
 {
     const auto is_zero = [&](int i) {
@@ -241,7 +241,7 @@ void LazyTape::find_slopes()
 [[gnu::always_inline]] inline void LazyTape::compute_at(std::size_t i, int k)
 {
     double* const own = series(static_cast<int>(i));
-    // Coefficients beyond a degree are zeros, and stay so.
+    // Coefficients that are zero beyond a degree stay zero.
     if (i > tape_.states && k <= tape_.degree[i]) own[k] = coefficient(i, k);
     if (has_slope_[i]) slopes_[i * width + static_cast<std::size_t>(k)] = k * own[k];
 }
@@ -288,7 +288,7 @@ void LazyTape::keep_guards(int k, double* guards) const
     }
 }
 
-/// Coefficient 0, and what later ones are multiplied by.
+/// Coefficient 0, and the factors of the later ones.
 double LazyTape::begin(std::size_t i)
 {
     const TapeOp& op = tape_.ops[i];
@@ -331,7 +331,7 @@ double LazyTape::begin(std::size_t i)
     return 0;
 }
 
-/// Of functions g(a) with g' = f(a) a'.
+/// Coefficients of functions g(a) with g' = f(a) a'.
 double LazyTape::coefficient_of_function(std::size_t i, int k) const
 {
     const TapeOp& op = tape_.ops[i];
@@ -346,7 +346,7 @@ double LazyTape::coefficient_of_function(std::size_t i, int k) const
     }
 }
 
-/// Of functions g(a) with f(a) g' = a'.
+/// Coefficients of functions g(a) with f(a) g' = a'.
 double LazyTape::coefficient_of_inverse(std::size_t i, int k) const
 {
     const TapeOp& op = tape_.ops[i];

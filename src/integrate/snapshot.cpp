@@ -28,7 +28,7 @@ std::string checksum(std::string_view text)
     return fmt::format("{}{:016x}\n", last_line, hash);
 }
 
-/// Takes the text up to the next line break off the front, and the break.
+/// Takes the text up to the next line break, and the break, off the front.
 std::string_view next_line(std::string_view& text)
 {
     const auto stop = text.find('\n');
@@ -50,7 +50,7 @@ T parse(std::string_view word, auto... format)
     return value;
 }
 
-/// Takes the word up to the next space off the front, and the space.
+/// Takes the word up to the next space, and the space, off the front.
 std::string_view next_word(std::string_view& line)
 {
     const auto stop = std::min(line.find(' '), line.size());
@@ -148,7 +148,7 @@ std::string plain_type_name(std::string_view written)
     if (start != std::string_view::npos && stop != std::string_view::npos) {
         written = written.substr(start + before.size(), stop - start - before.size());
     }
-    // What stands before a :: goes, back to where this name began.
+    // The qualification before a :: is dropped, back to the start of this name.
     std::string out;
     std::vector<std::size_t> begins{0};
     int parentheses = 0;

@@ -1,7 +1,7 @@
 // Roots of any order by values alone, where Newton's method converges linearly.
 //
-// Near a root of order m a guard behaves as sign(u) |u|^m, and its signed power 1/m as u:
-// a secant of those powers meets the root as it meets that of a straight line. Which power
+// Near a root of order m a guard behaves as sign(u) |u|^m, and its signed power 1/m as u: the
+// secant of the powers finds the root as it would for a straight line. The power that
 // straightens three samples is found by trial. The reciprocal straightens a pole, which is
 // a sign change as well.
 #pragma once
@@ -16,10 +16,10 @@
 
 namespace ricochet::detail {
 
-/// A place in a bracket, and the power of the guard that puts it there.
+/// An offset in a bracket, and the power of the guard whose secant predicts it.
 struct PowerRoot {
     double s = 0;
-    double power = 0;  ///< 0: the samples say nothing
+    double power = 0;  ///< 0: the samples fit no power
 };
 
 /// Root of the line through two of three samples, in the signed power of their values that
@@ -31,12 +31,12 @@ struct PowerRoot {
     const auto [a, b, c] = samples;
     if (!(a.s < b.s && b.s < c.s)) return {};
     for (const GuardSample& sample : samples) {
-        // A start on the surface has no value, but the least there is.
+        // A start that is counted as on the surface has the smallest value instead of its own.
         const double size = std::fabs(sample.value);
         if (!(size > std::numeric_limits<double>::min() && std::isfinite(size))) return {};
     }
     PowerRoot best;
-    double straightest = 0.1;  // of the larger distance, else no power fits
+    double straightest = 0.1;  // of the larger distance; above that no power fits
     for (const double power :
          {1.0, 1.0 / 3, 1.0 / 5, 0.5, 1.0 / 7, 1.0 / 9, 0.25, 2.0, 3.0, -1.0}) {
         const auto straight = [power](double g) {
@@ -58,9 +58,9 @@ struct PowerRoot {
     return best;
 }
 
-/// Narrows the bracket by values alone, to `tolerance` or neighbouring doubles; to
-/// `handed_back` already if the guard turns out to be a straight line there. Interpolation
-/// that does not shrink the bracket is given up for bisection.
+/// Narrows the bracket by values alone, to `tolerance` or neighbouring doubles; only to
+/// `handed_back` if the guard turns out to be a straight line there. Interpolation
+/// that does not shrink the bracket is replaced by bisection.
 inline void narrow_by_values(GuardPath& path, GuardSample& lo, GuardSample& hi, GuardSample recent,
                              double tolerance, double handed_back, double& size)
 {
@@ -76,10 +76,10 @@ inline void narrow_by_values(GuardPath& path, GuardSample& lo, GuardSample& hi, 
         const PowerRoot guess = patience > 0 ? power_root({lo, recent, hi}) : PowerRoot{};
         if (guess.power == 1 && width <= handed_back) return;
         double s = lo.s + width / 2;
-        if (hi.value == 0 && zeros < 2) {  // met exactly: is it the only zero?
+        if (hi.value == 0 && zeros < 2) {  // an exact zero: is it the only one?
             s = hi.s - (++zeros == 1 ? 1 : 64) * finest;
         } else if (guess.power != 0) {
-            // Converged from one side: reach for the other.
+            // Converged from one side: sample the other side.
             const double toward = last >= hi.s ? -1 : 1;
             past = std::fabs(guess.s - last) > 2 * finest ? 0 : past > 0 ? 4 * past : finest;
             const double place = guess.s + toward * past;

@@ -9,11 +9,11 @@
 
 namespace ricochet::detail {
 
-/// A change of the guard across the narrowest bracket that is more than this part of the
-/// guard's size in the step is no crossing of zero.
+/// A change of the guard across the narrowest bracket by more than this fraction of the
+/// guard's size in the step is not a crossing of zero.
 inline constexpr double jump_part = 1e-3;
 
-/// The larger of a size and |g|, as far as that is finite.
+/// The larger of a size and |g|; the size if g is not finite.
 [[nodiscard]] inline double larger(double size, double g) noexcept
 {
     return std::fabs(g) > size && std::isfinite(g) ? std::fabs(g) : size;
@@ -27,17 +27,17 @@ inline constexpr double jump_part = 1e-3;
     return !(change <= jump_part * size) && change > 2 * std::numeric_limits<double>::min();
 }
 
-/// Whether the guard jumps in the bracket or has a pole there, rather than a zero: it is
-/// narrowed, as long as the guard differs too much at its ends, until the middle shows a
-/// straight line or there is none. `size`: |g| in the step. What rounding of the time and
-/// the state may change is no jump.
+/// Whether the guard jumps in the bracket or has a pole there, rather than a zero: while the
+/// guard differs too much at its ends, the bracket is narrowed, until the middle lies on a
+/// straight line or there is none. `size`: |g| in the step. A change that rounding of the time
+/// and the state may cause is not a jump.
 [[nodiscard, gnu::noinline]] inline bool jumps(GuardPath& path, GuardSample lo, GuardSample hi,
                                                double size)
 {
     while (may_jump(lo, hi, size)) {
         const double middle = lo.s + (hi.s - lo.s) / 2;
         if (hi.s - lo.s <= path.finest(hi.s) || middle <= lo.s || middle >= hi.s) {
-            // By one way of following the motion: two differ by the error of the step.
+            // All from one evaluation of the motion: two differ by the error of the step.
             lo = path.value(lo.s);
             hi = path.value(hi.s);
             const double change = std::fabs(hi.value - lo.value);
@@ -54,8 +54,8 @@ inline constexpr double jump_part = 1e-3;
     return false;
 }
 
-/// Where the guard jumps. On a pole itself it is not finite, and no state to continue from: the
-/// bracket then reaches a few doubles beyond it, at most to `end`.
+/// Location of a jump. At a pole itself the guard is not finite, and there is no state to continue
+/// from: the bracket then reaches a few doubles beyond it, at most to `end`.
 [[nodiscard, gnu::noinline]] inline Location jump_at(GuardPath& path, const GuardSample& lo,
                                                      GuardSample hi, double end)
 {

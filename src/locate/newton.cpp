@@ -39,18 +39,18 @@ double hermite_root(double v0, double r0, double v1, double r1, double sign) noe
 
 namespace {
 
-/// Of a bracket, along which the flow may be followed: its square is 9e-16.
+/// Largest fraction of a bracket over which the flow may be extrapolated: its square is 9e-16.
 constexpr double straight_part = 3e-8;
-/// Corrections in sequence that are not by half shorter than the one before.
+/// Number of consecutive corrections that may fail to halve the one before.
 constexpr int most_linear = 4;
 
-/// A guard that jumps has no slope there, and its root is the place beyond.
+/// A guard that jumps has no slope there, and its root is the offset just beyond the jump.
 [[gnu::noinline]] void mark_jump(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
                                  double size, double end, Location& where)
 {
     const double slope = (hi.value - lo.value) / (hi.s - lo.s);
     for (const double rate : {lo.rate, hi.rate}) {
-        if (slope / rate > 0 && slope / rate <= 16) return;  // as steep as it says
+        if (slope / rate > 0 && slope / rate <= 16) return;  // as steep as its rate
     }
     if (!detail::jumps(path, lo, hi, size)) return;
     where = detail::jump_at(path, lo, hi, end);
@@ -71,8 +71,8 @@ constexpr int most_linear = 4;
     return where;
 }
 
-/// A root that the noise of the guard hides for as long as `noise` [s]. Along the flow the
-/// guard has left its side at `hi`; that the state there has, too, is seen to.
+/// A root that the noise of the guard hides for as long as `noise` [s]. Extrapolated along the
+/// flow the guard has left its side at `hi`; `hi` is moved until it has at the state there, too.
 [[nodiscard]] Location hidden(GuardPath& path, const GuardSample& lo, GuardSample hi, double end,
                               double rate, double noise)
 {
@@ -85,7 +85,7 @@ constexpr int most_linear = 4;
         .lo = lo.s, .hi = hi.s, .root = hi.s, .slope = rate, .error = std::max(noise, hi.s - lo.s)};
 }
 
-/// |g| in the bracket, as far as its ends and their rates tell.
+/// Estimate of |g| in the bracket from its ends and their rates.
 [[nodiscard]] double size_of(const GuardSample& lo, const GuardSample& hi) noexcept
 {
     const double width = hi.s - lo.s;
@@ -96,7 +96,7 @@ constexpr int most_linear = 4;
     return size;
 }
 
-/// Change of the rate from one sample to another, per second.
+/// Change of the rate from one sample to the other, per second.
 [[nodiscard]] double bend(const GuardSample& a, const GuardSample& b) noexcept
 {
     return std::fabs((b.rate - a.rate) / (b.s - a.s));
@@ -112,8 +112,8 @@ constexpr int most_linear = 4;
     return lo.s + u * width;
 }
 
-/// Halves a bracket that had to be widened far from where the slope at `sample`, which a
-/// kink may have spoilt, predicted the root.
+/// Halves a bracket that had to be widened far from the root predicted by the slope at `sample`,
+/// which a kink may have spoilt.
 void halve_along(GuardPath& path, const GuardSample& sample, double tolerance, GuardSample& lo,
                  GuardSample& hi)
 {
@@ -128,7 +128,7 @@ void halve_along(GuardPath& path, const GuardSample& sample, double tolerance, G
 
 /// Brackets the root predicted from `sample` as narrowly as rounding in the
 /// guard allows: from the predicted root outwards until the side changes. False
-/// if it does not change within the bracket: the prediction was wrong, or the guard is
+/// if it does not change within the bracket: either the prediction was wrong, or the guard is
 /// noise, which hides its root for as long as `noise` [s].
 [[nodiscard]] bool close_in(GuardPath& path, const GuardSample& sample, double correction,
                             double tolerance, const detail::NoiseScale& scale, GuardSample& lo,
@@ -193,7 +193,7 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double 
         const double width = hi.s - lo.s;
         const double finest = path.finest(hi.s);
         if (width <= std::max(tolerance, finest)) break;
-        // A root at an end is searched for beside it.
+        // A root at one end may be followed by another one beside it.
         const double beside = std::max(finest, reach / 4);
         if (s >= hi.s && slow == 0) s = hi.s - beside;
         if (s <= lo.s && slow == 0) s = lo.s + beside;
@@ -207,7 +207,7 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double 
         (beyond ? hi : lo) = sample;
         const double correction = -sample.value / sample.rate;
         const double distance = std::fabs(correction);
-        // What a straight line neglects over that distance, as a shift in time.
+        // The curvature that a straight line neglects over that distance, as a shift in time.
         const bool straight = distance <= std::min(width, std::max(reach, finest)) &&
                               distance * distance * curvature <=
                                   std::fabs(sample.rate) * std::max(finest, tolerance) / 2;
@@ -229,7 +229,7 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double 
             if (noise > 0) return hidden(path, lo, hi, end, sample.rate, noise);
         }
         last_value = sample.value;
-        // Not by half nearer, again and again: a root of higher order, a pole, or none.
+        // Repeatedly not halved: a root of higher order, a pole, or no root.
         linear = distance > 0.4 * last_distance && distance > 8 * finest ? linear + 1 : 0;
         last_distance = distance;
         if (linear == most_linear || !std::isfinite(correction)) {
@@ -241,10 +241,10 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double 
             slow = 0;
             continue;
         }
-        // Converged from one side: reach for the other.
+        // Converged from one side: sample the other side.
         past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
         s += correction + (beyond ? -past : past);
-        // Three samples that do not halve the bracket: bisect.
+        // Three samples have not halved the bracket: bisect.
         slow = hi.s - lo.s > width / 2 ? slow + 1 : 0;
         if (slow == 3) {
             s = lo.s + (hi.s - lo.s) / 2;

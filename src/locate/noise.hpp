@@ -1,10 +1,10 @@
-// Noise in a guard: values that no smooth function has, such as those of float arithmetic.
+// Noise in a guard: scatter that no smooth function has, such as that of float arithmetic.
 //
-// A bracket cannot be narrowed below the noise, only moved about in it. That there is noise
-// must be beyond doubt, since close roots of a smooth guard change its sign as often: third
-// differences decide. Over a distance d those of a polynomial of degree n that is at most G in
+// A bracket cannot be narrowed below the noise, only moved about in it. The presence of noise
+// must be beyond doubt, since close roots of a smooth guard change its sign as often; the test is
+// by third differences. Over a distance d those of a polynomial of degree n that is at most G in
 // a step of length h are below T_n'''(1) G (2 d / h)^3 (V. Markov), which is 4e6 G (d / h)^3
-// for n = 14; a kink spoils the three that straddle it, and no more.
+// for n = 14; a kink spoils only the three that straddle it.
 #pragma once
 
 #include <algorithm>
@@ -20,13 +20,13 @@ struct NoiseScale {
     double size = 0;
     double h = 0;
 
-    /// Noise larger than this part of the guard is not expected from any arithmetic.
+    /// No arithmetic is expected to make noise larger than this fraction of the guard.
     static constexpr double coarsest = 1e-5;
-    /// Noise smaller than this part is rounding of doubles, which close in by themselves.
+    /// Noise below this fraction is the rounding of doubles, and needs no treatment of its own.
     static constexpr double finest = 1e-10;
 
-    /// Whether doubles must show such a change of the guard, though its terms be a hundred
-    /// times larger than itself.
+    /// Whether a guard in doubles resolves such a change, even if its terms are a hundred
+    /// times larger than the guard itself.
     [[nodiscard]] bool resolves(double change) const noexcept
     {
         return std::fabs(change) > 0x1p-46 * size;
@@ -39,8 +39,8 @@ struct NoiseScale {
     }
 };
 
-/// By how much the guard changes from `at` to the nearest place where it is another: that of
-/// a staircase, if there is one.
+/// Change of the guard from `at` to the nearest offset with another value: the height of
+/// the steps if the guard is a staircase.
 [[nodiscard]] inline double tread_height(GuardPath& path, const GuardSample& sample,
                                          const GuardSample& at, const NoiseScale& scale)
 {
@@ -51,7 +51,7 @@ struct NoiseScale {
     return change;
 }
 
-/// How far b is off the parabola through the other three.
+/// Distance of b from the parabola through the other three.
 [[nodiscard]] inline double off_parabola(const GuardSample& a, const GuardSample& b,
                                          const GuardSample& c, const GuardSample& d) noexcept
 {
@@ -64,8 +64,8 @@ struct NoiseScale {
                      (b.s - d.s));
 }
 
-/// Goes on from a sample in noise, by some times `distance`, to the other side of the surface,
-/// and closes the bracket around the change of side; false if it is not near.
+/// Steps from a sample in noise, in multiples of `distance`, to the other side of the surface,
+/// and closes the bracket around the change of side; false if there is none nearby.
 [[nodiscard]] inline bool reach_across(GuardPath& path, const GuardSample& sample, GuardSample from,
                                        double distance, GuardSample& lo, GuardSample& hi)
 {
@@ -83,14 +83,14 @@ struct NoiseScale {
 
 /// If the guard near `place` is noise of about `residue`: narrows the bracket to a change of
 /// side there, and returns the time [s] over which the noise hides the root; else 0. `sample`
-/// is the last that `value_and_rate` took, the motion straight from there.
+/// is the last that `value_and_rate` took, and the motion is taken as straight from there.
 [[nodiscard, gnu::noinline]] inline double close_in_noise(GuardPath& path,
                                                           const GuardSample& sample, double place,
                                                           double residue, const NoiseScale& scale,
                                                           GuardSample& lo, GuardSample& hi)
 {
     constexpr int places = 8;
-    // Unevenly, so that the steps of a staircase do not look like a line.
+    // Unevenly spaced, so that the steps of a staircase do not look like a line.
     constexpr std::array<double, places> offsets{-5, -3.9, -2.3, -0.8, 0.4, 2.1, 3.3, 4.9};
     const double distance = std::fabs(residue / sample.rate);
     const double first = place + offsets.front() * distance;

@@ -28,7 +28,7 @@ Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double
         return sample.value;
     };
     const auto halve = [&] { (void)sample_at(lo.s + (hi.s - lo.s) / 2); };
-    // A step that begins on the surface, or a rounding behind it, has no sign there.
+    // A step that begins on the surface, or behind it by rounding, has no sign there.
     while (path.has_left(lo) && !narrow_enough(lo.s, hi.s)) halve();
     if (lo.value * hi.value < 0 && std::isfinite(lo.value * hi.value) &&
         !narrow_enough(lo.s, hi.s)) {
@@ -36,7 +36,7 @@ Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double
         boost::math::tools::toms748_solve(sample_at, lo.s, hi.s, lo.value, hi.value, narrow_enough,
                                           iterations);
     }
-    // An exact zero ends the search from one side: close the other.
+    // An exact zero ends the search from one side: close the bracket from the other.
     if (!narrow_enough(lo.s, hi.s)) (void)sample_at(hi.s - path.finest(hi.s));
     while (!narrow_enough(lo.s, hi.s)) halve();
     if (detail::jumps(path, lo, hi, size)) return detail::jump_at(path, lo, hi, end);

@@ -13,7 +13,7 @@ namespace ricochet {
 
 namespace {
 
-/// One contact with one tangent: at rest, stick or slip. Unique where friction |W_nt| < W_nn.
+/// One contact with one tangent: rest, stick or slip. Unique if friction |W_nt| < W_nn.
 bool close_in_plane(const Eigen::Matrix3d& w, const Eigen::Vector3d& q, double friction,
                     Eigen::Vector3d& p)
 {
@@ -31,7 +31,7 @@ bool close_in_plane(const Eigen::Matrix3d& w, const Eigen::Vector3d& q, double f
     return false;
 }
 
-/// The impulse of one contact where its solution is unique and written in closed form.
+/// The impulse of one contact if its solution is unique and known in closed form.
 bool close_form(const Eigen::Matrix3d& w, const Eigen::Vector3d& q, double friction, int tangents,
                 Eigen::Vector3d& p)
 {
@@ -141,7 +141,7 @@ void ContactSolver::jacobian(const Eigen::VectorXd& p)
             v_.middleRows(t, tangents) = w_.middleRows(t, tangents);
             continue;
         }
-        // p_t - bound z / |z|, and with two tangents its turning z.
+        // p_t - bound z / |z|, and with two tangents the derivative of the direction of z.
         const double e0 = z0 / length;
         const double e1 = z1 / length;
         for (int k = 0; k < tangents; ++k) {
@@ -161,7 +161,7 @@ void ContactSolver::jacobian(const Eigen::VectorXd& p)
     }
 }
 
-/// Once more with the last factors: what their regularisation left goes to rounding.
+/// Solves once more with the last factors, which reduces the error of regularisation to rounding.
 void ContactSolver::polish()
 {
     direction_ = -lu_.solve(f_);
@@ -170,7 +170,7 @@ void ContactSolver::polish()
     if (f_trial_.lpNorm<Eigen::Infinity>() < f_.lpNorm<Eigen::Infinity>()) trial_.swap(best_);
 }
 
-/// From p_; true and p_ the solution, or false and p_ as it was, unless improved.
+/// Newton's method from p_. True: p_ is the solution; false: p_ is as before, or better.
 bool ContactSolver::newton(ContactReport& report)
 {
     trial_ = p_;
@@ -185,7 +185,7 @@ bool ContactSolver::newton(ContactReport& report)
         if (iteration == options_.max_iterations || !std::isfinite(report.residual)) return false;
         ++report.iterations;
         jacobian(trial_);
-        // Redundant contacts make it singular: what is not determined is left as it is, nearly.
+        // Redundant contacts make it singular: undetermined impulses are left nearly as they are.
         v_.diagonal().array() += 1e-13;
         lu_.compute(v_);
         direction_ = -lu_.solve(f_);
@@ -203,8 +203,8 @@ bool ContactSolver::newton(ContactReport& report)
     }
 }
 
-/// One contact with the others' impulses as they are: the normal impulse that stops the
-/// approach, then the friction within its bound, and so on until both agree.
+/// Solves one contact with the others' impulses fixed: the normal impulse that stops the
+/// approach, then the friction within its bound, repeated until both agree.
 void ContactSolver::solve_contact(Eigen::Index c, double relaxation)
 {
     const Eigen::Index i = c * components_;
@@ -221,7 +221,7 @@ void ContactSolver::solve_contact(Eigen::Index c, double relaxation)
     if (free[0] >= 0) {
         p.setZero();
     } else {
-        // Sticking, if the cone holds what it takes.
+        // Sticking, if the impulse that it needs lies in the cone.
         Eigen::Vector3d holding = Eigen::Vector3d::Zero();
         holding.head(components_) =
             -w.topLeftCorner(components_, components_).ldlt().solve(free.head(components_));
@@ -295,12 +295,12 @@ ContactReport ContactSolver::solve(const Eigen::MatrixXd& w, const Eigen::Vector
 void ContactSolver::iterate(Eigen::VectorXd& p, ContactReport& report)
 {
     p_ = p.cwiseQuotient(units_);
-    // Without a velocity nothing has to act, and nothing is there to measure defects by.
+    // Without a velocity no impulse is needed, and there is no scale to measure defects by.
     if (!p_.allFinite() || q_.isZero(0)) p_.setZero();
     bool solved = newton(report);
-    // Sweeps, ever more of them between the attempts of Newton's method.
+    // Sweeps, with more of them each time between the attempts of Newton's method.
     for (int batch = 5; !solved && report.sweeps < options_.max_sweeps; batch = 2 * batch) {
-        // Where full sweeps run in circles, damped ones may not.
+        // Where full sweeps cycle, damped ones may converge.
         const double relaxation = batch > 100 ? 0.7 : 1;
         for (int k = 0; k < batch && report.sweeps < options_.max_sweeps; ++k, ++report.sweeps) {
             sweep(relaxation);
@@ -308,8 +308,8 @@ void ContactSolver::iterate(Eigen::VectorXd& p, ContactReport& report)
         solved = newton(report);
     }
     p = units_.cwiseProduct(p_);
-    // Newton's method leaves what its regularisation costs; one factor puts the normal velocity
-    // of a single contact right.
+    // Newton's method leaves the error of its regularisation; one factor corrects the normal
+    // velocity of a single contact.
     const double stop = friction_.size() == 1 && p_[0] > 0 ? w_.row(0).dot(p_) : 0;
     if (solved && stop > 0) p *= -q_[0] / stop;
 }

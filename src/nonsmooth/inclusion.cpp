@@ -16,7 +16,7 @@ void refuse_inclusion(std::string_view what, double given)
 
 namespace {
 
-/// Positive entries on the diagonal, of comparable size, and zeros elsewhere.
+/// Whether the diagonal is positive, of comparable size, and all else zero.
 bool is_plainly_diagonal(const Eigen::MatrixXd& a)
 {
     if (a.size() == 0 || !a.allFinite() || !a.isDiagonal(0)) return false;

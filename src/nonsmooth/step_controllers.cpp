@@ -53,7 +53,7 @@ StepVerdict PrintedPiStep::judge(double error, double h) noexcept
     const double factor =
         std::pow(now, -q / gamma1) * std::pow(before, q / gamma2) * std::pow(ratio, -kappa);
     if (!(factor >= c1)) {
-        // The power of a huge error is zero, and the step would be.
+        // The power of a huge error is zero, and so would be the step.
         return {false, std::min(std::max(factor, std::numeric_limits<double>::min()), 0.6)};
     }
     error_before = now;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t hidden = 8;
 
-/// Those of every system.
+/// Inputs that every system has.
 constexpr std::array<StepInput, 4> common{
     {{"log_error", -1, 3}, {"log_tolerance", -5, 3}, {"log_step", -1, 2}, {"switched", 0.5, 1}}};
 

@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// What follows a hidden layer, in registers.
+// Activation functions after a hidden layer, in registers.
 //
 // No function of the mathematical library is called: their bits differ between
 // libraries, and g++ would call them lane by lane.
@@ -26,7 +26,7 @@ struct Tanh {
     template <class T>
     RICOCHET_INLINE static Vector<T> of(Vector<T> x) noexcept
     {
-        // From `limit` on, 1 is as near as T can come.
+        // From `limit` on, 1 is the nearest number in T.
         constexpr T limit = sizeof(T) == 4 ? T(9) : T(20);
         const auto below = x < constant(-limit);
         const auto above = x > constant(limit);

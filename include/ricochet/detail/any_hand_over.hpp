@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// The loop of a hand-over for N components and M reactions, whatever the system.
+// The loop of a hand-over for N components and M reactions, for systems of any type.
 #pragma once
 
 #include <optional>
@@ -17,14 +17,14 @@
 
 namespace ricochet::detail {
 
-/// The options as they will be used.
+/// The options with defaults filled in.
 /// @throws std::invalid_argument naming the option.
 [[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
 
 void add(Statistics& sum, const Statistics& more) noexcept;
 void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
 
-/// Of an inclusion without branches: nothing.
+/// For an inclusion without branches: nothing.
 struct NoModes {
     template <class Inclusion>
     explicit NoModes(const Inclusion& /*inclusion*/)
@@ -33,7 +33,7 @@ struct NoModes {
 };
 struct NoneHeld {};
 
-/// `HandOver`, whatever the system.
+/// `HandOver` for systems of any type.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyHandOver {
     static constexpr bool can_branch = has_modes<N, M>;
@@ -114,7 +114,7 @@ private:
         try {
             simulation = stepping_.make(modes_, x, event_options());
         } catch (const std::invalid_argument&) {
-            return go_by_steps(PhaseCause::stuck);  // beside a surface by more than rounding
+            return go_by_steps(PhaseCause::stuck);  // next to a surface by more than rounding
         }
         ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
         FlutterWatch unresolved;
@@ -154,7 +154,7 @@ private:
         if (released && !set_valued_) end_with(Outcome::released);
     }
 
-    /// Where an event-driven step begins, and what had been recorded until then.
+    /// Start of an event-driven step, and the number of records until then.
     struct Place {
         double t = 0;
         Vector w;
@@ -184,14 +184,14 @@ private:
         if (held_.starts_beyond()) return false;
         if (fraction == 1) return true;
         const double shorter = fraction * (simulation.t() - before.t);
-        // Below that the motion has no smoothness that steps could follow.
+        // Below that length the motion has no smoothness that steps could follow.
         if (shorter <= 1e-9 * (options_.t_end - options_.t_start)) return true;
         longest_step_ = shorter;
         easy_steps_ = 0;
         return false;
     }
 
-    /// Of the y whose zero was an event; infinite where the event was another.
+    /// Speed |y'| of the y whose zero was an event; infinite if the event was another one.
     template <class X>
     [[nodiscard]] double speed_after(const Event<X>& event) const
     {
@@ -204,7 +204,7 @@ private:
         return std::abs(modes_.matrices().observe().row(i).dot(Modes::vector(rate)));
     }
 
-    /// What a step resolves of y.
+    /// Size of y that the tolerances of a step resolve.
     template <class X>
     [[nodiscard]] double resolution(const X& x) const
     {
@@ -227,7 +227,7 @@ private:
         return false;
     }
 
-    /// Whether so many steps in a row were shorter than need be that longer ones are tried.
+    /// Whether enough consecutive steps were shorter than necessary that longer ones are tried.
     [[nodiscard]] bool may_lengthen() noexcept requires can_branch
     {
         if (std::isinf(longest_step_)) return false;
@@ -241,7 +241,7 @@ private:
         return true;
     }
 
-    /// Goes on from `before` with steps of another length; what was recorded later is dropped.
+    /// Returns to `before` to take steps of another length; later records are dropped.
     template <class X>
     void go_back(Run<X>&& done, const Place& before)
     {
@@ -361,7 +361,7 @@ private:
     void go_by_steps(PhaseCause cause)
     {
         if (branching_) {
-            // A phase that is left at once is entered for a longer time the next time.
+            // A phase that is re-entered immediately is kept longer each time.
             const double lasted = run_.phases.empty() ? std::numeric_limits<double>::infinity()
                                                       : run_.state.t - run_.phases.back().from;
             const bool at_once = lasted < 10 * options_.set_valued.step;
@@ -448,7 +448,7 @@ private:
         return are_clear(branches, motion_.state().t, motion_.state().w);
     }
 
-    /// Whether every y of a reaction at a bound is farther from zero than errors reach.
+    /// Whether every y of a reaction at a bound is farther from zero than its error.
     template <class Branches>
     [[nodiscard]] bool are_clear(const Branches& branches, double t,
                                  const Vector& w) const requires can_branch
@@ -469,14 +469,14 @@ private:
         return !(branches.array() == Branch::inside).any() && are_clear(branches, t, w);
     }
 
-    /// Hands back to events, unless rates and reactions do not tell how the motion goes on.
+    /// Hands back to events, unless reactions and rates do not determine the motion.
     [[nodiscard]] bool release() requires can_branch
     {
         auto branches = motion_.branches();
         double t = motion_.state().t;
         Vector w = motion_.state().w;
         const Reaction y = modes_.observed(t, w);
-        // A y that has just been left is zero; which way it goes, its branch says.
+        // A y that has just left zero still has the value zero; its branch gives its sign.
         for (Eigen::Index i = 0; i < y.size(); ++i) {
             const bool wrong = branches[i] == Branch::lower ? y[i] < 0 : y[i] > 0;
             if (wrong) branches[i] = Branch::inside;

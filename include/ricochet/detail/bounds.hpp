@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// What the logit of a ReLU network can be over a box of features: proved bounds.
+// Proved bounds on the logit of a ReLU network over a box of features.
 //
 // *Method.* Forward, every neuron is an affine form in the box's own coordinates,
 // h = c + G t +- e with t in [-1, 1]^d (Singh et al., "Fast and effective robustness
@@ -45,7 +45,7 @@ public:
     /// evaluation over the domain could overflow.
     explicit NetworkBounds(const Model& model);
 
-    /// Memory of one thread.
+    /// Work space of one thread.
     class Scratch {
     public:
         explicit Scratch(const NetworkBounds& network);
@@ -69,8 +69,8 @@ public:
 
     /// A range that holds the computed logit of every raw feature vector with
     /// lower <= features <= upper, the box being within the domain. The backward pass is
-    /// left out where the forward one shows a logit of at least `enough`. A bound may be
-    /// -inf, inf or NaN where the arithmetic of the bound overflows; NaN is no bound.
+    /// left out if the forward one shows a logit of at least `enough`. A bound may be
+    /// -inf, inf or NaN if the arithmetic of the bound overflows; NaN is no bound.
     /// @param influence  one per input, written: how much the logit can change along this
     ///                   edge of the box, roughly. For choosing where to cut, no bound.
     [[nodiscard]] Interval over(const double* lower, const double* upper, double enough,

@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// What the modes of an inclusion are made of, beside its functions.
+// Constants of the modes of an inclusion.
 //
 // Digit i to base 3 of a mode is the branch of reaction i: 0 lower, 1 inside (held), 2 upper. With
 //
@@ -29,7 +29,7 @@ namespace ricochet::detail {
 template <int N, int M>
 inline constexpr bool has_modes = N != Eigen::Dynamic&& M != Eigen::Dynamic&& M <= most_cases;
 
-/// The matrices of the modes.
+/// The constant matrices of the modes.
 template <int N, int M>
 struct RICOCHET_ALIGNED BranchTerms {
     using Delassus = Eigen::Matrix<double, M, M>;

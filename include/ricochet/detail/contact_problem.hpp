@@ -25,8 +25,8 @@ struct ContactReport {
     bool converged = false;
     /// The largest defect over the contacts, of velocity or impulse, in units in which W has a
     /// unit diagonal in each contact, as a fraction of the largest component of q in these
-    /// units. Not of p: where there is no solution p grows without bound, and every defect
-    /// would be small beside it.
+    /// units. It is not relative to p: without a solution p grows without bound, and every defect
+    /// would be small compared with it.
     double residual = 0;
     int iterations = 0;  ///< of Newton's method, in all its attempts
     int sweeps = 0;      ///< over the contacts, one by one
@@ -42,7 +42,7 @@ struct ContactOptions {
 /// Solves contact problems of up to a number of components without allocating, once its
 /// memory has grown to their size.
 ///
-/// A single contact in closed form, where its solution is unique and needs no iteration. Else
+/// A single contact is solved in closed form, if its solution is unique and needs no iteration.
 /// first by a semismooth Newton method on the projections
 ///
 ///     p_n = max(0, p_n - rho u_n),   p_t = P(|.| <= friction p_n)(p_t - rho u_t)
@@ -50,16 +50,16 @@ struct ContactOptions {
 /// with a line search (P. Alart and A. Curnier, A mixed formulation for frictional contact
 /// problems prone to Newton like solution methods, Computer Methods in Applied Mechanics
 /// and Engineering 92, 1991); where that stalls by sweeps that solve one contact after
-/// another (nonsmooth Gauss-Seidel), from which Newton's method starts again every so
-/// often. The work is bounded; what is not solved then is reported as such.
+/// another (nonsmooth Gauss-Seidel), from which Newton's method starts again from time to
+/// time. The work is bounded; a problem that is not solved by then is reported as such.
 class ContactSolver {
 public:
     explicit ContactSolver(const ContactOptions& options = {});
 
     /// Improves `p`, the start of the iteration: the impulses of the step before, or zero.
     ///
-    /// @throws std::invalid_argument where the sizes do not fit, `components` is neither 2 nor
-    /// 3, a coefficient of friction is negative or infinite, or something is not finite.
+    /// @throws std::invalid_argument if the sizes do not fit, `components` is neither 2 nor
+    /// 3, a coefficient of friction is negative or infinite, or a number is not finite.
     ContactReport solve(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,
                         std::span<const double> friction, int components, Eigen::VectorXd& p);
 

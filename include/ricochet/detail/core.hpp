@@ -18,18 +18,18 @@
 
 namespace ricochet::detail {
 
-/// All that a run is made of besides its start and its options. What it points to must outlive it.
+/// All parts of a run except its start and its options. Objects that it points to must outlive it.
 template <class X>
 struct RunSetup {
     const SystemTable<X>* system = nullptr;
     void* door = nullptr;
     const StepKernel<X>* kernel = nullptr;
     QuietKernel<X> quiet = nullptr;  ///< with flow and guard inlined; may be null
-    bool quiet_on_series = false;    ///< it clears guards by their series
+    bool quiet_on_series = false;    ///< it clears guards by their power series
     bool error_controlled = true;
     bool method_by_name = false;
-    int order = 0;              ///< that the method was given, where it takes one
-    const char* stepping = "";  ///< its type, as the compiler writes it
+    int order = 0;              ///< order chosen for the method, if it has a choice
+    const char* stepping = "";  ///< type of the stepping, as the compiler writes it
     DetectorTable<X> detector;
     const void* detecting = nullptr;
     LocatorTable locator;
@@ -53,9 +53,9 @@ public:
     [[nodiscard]] virtual MeterReading meter() const = 0;
     virtual bool step() = 0;
     virtual bool advance() = 0;
-    /// Forgets what `advance` has not shown yet.
+    /// Skips everything that `advance` has not shown yet.
     virtual void show_all() noexcept = 0;
-    /// One step, which may be one of an interval that is closed later if it looks ahead.
+    /// Takes one step, which may belong to an interval that is closed later if it looks ahead.
     virtual void advance_once(bool look_ahead) = 0;
     /// The fastest way to the end, which `step` and `advance` do not take.
     virtual void run_to_end() = 0;
@@ -63,7 +63,7 @@ public:
     [[nodiscard]] virtual Run<X> finish() = 0;
     /// Result so far, with its time, state and counts up to date.
     virtual const Run<X>& bring_up_to_date() = 0;
-    /// Lets a run that was cancelled be continued.
+    /// Allows a run that was cancelled to continue.
     virtual void go_on() noexcept = 0;
     [[nodiscard]] virtual Snapshot save() = 0;
     virtual void restore(const Snapshot& snapshot) = 0;
@@ -74,7 +74,7 @@ template <class X>
 [[nodiscard]] std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
                                                     const Options& options);
 
-/// A whole run, on the stack.
+/// Computes a whole run, with the loop on the stack.
 template <class X>
 [[nodiscard]] Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options);
 

@@ -14,7 +14,7 @@ namespace ricochet::learn {
 /// Description of one feature.
 struct Column {
     std::string name;
-    std::string unit;  ///< "1" where it has none
+    std::string unit;  ///< "1" if it has none
 };
 
 /// n states of d features, each with the answer to "does the next step meet the
@@ -38,7 +38,7 @@ struct DataSet {
         return {features.data() + i * width(), width()};
     }
 
-    /// How many states are events.
+    /// Number of states that are events.
     [[nodiscard]] std::size_t events() const noexcept;
 
     /// @param row  d features

@@ -3,7 +3,7 @@
 // The degree of a guard as a polynomial in time and state together, from its text.
 //
 // A guard that takes any scalar is called with degrees in the place of numbers: 1 for the time and
-// every component, 0 for constants. What divides by a variable, bends or branches is no polynomial.
+// every component, 0 for constants. A guard that divides by a variable, bends or branches is none.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ public:
     /// A variable. @param branched  set where its value decides what is computed
     constexpr explicit Degree(bool& branched) noexcept : degree_(1), branched_(&branched) {}
 
-    /// 0 for what is a constant, or no polynomial.
+    /// The degree; 0 for constants and non-polynomials.
     [[nodiscard]] constexpr int value() const noexcept { return degree_ < none ? degree_ : 0; }
 
     template <class U>
@@ -194,7 +194,7 @@ private:
     Degree one_;
 };
 
-/// Whether the guard of such states tells its degree.
+/// Whether the guard can be evaluated with degrees for such states.
 template <class System, class X>
 concept DegreeKnown = GuardOfScalarArrays < System,
         fixed_size<X>()

@@ -1,7 +1,7 @@
 // Internal: what it declares may change without notice.
 //
 // Motion across and along switching surfaces: the fields that meet at a point, and the
-// combinations of them that slide. What `Filippov` is built from; no decisions here.
+// combinations of them that slide. The base of `Filippov`; it makes no decisions.
 #pragma once
 
 #include <algorithm>
@@ -21,9 +21,9 @@ namespace ricochet {
 
 /// Options of `Filippov`.
 struct FilippovOptions {
-    /// [1/s] Sliding follows h' = -restoring_rate h, which takes back what a curved
-    /// surface loses to the error of the steps; a plane loses nothing. It must be slow
-    /// against the motion, or it makes the motion stiff.
+    /// [1/s] Sliding follows h' = -restoring_rate h, which corrects the drift from a curved
+    /// surface by the error of the steps; there is none from a plane. It must be slow
+    /// compared with the motion, or it makes the motion stiff.
     double restoring_rate = 0;
 };
 
@@ -101,7 +101,7 @@ template <class Function, std::size_t count>
     return rates;
 }
 
-/// The motion in every mode, and what is known around a point.
+/// The motion in every mode, and the fields around a point.
 template <class Fields>
 class FilippovMotion {
 public:
@@ -219,7 +219,7 @@ public:
         return surface_rate(which, t, x, v[0]);
     }
 
-    // --- what meets at a point ---
+    // --- fields that meet at a point ---
 
     /// The fields that meet at a point of the surfaces in `on`.
     struct Around {

@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// Where fields meet at switching surfaces: what the rates of the surfaces decide.
+// Fields that meet at switching surfaces: the continuation that the rates of the surfaces decide.
 //
 // Region r of four has h_i > 0 for every bit i of r. At a point on some surfaces the
 // motion may depart into a region, or along one surface away from another, or stay on
@@ -20,7 +20,7 @@ enum class Place : std::uint8_t {
     sliding,  ///< held on h = 0 by the fields of both sides
 };
 
-/// Fate of a motion that is on a switching surface.
+/// Type of the meeting of two fields at a switching surface.
 enum class Meeting : std::uint8_t {
     crossing_up,    ///< both fields lead up
     crossing_down,  ///< both fields lead down
@@ -40,7 +40,7 @@ using Surfaces = unsigned;
 /// h_i]; zero for regions that do not meet at the point.
 using RegionRates = std::array<std::array<double, 4>, 2>;
 
-/// The region of a motion that slides nowhere.
+/// The region of a motion that does not slide on any surface.
 [[nodiscard]] constexpr unsigned region_of(const Places& places) noexcept
 {
     return (places[0] == Place::above ? 1u : 0u) | (places[1] == Place::above ? 2u : 0u);
@@ -49,7 +49,7 @@ using RegionRates = std::array<std::array<double, 4>, 2>;
 /// The rates of each surface in units of the largest of them.
 [[nodiscard]] RegionRates normalised(const RegionRates& rates) noexcept;
 
-/// How much of the fields above takes part in sliding on both surfaces.
+/// Shares of the fields above in sliding on both surfaces.
 struct Shares {
     double first = 0.5;
     double second = 0.5;
@@ -79,10 +79,10 @@ struct Shares {
     return (weights[0] * f0 + weights[3] * f3) + (weights[1] * f1 + weights[2] * f2);
 }
 
-/// The shares for which both surfaces keep still.
+/// The shares at which the rates of both surfaces vanish.
 struct SlidingShares {
     Shares shares;
-    /// Remainder until they cease to exist, because they meet with another such pair:
+    /// Margin until they cease to exist, because they merge with another such pair:
     /// the discriminant of the quadratic that they solve over the sum of its terms.
     double apart = 1;
 };

@@ -83,8 +83,8 @@ public:
         return system_->gap_rate(static_cast<int>(contact), position(x), velocity(x));
     }
 
-    /// The impact. Where its contact problem has no solution that the solver finds, the
-    /// velocity stays as it is, and the run ends for want of a way on.
+    /// Applies the impact. If the solver finds no solution of its contact problem, the
+    /// velocity stays as it is, and the run ends because it cannot continue.
     void reset(const FiredGuards& fired, double /*t*/, State& x) const
     {
         const Vector q = position(x);

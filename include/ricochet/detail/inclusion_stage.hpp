@@ -4,12 +4,12 @@
 //
 //     c A w = kappa f(t, w) + sigma G reaction + q,     law(E w - s(t), reaction)
 //
-// is what every implicit method asks for, in its stages. Its residual is a fraction of
-// the forces in play: the largest defect of the equation, and of the law
+// is solved in the stages of every implicit method. Its residual is a fraction of
+// the forces involved: the largest defect of the equation, and of the law
 //
 //     sigma G (reaction - P(reaction - rho y)),   rho_i = 1 / W_ii,  W = sigma E S^-1 G,
 //
-// over the largest term of the equation, with S = c A - kappa df/dw. It is free of units
+// over the largest term of the equation, with S = c A - kappa df/dw. It is nondimensional
 // and does not depend on anything that a solver carries along.
 #pragma once
 
@@ -56,7 +56,7 @@ struct StageOptions {
 
 namespace detail {
 
-/// S^-1 and what follows from it.
+/// S^-1 and the matrices that follow from it.
 template <int N, int M>
 struct RICOCHET_ALIGNED StageFactor {
     static constexpr bool direct = N != Eigen::Dynamic && N <= 4;
@@ -97,7 +97,7 @@ struct RICOCHET_ALIGNED StageFactor {
     }
 };
 
-/// Results that the stage solvers share, and their memory.
+/// Results and memory that the stage solvers share.
 template <int N, int M>
 struct RICOCHET_ALIGNED StageScratch {
     using Matrices = AnyMatrices<N, M>;
@@ -128,7 +128,7 @@ struct RICOCHET_ALIGNED StageScratch {
     std::array<StageFactor<N, M>, 4> factors;
     std::size_t next_factor = 0;
 
-    /// The factor of S at (t, w): an earlier one where f is affine and the weights are
+    /// The factor of S at (t, w): an earlier one if f is affine and the weights are
     /// the same.
     StageFactor<N, M>& factor(const Stage<N, M>& stage, const State& w)
     {
@@ -147,7 +147,7 @@ struct RICOCHET_ALIGNED StageScratch {
         return fresh;
     }
 
-    /// rho, from the diagonal of W. Sets that are no boxes need one value for all.
+    /// rho, from the diagonal of W. Sets that are not boxes need one value for all.
     void set_rho(const StageFactor<N, M>& by)
     {
         double sum = 0;
@@ -185,7 +185,7 @@ struct RICOCHET_ALIGNED StageScratch {
         }
     }
 
-    /// The residual of (w, r), with f = f(t, w) given; tells which law is worst.
+    /// The residual of (w, r), with f = f(t, w) given; finds which law is worst.
     StageReport residual(const Stage<N, M>& stage, const State& w, const State& f_at,
                          const Reaction& r)
     {

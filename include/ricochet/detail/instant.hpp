@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// Sums that do not forget: time and state carried with the rounding they lost.
+// Compensated sums: time and state are carried together with their rounding errors.
 //
 // A million additions of a step to a time lose a million roundings; keeping what
 // each addition rounded off, and adding it to the next, loses one. The sum of two

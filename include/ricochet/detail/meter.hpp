@@ -8,12 +8,12 @@
 //
 //     cost = (guard calls x their cost + answers x their cost + steps x their cost) / steps
 //
-// Counts are exact; what one of each costs is sampled with a clock, ever more rarely, for the
-// steps with planning apart from those without: it has its price, too. The ways are tried in turn
-// until the best one is clear beyond its noise. After that the others are tried again now and then,
-// but what trials cost more than the best way is kept below a share of the whole run (1 %), so that
-// a network of no use, however large or hostile, costs no more. Checking every step is not tried
-// where the looks that planning saves cost more than planning may.
+// Counts are exact; unit costs are sampled with a clock, more and more rarely, separately for
+// steps with and without planning, which has a cost, too. The alternatives are tried in turn
+// until the best one is clear beyond its noise. Then the others are tried again from time to time,
+// but their excess cost over the best one is kept below a fraction of the run (1 %), so that
+// a useless network, however large or hostile, costs no more. Checking every step is not tried
+// if the evaluations that planning saves cost more than planning can.
 //
 // Used through `Metered`; the state lives in the run, not in the detector.
 #pragma once
@@ -36,10 +36,10 @@ struct MeterOptions {
         counted,   ///< by the costs given here, so that the same run asks the same
         always,    ///< asked whenever there is something to ask
         never,
-        every_step,  ///< is checked: nothing is planned either
+        every_step,  ///< every step is checked: nothing is planned either
     };
     Decision decision = Decision::measured;
-    /// [s] of a check of the guard, an answer of the network and a step, if `counted`; not
+    /// [s] Cost of a check of the guard, of an inference and of a step, if `counted`; not
     /// negative, and the step above 0.
     double guard = 0;
     double network = 0;
@@ -51,16 +51,16 @@ struct MeterOptions {
 
 /// Measurements of a meter so far. Costs in seconds, 0 before the first sample.
 struct MeterReading {
-    double guard = 0;    ///< of a check
-    double network = 0;  ///< of an answer
-    double step = 0;     ///< of a step without looks and answers, in the way that is best
+    double guard = 0;    ///< cost of a check
+    double network = 0;  ///< cost of an inference
+    double step = 0;     ///< cost of a step without checks and inferences, in the best alternative
     std::uint64_t asked = 0;
-    std::uint64_t cleared = 0;  ///< answers that cleared something
-    double asking = 0;          ///< a step while the network is asked, all in all; 0: never tried
-    double not_asking = 0;      ///< a step while it is not, in the better way
-    double checking = 0;        ///< a step while every one is checked; 0: never tried
-    bool pays = false;          ///< to ask
-    bool checks = false;        ///< checking every step is the best way
+    std::uint64_t cleared = 0;  ///< inferences that cleared something
+    double asking = 0;          ///< cost of a step while the network is asked; 0: never tried
+    double not_asking = 0;      ///< cost of a step while it is not, in the better alternative
+    double checking = 0;        ///< cost of a step while every one is checked; 0: never tried
+    bool pays = false;          ///< asking the network pays
+    bool checks = false;        ///< checking every step is cheapest
 
     [[nodiscard]] double share_cleared() const noexcept
     {
@@ -109,7 +109,7 @@ public:
     [[nodiscard]] bool asks() const noexcept { return way_ == ask && asked_ < most_asked_; }
     /// Whether every step is to be checked now.
     [[nodiscard]] bool checks() const noexcept { return way_ == check; }
-    /// The answer has cleared something.
+    /// Records that the inference has cleared something.
     void note_cleared() noexcept { ++cleared_; }
 
     template <class Call>
@@ -123,7 +123,7 @@ public:
         return timed(++asked_, network_, call);
     }
 
-    /// Called now and then, with the counts of the run so far.
+    /// Called from time to time, with the counts of the run so far.
     void review(const Statistics& counts)
     {
         if (!decides_) return;
@@ -142,7 +142,7 @@ private:
     enum Way : std::uint8_t { check, plan, ask };
     static constexpr std::array<Way, 3> all_ways{check, plan, ask};
 
-    /// Steps and their cost in one of the ways, older pieces with less weight.
+    /// Steps and their cost in one alternative, older pieces with less weight.
     struct Account {
         double steps = 0;
         double cost = 0;     ///< [s]
@@ -156,8 +156,8 @@ private:
         void add(double more_steps, double more_cost) noexcept;
     };
     struct Counts {
-        double steps = 0;  ///< that stand
-        double work = 0;   ///< those taken back included
+        double steps = 0;  ///< number of steps that stand
+        double work = 0;   ///< including steps taken back
         double looks = 0;
         double asked = 0;
     };
@@ -196,9 +196,9 @@ private:
     bool decides_;
     bool samples_;
     Way best_;
-    Way way_;  ///< another than the best one: on trial
+    Way way_;  ///< a trial if it is not the best one
     SampledCost guard_, network_;
-    SampledCost checked_step_, planned_step_;  ///< without looks and answers
+    SampledCost checked_step_, planned_step_;  ///< without checks and inferences
     std::array<Account, 3> accounts_;
     std::uint64_t looks_ = 0;
     std::uint64_t asked_ = 0;
@@ -209,7 +209,7 @@ private:
     Counts then_;       ///< when the piece began
     double began_ = 0;  ///< [s] when the piece began
     double spent_ = 0;  ///< [s] on useless trials
-    double total_ = 0;  ///< [s] of the run
+    double total_ = 0;  ///< [s] total cost of the run
 };
 
 }  // namespace detail

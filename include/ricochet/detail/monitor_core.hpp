@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// The events of a host's steps, as they are compiled in the library.
+// The events in the steps of a host, as they are compiled in the library.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ enum class Verdict {
     ended,   ///< the run is over; `outcome` says why
 };
 
-/// A set of events that ends a step, at the same instant for all its members.
+/// A set of events that ends a step, at the same instant for the whole set.
 template <class X>
 struct Cut {
     double s = 0;  ///< [s] offset in the step shown last; 0 where the set follows another at the
@@ -34,14 +34,14 @@ struct Cut {
     Mode mode_after = 0;
     /// The guards that fired, in ascending order; of an accumulation the guard that came to rest.
     std::vector<std::size_t> fired;
-    bool on_time = false;        ///< with a time event
+    bool on_time = false;        ///< the set includes a time event
     bool accumulation = false;   ///< `after` is what `rest` makes of the limit, `t` its time
-    bool state_changed = false;  ///< false: the host need not start again
+    bool state_changed = false;  ///< false: the host need not restart
 };
 
 namespace detail {
 
-/// @throws std::invalid_argument: an array of a host's is not of the size of the state.
+/// @throws std::invalid_argument because an array of a host does not have the size of the state.
 [[noreturn]] void throw_wrong_size(std::size_t expected, std::size_t found);
 
 /// See `EventMonitor`.
@@ -53,7 +53,7 @@ public:
     AnyMonitor& operator=(const AnyMonitor&) = delete;
     virtual ~AnyMonitor() = default;
 
-    /// @param dxdt  null: the system's flow is asked
+    /// @param dxdt  null: computed by the system's flow
     virtual Verdict start(const Instant& t, const X& x, const double* dxdt, Mode mode,
                           double scale) = 0;
     virtual Verdict examine(const HostStepTable& step) = 0;

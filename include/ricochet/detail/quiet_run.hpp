@@ -1,8 +1,8 @@
 // Internal: what it declares may change without notice.
 //
-// Steps in a row in which nothing happens.
+// Quiet runs: consecutive steps without events.
 //
-// Of a small state with at most one guard the loop enters a function of the system's own, with
+// For a small state with at most one guard the loop enters a function of the system's own, with
 // flow and guard inlined, or one of the library's that calls them by pointer, which continues until
 // a step needs a check, or the end is near. Bits and counts are those of the loop.
 #pragma once
@@ -14,22 +14,22 @@
 
 namespace ricochet::detail {
 
-/// Why the loop is to continue.
+/// Reason for which the loop is to continue.
 enum class QuietEnd : std::uint8_t {
-    due,     ///< the next step is not one of these
-    failed,  ///< the current step cannot be accepted, nor be repeated by its error alone
-    moving,  ///< the state hardly changes in the current step, which is to be examined closely
+    due,     ///< the next step is not a quiet one
+    failed,  ///< the current step can neither be accepted nor be repeated by its error alone
+    moving,  ///< the state hardly changes in the current step, which has to be examined closely
     doubt,   ///< the guard may have an event in the current step
 };
 
 struct QuietRun {
-    // --- orders ---
-    double end = 0;  ///< [s] of the run, or of the next time event: no step reaches it
+    // --- input ---
+    double end = 0;  ///< [s] end of the run, or the next time event: no step reaches it
     double rtol = 0;
     double atol = 0;
     double h_min = 0;      ///< [s]
     double h_max = 0;      ///< [s]
-    bool looks = false;    ///< inside each step, once
+    bool looks = false;    ///< guards are evaluated inside each step, once
     bool departs = false;  ///< the guard starts on its surface
     std::uint64_t most_steps = 0;
     const std::atomic<bool>* cancelled = nullptr;
@@ -41,10 +41,10 @@ struct QuietRun {
     double inside = 0;  ///< at `CubicLook::inside`
     double h_next = 0;  ///< [s]
 
-    // --- what was done ---
+    // --- results ---
     QuietEnd why = QuietEnd::due;
-    double error = 0;       ///< of a failed step
-    bool repeated = false;  ///< it is an attempt after a failed one
+    double error = 0;       ///< error of a failed step
+    bool repeated = false;  ///< the failed step was itself a repetition
     std::uint64_t steps = 0;
     std::uint64_t rejected = 0;
     std::uint64_t guard_calls = 0;

@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// What `integrate` refuses, in sentences.
+// Set-ups that `integrate` rejects, each with a sentence.
 #pragma once
 
 #include <cstddef>

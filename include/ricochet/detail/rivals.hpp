@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// A trained network beside the other ways of looking for events, on the same runs.
+// A trained network compared with other methods of finding events, on the same runs.
 #pragma once
 
 #include <cstddef>
@@ -56,11 +56,11 @@ template <class Start>
     return cost;
 }
 
-/// The same runs in all ways that there are.
+/// The same runs with every method that is available.
 template <class System, class X, class Stepping, class Network>
 class RivalRuns {
 public:
-    /// Keeps references.
+    /// Keeps references to its arguments.
     RivalRuns(const System& system, const Network& network) : system_(&system), network_(&network)
     {
     }

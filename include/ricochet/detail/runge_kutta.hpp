@@ -3,7 +3,7 @@
 // Explicit Runge-Kutta methods, as departures from the tangent.
 //
 // With x(t0 + s) = x0 + s f0 + w(s) the first stage of w vanishes, and so does its start:
-// what is left of a tableau are the stages from the second on. The sums are formed in the
+// a tableau reduces to its stages from the second on. The sums are formed in the
 // order of Boost.Odeint's steppers and have their bits; terms whose coefficient is zero are
 // left out.
 //
@@ -157,7 +157,7 @@ public:
     }();
     static constexpr bool has_dense_output = requires { Tableau::dense(0.5); };
 
-    /// w(h) from the departures' own flow, `flow(w, w_rate, offset)`. Where the method is
+    /// w(h) from the departures' own flow, `flow(w, w_rate, offset)`. If the method is
     /// FSAL, also the rate at the end; `with_error`, also the error estimate. `like` gives the
     /// size of a state that is sized at run time.
     template <bool with_error, class Flow>
@@ -175,7 +175,7 @@ public:
         if constexpr (with_error) combine<Errors>(h, k, rate, error);
     }
 
-    /// Weights of the rates in w on the dense output: so many.
+    /// Number of weights of the rates in w on the dense output.
     static constexpr std::size_t dense_weights_count = Tableau::stages + 1;
     using DenseArray = std::array<double, dense_weights_count>;
 
@@ -188,7 +188,7 @@ public:
         for_each_component(w, [&](auto c) { w[c] = dense(weights, k, rate, c); });
     }
 
-    /// Weights of the rates in w at the part `Part::u` of a step of length h.
+    /// Weights of the rates in w at the fraction `Part::u` of a step of length h.
     template <class Part>
     [[nodiscard, gnu::always_inline]] static constexpr auto weights(double h) noexcept requires
         has_dense_output
@@ -230,7 +230,7 @@ public:
         static constexpr double times(double h, std::size_t j) { return h * coefficients[j]; }
     };
 
-    /// The stages from the second on that a row uses.
+    /// The stages from the second on that a row of the tableau uses.
     template <class Row>
     static constexpr auto used = [] {
         struct {
@@ -332,7 +332,7 @@ private:
     }
 };
 
-/// Stages that the largest of the methods keeps.
+/// Number of stages of the largest of the methods.
 inline constexpr std::size_t most_kept_stages = Fehlberg78Tableau::stages - 1;
 
 }  // namespace ricochet::detail

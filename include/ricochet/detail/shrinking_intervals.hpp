@@ -1,6 +1,6 @@
 // Internal: what it declares may change without notice.
 //
-// Do the events of a guard accumulate?
+// Detection of accumulating events of a guard.
 #pragma once
 
 #include <algorithm>
@@ -13,15 +13,15 @@
 
 namespace ricochet::detail {
 
-/// Recognises accumulating events: three intervals in a row that shrink, and a
-/// geometric remainder d q / (1 - q) that is no longer worth resolving, or excursions of
-/// the guard between two events that its rounding swallows. And events that do not advance
+/// Recognises accumulating events: three consecutive intervals that shrink, with a
+/// geometric remainder d q / (1 - q) that is no longer worth resolving, or with excursions of
+/// the guard between two events that are lost in its rounding. Also events that do not advance
 /// time at all. Legal event trains, however fast, keep a remainder that is worth resolving
-/// and excursions that can be told from rounding.
+/// and excursions that can be distinguished from rounding.
 class ShrinkingIntervals {
 public:
-    /// Takes note of an event at `t`, where a step would be of length `step` [s]; true
-    /// after a hundred in a row that time cannot tell apart.
+    /// Records an event at `t`, where a step would be of length `step` [s]; true
+    /// after a hundred in a row that time cannot distinguish.
     [[nodiscard]] bool stalls(const Instant& t, double step) noexcept
     {
         step_ = step;
@@ -47,15 +47,15 @@ public:
         return false;
     }
 
-    /// Whether a guard that leaves its surface at `rate` [1/s] after the event just noted is
-    /// going to rise so little, or for so short, compared with earlier excursions, that its
+    /// Whether a guard that leaves its surface at `rate` [1/s] after the event just recorded is
+    /// going to rise so little, or so briefly, compared with earlier excursions, that its
     /// rounding may matter.
     [[nodiscard]] bool is_low_at(double rate) const noexcept
     {
         return seen_ >= 2 && (rise(rate) <= 1e-3 * peak_ || interval_ <= 0.03 * longest_);
     }
 
-    /// The guard turns back from its surface at `rate` [1/s] after the event just noted, which
+    /// Records that the guard turns back from its surface at `rate` [1/s] after that event, which
     /// is `low` or not; infinity: it does not turn back.
     void depart(double rate, bool low) noexcept
     {
@@ -71,11 +71,11 @@ public:
     /// Whether the last departure was low.
     [[nodiscard]] bool is_low() const noexcept { return low_; }
 
-    /// Between the last two events [s].
+    /// Interval [s] between the last two events.
     [[nodiscard]] double interval() const noexcept { return interval_; }
 
-    /// Whether excursions sink into the guard's `rounding`: at the end of a shrinking series,
-    /// or three in a row. What a reset leaves of the guard adds to every excursion: with
+    /// Whether excursions are lost in the guard's `rounding`: at the end of a shrinking series,
+    /// or three in a row. The error that a reset leaves in the guard adds to every excursion: with
     /// restitution e they stay at 1 / (1 - e^2) of it, and decay less than half as fast from
     /// twice that on.
     [[nodiscard]] bool fades(double rounding) noexcept
@@ -86,9 +86,9 @@ public:
         return sunk_ >= 3 || (sunk && shrinking_ >= 3);
     }
 
-    /// Whether what is left after the event just noted is below `tolerance` [s] or
-    /// the resolution of its time. An interval that is far shorter than the ones before
-    /// made expect is the gap between two events, not the end of a series.
+    /// Whether the remainder after the event just recorded is below `tolerance` [s] or
+    /// the resolution of its time. An interval that is far shorter than the previous ones
+    /// suggest is the gap between two events, not the end of a series.
     ///
     /// An event that is located late by d, and whose reset puts the motion back on the surface,
     /// gains speed: intervals with the ratio q then stay at 2 q d / (1 - q), and shrink less than
@@ -108,14 +108,14 @@ public:
         return lingering_ >= 3;
     }
 
-    /// The event just noted is known to `error` [s].
+    /// Records that the time of the last event is known to `error` [s].
     void blame(double error) noexcept
     {
         late_ = error;
         blamed_ += error;
     }
 
-    /// By how much [s] the limit may be off: an event that is late by d delays all later ones by
+    /// Uncertainty [s] of the limit: an event that is late by d delays all later ones by
     /// d (1 + q) / (1 - q) in the end.
     [[nodiscard]] double error() const noexcept
     {
@@ -124,14 +124,14 @@ public:
                (lingering_ > 0 ? interval_ / (1 - q) : 0);
     }
 
-    /// Extrapolated time [s] from the last event to the limit of all; 0 where the intervals
+    /// Extrapolated time [s] from the last event to the limit of all; 0 if the intervals
     /// do not shrink, or only because events are late.
     [[nodiscard]] double remainder() const noexcept
     {
         return ratio_ < 1 && lingering_ < 3 ? interval_ * ratio_ / (1 - ratio_) : 0;
     }
 
-    /// Calls `visit` with every number that makes up the state.
+    /// Calls `visit` with every number of the state.
     template <class Visit>
     void visit(Visit&& visit)
     {
@@ -179,15 +179,15 @@ private:
     std::uint32_t seen_ = 0;
     std::uint32_t shrinking_ = 0;
     std::uint32_t stalled_ = 0;
-    double excursion_ = std::numeric_limits<double>::infinity();  ///< expected next
+    double excursion_ = std::numeric_limits<double>::infinity();  ///< expected size of the next
     double last_excursion_ = std::numeric_limits<double>::infinity();
     double peak_ = 0;         ///< the largest excursion
-    double longest_ = 0;      ///< [s] interval
-    double decay_ = 0;        ///< part that the last excursion has lost of the one before
-    double usual_decay_ = 0;  ///< as it was before rounding mattered
-    double usual_ratio_ = 1;  ///< of intervals, before lateness mattered
-    double late_ = 0;         ///< [s] the error of the last event
-    double blamed_ = 0;       ///< [s] the sum of all
+    double longest_ = 0;      ///< [s] longest interval
+    double decay_ = 0;        ///< fraction that the last excursion lost of the one before
+    double usual_decay_ = 0;  ///< decay before rounding mattered
+    double usual_ratio_ = 1;  ///< ratio of intervals before lateness mattered
+    double late_ = 0;         ///< [s] error of the last event
+    double blamed_ = 0;       ///< [s] sum of all such errors
     std::uint32_t lingering_ = 0;
     std::uint32_t sunk_ = 0;
     bool low_ = false;

@@ -83,7 +83,7 @@ inline constexpr std::size_t lanes = register_bytes / sizeof(T);
 #define RICOCHET_VECTOR_REGISTER "+m"
 #endif
 
-/// `value`, of which the compiler forgets what it is.
+/// `value`, hidden from the optimiser.
 template <class V>
 RICOCHET_INLINE V opaque(V value) noexcept
 {
@@ -99,7 +99,7 @@ RICOCHET_INLINE V product_plus(V a, V b, V c) noexcept
 }
 
 /// Adds a rounded product. The sum passes through the assembler too, because g++
-/// would else deferred long chains of sums and spill their products meanwhile.
+/// would otherwise defer long chains of sums and spill their products meanwhile.
 template <class V>
 RICOCHET_INLINE void accumulate(V& sum, V product) noexcept
 {

@@ -62,10 +62,10 @@ struct GuardCount<counted_at_run_time> {
 ///
 /// column by column, followed by two numbers: the `Undefined` reason why there are no
 /// derivatives any more, and the time [s] of the last event of a guard. Once a derivative
-/// is undefined S stays zero; the motion x goes on.
+/// is undefined S stays zero; the motion x continues.
 ///
 /// Derivatives of the system's functions are those that it declares (see
-/// linearization.hpp), else differences. Modes and notifications are those of the system.
+/// linearization.hpp), else differences. Modes and recorded events are those of the system.
 template <class System, class X = typename System::State>
 class Variational
     : public detail::GuardCount<Guarded<System, X> ? fixed_guard_count<System, X>() : 0> {
@@ -82,8 +82,8 @@ public:
     static constexpr bool unchecked_names = true;  // some members are absent where the system's are
     static constexpr bool changes_dimension = requires { requires System::changes_dimension; };
 
-    /// @param options  tolerances of the run, by which grazing is told from crossing
-    /// @throws std::invalid_argument for directions that make no sense, and whatever
+    /// @param options  tolerances of the run, by which grazing is distinguished from crossing
+    /// @throws std::invalid_argument for invalid directions, and for everything that
     /// `Parameter::with` throws.
     Variational(const System& system, const X& x0, const Directions<System>& directions,
                 const Options& options)
@@ -98,10 +98,10 @@ public:
 
     [[nodiscard]] std::size_t columns() const noexcept { return saltation_.columns(); }
 
-    /// Where its runs start.
+    /// State in which its runs start.
     [[nodiscard]] const State& start() const noexcept { return start_; }
 
-    /// Those of the components, for their derivatives too; empty where one holds for all.
+    /// Absolute tolerances of the components and of their derivatives; empty if one holds for all.
     [[nodiscard]] std::vector<double> tolerances(const Options& options) const
     {
         const std::vector<double>& each = options.component_atol;
@@ -115,7 +115,7 @@ public:
         return out;
     }
 
-    // --- the parts of its state ---
+    // --- parts of its state ---
 
     [[nodiscard]] std::size_t components(const State& y) const noexcept
     {
@@ -244,14 +244,14 @@ public:
             next = detail::ResetSet{fired}.apply(system(), mode, t, after, conflict);
         }
         if (!detail::fits_dimension<System>(before, after, next == mode)) {
-            y.clear();  // refused by the loop
+            y.clear();  // rejected by the loop
             return mode;
         }
         if (conflict.any()) {
             detail::for_each_component(after, [&](auto i) { after[i] = nan; });
         }
-        // A guard that holds the motion where it is, again and again at one time, does
-        // so to the derivatives too.
+        // A guard that holds the motion in place, repeatedly at one time, does
+        // the same to the derivatives.
         const bool again = saltation_.at_one_time(last_event(y), t);
         if (again && next == mode && same(before, after)) return mode;
         transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
@@ -260,7 +260,7 @@ public:
         return next;
     }
 
-    /// Which two resets of a set contradict each other, if any do.
+    /// The two resets of a set that contradict each other, if any do.
     [[nodiscard]] detail::Conflict conflict(const FiredGuards& fired, Mode mode, double t,
                                             const State& y) const requires Resetting<System, X>
     {
@@ -412,7 +412,7 @@ private:
         return equal;
     }
 
-    /// The matrix that y consists of, without the two numbers behind it.
+    /// The matrix that y consists of, without the two numbers after it.
     [[nodiscard]] Eigen::Map<const Eigen::MatrixXd> matrix(const State& y) const
     {
         return {y.data(), index(components(y) + 1), index(columns() + 1)};
@@ -449,7 +449,7 @@ private:
         dydt[y.size() - 1] = 0;
     }
 
-    /// Once a derivative is undefined, what is computed here is not shown.
+    /// Once a derivative is undefined, the values computed here are not shown.
     template <class S>
     void variational_series(Mode mode, const S& t, const std::vector<S>& y,
                             std::vector<S>& dydt) const
@@ -490,8 +490,8 @@ private:
         return {t, last_event_derivatives(y), t != never, y[y.size() - 1]};
     }
 
-    /// Replaces y by the state `after` and the derivatives that `pass` makes of the
-    /// motion, or by zeros where it finds that they do not exist.
+    /// Replaces y by the state `after` and the derivatives that `pass` computes from the
+    /// motion, or by zeros if it finds that they do not exist.
     template <class Pass>
     void transform(Mode mode, double t, State& y, Mode next, const X& after, const Pass& pass) const
     {

@@ -5,11 +5,11 @@
 // time and state is one of degree k m in the offset, and k m + 1 samples recover it up to
 // rounding: where all coefficients exceed the error of that, no root is possible, and
 // "no event" is proved. Other guards are interpolated, the interpolant is compared with
-// further samples, and the step is halved where they disagree: "no event" is checked.
+// further samples, and the step is halved if they disagree: "no event" is checked.
 //
 // Where the coefficients reach the surface, the step is cut into pieces on which the
-// guard is monotone, and the samples between them, taken from the guard itself, say what
-// happened: a crossing, a touch, neither, in the order of time.
+// guard is monotone, and samples of the guard itself between them determine what happened,
+// in order of time: a crossing, a touch, or neither.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ namespace ricochet {
 namespace detail {
 
 inline constexpr int most_bernstein_degree = 32;
-/// Degree of the interpolant of a guard whose degree is not known.
+/// Degree of the interpolant of a guard of unknown degree.
 inline constexpr int sampled_degree = 8;
 
 /// Points at which a polynomial on [0, 1] is sampled: the extrema of the Chebyshev polynomial of
@@ -50,13 +50,13 @@ private:
 /// Goal and interval of a search.
 struct BernsteinTask {
     Crossing crossing = Crossing::falling;
-    int degree = 0;        ///< of the guard in the offset; 0: not known
+    int degree = 0;        ///< degree of the guard in the offset; 0: unknown
     double clock = 0;      ///< [s] rounding of the time
     bool goes_on = false;  ///< the curve is defined beyond the end of the step
 };
 
-/// Whether the samples of a polynomial at its nodes keep it on the armed side all along.
-/// Of degree 0: whether those at the nodes of `sampled_degree` do so for a smooth guard.
+/// Whether the samples of a polynomial at its nodes prove that it stays on the armed side.
+/// For degree 0: whether samples at the nodes of `sampled_degree` do so for a smooth guard.
 [[nodiscard]] bool stays_on_side(const BernsteinTask& task, const Watch& watch,
                                  const double* values) noexcept;
 
@@ -66,15 +66,15 @@ struct BernsteinTask {
 
 }  // namespace detail
 
-/// `proved` speaks of the polynomial through the guard's samples, which are taken to be
-/// rounded to four units in the last place of the largest, and believes the degree that
-/// the system declares. Dense output that a method lacks costs it further steps.
+/// Evidence `proved` holds for the polynomial through the guard's samples, which are taken to be
+/// rounded to four units in the last place of the largest, and relies on the degree that
+/// the system declares. For a method without dense output it costs further steps.
 struct Bernstein {
     static constexpr bool uses_rates = true;
     static constexpr Screening screening = Screening::every;
-    static constexpr Evidence evidence = Evidence::proved;  ///< of a step without armed guards
+    static constexpr Evidence evidence = Evidence::proved;  ///< for steps without armed guards
 
-    /// Every step needs a check.
+    /// Returns true: every step needs a check.
     [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
                                                  double /*g1*/, double /*rate1*/,
                                                  double /*h*/) noexcept

@@ -8,7 +8,7 @@
 
 namespace ricochet {
 
-// The simple approach: which side is the guard on after the step?
+// The simplest approach compares the sides of a guard at both ends of a step.
 //
 // One guard call a step. Two crossings within one step cancel and are not seen,
 // so "no event" is only assumed.
@@ -18,7 +18,7 @@ namespace ricochet {
 struct Ends {
     static constexpr bool uses_rates = false;
     static constexpr Screening screening = Screening::ends;
-    static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
+    static constexpr Evidence evidence = Evidence::assumed;  ///< evidence for a step not suspected
 
     /// Whether a step needs a check, in the guard times `sign`, positive on its
     /// armed side.
@@ -46,29 +46,29 @@ struct Ends {
     }
 };
 
-// The honest classical rival: the guard and its rate at both ends of the step.
+// The classical approach: the guard and its rate at both ends of the step.
 //
-// The four numbers make a cubic. Where the guard heads for its surface at the start
+// The four numbers define a cubic. If the guard heads for its surface at the start
 // and away from it at the end, or the cubic's control points reach across, there may
-// be an extremum on the other side: it is found on the step itself, by Newton's method
-// on the rate, and only as exactly as it takes to know on which side it lies. Smooth
+// be an extremum on the other side: it is located on the step itself, by Newton's method
+// on the rate, and only as precisely as needed to decide on which side it lies. Smooth
 // guards are caught unless they turn more often within a step than a cubic can.
 
 /// Detector that evaluates a guard at both ends of a step and once inside, compares it with the
-/// cubic through values and rates, and searches for extrema where that leaves a doubt: the default.
+/// cubic through values and rates, and searches for extrema if that leaves doubts: the default.
 struct Extremum {
     static constexpr bool uses_rates = true;
     static constexpr Screening screening = Screening::extremum;
     static constexpr bool looks_inside = true;  ///< compares each step with the cubic of its ends
-    static constexpr Evidence evidence = Evidence::checked;  ///< of a step not suspected
+    static constexpr Evidence evidence = Evidence::checked;  ///< evidence for a step not suspected
 
     /// Whether a step needs a check, in the guard times `sign`, positive on its
     /// armed side: it has left, or the control points of its cubic reach across, or it
     /// turns back from the surface. A guard that turns five times further away than it
     /// bends would have to bend five times more than its ends show.
     ///
-    /// Without a branch, and in terms that `CubicLook` has as well: a loop over many guards is
-    /// vectorised.
+    /// Free of branches, and in terms that `CubicLook` has as well, so that a loop over many guards
+    /// is vectorised.
     [[nodiscard, gnu::always_inline]] static constexpr bool suspects(double sign, double g0,
                                                                      double rate0, double g1,
                                                                      double rate1,

@@ -1,4 +1,4 @@
-// Gates: networks before guards, which decide whether a step is checked.
+// Gates: networks that decide whether the guards of a step are checked.
 #pragma once
 
 #include <algorithm>
@@ -19,17 +19,17 @@
 
 namespace ricochet {
 
-// The verified gate: a network may change what a run costs, never what it finds.
+// The verified gate: a network may change the cost of a run, never its events.
 //
 // The network proposes which exact checks to defer, and every interval is closed
-// by an exact check that covers all of it. What covers an interval longer than one
-// step is a bound on the guard's rate; without a declared bound no interval can be
+// by an exact check that covers all of it. An interval longer than one step can be covered only by
+// a bound on the guard's rate; without a declared bound no interval can be
 // covered, and every step keeps its exact check. The network is then evaluated without
-// gain, and the statistics show it: no checks deferred, and how often it would have
-// been right. With any weights whatever the events are those of the exact detector,
+// gain, as the statistics show: no deferred checks, and how often its prediction would have
+// been right. For any weights the events are those of the exact detector,
 // bit for bit.
 
-/// Detector that counts how often a network predicts what `Exact` finds, and defers checks where
+/// Detector that counts how often a network predicts the finding of `Exact`, and defers checks if
 /// the guard declares bounds. The events are those of `Exact`, bit for bit, whatever the weights.
 template <class Exact = Extremum>
 class Verified : public detail::Around<Exact> {
@@ -37,7 +37,7 @@ public:
     static constexpr bool checks_every_step = true;
     static constexpr bool keeps_events = true;
 
-    /// Takes the network that predicts and the detector that decides.
+    /// Takes the network that predicts and the exact detector that decides.
     explicit Verified(Network network, const Exact& exact = {})
         : detail::Around<Exact>(exact), network_(std::move(network))
     {
@@ -61,35 +61,35 @@ private:
     Network network_;
 };
 
-// Calibrated gates: checks deferred on the word of a network.
+// Calibrated gates: checks deferred by the prediction of a network, without proof.
 //
-// Nothing else in the library skips a check without proof, so that it is asked for by name.
-// What is skipped counts as `gated`; how often events are missed was measured, on runs, when the
+// Nothing else in the library skips a check without proof, so this has to be asked for by name.
+// Skipped checks count as `gated`; how often events are missed was measured, on runs, when the
 // gate was trained (`Calibration` in its model). Outside the box of the model every step keeps
 // its exact check, and is counted in `Statistics::outside_domain`.
 //
-//     Calibrated        a horizon gate. Of a guard of which nothing is known but its value or
-//                       its sign. No check until the end of the longest horizon that is cleared,
+//     Calibrated        a horizon gate, for a guard of which only the value or the sign is
+//                       known. No check until the end of the longest horizon that is cleared,
 //                       then one; if it finds the guard on its other side, the run returns to the
-//                       event. An event is missed if, within a horizon, the guard goes through
-//                       its surface and back, and the network did not see it coming.
-//     CalibratedBounds  a level gate, of a guard with declared bounds: what `Planned` does, with
+//                       event. An event is missed if, within a horizon, the guard crosses
+//                       its surface and returns, and the network did not predict it.
+//     CalibratedBounds  a level gate, for a guard with declared bounds: as `Planned`, with
 //                       the level that is cleared as a lower bound, asked before the guard
-//                       is. Misses events only where that bound is wrong; where that is seen,
+//                       is. Misses events only where that bound is wrong; if this is detected,
 //                       the run ends as `Outcome::wrong_bound`.
-//     Foreseen          a horizon gate as the forecast of `Planned`, and nothing more: it says
-//                       when to look, exact values and declared bounds close every interval.
+//     Foreseen          a horizon gate as the forecast of `Planned`, and nothing more: it decides
+//                       when to check; exact values and declared bounds close every interval.
 //                       Verified: with any weights the events are those of the exact detector, bit
 //                       for bit.
 
 namespace detail {
 
-/// @throws std::invalid_argument unless the gate is of the kind that is wanted.
+/// @throws std::invalid_argument unless the gate is of the required kind.
 void check_gate_kind(const gates::Gate& gate, bool horizon);
-/// @throws std::invalid_argument: no step is kept.
+/// @throws std::invalid_argument because no step would be kept.
 void check_longest_stretch(std::size_t steps);
 
-/// A detector with a gate to ask.
+/// A detector that holds a gate.
 template <class Base>
 class AsksGate : public Base {
 public:
@@ -103,7 +103,7 @@ public:
     }
 
 protected:
-    /// @throws std::invalid_argument if the gate is of the other kind, or as `Base`.
+    /// @throws std::invalid_argument if the gate is of the other kind, or as `Base` does.
     template <class... Arguments>
     AsksGate(gates::Gate gate, bool horizon, const Arguments&... arguments)
         : Base(arguments...), gate_(std::move(gate))
@@ -128,8 +128,8 @@ public:
     static constexpr bool needs_bounds = false;
     static constexpr Evidence put_off = Evidence::gated;
 
-    /// @param longest_stretch  steps without a check, at most; as many starts are kept
-    /// @throws std::invalid_argument for a level gate, or if there is no interval.
+    /// @param longest_stretch  largest number of steps without a check; as many starts are kept
+    /// @throws std::invalid_argument for a level gate, or if `longest_stretch` is 0.
     explicit Calibrated(gates::Gate gate, std::size_t longest_stretch = 256,
                         const Exact& exact = {})
         : Base(std::move(gate), true, exact), longest_(longest_stretch)
@@ -148,7 +148,7 @@ public:
         return from.distance > 0 && to.distance > band;
     }
 
-    /// Time [s] without a check from here; a billionth longer than the horizon, which is a
+    /// Time [s] from here that needs no check; a billionth longer than the horizon, which is a
     /// number of steps, so that rounding does not cut off the last of them.
     template <class System, class X>
     [[nodiscard]] gates::Gate::Answer horizon(const System& system, Mode mode, double t,
@@ -177,13 +177,13 @@ public:
     {
     }
 
-    /// The least that it ever clears.
+    /// The lowest level that the gate ever clears.
     [[nodiscard]] double lowest_level() const noexcept
     {
         return this->gate().model().levels.front().value;
     }
 
-    /// A value that no guard is seen to be below; 0: nothing is known.
+    /// A level that the guard is predicted to be above; 0: none.
     template <class System, class X>
     [[nodiscard]] gates::Gate::Answer level(const System& system, std::size_t /*which*/, Mode mode,
                                             double t, const X& x) const
@@ -205,7 +205,7 @@ public:
     {
     }
 
-    /// When [s] to examine last.
+    /// Forecast of the latest time [s] from here at which to check.
     template <class System, class X>
     [[nodiscard]] gates::Gate::Answer horizon(const System& system, Mode mode, double t,
                                               const X& x) const
@@ -214,15 +214,15 @@ public:
     }
 };
 
-// The certified gate: what a network clears has been proved.
+// The certified gate: every prediction that clears a state has been proved.
 //
-// A certificate (nn/certificate.hpp) says that where the network clears, the first guard is above
-// a margin. With the system's own bounds that is as good as a value: `Planned` closes intervals
-// with it, and no exact look is needed where that is enough. Such steps are `proved`, and the
+// A certificate (nn/certificate.hpp) states that wherever the network clears, the first guard is
+// above a margin. With the system's own bounds that is as good as a value: `Planned` closes
+// intervals with it, and skips the exact check if it suffices. Such steps are `proved`, and the
 // events are those of the exact detector, bit for bit. Outside the box of the certificate, in a
 // box that it lists as unproved, in modes other than 0 and for other guards the exact guard is
-// asked. A system without bounds has every step checked: a state that is clear says nothing of the
-// next one.
+// evaluated. A system without bounds has every step checked: a state that is clear implies
+// nothing about the next one.
 
 /// Uses the levels of a gate that a certificate proves as lower bounds of the guard in the planner:
 /// the events are those of `Exact`, bit for bit.
@@ -231,8 +231,8 @@ class Certified : public Planned<Exact> {
 public:
     static constexpr bool keeps_events = true;
 
-    /// @throws std::invalid_argument if the model has no certificate or one that is void, names no
-    /// known recipe of features, or has too many of them; or as `Planned`.
+    /// @throws std::invalid_argument if the model has no certificate or a void one, names no
+    /// known recipe of features, or has too many features; or as `Planned`.
     explicit Certified(Model model, const PlannerOptions& options = {}, const Exact& exact = {})
         : Planned<Exact>(options, exact),
           certified_(std::make_shared<const CertifiedClassifier>(std::move(model))),
@@ -247,9 +247,9 @@ public:
         return certified_->certificate();
     }
 
-    /// Whether the certificate speaks of this system: its name, where it has one, and the
+    /// Checks that the certificate applies to this system: its name, if it has one, and the
     /// parameters that the model depends on, where it declares them. Steps may be of any length.
-    /// @throws std::invalid_argument naming what the model is for and what it would have to be.
+    /// @throws std::invalid_argument naming what the model was made for and what is required.
     template <class System, class X>
     void check(const System& system, const X& x, double /*smallest*/, double /*largest*/) const
     {
@@ -258,13 +258,13 @@ public:
                                   mode_count_of(system));
     }
 
-    /// The least that it ever clears.
+    /// The lowest margin that the gate ever clears.
     [[nodiscard]] double lowest_level() const noexcept
     {
         return certificate().levels.front().margin;
     }
 
-    /// A value that the guard is proved to be above; 0: none.
+    /// A margin that the guard is proved to be above; 0: none.
     template <class System, class X>
     [[nodiscard]] gates::Gate::Answer level(const System& system, std::size_t which, Mode mode,
                                             double t, const X& x) const
@@ -281,16 +281,16 @@ private:
     GateRecipe recipe_;
 };
 
-// A network that is asked only while that pays.
+// A network that is evaluated only while that saves time.
 //
 //     integrate(system, x0, options, FixedStep<Rk4>{}, Metered(Foreseen(gate)));
 //
-// For gates that cannot change what is found (`Verified`, `Foreseen`, `Certified`): events are
-// the same, bit for bit, whether the network is asked or not. How often it is asked depends on
+// For gates that cannot change the events (`Verified`, `Foreseen`, `Certified`): events are
+// the same, bit for bit, whether or not the network is asked. How often it is asked depends on
 // the clock, and so differs from run to run; `MeterOptions::decision` fixes it.
 
-/// A gate under which the events are those of its exact detector, whatever the network says (or,
-/// of a certificate, whether it is asked or not).
+/// A gate under which the events are those of its exact detector, whatever the network predicts
+/// (or, for a certified gate, whether or not it is asked).
 template <class Detector>
 concept KeepsEvents = requires
 {

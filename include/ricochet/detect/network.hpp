@@ -26,14 +26,14 @@ namespace ricochet {
 
 namespace detail {
 
-/// @throws std::invalid_argument: the model is for another system than `name`.
+/// @throws std::invalid_argument because the model is for another system than `name`.
 void check_model_system(const Model& model, std::string_view name);
-/// @throws std::invalid_argument: the model was trained for another value.
+/// @throws std::invalid_argument because the model was trained for another parameter value.
 void check_model_parameter(const Model& model, std::string_view parameter, double trained,
                            std::optional<double> value);
-/// @throws std::invalid_argument: the features are not to be had from this system.
+/// @throws std::invalid_argument because the system does not provide the model's features.
 void check_model_features(const Model& model, Recipe recipe, std::size_t features, bool offered);
-/// @throws std::invalid_argument: no step [s] taken is one the model was trained for.
+/// @throws std::invalid_argument because the model was trained for none of the steps [s] taken.
 void check_model_step(const Model& model, double smallest, double largest);
 
 /// Examines the end of a step that was not cleared. An event whose guard had left
@@ -56,7 +56,7 @@ class Network {
 public:
     static constexpr bool uses_rates = false;
     static constexpr Screening screening = Screening::ends;
-    static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
+    static constexpr Evidence evidence = Evidence::assumed;  ///< evidence for a step not suspected
     static constexpr bool checks_every_step = false;
     static constexpr std::size_t max_features = 16;
 
@@ -66,12 +66,12 @@ public:
 
     [[nodiscard]] const Model& model() const noexcept { return classifier_->model(); }
 
-    /// Whether this network can be asked about `system` in steps between `smallest`
+    /// Whether this network can be evaluated for `system` in steps between `smallest`
     /// and `largest` [s], at least in some of them. The system must declare its
-    /// `name`, and as `parameter(name)` those that the model depends on.
+    /// `name`, and through `parameter(name)` the parameters on which the model depends.
     ///
     /// @throws std::invalid_argument naming the model's system, parameters, features
-    /// or steps and what they would have to be.
+    /// or steps, and what is required of them.
     template <class System, class X>
     void check(const System& system, const X& x, double smallest, double largest) const
     {
@@ -92,8 +92,8 @@ public:
         detail::check_model_step(model(), smallest, largest);
     }
 
-    /// Whether the step is predicted to be free of events. Never of a step shorter
-    /// or longer than the network was trained for, nor outside its domain.
+    /// Whether the step is predicted to be free of events. Always false for a step shorter
+    /// or longer than the network was trained for, and outside its domain.
     template <class Guard, class Step>
     [[nodiscard]] bool clears(const Guard& guard, const Step& step) const noexcept
     {
@@ -112,7 +112,7 @@ public:
         return Ends::suspects(sign, g0, rate0, g1, rate1, h);
     }
 
-    /// A prediction may have been late, so that every event is examined with care.
+    /// Returns true: a prediction may have been late, so that every event is examined carefully.
     [[nodiscard]] static bool leaves_plainly(double, const GuardSample&, const GuardSample&,
                                              double) noexcept
     {

@@ -1,14 +1,14 @@
-// Time over which a bound on its speed keeps a guard away from its surface.
+// Time during which a bound on its speed keeps a guard away from its surface.
 //
 // A guard that is a distance d from its surface and changes by at most v per second now,
 // where v changes by at most A per second per second, covers
 //
 //     v tau + A tau^2 / 2 < d        from one value: conservative advancement
-//     path(tau) < d0 + d1            from two values, with speeds v0 and v1: the one that
-//                                    goes to the surface has to come back from it
+//     path(tau) < d0 + d1            from two values, with speeds v0 and v1: a guard that
+//                                    goes to the surface has to return from it
 //
-// Every function answers a doubt (a negative or infinite speed, anything that is not a
-// number) with "covers nothing". Speeds are of the guard: path per second times its
+// Every function treats an invalid bound (a negative or infinite speed, or NaN) as covering
+// nothing. Speeds are those of the guard: path per second times its
 // Lipschitz constant.
 #pragma once
 
@@ -25,14 +25,14 @@
 
 namespace ricochet {
 
-/// A guard at one instant: how far it is from its surface on its armed side, how fast
-/// that can change, and how fast the speed can change.
+/// Bounds on a guard at one instant: its distance from its surface on the armed side, the rate at
+/// which that can change, and the rate at which the speed can change.
 struct GuardBound {
     double distance = 0;
-    double speed = 0;         ///< [1/s] of the distance
-    double acceleration = 0;  ///< [1/s^2]
+    double speed = 0;         ///< [1/s] bound on the rate of the distance
+    double acceleration = 0;  ///< [1/s^2] bound on the rate of the speed
 
-    /// Whether the bounds are such that anything follows from them.
+    /// Whether the bounds are valid, so that they cover a time.
     [[nodiscard]] bool sound() const noexcept
     {
         constexpr double largest = std::numeric_limits<double>::max();
@@ -41,8 +41,8 @@ struct GuardBound {
 };
 
 /// The longest time [s] over which the guard cannot come nearer than 0: the root of
-/// v tau + A tau^2 / 2 = d. 0 where the distance is not positive or a bound not sound;
-/// infinite where nothing can move.
+/// v tau + A tau^2 / 2 = d. 0 if the distance is not positive or a bound is not valid;
+/// infinite if nothing can move.
 [[nodiscard]] inline double time_covered(const GuardBound& at) noexcept
 {
     if (!(at.distance > 0) || !at.sound()) return 0;
@@ -55,8 +55,8 @@ struct GuardBound {
 ///
 ///     (v0 + v1) tau / 2 + A tau^2 / 4 - (v1 - v0)^2 / (4 A)
 ///
-/// where the two lines meet inside. A is that of the earlier instant, and where it is 0
-/// its speed holds throughout. NaN where a bound is not sound.
+/// if the two lines meet inside. A is that of the earlier instant; if it is 0, the
+/// speed of that instant holds throughout. NaN if a bound is not valid.
 [[nodiscard]] inline double largest_change(const GuardBound& from, const GuardBound& to,
                                            double tau) noexcept
 {
@@ -83,14 +83,14 @@ struct GuardBound {
            from.distance + to.distance > (1 + margin) * change + 2 * band;
 }
 
-/// A guess at the longest time after which `stays_clear` will say yes, if the speed stays
-/// what it is and the guard continues with `slope` [1/s], which bends towards the surface as
-/// fast as it can: the root of
+/// An estimate of the longest time after which `stays_clear` will be true, if the speed stays
+/// constant and the guard continues with `slope` [1/s], bending towards its surface as
+/// strongly as it can: the root of
 ///
 ///     2 d + slope tau - A tau^2 / 2 = v tau + A tau^2 / 4
 ///
-/// Only a guess: it decides when to look, not what is seen. On a ball in a cavern the guess
-/// without the bend was too long more often than not.
+/// It is only an estimate: it decides when to check, not what is found. On a ball in a cavern the
+/// estimate without the bend was too long more often than not.
 [[nodiscard]] inline double time_to_look(const GuardBound& at, double slope) noexcept
 {
     if (!(at.distance > 0) || !at.sound()) return 0;
@@ -102,7 +102,7 @@ struct GuardBound {
 // Detectors that defer exact checks.
 //
 // A detector of this kind wraps an exact one. For a guard that has just been evaluated it
-// says for how long no check is needed, for how long none is expected to be needed, and whether
+// tells for how long no check is needed, for how long none is expected to be needed, and whether
 // two checks close the interval between them. The loop keeps the queue of deadlines: it continues
 // without a check while every guard is covered, tentatively while an interval is expected to be
 // closed, and returns to the first step that could not be closed, which the exact detector then
@@ -114,23 +114,23 @@ struct GuardBound {
 //                  between two checks are missed
 //     SlopeSkip    skips a fraction of the time in which the guard would reach its surface at
 //                  its last slope; may miss, too
-//
+//                  its last slope; may miss events, too
 // `Planned` on a system without bounds is the exact detector, and compiles to it.
 
 /// How `Planned` plans.
 struct PlannerOptions {
-    /// Look ahead: an interval is taken before it is closed by the value at its end, and
-    /// taken back where it could not be. Off: only as far as the bound covers for certain.
+    /// Take steps before they are closed by a check at the end of their interval, and take
+    /// them back if it could not be closed. Off: only as far as the bound covers with certainty.
     bool two_ended = true;
-    /// Steps taken before they are closed, at most; as many starts of steps are kept.
+    /// Largest number of steps taken before they are closed; as many starts of steps are kept.
     std::size_t longest_stretch = 256;
-    /// Bounds are of the motion, steps have errors: every bound is taken larger by this
-    /// fraction. At least 0.
+    /// Fraction by which every bound is enlarged, since bounds hold for the motion and steps have
+    /// errors. At least 0.
     double margin = 0.01;
-    /// Compare bounds with the values of the guard as they are taken, with one taken for that at
-    /// every eighth lower bound that is relied on and in every 64th step without a check; one
-    /// that is wrong, negative or no number ends the run as `Outcome::wrong_bound`. Without this,
-    /// too, a guard that is found beyond its surface where a bound has excluded it does, at the
+    /// Compare bounds with the values of the guard as they are taken, and with extra values at
+    /// every eighth lower bound that is used and in every 64th step without a check; a bound
+    /// that is wrong, negative or NaN ends the run as `Outcome::wrong_bound`. Even without this,
+    /// a guard that is found beyond its surface where a bound has excluded it ends the run, at the
     /// end of the run at the latest.
     bool check_bounds = detail::is_debug_build();
 };
@@ -139,9 +139,9 @@ namespace detail {
 
 /// @throws std::invalid_argument naming the option.
 void validate(const PlannerOptions& options);
-/// @throws std::invalid_argument: EveryK needs at least one step.
+/// @throws std::invalid_argument because EveryK needs at least one step.
 [[noreturn]] void throw_no_steps_between_looks();
-/// @throws std::invalid_argument: SlopeSkip's fraction is not in (0, 1], or it has no steps.
+/// @throws std::invalid_argument if SlopeSkip's fraction is not in (0, 1], or it has no steps.
 [[noreturn]] void throw_bad_slope_skip(double fraction, std::size_t longest);
 
 template <class Exact>
@@ -172,17 +172,17 @@ public:
 ///         else:    halve it at the kept starts; the first single step that is not covered is
 ///                  taken again, and examined by `Exact`
 ///
-/// The two-valued cover holds because a guard that reaches its surface has to come back from it.
+/// The cover by two values holds because a guard that reaches its surface has to return from it.
 /// The events are those of `Exact` at every step, bit for bit, as long as the bounds are true; a
 /// bound that is found to be wrong ends the run as `Outcome::wrong_bound`.
 template <class Exact = Extremum>
 class Planned : public detail::PutsOff<Exact> {
 public:
     static constexpr bool needs_bounds = true;
-    static constexpr Evidence put_off = Evidence::proved;  ///< of a step without a check
+    static constexpr Evidence put_off = Evidence::proved;  ///< evidence for a step without a check
 
     Planned() : Planned(PlannerOptions{}) {}
-    /// @throws std::invalid_argument if the margin is negative or there is no interval.
+    /// @throws std::invalid_argument if the margin is negative or `longest_stretch` is 0.
     explicit Planned(const PlannerOptions& options, const Exact& exact = {})
         : detail::PutsOff<Exact>(exact), options_(options)
     {
@@ -203,7 +203,7 @@ public:
         return time_covered(at);
     }
 
-    /// Time [s] after which a second check is hoped to close the interval.
+    /// Time [s] after which a second check is expected to close the interval.
     [[nodiscard]] double hoped(GuardBound at, double slope, double band) const noexcept
     {
         at.distance -= band;
@@ -220,7 +220,7 @@ private:
     PlannerOptions options_;
 };
 
-/// The simplest rival: every k-th step is examined.
+/// Simplest baseline for comparison: every k-th step is examined.
 template <class Exact = Extremum>
 class EveryK : public detail::PutsOff<Exact> {
 public:
@@ -238,7 +238,7 @@ public:
     [[nodiscard]] static constexpr bool checks_bounds() noexcept { return false; }
     [[nodiscard]] static constexpr double margin() noexcept { return 0; }
     [[nodiscard]] static double sure(const GuardBound&, double) noexcept { return 0; }
-    /// One step from the surface, where an event has left the guard.
+    /// Covers a single step at the surface, where an event has left the guard.
     [[nodiscard]] static double hoped(const GuardBound& at, double, double band) noexcept
     {
         return at.distance > band ? std::numeric_limits<double>::infinity() : 0;
@@ -253,7 +253,7 @@ private:
     std::size_t steps_;
 };
 
-/// The rival where no bound is known: skips `fraction` |g| / |slope|, with the slope of the
+/// Baseline for guards without a known bound: skips `fraction` |g| / |slope|, with the slope of the
 /// last two checks, and at most `longest` steps.
 template <class Exact = Extremum>
 class SlopeSkip : public detail::PutsOff<Exact> {

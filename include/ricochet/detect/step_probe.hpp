@@ -1,15 +1,15 @@
-// One guard along one step: how detectors and locators look inside.
+// One guard along one step: the view that detectors and locators have of a step.
 //
 // Detectors and locators are compiled once, over `GuardPath`; `StepProbe` is the path of a guard of
 // any system along a step of any method.
 //
-// There are two ways to a state inside a step. Repeating the step from its start with
+// A state inside a step can be obtained in two forms. Repeating the step from its start with
 // another length is as accurate as the method, and is used where the motion changes
-// course. The step's polynomial is nearly as accurate and can be had one component at
+// course. The step's polynomial is nearly as accurate and can be evaluated one component at
 // a time, and is used for events that are only recorded.
 //
 // Times inside a step are offsets s in [0, h] from its start, because an offset
-// resolves what a time of day cannot: at t = 20 s neighbouring doubles are 4e-15 s
+// resolves more than an absolute time: at t = 20 s neighbouring doubles are 4e-15 s
 // apart, at s = 0.01 s they are 2e-18 s apart. In a run backward in time offsets are
 // positive too, and rates are with respect to them. A host's own integrator can offer
 // its steps in this form and use the detectors and locators without our loop.
@@ -56,11 +56,11 @@ concept MethodStep = requires(const S& step, double s, X& x, X& dxdt, const X& a
         } -> std::convertible_to<int>;
     step.interpolate(s, x);
     step.restep(s, x);
-    step.restep(s, x, dxdt);  // and the flow at the end of it
+    step.restep(s, x, dxdt);  // the state, and the flow there
     step.flow(s, at, dxdt);   // dx/ds at offset s and state `at`
 };
 
-/// A step whose dense output is a polynomial that can be had a component at a time.
+/// A step whose dense output is a polynomial that can be evaluated one component at a time.
 template <class S, class X>
 concept DenseStep = MethodStep<S, X> && requires(const S& step)
 {
@@ -73,28 +73,28 @@ concept DenseStep = MethodStep<S, X> && requires(const S& step)
 struct Location {
     double lo = 0;                                            ///< still on the armed side
     double hi = 0;                                            ///< across the surface or on it
-    double root = 0;                                          ///< the best guess between them
-    double root_remainder = 0;                                ///< what rounding left out of it
+    double root = 0;                                          ///< best estimate of the root
+    double root_remainder = 0;                                ///< rounding error of the root
     double slope = std::numeric_limits<double>::quiet_NaN();  ///< rate of the guard there
     double error = 0;   ///< [s] width of the bracket, or more where rounding in g is coarser
     bool jump = false;  ///< a change of sign without a zero: a pole, or a jump of the guard
 };
 
-/// The narrowest bracket worth having at offset s of a step of length h: neighbouring
+/// Narrowest useful bracket at offset s of a step of length h: neighbouring
 /// doubles, or a millionth of their spacing at the end of the step.
 [[nodiscard]] inline double finest_bracket(double s, double h) noexcept
 {
     return std::numeric_limits<double>::epsilon() * std::max(std::fabs(s), 0x1p-20 * std::fabs(h));
 }
 
-/// States that a probe works with, so that probing allocates nothing.
+/// Work space for the states of a probe, so that probing allocates nothing.
 template <class X>
 struct ProbeSpace {
     explicit ProbeSpace(const X& like) : x(like), dxdt(like), root(like) {}
     X x, dxdt, root;
 };
 
-/// How states inside a step are obtained.
+/// Source of the states inside a step.
 enum class Path {
     restep,  ///< the method's own map from the start of the step
     dense,   ///< the step's polynomial
@@ -108,8 +108,8 @@ struct PathProperties {
     bool is_polynomial = false;  ///< the step has a polynomial, which continues beyond its end
 };
 
-/// A guard on a step as a function of the offset s in [0, h]: the only view that a detector or a
-/// locator has of a motion. Evaluations may cost a step of the method.
+/// A guard on a step as a function of the offset s in [0, h]: the only access to a motion that a
+/// detector or a locator has. Evaluations may cost a step of the method.
 class GuardPath {
 public:
     GuardPath(const GuardPath&) = delete;
@@ -126,14 +126,14 @@ public:
     /// The side from which a departure is searched for.
     [[nodiscard]] Side side() const noexcept { return side_; }
 
-    /// Searches for a departure from `side` from here on.
+    /// Searches for a departure from `side` from now on.
     void watch(Side side) noexcept
     {
         side_ = side;
         settled_ = false;
     }
 
-    /// Whether the guard of a sample has left the side that is watched.
+    /// Whether the guard of a sample has left the watched side.
     [[nodiscard]] bool has_left(const GuardSample& sample) const noexcept
     {
         return ricochet::has_left(side_, sample.value);
@@ -163,10 +163,10 @@ public:
     {
         return {.s = s, .value = value_along_the_flow(from.s, s), .rate = from.rate};
     }
-    /// The root lies `correction` after `sample`, the last that `value_and_rate` took,
-    /// and the motion is straight until there.
+    /// Tells the path that the root lies `correction` [s] after `sample`, the last that
+    /// `value_and_rate` took, and that the motion is straight until there.
     virtual void settle(double correction) = 0;
-    /// The rate of the guard at a sample where it is not known yet.
+    /// The rate of the guard at a sample for which it is not known yet.
     virtual void complete(GuardSample& sample) = 0;
     /// Change of the guard at offset s for 8 units in the last place of the time and of each
     /// component of the state, from its slopes.
@@ -178,7 +178,7 @@ public:
     [[nodiscard]] virtual int degree() const = 0;
 
 protected:
-    /// Two numbers, which are returned in registers.
+    /// Two numbers, which fit into registers when returned.
     struct Point {
         double value;
         double rate;
@@ -279,7 +279,7 @@ public:
 
     /// Detection examined the polynomial. Where the step's own map disagrees with it about the
     /// near end of the bracket, the bracket starts where the interval does; about the far end,
-    /// as it can near tangency, the polynomial is used from here on.
+    /// as it may near tangency, the polynomial is used from here on.
     void agree_on(GuardSample& lo, const GuardSample& hi, const GuardSample& start)
     {
         if (path_ == Path::dense) return;
@@ -328,7 +328,7 @@ private:
             if (sees()) return point_of_view(s, t);
         }
         step_->interpolate(s, space_->x);
-        // The polynomial's own: a flow that jumps does not agree with it.
+        // The rate of the polynomial itself: a flow that jumps does not agree with it.
         if constexpr (requires { step_->rate_of_polynomial(s, space_->dxdt); }) {
             step_->rate_of_polynomial(s, space_->dxdt);
         } else if constexpr (DenseStep<Step, State>) {
@@ -385,7 +385,7 @@ private:
     using RateView = decltype(component_view<true>(std::declval<const Step&>(), 0.0));
     static constexpr bool may_see = DenseStep<Step, State> && Guard::template sees<View>;
 
-    /// Whether the guard can be had from the polynomial a component at a time.
+    /// Whether the guard can be evaluated on the polynomial one component at a time.
     [[nodiscard]] bool sees() const noexcept
     {
         if constexpr (requires { guard_->sees_views(); }) {
@@ -431,7 +431,7 @@ private:
         }
     }
 
-    /// Whether the step is a polynomial; one of a host need not be.
+    /// Whether the step is a polynomial; a host's step need not be one.
     [[nodiscard]] static bool has_polynomial(const Step& step) noexcept
     {
         if constexpr (requires { step.is_hosts(); }) return !step.is_hosts();
@@ -440,8 +440,8 @@ private:
 
     [[nodiscard]] View view(double s) const { return component_view<false>(*step_, s); }
 
-    /// By how much the guard at offset s changes in all with relative changes of the time and
-    /// of one component of the state after the other.
+    /// Total change of the guard at offset s under relative changes of the time and
+    /// of each component of the state in turn.
     [[nodiscard]] double nudged(double s, double nudge)
     {
         const double t = step_->time(s);
@@ -459,7 +459,7 @@ private:
         return changes;
     }
 
-    /// Brings the state at offset s into the workspace.
+    /// Computes the state at offset s into the work space.
     void place(double s)
     {
         if (path_ == Path::dense) {

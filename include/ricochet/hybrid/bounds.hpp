@@ -1,15 +1,15 @@
 // Bounds that a system may declare on how fast its guards change.
 //
-//     speed_bound(which, t, x)         path per second at (t, x): at most this, now
-//     acceleration_bound(which, t, x)  how fast that speed can change, per second, optional
+//     speed_bound(which, t, x)         upper bound of the path per second at (t, x), now
+//     acceleration_bound(which, t, x)  bound on the change of that speed per second, optional
 //     lipschitz(which)                 change of the guard per unit of path, default 1
 //     lower_bound(which, t, x)         guard >= lower_bound, cheap and proved, optional
-//     upper_bound(which, t, x)         guard <= upper_bound, the same for a guard that is
+//     upper_bound(which, t, x)         guard <= upper_bound, correspondingly for a guard that is
 //                                      armed below its surface, optional
 //
 // `path` is any measure of the motion that the system chooses: the path length of a ball's
-// centre, the largest path length of any point of a body. A guard of explicit time counts its
-// change by time as path. A system with modes takes the mode before t. A system without
+// centre, the largest path length of any point of a body. A guard that depends on time explicitly
+// counts that change as path, too. A system with modes takes the mode before t. A system without
 // `guard_count` may leave out `which`; one with it may leave out both, where its guards
 // share a bound.
 //
@@ -19,7 +19,7 @@
 // without a reset, so that it should also hold a little beyond an event surface. Without
 // it, `speed_bound` holds for the whole motion until the next event.
 //
-// Bounds are taken as true by `Planned`. One that is not a number, negative or infinite
+// `Planned` relies on bounds being true. A bound that is NaN, negative or infinite
 // covers nothing.
 #pragma once
 
@@ -32,7 +32,7 @@ namespace ricochet {
 
 namespace detail {
 
-/// Calls `function` in whichever form it has: with guard and mode, either, or neither.
+/// Calls `function` in whichever form the system has: with guard and mode, one of them, or none.
 template <class System, class Function, class... Arguments>
 [[nodiscard]] constexpr double call_bound(const Function& function, [[maybe_unused]] std::size_t which,
                                           [[maybe_unused]] Mode mode, const Arguments&... arguments)
@@ -95,7 +95,7 @@ template <class System, class X>
     return call_bound<System>(call, which, mode, t, x);
 }
 
-/// 0 where the speed bound holds for the whole motion.
+/// The acceleration bound; 0 if the speed bound holds for the whole motion.
 template <class System, class X>
 [[nodiscard]] double call_acceleration_bound(const System& system, std::size_t which, Mode mode, double t, const X& x)
 {
@@ -121,7 +121,7 @@ template <class System, class X>
     return call_bound<System>(call, which, mode, t, x);
 }
 
-/// Refuses bounds that are declared but do not fit, like `check_declarations`.
+/// Rejects bounds that are declared but do not fit, like `check_declarations`.
 template <class System, class X>
 constexpr void check_bound_declarations()
 {

@@ -20,7 +20,7 @@ enum class EventKind : std::uint8_t {
     jump,          ///< the guard changed sign without a zero: it jumped, or has a pole there
 };
 
-/// Whether a guard is on its other side after such an event.
+/// Whether a guard is on its other side after an event of this kind.
 [[nodiscard]] constexpr bool changes_sign(EventKind kind) noexcept
 {
     return kind == EventKind::crossing || kind == EventKind::jump;
@@ -41,7 +41,7 @@ struct Bracket {
     double hi = 0;
 };
 
-/// One event. `t` lies in `bracket`, at the root of the guard as exactly as it is
+/// One event. `t` lies in `bracket`, at the root of the guard as precisely as it is
 /// known, and `before` is the state there: on its surface up to rounding, on either
 /// side. The events of a set happen at one time, that of the set: for all but the
 /// first, `t` may lie outside their own `bracket`, by no more than the window, and
@@ -50,14 +50,14 @@ template <class State>
 struct Event {
     double t = 0;  ///< [s]
     EventKind kind = EventKind::crossing;
-    std::size_t guard = 0;  ///< which guard of the system, or `no_guard`
+    std::size_t guard = 0;  ///< index of the guard, or `no_guard`
     Mode mode_before = 0;
     Mode mode_after = 0;
     State before{};     ///< x⁻
     State after{};      ///< x⁺, equal to x⁻ where there is no reset
     Bracket bracket;    ///< [s]
     double slope = 0;   ///< rate of the guard at the event, per second; NaN if not computed
-    double error = 0;   ///< [s] of location within the step, not of the solution
+    double error = 0;   ///< [s] error of location within the step, not of the solution
     bool late = false;  ///< found at a step after the one that held it
 };
 

@@ -30,7 +30,7 @@
 //
 //     x' = (1-a)(1-b) f_0 + a (1-b) f_1 + (1-a) b f_2 + a b f_3
 //
-// Sliding ends where a share leaves [0, 1]. What is decided where is in
+// Sliding ends where a share leaves [0, 1]. The rules of the decision are documented at
 // `Filippov::reset`.
 #pragma once
 
@@ -70,7 +70,7 @@ struct FilippovState<Fields> {
 }  // namespace detail
 
 /// The hybrid system of fields that meet at switching surfaces. For runs forward in
-/// time: sliding forgets where it came from and cannot be run backward.
+/// time: sliding motions merge, so that they cannot be run backward.
 ///
 /// A mode says for each surface whether the motion is below, above or sliding; digit i
 /// of its number to base 3 is the `Place` at surface i. Start a run in `start_mode`.
@@ -89,7 +89,7 @@ struct FilippovState<Fields> {
 /// differ in size by 1e3, rounding may lead sliding on both off its surfaces unseen.
 ///
 /// Along one surface the exits are r_below and -r_above: as smooth as the fields, with
-/// neither quotient nor pole, and zero just where the share a is 0 or 1. On two they
+/// with neither quotient nor pole, and zero exactly where the share a is 0 or 1. On two they
 /// are the shares themselves, a and 1 - a, unless the combination ceases to exist
 /// before: then all four fall together.
 template <class Fields>
@@ -159,7 +159,7 @@ public:
         }
     }
 
-    // --- the contract of a system ---
+    // --- the functions of a hybrid system ---
 
     template <StateVector X>
     void flow(Mode mode, double t, const X& x, X& dxdt) const
@@ -188,8 +188,8 @@ public:
         }
     }
 
-    /// The rate of a surface, which is zero where rounding decides its sign: so that the
-    /// side to which a motion tangent to its surface is bent is found from the bending.
+    /// The rate of a surface, set to zero if its sign is only rounding: then the
+    /// side to which a motion tangent to its surface bends is found from its curvature.
     /// Rates of exits are differences.
     template <StateVector X>
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const X& x,
@@ -217,7 +217,7 @@ public:
         }
     }
 
-    /// Mode of a motion that has met surfaces, or may leave the surfaces on which it
+    /// Mode after a motion has met surfaces, or may leave the surfaces on which it
     /// slides; x is moved onto the surfaces on which it is to slide or has slid, by the
     /// rounding and drift that separates it from them, along the jumps of the field. The
     /// decision is made exactly on the surfaces.
@@ -227,16 +227,16 @@ public:
     /// is taken. If there are two, the surface is repulsive and the solution not unique:
     /// the exit with the larger rate is taken, of equal rates the one upward. A rate that is zero,
     /// to 2e-13 of the larger, takes the sign that it will have next along its field; an
-    /// exit that has fired counts.
+    /// up to 2e-13 of the larger, takes the sign that it will have next along its field; an
     ///
     /// A surface that the state is on or beyond counts as met, whichever guard has fired.
     ///
-    /// On two surfaces: as steep but continuous switching would do, see
+    /// On two surfaces: as steep but continuous switching would decide, see
     /// `detail::follow_shares`, with the rates of each surface in units of the largest.
     /// It starts from the weights with which the motion arrives; after an exit from the weights
     /// a moment later; at a start or time event from (1/2, 1/2).
     ///
-    /// `meeting` returns the result beforehand.
+    /// `meeting` returns the result in advance.
     template <StateVector X>
     [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, X& x) const
     {
@@ -266,11 +266,11 @@ public:
         }));
     }
 
-    /// Crossings of two surfaces that accumulate lead onto their intersection. There is no
-    /// other accumulation that Filippov's rule could continue: that of crossings of one
+    /// An accumulation of crossings of two surfaces leads onto their intersection. There is no
+    /// other accumulation that Filippov's rule could continue: an accumulation of crossings of one
     /// surface is sliding of second order, which needs the rate of h as a second surface.
-    /// With one surface there is no `rest`, and such a run ends; with two it ends by a
-    /// state that is NaN.
+    /// With one surface there is no `rest`, and such a run ends; with two it ends with a
+    /// state of NaN.
     template <StateVector X>
     requires(surface_count == 2) [[nodiscard]] Mode
         rest(std::size_t which, Mode mode, double t, X& x) const
@@ -293,8 +293,8 @@ public:
         return fields().next_time_event(t);
     }
 
-    /// The jump of the fields' own `time_reset`, if any. Fields may also have changed:
-    /// what slides is decided again.
+    /// Applies the jump of the fields' own `time_reset`, if any. Fields may also have changed:
+    /// the sliding surfaces are decided again.
     template <StateVector X>
     [[nodiscard]] Mode time_reset(Mode mode, double t, X& x) const requires Timed<Fields>
     {
@@ -302,7 +302,7 @@ public:
         return number(rules_.decide(from, Rules::sliding_in(from), t, x));
     }
 
-    // --- questions ---
+    // --- queries ---
 
     /// The mode in which a run from (t, x) starts. A surface counts as met where
     /// |h| <= tolerance, in the unit of h; then the rule of `reset` applies.
@@ -357,7 +357,7 @@ private:
     {
         return kind_of(which) >= exits_below;
     }
-    /// The place of an exit in `detail::Exits`.
+    /// Index of an exit guard in `detail::Exits`.
     [[nodiscard]] static constexpr std::size_t exit_of(std::size_t which) noexcept
     {
         return 2 * surface_of(which) + (kind_of(which) - exits_below);
@@ -403,7 +403,7 @@ private:
                                       const X& dxdt) const
     {
         const double rate = rules_.surface_rate(which, t, x, dxdt);
-        // Only a rate that is small by any measure is worth a comparison with others.
+        // Only a rate that is small by any measure has to be compared with others.
         if (std::fabs(rate) > 1e-6 * detail::largest_component(dxdt)) return rate;
         const auto near = rules_.around(Rules::bit(which) | Rules::sliding_in(at), at, t, x);
         const double size = detail::largest_component(near.rates[which]);

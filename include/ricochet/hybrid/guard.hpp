@@ -6,8 +6,8 @@
 // the end of the step has bounced, although the guard was zero at the start.
 //
 // Guards are edge-triggered: one that lies beyond its surface already, at the start or
-// when a mode begins, does not fire before it has come back. Only a `unilateral` guard,
-// which bounds the motion, makes a demand on where the state is.
+// when a mode begins, does not fire before it has returned. Only a `unilateral` guard,
+// which bounds the motion, restricts where the state may be.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ enum class Crossing {
 };
 
 /// Side on which a guard was armed: its sign, or on its surface the sign of its first nonzero
-/// derivative along the flow. On a plateau all of these vanish, and the guard waits.
+/// derivative along the flow. On a plateau all of these vanish, and the side is still open.
 enum class Side { below, plateau, above };
 
 /// Properties of a guard that a system declares.
@@ -40,26 +40,26 @@ struct GuardInfo {
     bool resets = true;            ///< false: events are only recorded
     std::uint32_t stop_after = 0;  ///< the run ends with this many events; 0: never
     bool unilateral = false;       ///< g >= 0 bounds the motion
-    bool boolean = false;          ///< only the sign means anything: no rates, bisection
-    int degree = 0;                ///< a polynomial of this degree in (t, x) together; 0: not known
-    double touch = 0;              ///< |g| at a zero of the rate that counts as a touch; at least
+    bool boolean = false;          ///< only the sign has a meaning: no rates, bisection
+    int degree = 0;                ///< a polynomial of this degree in (t, x) together; 0: unknown
+    double touch = 0;              ///< |g| at a zero of the rate that counts as a touch; not below
                                    ///< 64 units in the last place of the guard's size
 };
 
-/// The side that a value lies on; zero is a plateau.
+/// The side that a value lies on; plateau for zero.
 [[nodiscard]] constexpr Side side_of(double value) noexcept
 {
     return value > 0 ? Side::above : value < 0 ? Side::below : Side::plateau;
 }
 
-/// The other side of the surface; of a plateau the plateau.
+/// The other side of the surface; plateau for plateau.
 [[nodiscard]] constexpr Side opposite(Side side) noexcept
 {
     return side == Side::above ? Side::below : side == Side::below ? Side::above : Side::plateau;
 }
 
-/// Whether a guard armed on `side` and worth `g` has left that side: crossed its
-/// surface or arrived on it. NaN and plateaus have not.
+/// Whether a guard armed on `side`, with the value `g`, has left that side: crossed its
+/// surface or arrived on it. False for NaN and plateaus.
 [[nodiscard]] constexpr bool has_left(Side side, double g) noexcept
 {
     return (side == Side::above && g <= 0) || (side == Side::below && g >= 0);
@@ -76,7 +76,7 @@ struct GuardInfo {
     return false;
 }
 
-/// Whether a guard armed on `side` and worth `g_end` at the end of a step has
+/// Whether a guard armed on `side`, with the value `g_end` at the end of a step, has
 /// triggered. The end is included, so a zero on the boundary of two steps counts
 /// once; the start is represented by `side`, so a step that begins on the
 /// surface, as after a bounce, is assessed like any other.

@@ -1,7 +1,7 @@
 // The scalar of a system's functions as a template parameter.
 //
-// One text of a flow, a guard or a reset serves numbers, dual numbers (dual.hpp) and power series
-// (taylor.hpp) where the time and the state have one scalar, whatever it is. On arrays:
+// One template of a flow, a guard or a reset serves numbers, dual numbers (dual.hpp) and power
+// series (taylor.hpp), if the time and the state have one scalar type, whatever it is. On arrays:
 //
 //     template <class S>
 //     constexpr void flow(const S& t, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
@@ -23,7 +23,7 @@
 
 namespace ricochet {
 
-/// What the components of X are.
+/// Type of the components of X.
 template <class X>
 using ScalarOf = std::remove_cvref_t<decltype(std::declval<const X&>()[0])>;
 

@@ -5,7 +5,7 @@
 
 namespace ricochet {
 
-/// Why a step was taken to hold no event.
+/// Reason for which a step was taken to hold no event.
 enum class Evidence : std::uint8_t {
     proved,   ///< a bound or polynomial excludes a root
     checked,  ///< evaluated at the ends and at the interior extremum
@@ -33,14 +33,14 @@ struct EvidenceCounts {
 
 /// Counts over one run.
 struct Statistics {
-    std::uint64_t steps = 0;             ///< accepted, also those cut short by an event
+    std::uint64_t steps = 0;             ///< accepted steps, including those cut short by an event
     std::uint64_t rejected = 0;          ///< steps that failed the error test
     std::uint64_t refined_steps = 0;     ///< steps divided for a guard that they did not resolve
-    std::uint64_t unresolved_steps = 0;  ///< of these, not resolved by the finest division
+    std::uint64_t unresolved_steps = 0;  ///< refined steps that the finest division did not resolve
     std::uint64_t resteps = 0;           ///< steps repeated from their start to locate an event
-    std::uint64_t flow_calls = 0;        ///< evaluations of the flow, all purposes
-    std::uint64_t guard_calls = 0;       ///< evaluations of the guard, all purposes
-    std::uint64_t network_calls = 0;     ///< inferences
+    std::uint64_t flow_calls = 0;        ///< evaluations of the flow, for all purposes
+    std::uint64_t guard_calls = 0;       ///< evaluations of the guard, for all purposes
+    std::uint64_t network_calls = 0;     ///< evaluations of a network
     std::uint64_t false_alarms = 0;      ///< a network predicted an event and there was none
     std::uint64_t missed_events = 0;     ///< events in a step that a network had cleared
     std::uint64_t late_events = 0;       ///< missed events that only a later step found
@@ -48,8 +48,8 @@ struct Statistics {
         0;  ///< steps whose exact check a network or a plan deferred for good
     std::uint64_t outside_domain = 0;  ///< states outside the box of a gate: checked exactly
     std::uint64_t bound_calls = 0;     ///< evaluations of `lower_bound`, `upper_bound`
-    std::uint64_t rollbacks = 0;       ///< intervals taken back to a step that was not closed
-    std::uint64_t repeated_steps = 0;  ///< steps taken again for that
+    std::uint64_t rollbacks = 0;       ///< returns to the start of a step that could not be closed
+    std::uint64_t repeated_steps = 0;  ///< steps taken again because of that
     std::uint64_t events = 0;
     std::uint64_t suppressed = 0;  ///< repeats of an event inside its own window
     std::uint64_t disabled = 0;    ///< crossings that `enabled` rejected

@@ -5,17 +5,17 @@
 //     guard_rate(t, x, dxdt)    dg/dt along the flow               optional; not needed where
 //                                                                  the guard takes any scalar
 //                                                                  (hybrid/scalar.hpp)
-//     guard_curvature(t, x)     d2g/dt2 along the flow             for some networks
+//     guard_curvature(t, x)     d2g/dt2 along the flow             for networks that use it
 //     reset(t, x)               x⁻ becomes x⁺, in place            optional
 //     rest(t, x)                where infinitely many events end   optional
 //     crossing                  which sign change counts           default: falling
 //     unilateral                g >= 0 bounds the motion           default: false
 //     guard_info()              both and more, as a GuardInfo      instead of these two
-//     name, parameter(name)     what it is                         for networks
+//     name, parameter(name)     identification                     for networks
 //     State                     state type when none is given      optional
 //
 // A system with many guards declares `guard_count`, a constant or a member, and each
-// function of a guard takes first which one is meant:
+// function of a guard first takes the index of the guard:
 //
 //     guard(which, t, x)        or guards(t, x, g), all of them together into a
 //                               std::span<double>, or both
@@ -39,19 +39,19 @@
 //
 // Events at known times:
 //
-//     next_time_event(t)        the first after t, t excluded, or infinity
+//     next_time_event(t)        the first after t (not t itself), or infinity
 //     previous_time_event(t)    the last before t, for runs backward in time
 //     time_reset(t, x)          or Mode time_reset(mode, t, x); optional
 //
-// How fast its guards can change, so that a detector may leave most of them unasked:
+// Bounds on how fast its guards can change, which let a detector skip most evaluations:
 // speed_bound and others, see hybrid/bounds.hpp.
 //
-// All functions are const and free of side effects; t is in seconds. A function of one
-// of these names that fits none of the forms, and one of a name that is nearly one of
-// these, is refused by the compiler, see detail/declarations.hpp. Guards written
-// for any x that has `x[i]` are located without the rest of the state. A system
-// without a guard is integrated as a plain ordinary differential equation: none of
-// the machinery of events is run.
+// All functions are const and free of side effects; t is in seconds. A function that has one
+// of these names but none of the forms, or a name that is nearly one of
+// these, is rejected by the compiler, see detail/declarations.hpp. Guards written
+// for any x that has `x[i]` are located without computing the rest of the state. A system
+// without a guard is integrated as a plain ordinary differential equation, without
+// the machinery of events.
 #pragma once
 
 #include <concepts>
@@ -79,10 +79,10 @@ concept StateVector = std::copyable<X> && requires(X& x, const X& y, std::size_t
     { y.size() } -> std::convertible_to<std::size_t>;
 };
 
-/// The guards that fired together, ascending.
+/// Set of the guards that fired together, in ascending order.
 class FiredGuards {
 public:
-    /// Keeps a view of `guards`, which are ascending.
+    /// Keeps a view of `guards`, which must be ascending.
     explicit FiredGuards(std::span<const std::size_t> guards, bool time_event = false) noexcept
         : guards_(guards), time_event_(time_event)
     {
@@ -154,11 +154,11 @@ concept PlainSingleGuard = !CountsGuards<System> && requires(const System& syste
     { system.guard(t, x) } -> std::convertible_to<double>;
 };
 
-/// One guard can be had without the others.
+/// The system can evaluate one guard without the others.
 template <class System, class X>
 concept GuardAlone = ModedGuardOf<System, X> || PlainGuardOf<System, X> || ModedSingleGuard<System, X> || PlainSingleGuard<System, X>;
 
-/// All guards come from one call.
+/// The system evaluates all guards in one call.
 template <class System, class X>
 concept GuardsTogether = ModedGuards<System, X> || PlainGuards<System, X>;
 
@@ -184,10 +184,10 @@ concept PlainSingleRate = !CountsGuards<System> && requires(const System& system
     { system.guard_rate(t, x, dxdt) } -> std::convertible_to<double>;
 };
 
-/// The system writes the rate of one guard.
+/// The system computes the rate of one guard.
 template <class System, class X, class D = X>
 concept RateWritten = ModedRateOf<System, X, D> || PlainRateOf<System, X, D> || ModedSingleRate<System, X, D> || PlainSingleRate<System, X, D>;
-/// It does, or dual numbers through its guard have the rate.
+/// It does, or the rate follows from the guard by dual numbers.
 template <class System, class X, class D = X>
 concept RateAlone = RateWritten<System, X, D> || RateByDuals<System, X>;
 
@@ -264,7 +264,7 @@ concept PlainSingleRest = !CountsGuards<System> && requires(const System& system
     system.rest(t, x);
 };
 
-// --- what is said of guards ---
+// --- properties of guards ---
 
 template <class System>
 concept InfoOf = requires(const System& system, std::size_t which) {
@@ -282,7 +282,7 @@ concept EnabledIn =
     (CountsGuards<System> && requires(const System& system, std::size_t which, Mode mode) { { system.enabled(which, mode) } -> std::convertible_to<bool>; }) ||
     (!CountsGuards<System> && requires(const System& system, Mode mode) { { system.enabled(mode) } -> std::convertible_to<bool>; });
 
-/// Whether a crossing is an event depends on where it is.
+/// Whether a crossing is an event depends on the state there.
 template <class System, class X>
 concept EnabledAt =
     (CountsGuards<System> && (requires(const System& system, std::size_t which, Mode mode, double t, const X& x) { { system.enabled(which, mode, t, x) } -> std::convertible_to<bool>; } ||
@@ -290,7 +290,7 @@ concept EnabledAt =
     (!CountsGuards<System> && (requires(const System& system, Mode mode, double t, const X& x) { { system.enabled(mode, t, x) } -> std::convertible_to<bool>; } ||
                                requires(const System& system, double t, const X& x) { { system.enabled(t, x) } -> std::convertible_to<bool>; }));
 
-// --- times ---
+// --- time events ---
 
 template <class System>
 concept TimedBackward = requires(const System& system, double t) {
@@ -311,32 +311,32 @@ concept Flowing = detail::ModedFlow<System, X> || detail::PlainFlow<System, X>;
 template <class System, class X>
 concept Guarded = Flowing<System, X> && (detail::GuardAlone<System, X> || detail::GuardsTogether<System, X>);
 
-/// The guard's rate dg/dt + (dg/dx) x' is known in closed form.
+/// The guard's rate dg/dt + (dg/dx) x' is available in closed form.
 template <class System, class X>
 concept RatedGuard = Guarded<System, X> && (detail::RateAlone<System, X> || detail::RatesTogether<System, X>);
 
-/// Something happens at an event: `reset` replaces x⁻ by x⁺.
+/// A system whose events change the state: `reset` replaces x⁻ by x⁺.
 template <class System, class X>
 concept Resetting = Guarded<System, X> && (detail::ResetsAlone<System, X> || detail::ResetsTogether<System, X>);
 
-/// `rest` says what becomes of the motion where its events accumulate.
+/// A system with `rest`, which continues the motion beyond an accumulation of its events.
 template <class System, class X>
 concept Resting = Guarded<System, X> && (detail::ModedRestOf<System, X> || detail::PlainRestOf<System, X> || detail::ModedSingleRest<System, X> || detail::PlainSingleRest<System, X>);
 
-/// Something happens at known times.
+/// A system with time events.
 template <class System>
 concept Timed = requires(const System& system, double t) {
     { system.next_time_event(t) } -> std::convertible_to<double>;
 };
 
-/// Has modes: some function of it takes one.
+/// A system with modes: at least one of its functions takes a mode.
 template <class System, class X>
 concept Moded = detail::ModedFlow<System, X> || requires(const System& system) { system.mode_count; } || requires(const System& system) { system.mode_count(); };
 
-/// `guard_count` that is not a constant.
+/// A system whose `guard_count` is not a constant.
 inline constexpr std::size_t counted_at_run_time = static_cast<std::size_t>(-1);
 
-/// Number of guards where the type fixes it, else `counted_at_run_time`.
+/// Number of guards if the type fixes it, else `counted_at_run_time`.
 template <class System, class X>
 [[nodiscard]] constexpr std::size_t fixed_guard_count() noexcept
 {
@@ -362,7 +362,7 @@ template <class X, class System>
     }
 }
 
-/// Properties of a guard: as the system declares them, else the defaults.
+/// Properties of a guard: those that the system declares, else the defaults.
 template <class X, class System>
 [[nodiscard]] constexpr GuardInfo guard_info_of(const System& system, std::size_t which)
 {
@@ -390,9 +390,9 @@ template <class X, class System>
 
 namespace detail {
 
-// --- calling whichever form a system has ---
+// --- calls in whichever form a system has ---
 
-/// x' into `dxdt`. A flow that gives it another dimension has made a mistake: then `dxdt` is
+/// Computes x' into `dxdt`. A flow that changes the dimension of `dxdt` is in error: then `dxdt` is
 /// filled with NaN in the dimension of x, so that nothing is read beyond its end, and the
 /// result is false.
 template <class System, class X>
@@ -413,7 +413,7 @@ template <class System, class X>
     return true;
 }
 
-/// Whether a reset may leave `after` where the state was `before`.
+/// Whether a reset may produce `after` from the state `before`.
 template <class System, class X>
 [[nodiscard]] constexpr bool fits_dimension(const X& before, const X& after, bool same_mode) noexcept
 {
@@ -427,7 +427,7 @@ template <class System, class X>
 [[nodiscard]] constexpr double as_guard_value(bool inside) noexcept { return inside ? 1 : -1; }
 [[nodiscard]] constexpr double as_guard_value(double g) noexcept { return g; }
 
-/// One guard. X may be a view.
+/// Value of one guard. X may be a view.
 template <class System, class X>
 [[gnu::always_inline]] [[nodiscard]] inline double call_guard(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x)
 {
@@ -442,7 +442,7 @@ template <class System, class X>
     }
 }
 
-/// All guards into `g`.
+/// Values of all guards, into `g`.
 template <class System, class X>
 [[gnu::always_inline]] inline void call_guards(const System& system, [[maybe_unused]] Mode mode, double t, const X& x, std::span<double> g)
 {
@@ -457,7 +457,7 @@ template <class System, class X>
     }
 }
 
-/// The rate of one guard with x' = dxdt.
+/// The rate of one guard along x' = dxdt.
 template <class System, class X, class D>
 [[gnu::always_inline]] [[nodiscard]] inline double call_rate(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x, const D& dxdt)
 {
@@ -484,7 +484,7 @@ inline void call_rates(const System& system, [[maybe_unused]] Mode mode, double 
     }
 }
 
-/// The reset of one guard; returns the mode after it.
+/// Applies the reset of one guard; returns the mode after it.
 template <class System, class X>
 [[nodiscard]] Mode call_reset(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, X& x)
 {

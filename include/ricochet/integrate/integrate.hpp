@@ -8,7 +8,7 @@ namespace ricochet {
 
 namespace detail {
 
-/// Whether a system is to be handed over to an inclusion, by an `integrate` of its own.
+/// Whether a system declares an inclusion, to which its own `integrate` hands over.
 template <class System>
 concept WantsHandOver = requires(const System& system)
 {
@@ -19,16 +19,16 @@ concept WantsHandOver = requires(const System& system)
 
 /// Integrates `system` from x0 at `options.t_start` to `options.t_end`.
 ///
-/// @param system   declares what it has (see hybrid/system.hpp); not copied, not
+/// @param system   declares its functions (see hybrid/system.hpp); not copied, not
 ///                 changed
-/// @param x0       start; its type is the state type of the run
+/// @param x0       initial state; its type is the state type of the run
 /// @param options  only `t_end` is required
 /// @param stepping `ErrorControlled<Method>` or `FixedStep<Method>`
-/// @param detector `Extremum`, `Ends`, `Bernstein`, a `Network`, one that is `Verified`, or one
-///                 of these exact ones that is `Planned`
+/// @param detector `Extremum`, `Ends`, `Bernstein`, a `Network`, or a detector that wraps one of
+///                 the exact ones, such as `Planned` or `Verified`
 /// @param locator  `Newton`, `Bisection` or `Toms748`
-/// @throws std::invalid_argument for options, start or guards that make no sense.
-///         What happens along the way is returned as `Run::outcome`.
+/// @throws std::invalid_argument for invalid options, start or guards.
+///         What happens during the run is returned as `Run::outcome`.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>
@@ -46,13 +46,13 @@ requires Flowing<System, X> && StateVector<X>
                                  x0);
 }
 
-/// Systems without a flow for such a state.
+/// A system without a flow for such a state.
 template <class System, class X>
 concept NotIntegrable = !(Flowing<System, X> && StateVector<X>);
 
 namespace detail {
 
-/// Whether the flow fits the state that the system declares, but not the start.
+/// Whether the flow fits the state type that the system declares, but not the type of the start.
 template <class System, class X>
 [[nodiscard]] consteval bool takes_another_state()
 {
@@ -66,7 +66,7 @@ template <class System, class X>
 
 }  // namespace detail
 
-/// Refuses at compile time a system that cannot be integrated, with a sentence instead of a list of
+/// Rejects at compile time a system that cannot be integrated, with a sentence instead of a list of
 /// concepts.
 template <class System, class X = typename System::State, class... Choices>
 requires NotIntegrable<System, X> Run<X> integrate(const System&, const X&, const Options&,

@@ -59,17 +59,17 @@ struct Fehlberg78 {
     using Stepper = detail::RungeKutta<detail::Fehlberg78Tableau, State>;
 };
 
-/// The methods that `MethodByName` can be.
+/// The methods that `MethodByName` can select.
 enum class MethodName : std::uint8_t { euler, rk4, cash_karp54, dopri5, fehlberg78 };
 
-/// A method chosen at run time, with the same bits: for programs that offer all of them. The flow
+/// A method selected at run time, with the same bits: for programs that offer all of them. The flow
 /// is called through a pointer, which costs small states a few nanoseconds a call.
 struct MethodByName {
     MethodName name = MethodName::dopri5;
 };
 
-/// Steps of the size `Options::step`; the last one is cut to end at `t_end`, and
-/// the grid starts again at every event.
+/// Steps of the length `Options::step`; the last one is cut to end at `t_end`, and
+/// the sequence starts again at every event.
 template <class Method = Rk4>
 struct FixedStep {
     using method = Method;
@@ -88,7 +88,7 @@ namespace detail {
 
 namespace odeint = boost::numeric::odeint;
 
-/// A method of ours, which departs from the tangent by itself.
+/// A method of this library, which computes steps as departures from the tangent.
 template <class Stepper>
 concept Departing = requires
 {
@@ -99,7 +99,7 @@ template <class Stepper, class... Tags>
 inline constexpr bool has_category = (std::is_same_v<typename Stepper::stepper_category, Tags> ||
                                       ...);
 
-/// Error estimate, and the rate at the end for free (first same as last).
+/// A method with an error estimate, and with the rate at the end for free (first same as last).
 template <class Stepper>
 inline constexpr bool is_fsal = has_category<Stepper, odeint::explicit_error_stepper_fsal_tag>;
 template <Departing Stepper>
@@ -121,7 +121,7 @@ inline constexpr bool has_interpolant = requires(const Stepper& stepper, X& x)
 template <Departing Stepper, class X>
 inline constexpr bool has_interpolant<Stepper, X> = Stepper::has_dense_output;
 
-/// One of our own methods, which the library has compiled, too.
+/// One of the library's own methods, which is also compiled in the library.
 template <class Method>
 struct NameOf {
     static constexpr bool known = false;

@@ -10,39 +10,39 @@
 
 namespace ricochet {
 
-/// Options of `integrate`. Times in seconds. Only `t_end` has no default. A run backward
+/// Options of `integrate`. Times are in seconds. Only `t_end` has no default. A run backward
 /// in time applies resets as they are, not inverted.
 struct Options {
     double t_start = 0;
-    double t_end = std::numeric_limits<double>::quiet_NaN();  ///< before t_start: backward in time
-    Mode mode = 0;                                            ///< at the start
+    double t_end = std::numeric_limits<double>::quiet_NaN();  ///< before t_start: runs backward
+    Mode mode = 0;                                            ///< mode at the start
 
-    /// The step of a fixed-step run, where it is required; with error control the
-    /// first step tried, estimated from the flow if zero.
+    /// [s] Length of the steps of a fixed-step run, where it is required; with error control the
+    /// length of the first step tried, estimated from the flow if zero.
     double step = 0;
 
-    /// Error control: a step is accepted where its estimated error in every
+    /// Error control: a step is accepted if its estimated error in every
     /// component stays below atol + rtol |x|. Ignored by fixed steps.
     double rtol = 1e-8;
     double atol = 1e-10;
-    /// One for each component of the start, in place of `atol`; of components that a reset
-    /// adds it is `atol`.
+    /// Absolute tolerances, one for each component of the start, instead of `atol`, which then
+    /// applies to components that a reset adds.
     std::vector<double> component_atol{};
-    double h_min = 0;  ///< 0: a few units in the last place of the time
+    double h_min = 0;  ///< [s] 0: a few units in the last place of the time
     double h_max = std::numeric_limits<double>::infinity();
 
-    /// An event is located to a bracket no wider than
-    /// event_tolerance + event_rtol |t|, or to neighbouring doubles where that is
-    /// smaller.
+    /// [s] An event is located to a bracket no wider than
+    /// event_tolerance + event_rtol |t|, or to neighbouring doubles if these are further
+    /// apart.
     double event_tolerance = 0;
     double event_rtol = 0;
 
-    /// Events no further apart than max(event_window, event tolerance, 4 units in the
-    /// last place of t) happen together: one set, applied once.
+    /// [s] Events no further apart than max(event_window, event tolerance, 4 units in the
+    /// last place of t) happen together: they form one set, applied once.
     double event_window = 0;
 
-    /// Whether detectors that can (`LooksInside`) evaluate every guard once inside each step,
-    /// too, and divide a step in which a cubic through its ends does not tell what the guard
+    /// Whether detectors that can (`LooksInside`) evaluate every guard once inside each step as
+    /// well, and divide a step if the cubic through its ends does not describe what the guard
     /// does. Without it a guard that moves faster than the state may be lost. Guards that
     /// declare bounds, and may be expensive, are never examined inside.
     bool look_inside = true;
@@ -52,18 +52,18 @@ struct Options {
     bool event_states = true;   ///< off: events without reset are kept without their states
     bool record_steps = false;  ///< keep every step, for `Run::solution`
 
-    /// Times at which the trajectory is wanted, in the order in which the run meets
+    /// Times [s] at which the trajectory is recorded, in the order in which the run reaches
     /// them. A time that coincides with an event gets the state after it.
     std::vector<double> sample_times{};
 
     std::uint64_t max_steps = std::numeric_limits<std::uint64_t>::max();
 
-    /// Number of consecutive steps that have to advance the time by 1e-9 of the span from t_start
-    /// to t_end together, or the run ends as `Outcome::stalled`. 0: any number may stand still.
+    /// Number of consecutive steps that together have to advance the time by 1e-9 of the span from
+    /// t_start to t_end; else the run ends as `Outcome::stalled`. 0: no limit.
     std::uint64_t stall_steps = 1'000'000;
 
-    /// Set from another thread or a signal handler, it ends the run after the step in
-    /// progress; nothing is lost.
+    /// Flag, set from another thread or a signal handler, that ends the run after the step in
+    /// progress; results so far are kept.
     const std::atomic<bool>* cancelled = nullptr;
 };
 

@@ -12,8 +12,8 @@ enum class Outcome {
     zeno,  ///< events accumulate, or a motion presses on its guard, and no rest rule stops it
     outside_mode,          ///< a reset left the state behind a unilateral guard
     endless_cascade,       ///< resets kept triggering each other at one instant
-    conflicting_resets,    ///< two resets of one set, or one and a time event's, wrote one
-                           ///< component differently
+    conflicting_resets,    ///< two resets of one set, or a reset and a time event's, gave one
+                           ///< component different values
     unknown_mode,          ///< a reset returned a mode that the system does not have
     step_underflow,        ///< no step above h_min met the tolerance
     step_limit,            ///< `Options::max_steps` steps were taken
@@ -25,11 +25,11 @@ enum class Outcome {
     wrong_dimension,       ///< the flow or a reset left a state of another dimension
     stalled,               ///< `Options::stall_steps` steps hardly advanced the time
     stopped_by_callback,   ///< a function of the system reported an error, see `ricochet.h`
-    at_rest,               ///< of a fault: nothing moves any more, nor will; the end is reached
-    not_handed_over,       ///< a set-valued phase was due, and `HandOverOptions::events_only`
-    released,              ///< no reaction is held any more, and `HandOverOptions::until_released`
+    at_rest,               ///< of a fault: nothing moves or will move again; the end is reached
+    not_handed_over,       ///< a set-valued phase was due, with `HandOverOptions::events_only`
+    released,              ///< no reaction is held any more, with `HandOverOptions::until_released`
     law_violated,          ///< a set-valued step ended with a reaction that contradicts its y
-    running,               ///< of a set-valued motion: it has not ended
+    running,               ///< only of a set-valued motion: it has not ended yet
 };
 
 /// The enumerator's name, e.g. "reached_end".

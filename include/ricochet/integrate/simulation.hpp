@@ -9,7 +9,7 @@
 // Steps are half-open, (t, t + h]. Between the first step and the last nothing is allocated for
 // states of fixed size, unless something is recorded.
 //
-// The loop itself is compiled in the library (detail/core.hpp); what is made here are its tables
+// The loop itself is compiled in the library (detail/core.hpp); this header makes its tables
 // of a system, a method, a detector and a locator.
 #pragma once
 
@@ -35,7 +35,7 @@ namespace ricochet {
 
 namespace detail {
 
-/// Parts of a run besides its start and its options, in a place that does not move.
+/// Parts of a run besides its start and its options, at addresses that do not change.
 template <class System, class X, class Stepping, class Detector, class Locator>
 class PartsOfRun {
     using Method = typename Stepping::method;
@@ -56,7 +56,7 @@ class PartsOfRun {
                       fixed_guard_count<System, X>() == 1,
                   "ricochet: a network predicts the events of one guard");
 
-    /// Whether the method is a power series.
+    /// Whether the method uses power series.
     static constexpr bool by_series = [] {
         if constexpr (NameOf<Method>::known || by_name) return false;
         if constexpr (!NameOf<Method>::known && !by_name) {
@@ -86,7 +86,7 @@ class PartsOfRun {
                 }
             }
         } else if constexpr (by_series) {
-            // Guards that have no series are sampled, which the loop does.
+            // Guards without a power series are sampled by the loop.
             constexpr bool proves =
                 screening == Screening::extremum || screening == Screening::every;
             constexpr bool one = fixed_guard_count<System, X>() == 1 && !D::predicts &&
@@ -100,7 +100,7 @@ class PartsOfRun {
         return nullptr;
     }
 
-    /// The order that the method was given.
+    /// The order that was chosen for the method.
     [[nodiscard]] int order() const noexcept
     {
         if constexpr (requires { door_.given_order; }) return door_.given_order;
@@ -146,14 +146,14 @@ private:
     Locator locator_;
 };
 
-/// A state of the loop's as one like `like` of the caller's.
+/// Converts a state of the loop into one like `like`, of the caller's type.
 template <class X>
 [[nodiscard]] X as_callers(const CoreState<X>& x, const X& like)
 {
     if constexpr (std::is_same_v<X, CoreState<X>>) {
         return x;
     } else {
-        if (x.size() == 0) return X{};  // not known, or not kept
+        if (x.size() == 0) return X{};  // unknown, or not recorded
         X out = like;
         copy_state(x, out);
         return out;
@@ -176,7 +176,7 @@ template <class X>
             .late = event.late};
 }
 
-/// Brings `to` up to date with what has been recorded in `run` since.
+/// Brings `to` up to date with the records in `run`, converting only the new ones.
 template <class X>
 void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
 {
@@ -228,11 +228,11 @@ template <class X>
 
 /// A run that the caller drives, from (t_start, x0) to t_end.
 ///
-/// With the mode q, the method's map Phi(h; q, t, x), guards g_i that are armed on a side each, and
+/// With the mode q, the method's map Phi(h; q, t, x), guards g_i, each armed on a side, and
 /// resets r_i, one `step` is
 ///
 ///     h        = the length that error control or `Options::step` asks for, at most up to t_end
-///     and
+///                and
 ///                to the next time event; shorter until the error of Phi(h; q, t, x) is accepted
 ///     F, s     = the earliest set of acting guards that leave their side within (0, h], and its
 ///                offset; nothing and h if there is none
@@ -250,7 +250,7 @@ template <class X>
 /// so that steps are half-open, (t, t + h]: a zero at the end of a step belongs to it, a zero at
 /// its start to the step before. A guard acts if it has a reset or may end the run. The set F does
 /// not depend on the order in which guards are declared. Events are those of one call of
-/// `integrate`, however the run is driven.
+/// `integrate`, however the caller drives the run.
 ///
 /// Exceptions from the functions of the system pass through unchanged. The simulation is then
 /// at the end of its last complete step with its events (`take`: at most as far back as its last
@@ -289,8 +289,8 @@ public:
     }
     [[nodiscard]] Mode mode() const noexcept { return loop_->mode(); }
     [[nodiscard]] bool ended() const noexcept { return loop_->ended(); }
-    /// Result so far; its time and state are brought up to date by
-    /// `finish`.
+    /// Result so far; `finish` brings its time and state up to
+    /// date.
     [[nodiscard]] const Run<X>& run() const
     {
         if constexpr (same) {
@@ -308,14 +308,14 @@ public:
     /// that defers checks does not look ahead here, since every step is final.
     bool step() { return loop_->step(); }
 
-    /// Goes on to the next sample time, or to the end of the next step that holds events;
+    /// Advances to the next sample time, or to the end of the next step that holds events;
     /// `t`, `x` and `mode` are those there, after the events. False: the run has ended, and
-    /// nothing has happened in it that was not shown.
+    /// everything that happened in it has been shown.
     bool advance() { return loop_->advance(); }
 
-    /// Goes on to the end, and calls `observe(event)` for every event recorded on the
-    /// way, `observe(simulation)` after every step; whichever of the two it takes. Neither
-    /// sees what is not final: with the second, no detector looks ahead.
+    /// Advances to the end. Calls `observe(event)` for every recorded event and
+    /// `observe(simulation)` after every step, each if `observe` accepts it. Both
+    /// see only final results: with the second, no detector looks ahead.
     template <class Observer>
     void run_to_end(Observer&& observe)
     {
@@ -339,22 +339,22 @@ public:
     /// Advances to the end and returns the result.
     [[nodiscard]] Run<X> take() { return detail::as_callers<X>(loop_->take(), shown_.x); }
 
-    /// Hands over what has been computed so far; before the end its outcome is `cancelled`. The
-    /// simulation is over.
+    /// Returns the result so far; before the end its outcome is `cancelled`. The simulation
+    /// is over.
     [[nodiscard]] Run<X> finish() { return detail::as_callers<X>(loop_->finish(), shown_.x); }
 
-    /// All that the future depends on. A simulation of the same system with the same
+    /// State on which the future of the run depends. A simulation of the same system with the same
     /// options, stepping, detector and locator that restores it continues with the same
-    /// bits; only its end, its sample times and what it records may be others. What was
-    /// recorded is not part of it.
+    /// bits; only its end, its sample times and what it records may differ. Recorded
+    /// results are not part of it.
     [[nodiscard]] Snapshot save() { return loop_->save(); }
 
     /// @throws std::invalid_argument naming what does not agree if the snapshot is of another
-    /// run, or no state of one; then nothing has changed.
+    /// run, or does not hold a valid state; then nothing has changed.
     void restore(const Snapshot& snapshot) { loop_->restore(snapshot); }
 
 private:
-    /// Result of a run whose states are of another type than the loop's.
+    /// Result of a run with states of another type than the loop's.
     struct Shown {
         explicit Shown(const X& like) : x(like) {}
         X x;

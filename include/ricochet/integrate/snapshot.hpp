@@ -1,4 +1,4 @@
-// A run, saved: everything its future depends on, as numbers, and the run it belongs to.
+// A saved run: everything that its future depends on, as numbers, and the identity of the run.
 #pragma once
 
 #include <concepts>
@@ -30,7 +30,7 @@ struct RunProperty {
 /// State of a simulation, as `Simulation::save` returns it: real numbers and other values, in the
 /// order in which the simulation lists them.
 struct Snapshot {
-    std::vector<RunProperty> run;  ///< the run that it belongs to
+    std::vector<RunProperty> run;  ///< properties of the run that was saved
     std::vector<double> numbers;
     std::vector<std::uint64_t> counts;
 
@@ -40,17 +40,17 @@ struct Snapshot {
 /// The snapshot as text, its numbers in hexadecimal so that no bit is lost, with a checksum.
 [[nodiscard]] std::string to_text(const Snapshot& snapshot);
 
-/// @throws std::invalid_argument if `text` is not what `to_text` has written, to the letter.
+/// @throws std::invalid_argument if `text` is not exactly what `to_text` has written.
 [[nodiscard]] Snapshot snapshot_from_text(std::string_view text);
 
 namespace detail {
 
-/// @throws std::invalid_argument: the snapshot does not fit the simulation.
+/// @throws std::invalid_argument because the snapshot does not fit the simulation.
 [[noreturn]] void throw_snapshot_does_not_fit();
-/// @throws std::invalid_argument: `what` has a value that it has in no run.
+/// @throws std::invalid_argument because `what` has a value that no run gives it.
 [[noreturn]] void throw_snapshot_is_no_state(std::string_view what);
 
-/// The name of a type as the compiler writes it, somewhere in this text.
+/// The name of a type as the compiler writes it, somewhere within this text.
 template <class T>
 [[nodiscard]] constexpr const char* written_type() noexcept
 {
@@ -60,7 +60,7 @@ template <class T>
 /// Name of a type without namespaces, the same from every compiler: `Planned<Extremum>`.
 [[nodiscard]] std::string plain_type_name(std::string_view written);
 
-/// The name that a system declares, else that of its type.
+/// The name that a system declares, or else the name of its type.
 template <class System>
 [[nodiscard]] std::string name_of_system(const System& system)
 {
@@ -75,21 +75,21 @@ template <class System>
     }
 }
 
-/// Parts of a run, by name.
+/// Parts of a run, identified by name.
 struct RunParts {
     std::string system;
     std::string stepping, detector, locator;
-    std::size_t components = 0;  ///< of the state at the start
+    std::size_t components = 0;  ///< number of components of the state at the start
     std::size_t guards = 0;
     bool error_controlled = false;
 };
 
 [[nodiscard]] std::vector<RunProperty> properties_of_run(const RunParts& parts,
                                                          const Options& options);
-/// @throws std::invalid_argument naming the first property that the two do not share.
+/// @throws std::invalid_argument naming the first property that is not the same in both.
 void require_same_run(const std::vector<RunProperty>& saved, const std::vector<RunProperty>& here);
 
-/// Whether a flag, a count or an enumerator may have this value.
+/// Whether a flag, a count or an enumerator can have this value.
 [[nodiscard]] constexpr bool may_be(Side, std::uint64_t value) noexcept
 {
     return value <= static_cast<std::uint64_t>(Side::above);
@@ -165,7 +165,7 @@ public:
         for_each_component(x, [&](auto i) { (*this)(x[i]); });
     }
 
-    /// Everything has been read.
+    /// Checks that everything has been read.
     void finish() const
     {
         if (number_ != snapshot_->numbers.size() || count_ != snapshot_->counts.size()) {

@@ -1,4 +1,4 @@
-// The whole solution, to be asked for any time afterwards.
+// The whole solution, for evaluation at any time after the run.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 
 namespace ricochet {
 
-/// Steps as polynomials, of the order that the method reaches over many steps. Where
-/// the state jumps there is a value on either side.
+/// Steps as polynomials, of the order that the method attains over many steps. Where
+/// the state jumps there is one value on each side.
 template <class State>
 class Solution {
 public:
@@ -23,7 +23,7 @@ public:
     [[nodiscard]] std::size_t size() const noexcept { return pieces_.size(); }
 
     /// x at time t [s], after an event at t. Before the first and after the last
-    /// recorded step the nearest state that was computed. Needs at least one step.
+    /// recorded step, the nearest computed state. Needs at least one step.
     [[nodiscard]] State operator()(double t) const { return evaluate(pieces_[after(t)], t); }
 
     /// x at time t [s], before an event at t.
@@ -37,7 +37,7 @@ public:
     /// The mode at time t [s], after an event at t.
     [[nodiscard]] Mode mode(double t) const { return pieces_[after(t)].mode; }
 
-    /// When step k starts [s]; for k = size(), when the last one ends. At least one step.
+    /// Time [s] at which step k starts; for k = size(), at which the last one ends. Needs a step.
     [[nodiscard]] double time(std::size_t k) const
     {
         if (k < pieces_.size()) return pieces_[k].t;
@@ -45,7 +45,7 @@ public:
         return last.backward ? last.t - last.length : last.t + last.length;
     }
 
-    /// Hands every number to `visit`, which writes it or replaces it by what it reads
+    /// Passes every number to `visit`, which writes it or replaces it by the number that it reads
     /// (`detail::SnapshotWriter`, `detail::SnapshotReader`).
     template <class Visitor>
     void visit(Visitor&& visit)
@@ -77,7 +77,7 @@ public:
         }
     }
 
-    /// Adds a step of which the first `length` [s] were used.
+    /// Adds a step, of which only the first `length` [s] were used.
     void add(double t0, bool backward, Mode mode, const DenseParts<State>& parts, double length)
     {
         Piece piece{.t = t0,
@@ -101,7 +101,7 @@ public:
         pieces_.push_back(std::move(piece));
     }
 
-    /// Adds the steps of `from`, with states of another type, beyond as many as there are already.
+    /// Adds the steps of `from`, with states of another type, that are not yet in this solution.
     template <class Other, class Convert>
     void add_from(const Solution<Other>& from, const Convert& convert)
     {
@@ -127,7 +127,7 @@ public:
         }
     }
 
-    /// Keeps the first `size` steps.
+    /// Keeps only the first `size` steps.
     void shrink(std::size_t size)
     {
         pieces_.erase(pieces_.begin() + static_cast<std::ptrdiff_t>(size), pieces_.end());
@@ -152,7 +152,7 @@ private:
         return piece.backward ? piece.t - t : t - piece.t;
     }
 
-    /// The last piece that starts at t or before it.
+    /// The last piece that starts at or before t.
     [[nodiscard]] std::size_t after(double t) const noexcept
     {
         const auto later = [](double time, const Piece& piece) { return offset(piece, time) < 0; };

@@ -1,11 +1,11 @@
-// Certificates: statements that were proved of a model, as they are kept in its file and used.
+// Certificates: proved statements about a model, as they are stored in its file and used.
 //
-// A certificate says, for every state in a box and for each of its levels:
+// A certificate states, for every state in a box and for each of its levels:
 //
 //     logit < threshold  implies  guard > margin,
 //
-// but for the boxes that a level lists as unproved. It is made by `learn/certify.hpp`. It is
-// void as soon as anything that it speaks of has changed: weights, threshold,
+// except in the boxes that a level lists as unproved. It is made by `learn/certify.hpp`. It is
+// void as soon as any of its subjects has changed: weights, threshold,
 // normalisation, domain, recipe, system or parameters, of which it carries a fingerprint. The
 // fingerprint guards against accidents, not against forgery.
 #pragma once
@@ -25,10 +25,10 @@ namespace ricochet {
 /// One statement of a certificate.
 struct CertificateLevel {
     double margin = 0;                              ///< in units of the guard
-    double threshold = 0;                           ///< of the logit
-    std::uint64_t boxes = 0;                        ///< examined
-    double seconds = 0;                             ///< that it took
-    std::vector<std::vector<Interval>> unproved{};  ///< boxes, to be asked exactly
+    double threshold = 0;                           ///< threshold of the logit
+    std::uint64_t boxes = 0;                        ///< number of boxes examined
+    double seconds = 0;                             ///< [s] time that the proof took
+    std::vector<std::vector<Interval>> unproved{};  ///< boxes that need the exact guard
 };
 
 /// A proof that wherever a network clears, the guard of its system is above a margin.
@@ -38,7 +38,7 @@ struct Certificate {
     std::string system;
     std::map<std::string, double> parameters;  ///< of the system
     std::vector<Interval> box;                 ///< of raw features
-    /// Margins rise, thresholds do not; the first threshold is that of the model.
+    /// Margins increase, thresholds do not; the first threshold is that of the model.
     std::vector<CertificateLevel> levels;
 };
 
@@ -48,15 +48,15 @@ struct Certificate {
 /// Text of a certificate as it is stored in a model, one line of JSON; numbers keep their bits.
 [[nodiscard]] std::string to_text(const Certificate& certificate);
 
-/// @throws std::invalid_argument in one sentence if the text is no certificate.
+/// @throws std::invalid_argument with one sentence if the text is no certificate.
 [[nodiscard]] Certificate parse_certificate(std::string_view text);
 
-/// Why the certificate of `model` does not hold for it, in words that follow "the certificate";
-/// empty if it holds.
+/// Reason why the certificate of `model` does not hold for it, in words that follow "the
+/// certificate"; empty if it holds.
 /// @throws std::invalid_argument as `parse_certificate`.
 [[nodiscard]] std::string why_void(const Model& model);
 
-/// A model whose certificate holds.
+/// A model together with a certificate that holds for it.
 ///
 /// Immutable, so threads may share it; evaluation allocates nothing.
 class CertifiedClassifier {
@@ -68,11 +68,11 @@ public:
     [[nodiscard]] const Classifier& classifier() const noexcept { return classifier_; }
     [[nodiscard]] const Certificate& certificate() const noexcept { return certificate_; }
 
-    /// Whether the guard is proved to be above the first margin at these features. Never outside
-    /// the box, nor in an unproved box, nor for NaN.
+    /// Whether the guard is proved to be above the first margin at these features. False outside
+    /// the box, in an unproved box, and for NaN.
     [[nodiscard]] bool clears(const double* features) const noexcept;
 
-    /// The largest margin that the guard is proved to be above; -inf if there is none.
+    /// The largest margin above which the guard is proved to be; -inf if there is none.
     [[nodiscard]] double lower_bound(const double* features) const noexcept;
 
 private:

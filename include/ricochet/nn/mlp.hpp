@@ -34,12 +34,12 @@ enum class InstructionSet {
 /// Whether this build has kernels for `set` and this processor runs them.
 [[nodiscard]] bool supported(InstructionSet set) noexcept;
 
-/// The fastest that is supported.
+/// The fastest instruction set that is supported.
 [[nodiscard]] InstructionSet best_instruction_set() noexcept;
 
 namespace detail {
 
-/// Input of a kernel; the pointers are into memory that an `Mlp` owns.
+/// Input of a kernel; the pointers refer to memory that an `Mlp` owns.
 template <class T>
 struct Network {
     const T* parameters = nullptr;          ///< as `pack` stores them, aligned to 64 bytes
@@ -56,7 +56,7 @@ using Kernel = void (*)(const Network<T>&, const T* in, T* out, std::size_t samp
 /// Options of the inference.
 struct MlpOptions {
     InstructionSet instruction_set = best_instruction_set();
-    bool common_shapes = true;  ///< use an instance of its own for a common shape
+    bool common_shapes = true;  ///< use a specialised instance for a common shape
 };
 
 /// A network in the arithmetic of T, float or double.
@@ -64,24 +64,24 @@ struct MlpOptions {
 ///     x_0 = in,  x_k+1 = activation(W_k x_k + b_k),  out = W_n x_n + b_n
 ///
 /// Immutable, so threads may share it; copies share the parameters. Evaluation
-/// allocates nothing, keeps its activations on the stack, and carries NaN and
-/// infinity through as the formula does. Offset, scale and threshold of the model
+/// allocates nothing, keeps its activations on the stack, and propagates NaN and
+/// infinity as the formula does. Offset, scale and threshold of the model
 /// are not applied: see `Classifier`.
 template <class T>
 class Mlp {
 public:
-    static constexpr std::size_t max_width = 256;  ///< of a layer, and of the input
+    static constexpr std::size_t max_width = 256;  ///< largest width of a layer, and of the input
     static constexpr std::size_t max_layers = 64;
 
-    /// @throws std::invalid_argument if the layers do not fit together, or are wider
-    /// or more than the limits, or if the instruction set is not supported.
+    /// @throws std::invalid_argument if the layers do not fit together, if their width
+    /// or number exceeds the limits, or if the instruction set is not supported.
     explicit Mlp(const Model& model, const MlpOptions& options = {});
 
     /// Reads `inputs()` values and writes `outputs()`.
     void forward(const T* in, T* out) const noexcept { kernel_(network_, in, out, 1); }
 
     /// Reads `samples` rows of `inputs()` values each, and writes as many rows of
-    /// `outputs()`: the same bits as one by one.
+    /// `outputs()`; the bits are those of single evaluations.
     void forward_batch(const T* in, std::size_t samples, T* out) const noexcept
     {
         kernel_(network_, in, out, samples);
@@ -102,7 +102,7 @@ extern template class Mlp<double>;
 // Evaluation of a multilayer perceptron whose shape is known at compile time.
 //
 // Compiled with the caller's flags, e.g. -O2 -march=x86-64-v3, and inlined. The
-// result has the same bits as that of `Mlp`, whatever the flags, but for those that
+// result has the same bits as that of `Mlp` for all flags except those that
 // give up IEEE arithmetic (-ffast-math).
 
 /// A network with `Widths` values between its layers, the inputs first and the
@@ -138,7 +138,7 @@ public:
     }
 
     // Inlined without exception, so that translation units with different flags do
-    // not share one definition; the same holds for all it calls.
+    // not share one definition; the same holds for every function that it calls.
     /// Reads `inputs()` values and writes `outputs()`.
     RICOCHET_INLINE void forward(const T* in, T* out) const noexcept
     {

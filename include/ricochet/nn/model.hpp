@@ -1,7 +1,7 @@
-// A trained network as it is stored: layers, and what they were trained for.
+// A trained network as it is stored: its layers, and the problem that it was trained for.
 //
 // Plain data. The functions below read and write it, `nn/mlp.hpp` evaluates
-// it, `learn/` makes it.
+// it, `learn/` trains it.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ namespace ricochet {
 /// Activation after every hidden layer; the last layer is linear.
 enum class Activation { relu, tanh };
 
-/// How the weights are stored, and in what arithmetic they are evaluated.
+/// Type in which the weights are stored, and in whose arithmetic they are evaluated.
 enum class Precision { f32, f64 };
 
 /// y = weight x + bias.
@@ -46,19 +46,19 @@ struct SelfTest {
 ///     horizon   output k below `threshold`: no event within `value` [s]
 ///     level     the one output below `threshold`: the guard is above `value`
 ///
-/// Values rise; the thresholds of a level gate do not.
+/// Values increase; the thresholds of a level gate do not increase.
 struct GateLevel {
     double value = 0;
     double threshold = 0;
 };
 
-/// Behaviour of a gate on runs that it was not made from.
+/// Behaviour of a gate on runs from which it was not made.
 struct Calibration {
-    std::uint64_t events = 0;  ///< of the runs; 0: none were made
+    std::uint64_t events = 0;  ///< number of events in the runs; 0: there were no runs
     std::uint64_t misses = 0;  ///< of these, events that a gated run did not find
-    double miss_bound = 1;     ///< of the share that is missed, at 95 % confidence
-    std::uint64_t steps = 0;   ///< of the runs
-    std::uint64_t seed = 0;    ///< of the runs
+    double miss_bound = 1;     ///< bound on the fraction missed, at 95 % confidence
+    std::uint64_t steps = 0;   ///< number of steps of the runs
+    std::uint64_t seed = 0;    ///< seed of the runs
 };
 
 /// A multilayer perceptron and its provenance.
@@ -67,7 +67,7 @@ struct Calibration {
 ///
 /// with `features` computed from (t, x, h) by the recipe of that name.
 struct Model {
-    /// Or "gate-horizon", "gate-level", "step-policy", "step-actor".
+    /// Kind of the model; also "gate-horizon", "gate-level", "step-policy", "step-actor".
     std::string kind = "event-classifier";
     std::string system;                        ///< e.g. "bouncing-ball"
     std::map<std::string, double> parameters;  ///< of the system, those the model depends on
@@ -77,21 +77,21 @@ struct Model {
     std::vector<Interval> domain;              ///< one per raw feature
     Activation activation = Activation::relu;
     Precision precision = Precision::f32;
-    double threshold = 0;  ///< an event is predicted where the logit is not below it
+    double threshold = 0;  ///< an event is predicted if the logit is not below it
     double step_min = 0;   ///< [s] smallest step the model was trained for
     double step_max = 0;   ///< [s] largest step the model was trained for
     std::uint64_t seed = 0;
     std::vector<DenseLayer> layers;
     SelfTest self_test;
     std::string certificate;          ///< empty: none
-    std::vector<GateLevel> levels{};  ///< of a gate
-    Calibration calibration{};        ///< of a gate
+    std::vector<GateLevel> levels{};  ///< decisions of a gate; else empty
+    Calibration calibration{};        ///< measured behaviour of a gate
 };
 
 // Models in files: the safetensors format, with provenance in its metadata.
 //
 // Eight bytes give the length of a JSON header, little-endian; the header gives
-// type, shape and place of each tensor; the rest of the file is the tensors.
+// type, shape and offset of each tensor; the rest of the file is the tensors.
 //
 //     layers.<k>.weight   outputs x inputs, F32 or F64, k = 0, 1, ...
 //     layers.<k>.bias     outputs
@@ -108,14 +108,14 @@ struct Model {
 //         step_range         smallest and largest step [s]
 //         seed               integer
 //         self_test_input    raw features
-//         self_test_output   what the model makes of them
+//         self_test_output   the outputs of the model for them
 //         certificate        optional
 //         levels             of a gate: value and threshold of each
 //         calibration        of a gate, optional: events, misses, bound, steps, seed
 //
-// A file is untrusted: whatever does not fit is refused, in one sentence.
+// Files are untrusted: content that does not fit is rejected with one sentence.
 
-/// A model file that cannot be read, written or believed. The message names file,
+/// A model file that cannot be read, written or trusted. The message names file,
 /// tensor or metadata entry, what was expected and what was found.
 class ModelError : public std::runtime_error {
 public:
@@ -127,7 +127,7 @@ struct LoadOptions {
     bool allow_non_finite = false;  ///< accept NaN and infinite weights
 };
 
-/// @throws ModelError if the file cannot be read or does not fit.
+/// Reads a model. @throws ModelError if the file cannot be read or does not fit.
 [[nodiscard]] Model load_model(const std::string& path, const LoadOptions& options = {});
 
 /// The model in the bytes of a file; `name` stands for the file in messages.
@@ -136,14 +136,14 @@ struct LoadOptions {
                                 const LoadOptions& options = {});
 
 /// The bytes of a file. Numbers keep their bits, but for weights of an f32 model,
-/// which are rounded to float. An empty self-test is filled in, at the middle of
-/// the domain. The options say what a later load will accept.
-/// @throws ModelError if the bytes would be refused by it.
+/// which are rounded to float. An empty self-test is filled in, at the centre of
+/// the domain. The options are those with which the file will be loaded.
+/// @throws ModelError if a load with these options would reject the bytes.
 [[nodiscard]] std::vector<std::byte> to_safetensors(const Model& model,
                                                     const LoadOptions& options = {});
 
-/// Writes beside `path` and renames, so that a file of that name is complete or as
-/// it was, and nothing else is left behind.
+/// Writes to a temporary file beside `path` and renames it, so that the file is complete or
+/// unchanged, and nothing else is left behind.
 /// @throws ModelError if the file cannot be written, or as `to_safetensors`.
 void save_model(const Model& model, const std::string& path, const LoadOptions& options = {});
 

@@ -5,7 +5,7 @@
 //     contact  where impacts accumulate, where a contact stays closed, or where an impact has
 //              no solution: Moreau's midpoint rule, until every contact has opened
 //
-// Nothing is declared for it beyond what time stepping needs.
+// A system needs no declarations beyond those that time stepping needs.
 #pragma once
 
 #include <algorithm>
@@ -42,9 +42,9 @@ concept Contacting = requires(const System& system,
 struct ContactStatistics {
     Statistics event_driven;
     TimeSteppingStatistics time_stepping;
-    std::uint64_t to_contact = 0;  ///< hand-overs, a start there included
+    std::uint64_t to_contact = 0;  ///< hand-overs, including a start in contact
     std::uint64_t to_flight = 0;
-    double contact_time = 0;  ///< [s] of the motion
+    double contact_time = 0;  ///< [s] duration of the motion in contact
 };
 
 namespace detail {
@@ -60,7 +60,7 @@ struct AnyContactRun {
     std::vector<Phase> phases;
     Trajectory<X> trajectory;  ///< at the sample times
     ContactStatistics statistics;
-    ContactReport failure;  ///< with `not_converged`, and `non_finite` in contact
+    ContactReport failure;  ///< set with `not_converged`, and with `non_finite` in contact
 };
 
 }  // namespace detail
@@ -72,7 +72,7 @@ struct ContactRun : detail::AnyContactRun<System::coordinates> {
 
 namespace detail {
 
-/// Makes simulations of free flight by one stepper.
+/// Makes simulations of free flight with a given stepper.
 template <int N>
 struct FlightStepping {
     std::unique_ptr<EventLoop<2 * N>> (*make)(const AnyFlight<N>& flight,
@@ -89,7 +89,7 @@ std::unique_ptr<EventLoop<2 * N>> make_flight_loop(const AnyFlight<N>& flight,
     return std::make_unique<EventLoopBy<2 * N, AnyFlight<N>, Stepping>>(flight, x, options);
 }
 
-/// `ContactMotion`, whatever the system.
+/// `ContactMotion` for systems of any type.
 template <int N>
 class RICOCHET_ALIGNED AnyContactMotion {
 public:
@@ -220,7 +220,7 @@ private:
 
     // --- samples ---
 
-    /// Interpolates on straight lines, which is as accurate as the steps.
+    /// Interpolates linearly, which is as accurate as the steps.
     void emit_samples(double t_before, const X& before)
     {
         while (run_.trajectory.t.size() < options_.sample_times.size()) {
@@ -282,8 +282,8 @@ public:
     using X = typename Flight::State;
     using Vector = typename Flight::Vector;
 
-    /// @throws std::invalid_argument for what `TimeStepping` refuses, a start inside an obstacle
-    /// among it.
+    /// @throws std::invalid_argument for everything that `TimeStepping` rejects, including a start
+    /// inside an obstacle.
     ContactMotion(const System& system, const Vector& q, const Vector& v,
                   const HandOverOptions& options)
         : by_(detail::TypedMechanism<System>(system), q, v, options,
@@ -299,7 +299,7 @@ private:
     detail::AnyContactMotion<N> by_;
 };
 
-/// A whole run in one call.
+/// Runs a whole motion in one call.
 template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
 [[nodiscard]] ContactRun<System> hand_over(const System& system,
                                            const Eigen::Matrix<double, System::coordinates, 1>& q,

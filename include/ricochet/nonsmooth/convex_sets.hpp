@@ -1,17 +1,17 @@
-// Closed convex sets: their projection, and how it varies.
+// Closed convex sets, their projection, and its derivative.
 //
 // A set is a value with
 //
-//     dimension()        of the space it lies in
+//     dimension()        dimension of the space that it lies in
 //     project(z, p)      p = the point of the set nearest to z; z and p may be the same
 //     derivative(z, d)   an element of the generalised Jacobian of the projection at z,
 //                        row by row; where faces meet, the mean of theirs or that of
 //                        the smallest face
-//     fault()            what is wrong with the set ("is empty"), nothing if it is fine;
+//     fault()            sentence that says why the set is invalid ("is empty"), or empty;
 //                        optional
 //
-// An own set that has these three functions serves like those here; `check_projection`
-// finds out whether its projection is one.
+// A user's own set that has these three functions serves like those here; `check_projection`
+// tests whether its projection is one.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ concept ConvexSet = requires(const Set& set, std::span<const double> z, std::spa
     set.derivative(z, out);
 };
 
-/// A product of intervals, whose bounds are known.
+/// A product of intervals with known bounds.
 template <class Set>
 concept BoxSet = ConvexSet<Set> && requires(const Set& set, std::size_t i)
 {
@@ -51,7 +51,7 @@ concept BoxSet = ConvexSet<Set> && requires(const Set& set, std::size_t i)
 
 namespace detail {
 
-/// 1 inside, 0 outside, 1/2 on a bound, 0 where the bounds coincide.
+/// Derivative: 1 inside, 0 outside, 1/2 on a bound, 0 where the bounds coincide.
 [[nodiscard]] inline double clamp_slope(double z, double lower, double upper) noexcept
 {
     if (!(lower < upper) || z < lower || z > upper) return 0;
@@ -87,20 +87,20 @@ void clamp_derivative(const Box& box, std::span<const double> z, std::span<doubl
 
 namespace sets {
 
-/// [lower, upper], either of which may be infinite. As a set of reactions: a relay
-/// (sign), Coulomb friction of one direction. As a set of states: stops, a saturation.
+/// [lower, upper]; either bound may be infinite. As a set of reactions: a relay
+/// (sign), Coulomb friction in one direction. As a set of states: stops, a saturation.
 class IntervalSet {
 public:
-    /// [lower, upper]; lower above upper is a fault, see `fault`.
+    /// Takes [lower, upper]; lower above upper is a fault, see `fault`.
     constexpr IntervalSet(double lower, double upper) noexcept : lower_(lower), upper_(upper) {}
 
-    /// [-bound, bound]: friction in one direction. A negative bound is a fault.
+    /// Returns [-bound, bound]: friction in one direction. A negative bound is a fault.
     [[nodiscard]] static constexpr IntervalSet symmetric(double bound) noexcept
     {
         return {-bound, bound};
     }
 
-    /// [0, infinity): a diode's current, the force of a contact.
+    /// Returns [0, infinity): a diode's current, the force of a contact.
     [[nodiscard]] static constexpr IntervalSet half_line() noexcept
     {
         return {0, std::numeric_limits<double>::infinity()};
@@ -183,7 +183,7 @@ public:
     }
 };
 
-/// |x| <= radius in N dimensions: isotropic friction whose bound is known.
+/// |x| <= radius in N dimensions: isotropic friction with a known bound.
 template <std::size_t N>
 class Ball {
 public:
@@ -202,7 +202,7 @@ public:
         }
     }
 
-    /// Outside: (radius / |z|) (I - z z' / |z|^2).
+    /// Outside the ball: (radius / |z|) (I - z z' / |z|^2).
     void derivative(std::span<const double> z, std::span<double> d) const noexcept
     {
         const double length = norm(z);
@@ -242,7 +242,7 @@ private:
 };
 
 /// Coulomb's cone |(x1, ..., x_{N-1})| <= friction x0: the force of a contact with its
-/// normal component first. Friction 0 makes it the half line of the normal.
+/// normal component first. Friction 0 reduces it to the half line of the normal.
 template <std::size_t N>
 class FrictionCone {
     static_assert(N >= 2);
@@ -320,11 +320,11 @@ private:
     double friction_;
 };
 
-/// First x Second x ...
+/// The product set First x Second x ...
 template <class... Sets>
 class Product {
 public:
-    /// Takes the factors, in the order of the components.
+    /// Takes the two factors, in the order of their components.
     explicit constexpr Product(const Sets&... sets) noexcept : sets_(sets...) {}
 
     [[nodiscard]] constexpr std::size_t dimension() const noexcept
@@ -344,7 +344,7 @@ public:
         const std::size_t all = dimension();
         std::fill(d.begin(), d.end(), 0.0);
         for_each([&](const auto& set, std::size_t first, std::size_t n) {
-            // The block is made where its rows will end up, and spread from the last.
+            // The block is computed where its rows will end up, and spread out from the last row.
             const auto block = d.subspan(first * all, n * n);
             set.derivative(z.subspan(first, n), block);
             for (std::size_t i = n; i-- > 0;) {
@@ -404,7 +404,7 @@ private:
 
 }  // namespace sets
 
-/// Sentence that says why `set` is not valid; empty if it is, or does not say.
+/// Sentence that says why `set` is not valid; empty if it is valid, or has no `fault`.
 template <ConvexSet Set>
 [[nodiscard]] std::string_view fault_of(const Set& set) noexcept
 {
@@ -425,9 +425,9 @@ void check_projection(std::size_t dimension, const Projection& project,
                       const Projection& derivative);
 }  // namespace detail
 
-/// Samples the projection at pairs of random points of several magnitudes: P P z = P z,
+/// Tests the projection at pairs of random points of several magnitudes: P P z = P z and
 /// |P z - P y|^2 <= (P z - P y).(z - y), which hold for every projection on a closed
-/// convex set and together at no cost else; and the derivative against differences of
+/// convex set and, together, for no other map; and the derivative against differences of
 /// the projection, where these do not straddle a kink.
 ///
 /// @throws std::invalid_argument naming what failed and where.

@@ -1,18 +1,18 @@
-// Hybrid systems that also know their motion as an inclusion.
+// Hybrid systems that also declare their motion as an inclusion.
 //
 // A system with a flow and guards of its own may declare
 //
 //     set_valued()         an Inclusion (inclusion.hpp) of the same state
-//     start_mode(t, x)     where it has modes: the one in which it continues from (t, x)
+//     start_mode(t, x)     if it has modes: the mode in which it continues from (t, x)
 //
-// `integrate` then follows its events while they lead on. Where they do not (switchings that
+// `integrate` then follows its events as long as that is possible. Where it is not (switchings that
 // accumulate or chatter, a motion that presses on its guard, resets that contradict one another)
-// the inclusion takes over, by hand_over.hpp, and gives back where none of its reactions is held
+// the inclusion takes over, by hand_over.hpp, and hands back when none of its reactions is held
 // any more.
 //
 // The guard where a motion may come to rest must be `unilateral`, or of `either` direction and
-// without modes: only then is a motion that presses on its surface an event again immediately, and
-// what follows recognised. A guard that waits for an edge lets that motion pass, and the
+// without modes: only then is a motion that presses on its surface an event again immediately, so
+// that the pressing is recognised. A guard that waits for an edge lets that motion pass, and the
 // inclusion is never asked.
 //
 // Inclusions without events of their own are handed to hand_over.hpp directly.
@@ -63,12 +63,12 @@ template <class To, class From>
     return like;
 }
 
-/// Whether a guard without a reset of the state switches within what the steps resolve: 200
+/// Whether a guard without a reset of the state switches within the resolution of the steps: 200
 /// crossings in a row between which it goes, on average, no farther than a thousand times the
-/// error of a step. Error control then chooses how often it switches, not the motion.
+/// error of a step. Error control then decides how often it switches, not the motion.
 class SwitchingWatch {
 public:
-    /// Reviews the events recorded until now; `error` is the error of a step.
+    /// Reviews the events recorded so far; `error` is the error of a step.
     template <class X, class Error>
     [[nodiscard]] bool operator()(const std::vector<Event<X>>& events, const Error& error)
     {
@@ -146,7 +146,7 @@ public:
     }
 
 private:
-    /// Why the inclusion is to continue; nothing if the run is over.
+    /// Reason for which the inclusion is to continue; empty if the run is over.
     [[nodiscard]] std::optional<PhaseCause> follow_events()
     {
         if (steps_taken() >= options_.max_steps) {
@@ -163,7 +163,7 @@ private:
         try {
             simulation.emplace(system_, run_.x, options, stepping_, detector_, locator_);
         } catch (const std::invalid_argument&) {
-            if (run_.phases.size() == 1) throw;  // of the caller
+            if (run_.phases.size() == 1) throw;  // by the caller
             return PhaseCause::stuck;
         }
         detail::ChatterWatch watch(run_.t, hand_over_.set_valued.step / 100);
@@ -215,7 +215,7 @@ private:
         run_.outcome = done.outcome;
         if (done.outcome != Outcome::released) return true;
         if (!moved) {
-            // The inclusion sees nothing that would hold the motion back, and events do not lead
+            // The inclusion finds nothing that would hold the motion back, and events do not lead
             // on.
             run_.outcome = Outcome::not_handed_over;
             return true;
@@ -224,7 +224,7 @@ private:
         return false;
     }
 
-    /// Error of a step that ends at x.
+    /// Error of a step that ends at state x.
     [[nodiscard]] double error_of(const X& x) const
     {
         double largest = 0;
@@ -232,7 +232,7 @@ private:
         return options_.atol + options_.rtol * largest;
     }
 
-    /// Number of steps of both kinds, attempts included.
+    /// Number of steps of both kinds, including attempts.
     [[nodiscard]] std::uint64_t steps_taken() const noexcept
     {
         return run_.statistics.event_driven.steps + run_.statistics.set_valued.attempted;
@@ -274,10 +274,10 @@ private:
     MixedRun<X> run_;
 };
 
-/// Events first, the inclusion where they do not lead on.
+/// Follows events first, and the inclusion where events do not lead on.
 ///
 /// @throws std::invalid_argument as for other systems; also for `stop_at_event`,
-///         `record_steps` and a backward run, which a hand-over does not have.
+///         `record_steps` and a backward run, which a hand-over does not support.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
@@ -290,7 +290,7 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
         .take();
 }
 
-/// An inclusion alone: `hand_over`.
+/// Runs an inclusion alone: `hand_over`.
 template <class System, class X, class Stepping = ErrorControlled<Dopri5>>
 requires NotIntegrable<System, X> && Inclusion<System>
 [[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,

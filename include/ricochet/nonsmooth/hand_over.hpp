@@ -4,11 +4,11 @@
 //                    equation (branch_modes.hpp), any explicit stepper, changes located to the
 //                    step map
 //     set-valued     where that ends: changes that coincide, reactions that y' = 0 does not
-//                    determine, switching that accumulates; and sets that have no such
+//     set-valued     where that ends: changes that coincide, reactions that y' = 0 does not
 //                    branches at all. Bathe's steps, until the branches are plain again
 //
-// The reaction with which a phase starts is the minimal selection. A system that declares no
-// inclusion includes nothing of this.
+// The reaction with which a phase starts is the minimal selection. Systems that declare no
+// inclusion include none of these headers.
 #pragma once
 
 #include <type_traits>
@@ -31,15 +31,15 @@ public:
     using Reaction = ReactionOf<System>;
     using State = SetValuedState<System>;
 
-    /// @throws std::invalid_argument for options, systems and initial states that cannot be
-    /// right.
+    /// @throws std::invalid_argument for invalid options, systems and initial
+    /// states.
     HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
         : by_(detail::TypedInclusion<System>(system), w0, options, stepping())
     {
     }
 
-    /// Goes on from the state of an earlier run, with its reaction.
-    /// @throws std::invalid_argument also where the reaction is outside the set.
+    /// Starts from the state of an earlier run, with its reaction.
+    /// @throws std::invalid_argument also if the reaction lies outside the set.
     HandOver(const System& system, const State& start, const HandOverOptions& options)
         : by_(detail::TypedInclusion<System>(system), start, options, stepping())
     {
@@ -62,7 +62,7 @@ private:
     detail::AnyHandOver<N, M> by_;
 };
 
-/// A whole run in one call.
+/// Runs a whole inclusion in one call.
 template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
 [[nodiscard]] HandOverRun<System> hand_over(const System& system, const StateOf<System>& w0,
                                             const HandOverOptions& options,

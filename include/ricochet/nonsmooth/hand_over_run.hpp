@@ -1,4 +1,4 @@
-// What a hand-over is asked for, and what comes of it: phases of events and of set-valued steps.
+// Options and results of a hand-over: phases of events and of set-valued steps.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@
 
 namespace ricochet {
 
-/// Why a phase began.
+/// Reason for which a phase began.
 enum class PhaseCause {
     start,
     no_modes,       ///< the set is no box, or has more than four reactions
@@ -23,12 +23,12 @@ enum class PhaseCause {
     several,        ///< changes coincide, and rates do not tell what follows
     accumulation,   ///< infinitely many switchings in finite time
     chattering,     ///< more switchings in a short time than can be worth locating
-    stuck,          ///< the event-driven loop could not go on
+    stuck,          ///< the event-driven loop could not continue
     contradiction,  ///< an event-driven step contradicted the law of a reaction
     released,       ///< event-driven again: every branch is plain
 };
 
-/// The name of a cause, as in its declaration.
+/// The enumerator's name.
 [[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
 
 /// Start of a phase of a hand-over, until the next one or the end of the run.
@@ -43,25 +43,25 @@ struct HandOverOptions {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();
 
-    /// Of the event-driven phases, as in `Options`.
+    /// Options of the event-driven phases, as in `Options`.
     double rtol = 1e-10;
     double atol = 1e-12;
     double h_max = std::numeric_limits<double>::infinity();
     double event_tolerance = 0;
 
-    /// The run ends, as `not_handed_over`, where a set-valued phase would begin.
+    /// The run ends, as `not_handed_over`, when a set-valued phase would begin.
     bool events_only = false;
 
-    /// The run ends, as `released`, where every reaction is at a bound and no y so near to zero
+    /// The run ends, as `released`, when every reaction is at a bound and no y is so near to zero
     /// that its sign is an accident.
     bool until_released = false;
 
-    /// Of the set-valued phases; their times are those of the run. A step of zero is a
-    /// thousandth of the run. Changes are located where the set is a box.
+    /// Options of the set-valued phases; their times are those of the run. A step of zero is a
+    /// thousandth of the run. Changes are located if the set is a box.
     SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
 
     std::vector<double> sample_times{};     ///< ascending
-    std::uint64_t max_steps = 100'000'000;  ///< of both kinds, attempts included
+    std::uint64_t max_steps = 100'000'000;  ///< of both kinds, including attempts
     const std::atomic<bool>* cancelled = nullptr;
 };
 
@@ -69,9 +69,9 @@ struct HandOverOptions {
 struct HandOverStatistics {
     Statistics event_driven;
     SetValuedStatistics set_valued;
-    std::uint64_t to_set_valued = 0;  ///< hand-overs, a start there included
+    std::uint64_t to_set_valued = 0;  ///< hand-overs, including a start there
     std::uint64_t to_events = 0;
-    double set_valued_time = 0;  ///< [s] of the motion
+    double set_valued_time = 0;  ///< [s] duration of the set-valued motion
 };
 
 namespace detail {
@@ -97,8 +97,8 @@ template <Inclusion System>
 struct HandOverRun : detail::AnyHandOverRun<state_size<System>, reaction_size<System>> {
 };
 
-/// From the options of `integrate`.
-/// @throws std::invalid_argument for those that a hand-over does not have: `stop_at_event`,
+/// Converts the options of `integrate`.
+/// @throws std::invalid_argument for options that a hand-over does not support: `stop_at_event`,
 /// `record_steps`, a run backward.
 [[nodiscard]] HandOverOptions hand_over_options(const Options& options);
 

@@ -6,15 +6,15 @@
 //
 //     -y in the normal cone of K at the reaction,
 //
-// so that the reaction opposes y with all that K allows, and takes whatever value in K
-// keeps y at zero: a relay, dry friction, a diode, a unilateral contact. Where instead
-// `confines` is Confines::state, K is a set that y must not leave, and -reaction is in
+// so that the reaction opposes y with all that K allows, and takes the value in K that
+// keeps y at zero if there is one: a relay, dry friction, a diode, a unilateral contact. If
+// `confines` is Confines::state instead, K is a set that y must not leave, and -reaction is in
 // the normal cone of K at y: stops, a saturated integrator.
 //
 // A system is a value with
 //
 //     state_size, reaction_size        static constexpr int, or Eigen::Dynamic with
-//     size(), reactions()              member functions that tell
+//     size(), reactions()              member functions that return them
 //     smooth(t, w, f)                  writes f
 //     reaction_set(t, w)               K, a ConvexSet of dimension reaction_size
 //
@@ -26,8 +26,8 @@
 //     mass(A)                          A, constant; the unit matrix
 //     observe(E)                       E; selects the first components
 //     act(G)                           G; the transpose of E
-//     offset(t, s)                     s(t), continuous, the motion of what y is relative to; zero
-//     offset_rate(t, s)                its rate; a difference without it, wrong beside a kink
+//     offset(t, s)                     s(t), continuous, the motion that y is relative to; zero
+//     offset_rate(t, s)                its rate; else a difference, which is wrong beside a kink
 //     branch_bound(t, w, i, branch)    a bound that continues smoothly beyond y = 0, see
 //                                      branch_modes.hpp
 //     bound_gradient(t, w, i, g)       d upper_i / dw of a BoxSet of symmetric intervals
@@ -101,7 +101,7 @@ constexpr Confines confines() noexcept
     }
 }
 
-/// @throws std::invalid_argument: "inclusion: <what>".
+/// @throws std::invalid_argument with the message "inclusion: <what> <given>".
 [[noreturn]] void refuse_inclusion(std::string_view what);
 [[noreturn]] void refuse_inclusion(std::string_view what, double given);
 

@@ -23,25 +23,25 @@ namespace ricochet {
 
 /// How the error of a step is estimated.
 enum class ErrorEstimate {
-    none,      ///< what a `ConstantStep` needs
+    none,      ///< sufficient for a `ConstantStep`
     embedded,  ///< `CompositeStep::embedded_error`: Bathe's scheme, averaged reaction
-    doubling,  ///< one step against two of half the length, of which the result is kept
+    doubling,  ///< one step against two of half the length, the result of which is kept
 };
 
 /// How changes of branch inside a step are treated.
 enum class Switches {
-    stepped_over,  ///< as the source does: of order 1 at a jump of the reaction
-    /// Ends a step where a branch changes within it: the last instant at
-    /// which the motion on the branches of its start agrees with them. Boxes only.
+    stepped_over,  ///< as in the source paper: of order 1 at a jump of the reaction
+    /// A step ends where a branch changes within it: at the last instant at
+    /// which the motion on the branches of its start agrees with them. For boxes only.
     located,
 };
 
-/// Components that are measured as one field: the norm of their error against
+/// Components whose error is measured as that of one field: its norm against
 /// rtol max(norm of the field, floor). A floor as large as the field will be makes the tolerance
-/// absolute, none makes it relative.
+/// absolute, a floor of zero makes it relative.
 struct ErrorField {
     Eigen::Index first = 0;
-    Eigen::Index count = 0;  ///< positive
+    Eigen::Index count = 0;  ///< number of components, positive
     double rtol = 1e-3;      ///< positive
     double floor = 0;        ///< in the units of the state
 };
@@ -50,12 +50,12 @@ struct ErrorField {
 struct SetValuedOptions {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();
-    double step = 0;  ///< the first, and all of them with `ConstantStep`; positive
+    double step = 0;  ///< length of the first step, and of all steps with `ConstantStep`; positive
     StepController controller = ConstantStep{};
     ErrorEstimate estimate = ErrorEstimate::none;
-    double rtol = 1e-4;  ///< errors are measured against atol + rtol |w|, root mean square
+    double rtol = 1e-4;  ///< errors are measured against atol + rtol |w|, in root mean square
     double atol = 1e-6;
-    /// In place of rtol and atol: the error is that of the worst field.
+    /// Fields to measure instead of rtol and atol: the error is that of the worst field.
     std::vector<ErrorField> fields{};
     int error_order = 2;  ///< p in (two half steps - one step) / (2^p - 1)
     double h_min = 0;     ///< 0: 1e-12 of the time integrated
@@ -72,21 +72,21 @@ void validate(const SetValuedOptions& options);
 struct SetValuedStatistics {
     std::uint64_t attempted = 0;
     std::uint64_t accepted = 0;
-    std::uint64_t rejected = 0;    ///< by the controller
+    std::uint64_t rejected = 0;    ///< steps rejected by the controller
     std::uint64_t unsolved = 0;    ///< attempts whose stages did not converge
-    std::uint64_t stages = 0;      ///< solved, whatever became of them
-    std::uint64_t iterations = 0;  ///< of their solvers
-    std::uint64_t switches = 0;    ///< located changes of branch
+    std::uint64_t stages = 0;      ///< stages solved, whether or not their step was accepted
+    std::uint64_t iterations = 0;  ///< iterations of the stages' solvers
+    std::uint64_t switches = 0;    ///< changes of branch that were located
 };
 
 namespace detail {
 /// @throws std::invalid_argument naming the field, unless it lies within `size` components.
 void validate_fields(const std::vector<ErrorField>& fields, Eigen::Index size);
-/// @throws std::invalid_argument if a learned controller's policy is not for this layout, or if
-/// there is none, null.
+/// @throws std::invalid_argument if a learned controller's policy is null, or is for another
+/// layout.
 void validate_policy(const SetValuedOptions& options, const StepLayout* layout);
 
-/// `SetValuedMotion`, whatever the system.
+/// `SetValuedMotion` for systems of any type.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyMotion {
 public:
@@ -99,12 +99,12 @@ public:
     AnyMotion(const AnyInclusion<N, M>& inclusion, const Vector& w0,
               const SetValuedOptions& options);
 
-    /// Goes on from (t, w) as from a start: after a jump, or when an event-driven
+    /// Restarts from (t, w): after a jump, or when an event-driven
     /// integrator hands over.
     void restart(double t, const Vector& w);
 
-    /// Goes on from a state with a known reaction.
-    /// @throws std::invalid_argument where the reaction is outside the set.
+    /// Restarts from a state with a known reaction.
+    /// @throws std::invalid_argument if the reaction lies outside the set.
     void restart(const State& state);
 
     [[nodiscard]] const State& state() const noexcept { return now_; }
@@ -115,19 +115,19 @@ public:
     [[nodiscard]] Outcome outcome() const noexcept { return outcome_; }
     /// The stage that ended the run as `not_converged`.
     [[nodiscard]] const StageReport& failure() const noexcept { return failure_; }
-    /// The step that will be tried next.
+    /// Length of the step that will be tried next.
     [[nodiscard]] double next_step() const noexcept { return h_; }
-    /// Sets the next step, positive, for callers that choose the steps themselves.
+    /// Sets the length of the next step, positive, for callers that choose the steps themselves.
     void next_step(double h) noexcept { h_ = h; }
     /// The scaled error of the last attempt.
     [[nodiscard]] double error() const noexcept { return scaled_error_; }
-    /// Counts, with those of a `LearnedStep`.
+    /// Counts, including those of a `LearnedStep`.
     [[nodiscard]] const StepController& controller() const noexcept { return options_.controller; }
     [[nodiscard]] AnyStep<N, M>& stepper() noexcept { return step_; }
     [[nodiscard]] const Matrices& matrices() const noexcept { return step_.matrices(); }
-    /// The branches of the state, kept where switches are located.
+    /// The branches of the state, which are kept if switches are located.
     [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
-    /// Whether changes are located from now on, where the options ask for it.
+    /// Sets whether changes are located from now on, if the options ask for it.
     void locate_switches(bool locate) noexcept { locates_ = locate; }
     /// The change that was located last.
     struct Switch {
@@ -137,10 +137,10 @@ public:
     };
     [[nodiscard]] const Switch& last_switch() const noexcept { return last_switch_; }
 
-    /// The next accepted step. `running`, or how the run ended.
+    /// Takes the next accepted step. Returns `running`, or how the run ended.
     Outcome advance();
 
-    /// To the end. `observer(state)` sees the start and every accepted step.
+    /// Runs to the end. `observer(state)` sees the start and every accepted step.
     template <class Observer>
     Outcome run(const Observer& observer)
     {
@@ -156,9 +156,9 @@ public:
     }
 
     /// The state within the last step at which the scalar `g(state)`, of opposite signs at
-    /// its ends, vanishes: by repeating the step with other lengths, so that it is as
-    /// accurate as a step; to `tolerance` in time. `g` may examine the reaction, as for the
-    /// release of what sticks. Nothing if the signs are equal or a step fails.
+    /// its ends, vanishes: found by repeating the step with other lengths, so that it is as
+    /// accurate as a step; to `tolerance` in time. `g` may depend on the reaction, as for the
+    /// release of a sticking contact. Empty if the signs are equal or a step fails.
     template <class Function>
     [[nodiscard]] std::optional<State> locate(const Function& g, double tolerance = 0)
     {
@@ -198,7 +198,7 @@ private:
         Reaction nearest = state.reaction;
         inclusion().project(state.t, state.w, state.reaction, nearest);
         const double off = (nearest - state.reaction).template lpNorm<Eigen::Infinity>();
-        // States of earlier steps are in the set to the solver's tolerance.
+        // The reaction of an earlier step lies in the set only to the solver's tolerance.
         if (!(off <= 1e-9 * (1 + nearest.template lpNorm<Eigen::Infinity>()))) {
             refuse_inclusion("the reaction at the start is outside its set by", off);
         }
@@ -206,7 +206,7 @@ private:
 
     Outcome end_with(Outcome outcome) { return outcome_ = outcome; }
 
-    /// One attempt into trial_, with its error.
+    /// Makes one attempt at a step, with its error, into trial_.
     StageReport attempt(double h)
     {
         switched_ = false;
@@ -243,7 +243,7 @@ private:
         return report;
     }
 
-    /// Inputs of a policy about the attempt.
+    /// Inputs of a policy for the attempt.
     [[nodiscard]] StepView view(double h)
     {
         StepView out{.step = h};
@@ -275,7 +275,7 @@ private:
                 return v.segment(field.first, field.count).norm();
             };
             const double size = std::max({norm(a), norm(b), field.floor});
-            // Nothing moved, and nothing is wrong: zero over zero is no error.
+            // Nothing moved, and nothing is wrong: zero over zero counts as no error.
             const double off = norm(error);
             if (!(off == 0)) worst = std::max(worst, off / (field.rtol * size));
             if (std::isnan(off)) return off;
@@ -295,7 +295,7 @@ private:
         return std::sqrt(sum / static_cast<double>(error.size()));
     }
 
-    /// Where the step as taken leaves the branches of its start: trial_ becomes the end
+    /// If the step leaves the branches of its start, trial_ becomes the end
     /// of the shorter step that stays on them.
     StageReport end_at_switch(double h, const StageReport& whole)
     {
@@ -309,10 +309,10 @@ private:
         double high = h;
         double at_high = end;
         if (end >= 0) {
-            // Out and back again within the step? The middle stage would show it.
+            // Left and entered again within the step? The middle stage would show it.
             const double middle = step_.slack(step_.middle(), start_branches_);
             if (middle >= 0) {
-                // The two half steps of `doubling` are better than the one that was examined.
+                // The two half steps of `doubling` are better than the step that was examined.
                 const bool keep = options_.estimate == ErrorEstimate::doubling &&
                                   step_.slack(trial_, start_branches_) >= 0;
                 if (!keep) trial_ = half_;
@@ -333,8 +333,8 @@ private:
         return report;
     }
 
-    /// A root of `function` between low and high, whose values have opposite signs: the
-    /// Illinois variant of false position, halved where it dawdles. Zero without a root.
+    /// A root of `function` between low and high, whose values have opposite signs: by the
+    /// Illinois variant of false position, halved if it stagnates. Zero without a root.
     template <class Function>
     [[nodiscard]] static double find(double low, double at_low, double high, double at_high,
                                      double tolerance, const Function& function)
@@ -370,14 +370,14 @@ private:
             now_.t = options_.t_end;
             outcome_ = Outcome::reached_end;
         } else {
-            // The time is carried with the remainder of its additions.
+            // The time is carried with the rounding error of its additions.
             const double increment = (trial_.t - t) + remainder_;
             now_.t = t + increment;
             remainder_ = increment - (now_.t - t);
         }
         ++statistics_.accepted;
         if (options_.switches == Switches::located) {
-            // Reactions that depend on one another can change places without end.
+            // Reactions that depend on one another can change places endlessly.
             if (!switched_) {
                 short_switches_ = 0;
             } else if (now_.t - t < 0.1 * options_.step) {
@@ -387,8 +387,8 @@ private:
         }
     }
 
-    /// After a switch the reaction is that of the branch now entered; a bound that has
-    /// just been reached is left for good, whatever rounding says of it.
+    /// After a switch the reaction is that of the branch now entered. A bound that it has
+    /// just reached is set exactly, so that rounding cannot lead back inside.
     void enter_next_branches()
     {
         if (!switched_) {
@@ -409,12 +409,12 @@ private:
             last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
             return;
         }
-        // Sliding has come to a stop: it sticks, or continues across.
+        // Sliding has stopped: the contact sticks, or slides on in the other direction.
         zero_observed(which);
         try {
             now_.reaction = minimal_selection(step_.matrices(), now_.t, now_.w);
         } catch (const std::invalid_argument&) {
-            // Nothing but the solver's reaction, then.
+            // There is no minimal selection: the solver's reaction is kept.
         }
         step_.branches_of(now_, start_branches_);
         last_switch_ = {static_cast<std::size_t>(which), from, start_branches_[which]};
@@ -452,7 +452,7 @@ private:
     bool holds_length_ = true;
     bool locates_ = true;
     bool switched_ = false;
-    Eigen::Index short_switches_ = 0;  // in a row
+    Eigen::Index short_switches_ = 0;  // number of consecutive ones
 };
 
 template <int N, int M>
@@ -521,12 +521,12 @@ Outcome AnyMotion<N, M>::advance()
         }
         const double left = options_.t_end - now_.t;
         if (left <= 4 * std::numeric_limits<double>::epsilon() * std::abs(options_.t_end)) {
-            // A change was located at the end up to rounding.
+            // A change was located at the end, up to rounding.
             now_.t = options_.t_end;
             return end_with(Outcome::reached_end);
         }
         double h = std::min(h_, options_.h_max);
-        // No sliver is left for the last step: a step within a part in 1e9 takes it all.
+        // The last step takes all of the remainder if only a part in 1e9 would be left.
         const bool last = left <= h * (1 + 1e-9);
         if (last) h = left;
         ++statistics_.attempted;
@@ -566,15 +566,15 @@ Outcome AnyMotion<N, M>::advance()
 ///
 ///     A w' = f(t, w) + G r,    y = E w - s(t),    -y in the normal cone of K at r
 ///
-/// in the stages of Bathe's scheme, is assessed by the step controller, and is accepted or repeated
+/// in the stages of Bathe's scheme. The step controller assesses it, and it is accepted or repeated
 /// with another length. The reaction is part of the state, so that the same (t, w, r) and h give
 /// the same bits.
 template <Inclusion System>
 class SetValuedMotion : public detail::AnyMotion<state_size<System>, reaction_size<System>> {
 public:
-    /// Starts with the minimal selection. Debug builds sample the projection of the first set.
-    /// @throws std::invalid_argument for options, systems and initial states that cannot be
-    /// right.
+    /// Starts with the minimal selection. Debug builds test the projection of the first set.
+    /// @throws std::invalid_argument for invalid options, systems and initial
+    /// states.
     SetValuedMotion(const System& system, const StateOf<System>& w0,
                     const SetValuedOptions& options)
         : SetValuedMotion::AnyMotion(detail::TypedInclusion<System>(system), w0, options)

@@ -1,11 +1,11 @@
 // Rules that choose the next step from the errors of the last ones.
 //
-// A controller is a value. It is told of every attempt, either the error of a step,
-// scaled so that 1 is just acceptable, or that the step could not be computed, and says
-// whether the step is accepted and by what the next one differs:
+// A controller is a value. It receives every attempt, either the error of a step,
+// scaled so that 1 is just acceptable, or the fact that the step could not be computed, and decides
+// whether the step is accepted and by which factor the next one differs:
 //
 //     StepVerdict judge(error, h)      error >= 0, finite; h was the step
-//     double failed()                  factor after a step without a solution
+//     double failed()                  factor after a step that had no solution
 //     void reset()                     forgets the past, as after a jump of the motion
 //
 // Some of these rules accept steps of an error above 1, and some reject below it.
@@ -24,11 +24,11 @@ namespace ricochet {
 /// Decision of a step controller: whether the step is accepted, and the factor of the next length.
 struct StepVerdict {
     bool accepted = true;
-    double factor = 1;  ///< the next step over this one
+    double factor = 1;  ///< length of the next step over this one
 };
 
-/// Every step as long as the first. A step without a solution is halved, and the length
-/// is then regained step by step.
+/// Keeps every step as long as the first. A step without a solution is halved, and the length
+/// is then restored step by step.
 struct ConstantStep {
     [[nodiscard]] static StepVerdict judge(double /*error*/, double /*h*/) noexcept { return {}; }
     [[nodiscard]] static double failed() noexcept { return 0.5; }
@@ -41,7 +41,7 @@ struct ConstantStep {
 /// rejecting it costs more than it gains: with `reject_above` = 100 such a step is
 /// taken, and the next is shorter.
 struct ErrorStep {
-    int order = 3;            ///< of a local error: one more than that of the method
+    int order = 3;            ///< order of a local error: one more than that of the method
     double reject_above = 1;  ///< at least 1
     ErrorRule rule{};
 
@@ -58,7 +58,7 @@ struct ErrorStep {
 ///     no solution   factor down
 ///
 /// As printed, its first case counts a step of error > 1 as successful and its second has
-/// the time that is left inside a maximum; both are taken for slips.
+/// the remaining time inside a maximum; both are taken for misprints.
 struct HeuristicStep {
     int order = 1;
     double up = 2;
@@ -95,8 +95,8 @@ struct ClassicStep {
 ///
 /// rejected where that is below c1, and at most c2. With equal gammas only the ratio of
 /// two errors enters: nothing draws the error to 1, and with c1 = 1.8 a step is accepted
-/// only if the next may be nearly twice as long. It is here to be compared; use
-/// `FilteredStep`. A rejected step is at least cut to 0.6, lest it repeat for ever.
+/// only if the next may be nearly twice as long. It is included for comparison; use
+/// `FilteredStep`. A rejected step is cut to 0.6 at most, lest it repeat forever.
 struct PrintedPiStep {
     int order = 1;
     double gamma1 = 1.0 / 6;
@@ -118,7 +118,7 @@ struct PrintedPiStep {
 ///
 ///     factor = error^(-beta1 / k) error_before^(-beta2 / k) factor_before^-alpha
 ///
-/// rejected below `least`, with the factor `down`; at most `most`. After three
+/// rejected below `least`, with the factor `down`; limited to `most`. After three
 /// rejections in a row the past is forgotten. The defaults are h211b with b = 4, which
 /// the code of the paper above runs as its PI control.
 struct FilteredStep {
@@ -148,9 +148,9 @@ struct FilteredStep {
 };
 
 /// Steps of lengths that were chosen before the run, whatever their errors, the last of them for
-/// all that is left; the first is the run's own first step.
+/// the whole remainder; the first is the run's own first step.
 struct PrescribedSteps {
-    std::shared_ptr<const std::vector<double>> lengths{};  ///< [s] positive; neither is empty
+    std::shared_ptr<const std::vector<double>> lengths{};  ///< [s] positive; not null or empty
 
     [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
     [[nodiscard]] static double failed() noexcept { return 0.5; }
@@ -166,10 +166,10 @@ class StepRanges;
 struct StepView {
     static constexpr std::size_t state_inputs = 6;
 
-    double tolerance = 1;  ///< to which the error was scaled
+    double tolerance = 1;  ///< tolerance to which the error was scaled
     double step = 1;       ///< the attempt's length over the system's unit of time
-    double switched = 0;   ///< share of the reactions that left their branch in it
-    std::array<double, state_inputs> state{};  ///< of its end, as the system declares
+    double switched = 0;   ///< fraction of the reactions that left their branch in it
+    std::array<double, state_inputs> state{};  ///< inputs from its end, as the system declares them
 };
 
 /// A learned rule: the factor of `plain` times that of a policy (`nonsmooth/step_policy.hpp`).
@@ -181,13 +181,13 @@ struct LearnedStep {
     StepRanges* seen = nullptr;  ///< widened by every input, unless null
 
     [[nodiscard]] StepVerdict judge(double error, double h, const StepView& view) noexcept;
-    /// Same as `plain` for callers without a view.
+    /// Verdict of `plain`, for callers without a view.
     [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
     [[nodiscard]] double failed() const noexcept { return plain.failed(); }
     void reset() const noexcept {}
 
-    std::uint64_t asked = 0;        ///< verdicts
-    std::uint64_t handed_over = 0;  ///< of these, left to `plain`
+    std::uint64_t asked = 0;        ///< number of verdicts
+    std::uint64_t handed_over = 0;  ///< of these, decided by `plain` alone
 };
 
 using StepController = std::variant<ConstantStep, ErrorStep, HeuristicStep, ClassicStep,

@@ -4,10 +4,10 @@
 //     BatheOptions{.controller = LearnedStep{policy}, .estimate = ErrorEstimate::embedded}
 //
 // The classical proposal h 0.9 E^(-1/3) is multiplied by exp(network), held within [e^-2, e^2].
-// What the network is asked about is intensive, means over a field rather than sums, so that a
-// policy trained on one element serves any mesh. It decides about lengths alone: whatever its
+// The inputs of the network are intensive, means over a field rather than sums, so that a
+// policy trained on one element serves any mesh. It decides only about lengths: whatever its
 // weights, a step that is too wrong is rejected and repeated by the classical rule, and inputs
-// outside of those seen in training, or NaN, are that rule's too.
+// outside of the range seen in training, or NaN, are left to that rule, too.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@
 
 namespace ricochet {
 
-/// The range of every input that was met.
+/// The range of every input that was met in training.
 class StepRanges {
 public:
     static constexpr std::size_t inputs = 4 + StepView::state_inputs;
@@ -33,7 +33,7 @@ public:
     void include(const Inputs& inputs) noexcept;
     void include(const StepRanges& other) noexcept;
     [[nodiscard]] bool empty() const noexcept { return !(lower_[0] <= upper_[0]); }
-    /// One per input, each wider by this share of its width on both sides.
+    /// One interval per input, widened by this fraction of its width on both sides.
     [[nodiscard]] std::vector<Interval> domain(double margin) const;
 
 private:
@@ -55,18 +55,18 @@ public:
     static constexpr std::size_t inputs = StepRanges::inputs;
     static constexpr double most = 2;  ///< of |log factor|
 
-    /// @throws std::invalid_argument if the model is not of that kind, or has not that many
+    /// @throws std::invalid_argument if the model is of another kind, or does not have that many
     /// inputs and one output, or as `Mlp`.
     explicit StepPolicy(Model model);
 
-    /// @throws std::invalid_argument naming both, if the policy is for another system or layout.
+    /// @throws std::invalid_argument naming both if the policy is for another system or layout.
     void require(const StepLayout& layout) const;
 
-    /// log E, log tolerance, log step, share that switched, and those of the system.
+    /// log E, log tolerance, log step, fraction that switched, and the inputs of the system.
     [[nodiscard]] static StepRanges::Inputs inputs_of(double error, const StepView& view) noexcept;
 
-    /// By how much to multiply the classical proposal, in [e^-2, e^2]. Nothing where an input is
-    /// outside of the domain, or the network's answer is not a number.
+    /// Factor for the classical proposal, in [e^-2, e^2]. Empty if an input is
+    /// outside of the domain, or the network's output is not a number.
     [[nodiscard]] std::optional<double> factor(const StepRanges::Inputs& inputs) const noexcept;
 
     [[nodiscard]] const Model& model() const noexcept { return model_; }
@@ -81,7 +81,7 @@ private:
 /// @throws std::invalid_argument for another number of weights.
 [[nodiscard]] Model step_policy_model(const StepLayout& layout, const std::vector<double>& weights);
 
-/// How many weights that network has.
+/// Number of weights of that network.
 inline constexpr std::size_t step_policy_weights = (StepPolicy::inputs + 1) * 8 + 9 * 8 + 9;
 
 }  // namespace ricochet

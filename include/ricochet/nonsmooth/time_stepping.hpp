@@ -3,9 +3,9 @@
 //     M(q) dv = F(t, q, v) dt + H(q)' dp,    q' = v
 //
 // Impacts are not located: a step ends with the velocities that Newton's law of impact
-// and Coulomb's law of friction allow, for all contacts together, whether one of them has
-// closed within it or a hundred. The order is 1, and positions may go behind their
-// constraints by a step times their velocity; but nothing can accumulate or be missed.
+// and Coulomb's law of friction allow, for all contacts together, however many of them have
+// closed within it. The order is 1, and positions may go behind their
+// constraints by a step times their velocity; but no impacts can accumulate or be missed.
 //
 // A system is a value with
 //
@@ -16,8 +16,8 @@
 //     gaps(q, g)                 one per contact; open where positive
 //     directions(q, H)           for each contact the row of its gap's rate, then those of
 //                                its tangential velocities
-//     restitution(c)             Newton's coefficient, in [0, 1]
-//     friction(c)                Coulomb's, finite, zero or positive
+//     restitution(c)             Newton's coefficient of contact c, in [0, 1]
+//     friction(c)                Coulomb's coefficient, finite, zero or positive
 #pragma once
 
 #include <Eigen/Dense>
@@ -40,19 +40,19 @@ namespace ricochet {
 struct TimeSteppingOptions {
     double t_start = 0;
     double t_end = std::numeric_limits<double>::quiet_NaN();
-    double step = 0;  ///< [s], positive
+    double step = 0;  ///< [s] length of the steps, positive
     ContactOptions contacts{};
 };
 
-/// A run of no length is accepted.
+/// Validates the options. A run of no length is accepted.
 ///
 /// @throws std::invalid_argument naming the option.
 void validate(const TimeSteppingOptions& options);
 
 namespace detail {
 
-/// @throws std::invalid_argument naming the contact where a coefficient is out of range or the
-/// gap is negative by more than `room` [m], or no number.
+/// @throws std::invalid_argument naming the contact if a coefficient is out of range or the
+/// gap is below -`room` [m], or NaN.
 void check_contact(int contact, double restitution, double friction, double gap, double room);
 
 }  // namespace detail
@@ -61,14 +61,14 @@ void check_contact(int contact, double restitution, double friction, double gap,
 struct TimeSteppingStatistics {
     std::uint64_t steps = 0;
     std::uint64_t problems = 0;    ///< steps with a closed contact
-    std::uint64_t iterations = 0;  ///< of Newton's method in them
+    std::uint64_t iterations = 0;  ///< iterations of Newton's method in them
     std::uint64_t sweeps = 0;
-    std::uint64_t unsolved = 0;  ///< steps that were tried again at half the length
+    std::uint64_t unsolved = 0;  ///< steps that were repeated at half the length
 };
 
 namespace detail {
 
-/// `TimeStepping`, whatever the system.
+/// `TimeStepping` for systems of any type.
 template <int N>
 class RICOCHET_ALIGNED AnyTimeStepping {
 public:
@@ -84,7 +84,7 @@ public:
     AnyTimeStepping(const AnyMechanism<N>& system, const Vector& q, const Vector& v,
                     const TimeSteppingOptions& options);
 
-    /// Goes on from (t, q, v), where an integrator of free flight hands over.
+    /// Restarts from (t, q, v), when an integrator of free flight hands over.
     void restart(double t, const Vector& q, const Vector& v);
 
     [[nodiscard]] const State& state() const noexcept { return state_; }
@@ -239,7 +239,7 @@ Outcome AnyTimeStepping<N>::advance()
     double h = options_.step;
     bool last = left <= h * (1 + 1e-9);
     if (last) h = left;
-    // Another length is another problem, which may be easier.
+    // Another length gives another problem, which may be easier.
     for (int attempt = 0; !take(h); ++attempt) {
         if (attempt == 10) return outcome_ = Outcome::not_converged;
         ++statistics_.unsolved;
@@ -267,7 +267,7 @@ Outcome AnyTimeStepping<N>::advance()
 /// M. Jean, The non-smooth contact dynamics method, Computer Methods in Applied
 /// Mechanics and Engineering 177, 1999.)
 ///
-/// Memory is allocated where the number of closed contacts changes.
+/// Memory is allocated only when the number of closed contacts changes.
 template <class System>
 class TimeStepping : public detail::AnyTimeStepping<System::coordinates> {
 public:
@@ -279,8 +279,8 @@ public:
     using Directions = Eigen::Matrix<double, C * D, N>;
     using Impulses = Eigen::Matrix<double, C * D, 1>;
 
-    /// @throws std::invalid_argument for options, a matrix that is not positive definite,
-    /// coefficients out of range, a start that is not finite or inside an obstacle by more than
+    /// @throws std::invalid_argument for invalid options, a matrix that is not positive definite,
+    /// coefficients out of range, or a start that is not finite or inside an obstacle by more than
     /// rounding.
     TimeStepping(const System& system, const Vector& q, const Vector& v,
                  const TimeSteppingOptions& options)

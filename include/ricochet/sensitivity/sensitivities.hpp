@@ -1,4 +1,4 @@
-// A run and its derivatives by initial state and parameters.
+// A run and its derivatives with respect to initial state and parameters.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,42 +20,42 @@
 
 namespace ricochet {
 
-/// Derivatives of one event, a column for each direction. NaN where they do not exist.
+/// Derivatives of one event, one column for each direction. NaN if they do not exist.
 struct EventSensitivity {
     Eigen::VectorXd dt;        ///< of its time [s]
     Eigen::MatrixXd before;    ///< S⁻: of the state, at the fixed time of the event
     Eigen::MatrixXd after;     ///< S⁺
-    Eigen::MatrixXd at_event;  ///< of the state before the reset at the event as it moves:
+    Eigen::MatrixXd at_event;  ///< of the state before the reset, at the moving time of the event:
                                ///< S⁻ + x' dt
 };
 
-/// Where the derivatives ended.
+/// The event at which the derivatives ended.
 struct UndefinedAt {
     std::size_t event;  ///< index into `Run::events`
     Undefined reason;
 };
 
 /// A run with its derivatives. Columns are the directions: the components of the
-/// initial state, where asked for, then the parameters.
+/// initial state, if asked for, then the parameters.
 template <class X>
 struct Sensitivities {
     /// The run itself. Its `solution` stays empty.
     Run<X> run;
-    /// For each of `run.events`.
+    /// Derivatives of each of `run.events`.
     std::vector<EventSensitivity> events;
-    /// Derivatives of `run.x` at the fixed time `run.t`: n x directions. (At the event
-    /// that ended a run, `events.back()` tells how the time moves.)
+    /// Derivatives of `run.x` at the fixed time `run.t`: n x directions. (For the event
+    /// that ended a run, `events.back()` holds the derivative of the time.)
     Eigen::MatrixXd state;
     /// Derivatives at each of `run.trajectory.t`.
     std::vector<Eigen::MatrixXd> trajectory;
-    /// The first event through which there is no derivative, if there is one: from it
+    /// The first event through which there is no derivative, if there is one: from there
     /// on every derivative is NaN. The run is not affected.
     std::optional<UndefinedAt> undefined_at;
 };
 
 namespace detail {
 
-/// Takes a run of the variational system apart.
+/// Splits a run of the variational system into the run and its derivatives.
 template <class System, class X>
 class Separation {
     using Flat = std::vector<double>;
@@ -115,7 +115,7 @@ private:
         }
     }
 
-    /// The variational system answers contradictory resets with NaN: says what it was.
+    /// Names the conflict of contradictory resets, which the variational system answers with NaN.
     void name_conflict()
     {
         if constexpr (Resetting<System, X>) {
@@ -160,7 +160,7 @@ private:
         }
     }
 
-    /// The derivatives end at an event that says so, and at a touch of a guard that
+    /// The derivatives end at an event that is marked so, and at a touch of a guard that
     /// resets: some neighbours of the motion cross there.
     void note_undefined(std::size_t k)
     {
@@ -186,7 +186,7 @@ private:
         return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(variational_.columns()), nan);
     }
 
-    /// Derivatives of the time of event k; `before` if those of the state exist there.
+    /// Derivatives of the time of event k; `before` tells whether those of the state exist there.
     [[nodiscard]] Eigen::VectorXd time_of(std::size_t k, bool before) const
     {
         const Event<Flat>& event = flat_.events[k];
@@ -224,15 +224,15 @@ private:
 }  // namespace detail
 
 /// Integrates `system` as `integrate` does, together with the derivatives of state and
-/// event times by the initial state and by parameters, exact through events (see
+/// event times with respect to the initial state and parameters, exact through events (see
 /// saltation.hpp) up to the error of the method and of differences.
 ///
-/// @param directions  what to differentiate by; {} is the initial state
+/// @param directions  differentiation directions; {} is the initial state
 /// @param options     as for the run alone; the derivatives are under its error control
-///                    too, so that the steps differ from those of the run alone, and
+///                    as well, so that the steps differ from those of the run alone, and
 ///                    its results by the tolerance. `record_steps` is ignored.
-/// @throws std::invalid_argument as `integrate`, and for directions that make no sense.
-///         Where derivatives do not exist, `undefined_at` says so.
+/// @throws std::invalid_argument as `integrate`, and for invalid directions.
+///         If derivatives do not exist, `undefined_at` holds the event.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>
@@ -255,9 +255,9 @@ requires Flowing<System, X> && StateVector<X>
         .take(options.record_events);
 }
 
-/// The derivative of the state after one `period` [s] by the state at its start: the
+/// The derivative of the state after one `period` [s] with respect to the state at its start: the
 /// product of the fundamental matrices of the flights and the saltation matrices of the
-/// events. NaN where it does not exist, or where the run does not reach its end.
+/// events. NaN if it does not exist, or if the run does not reach its end.
 ///
 /// @param options  `t_end` is not used
 /// @throws std::invalid_argument as `sensitivities`.
@@ -295,11 +295,11 @@ requires Flowing<System, X> && StateVector<X>
 // the rate of convergence of the Levenberg-Marquardt method, Computing Supplementa 15,
 // 2001).
 
-/// How an orbit is looked for.
+/// Options of the search for an orbit.
 struct Shooting {
-    /// [s] Of the orbit, positive; of an autonomous system a first guess.
+    /// [s] Period of the orbit, positive; for an autonomous system a first guess.
     double period = std::numeric_limits<double>::quiet_NaN();
-    /// The system does not depend on time, and the period is to be found.
+    /// Whether the system does not depend on time, so that the period is to be found.
     bool autonomous = false;
     /// The orbit has closed when |x(T) - x0| <= tolerance max(1, |x0|) in every
     /// component. What can be reached depends on `Options::rtol` and `atol`.
@@ -307,7 +307,7 @@ struct Shooting {
     int max_iterations = 30;
 };
 
-/// How the search for an orbit ended.
+/// Outcome of the search for an orbit.
 enum class ShootingEnd : std::uint8_t {
     closed,                ///< the orbit has closed to the tolerance
     equilibrium,           ///< the motion stands still: closed, but no orbit
@@ -324,7 +324,7 @@ enum class ShootingEnd : std::uint8_t {
 /// One sentence, with the remedy where there is one.
 [[nodiscard]] std::string_view describe(ShootingEnd end) noexcept;
 
-/// An orbit, or how near the search has come.
+/// The orbit found, or the best approximation of it.
 template <class X>
 struct PeriodicOrbit {
     bool converged = false;
@@ -333,21 +333,21 @@ struct PeriodicOrbit {
     double period = 0;    ///< [s]
     double residual = 0;  ///< largest |x(T) - x| / max(1, |x|)
     int iterations = 0;   ///< corrections made
-    /// Derivative of x(T) by x; NaN where it does not exist.
+    /// Derivative of x(T) with respect to x; NaN if it does not exist.
     Eigen::MatrixXd monodromy{};
-    /// Its eigenvalues, the largest first. Of an autonomous system one of them is 1: the
+    /// Its eigenvalues, the largest first. For an autonomous system one of them is 1: the
     /// direction along the orbit. The orbit attracts if all others are inside the unit
-    /// circle; one is 0 for each dimension that sticking takes away.
+    /// circle; one is 0 for each dimension that sticking removes.
     Eigen::VectorXcd multipliers{};
     Run<X> run{};  ///< one period from x
 };
 
-/// @throws std::invalid_argument naming the member, what was given and expected.
+/// @throws std::invalid_argument naming the member, what was given and what was expected.
 void validate(const Shooting& shooting);
 
 namespace detail {
 
-/// One shot: where a run of a period leads, and its derivative.
+/// One shot: the end of a run over one period, and its derivative.
 struct Shot {
     ShootingEnd problem = ShootingEnd::closed;  ///< `closed`: none
     Eigen::VectorXd end{};                      ///< x(T)
@@ -366,12 +366,12 @@ struct ShotOrbit {
     Eigen::VectorXcd multipliers{};
 };
 
-/// The search itself; `shoot(x, period)` is the run of a period from x.
+/// The search itself; `shoot(x, period)` runs one period from x.
 [[nodiscard]] ShotOrbit shoot_orbit(
     const std::function<Shot(const Eigen::VectorXd&, double)>& shoot, const Eigen::VectorXd& guess,
     const Shooting& shooting);
 
-/// x as an Eigen vector.
+/// Converts x to an Eigen vector.
 template <class X>
 [[nodiscard]] Eigen::VectorXd vector_of(const X& x)
 {
@@ -400,16 +400,16 @@ template <class X>
 
 }  // namespace detail
 
-/// Looks for a periodic orbit near `guess`, in the mode `options.mode`, at the time
-/// `options.t_start`. The start should lie away from the surfaces of guards.
+/// Searches for a periodic orbit near `guess`, in the mode `options.mode`, at the time
+/// `options.t_start`. The start should lie away from the event surfaces.
 ///
 /// A correction that does not bring the ends of the orbit closer, or that changes the
-/// period by more than a quarter, is halved, up to seven times. What the motion does never throws:
+/// period by more than a quarter, is halved, up to seven times. Failures of the motion never throw:
 /// `end` says how the search ended, and the best orbit found is returned.
 ///
 /// @param options  `t_end` is not used; `rtol` and `atol` well below the tolerance of
 ///                 the orbit
-/// @throws std::invalid_argument for a guess, a period or options that make no sense.
+/// @throws std::invalid_argument for an invalid guess, period or option.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>
@@ -443,7 +443,7 @@ requires Flowing<System, X> && StateVector<X>
                     .start_rate = rate_at(options.mode, options.t_start, x),
                     .end_rate = rate_at(s.run.mode, s.run.t, s.run.x)};
         } catch (const std::invalid_argument&) {
-            // A correction may lead where no run can start; a guess may not.
+            // A correction may lead to a point from which no run can start; a guess may not.
             if (first) throw;
             return {.problem = ShootingEnd::run_ended};
         }
