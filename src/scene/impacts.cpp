@@ -26,21 +26,18 @@ constexpr std::size_t most_exact = 600;
 constexpr int few_sweeps = 30;
 constexpr int most_sweeps = 10'000;
 
-Vector2 velocity_of(const std::vector<Vector2>& v, const Contact& contact)
-{
-    return contact.surface ? v[contact.slot_a] : v[contact.slot_a] - v[contact.slot_b];
-}
-
 }  // namespace
 
 double Impacts::approach(const Cluster& cluster, const Contact& contact) const
 {
-    return -dot(velocity_of(cluster.after, contact), contact.normal);
+    return -dot(relative_velocity(cluster.after, contact), contact.normal);
 }
 
 double Impacts::noise(const Cluster& cluster, const Contact& contact) const
 {
-    const double other = contact.surface ? 0 : norm(cluster.after[contact.slot_b]);
+    const double other = !contact.surface ? norm(cluster.after[contact.slot_b])
+                         : contact.moving ? norm(contact.surface_velocity)
+                                          : 0;
     return 8 * epsilon * (norm(cluster.after[contact.slot_a]) + other);
 }
 
@@ -61,7 +58,7 @@ void Impacts::strike(Cluster& cluster, Contact& contact) const
     contact.tangential = 0;
     if (contact.friction > 0) {
         const Vector2 tangent = turned(contact.normal);
-        const double slip = dot(velocity_of(cluster.after, contact), tangent);
+        const double slip = dot(relative_velocity(cluster.after, contact), tangent);
         const double most = contact.friction * contact.impulse;
         contact.tangential = std::clamp(-slip * contact.mass, -most, most);
         push(cluster, contact, contact.impulse * contact.normal + contact.tangential * tangent);
@@ -143,6 +140,19 @@ double Impacts::kinetic_energy(const Cluster& cluster) const
     return 0.5 * twice;
 }
 
+/// [J] By surfaces that move, in the current solve.
+double Impacts::work_of_surfaces(const Cluster& cluster) const
+{
+    double work = 0;
+    for (const std::uint32_t k : struck_) {
+        const Contact& contact = cluster.contacts[k];
+        if (!contact.moving) continue;
+        work += contact.impulse * dot(contact.normal, contact.surface_velocity) +
+                contact.tangential * dot(turned(contact.normal), contact.surface_velocity);
+    }
+    return work;
+}
+
 /// Newton's restitution and Coulomb's friction at several contacts may gain energy together. Then
 /// restitution is spent, and where the sweeps still gain, friction is left out.
 void Impacts::solve_without_gain(Cluster& cluster) const
@@ -152,7 +162,7 @@ void Impacts::solve_without_gain(Cluster& cluster) const
     solve(cluster);
     std::vector<std::pair<double, double>> laws;
     for (const bool with_friction : {true, false}) {
-        if (kinetic_energy(cluster) <= most) break;
+        if (kinetic_energy(cluster) - work_of_surfaces(cluster) <= most) break;
         cluster.after = start;
         for (const std::uint32_t k : struck_) {
             Contact& contact = cluster.contacts[k];
@@ -183,7 +193,7 @@ void Impacts::sweep(Cluster& cluster, double smallest, int most) const
             Vector2 impulse = change * contact.normal;
             if (contact.friction > 0) {
                 const Vector2 tangent = turned(contact.normal);
-                const double slip = dot(velocity_of(cluster.after, contact), tangent);
+                const double slip = dot(relative_velocity(cluster.after, contact), tangent);
                 const double most = contact.friction * contact.impulse;
                 const double held =
                     std::clamp(contact.tangential - slip * contact.mass, -most, most);
@@ -237,6 +247,7 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
         event.after[0] = cluster.after[contact.slot_a];
         if (contact.surface) {
             event.other = {true, world_.faces[contact.b].surface};
+            event.before[1] = event.after[1] = contact.surface_velocity;
         } else {
             event.other = {false, contact.b};
             event.before[1] = before_wave_[contact.slot_b];

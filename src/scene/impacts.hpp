@@ -19,9 +19,19 @@ struct Contact {
     double friction = 0;
     double impulse = 0;  ///< of the current solve, normal and tangential
     double tangential = 0;
-    double target = 0;  ///< [m/s] separation that is asked for
-    double mass = 0;    ///< effective
+    double target = 0;           ///< [m/s] separation that is asked for
+    double mass = 0;             ///< effective
+    bool moving = false;         ///< whether its surface moves
+    Vector2 surface_velocity{};  ///< [m/s]
 };
+
+/// Of body a relative to what it touches, where `v` are the velocities of the cluster.
+[[nodiscard]] inline Vector2 relative_velocity(const std::vector<Vector2>& v,
+                                               const Contact& contact)
+{
+    if (!contact.surface) return v[contact.slot_a] - v[contact.slot_b];
+    return contact.moving ? v[contact.slot_a] - contact.surface_velocity : v[contact.slot_a];
+}
 
 struct Cluster {
     std::vector<std::uint32_t> bodies;
@@ -60,6 +70,7 @@ private:
     void solve(Cluster& cluster) const;
     void solve_without_gain(Cluster& cluster) const;
     [[nodiscard]] double kinetic_energy(const Cluster& cluster) const;
+    [[nodiscard]] double work_of_surfaces(const Cluster& cluster) const;
     bool solve_exactly(Cluster& cluster) const;
     void sweep(Cluster& cluster, double smallest, int most) const;
     bool wave(Cluster& cluster);

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "scene/islands.hpp"
-#include "scene/world.hpp"
+#include "scene/moving.hpp"
 
 namespace ricochet::detail {
 
@@ -55,29 +55,6 @@ namespace {
     while (out.degree > 0 && is_zero(out.c[static_cast<std::size_t>(out.degree)])) --out.degree;
     return out;
 }
-
-/// The root of a gap on the steps' polynomials, moved to where the gap closes on the methods' own
-/// maps. `gap` returns the gap there and its rate.
-template <class Gap>
-[[nodiscard]] double on_map(double after, double until, const Gap& gap)
-{
-    for (int i = 0; i < 3; ++i) {
-        const auto [value, rate] = gap(after);
-        if (!(rate < 0)) break;
-        const double change = -value / rate;
-        // The map differs from the polynomial by the error of a step.
-        if (std::fabs(change) > 0.1 * until) break;
-        after = std::clamp(after + change, 0.0, until);
-        // Newton's method doubles the digits: the next change would be below rounding.
-        if (std::fabs(change) <= 1e-9 * after) break;
-    }
-    return after;
-}
-
-struct GapAndRate {
-    double gap = 0;
-    double rate = 0;
-};
 
 }  // namespace
 

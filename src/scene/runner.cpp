@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "scene/large_pages.hpp"
+#include "scene/moving.hpp"
 
 namespace ricochet::detail {
 
@@ -63,7 +64,7 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
 /// times as fast at a fraction of 0.3 as one body in each.
 void Runner::place_all()
 {
-    celled_ = members_.size() > 1 || world_.faces.size() > world_.wall_count;
+    celled_ = members_.size() > 1 || world_.fixed_count > world_.wall_count;
     if (!celled_) return;
     Vector2 low{never, never};
     Vector2 high{-never, -never};
@@ -83,7 +84,7 @@ void Runner::place_all()
     const double slack = islands_.empty() ? 1.0001 : 1.3;
     double side = std::max(2 * radius * slack, 0.65 * std::sqrt(width * height / count));
     if (!(side > 0)) side = std::max({width, height, 1.0});
-    if (members_.size() <= few_bodies && world_.faces.size() - world_.wall_count <= few_faces) {
+    if (members_.size() <= few_bodies && world_.fixed_count - world_.wall_count <= few_faces) {
         side = 0x1p200;  // so few are all asked, and none pays for the cells that it crosses
     }
     const auto buckets = [&](double extent) {
@@ -105,7 +106,7 @@ void Runner::place_faces()
     double radius = 0;
     for (const std::uint32_t i : members_) radius = std::max(radius, world_.bodies[i].radius);
     const double reach = 1.001 * radius + 0.15 * cells_.side();
-    for (std::uint32_t f = world_.wall_count; f < world_.faces.size(); ++f) {
+    for (std::uint32_t f = world_.wall_count; f < world_.fixed_count; ++f) {
         const Face& face = world_.faces[f];
         const Vector2 end = face.at - face.length * turned(face.normal);
         const auto from = cells_.cell_of(
@@ -244,6 +245,21 @@ void Runner::consider_walls(std::uint32_t i)
     }
 }
 
+/// Surfaces that move, which wake sleepers, too.
+void Runner::consider_moving(std::uint32_t i)
+{
+    const auto count = static_cast<std::uint32_t>(world_.faces.size());
+    for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
+        if (known_to_group(i, true, f)) continue;
+        consider(i, meet_moving(world_, i, f, t_end_), true, f);
+    }
+    if (!world_.broken) return;
+    const BrokenBound& broken = *world_.broken;
+    fail(broken.non_finite ? Outcome::non_finite : Outcome::wrong_bound, {i},
+         fmt::format("the motion of {} {}, at t = {} s",
+                     world_.scene.name_of(SurfaceId{broken.surface}), broken.what, broken.t));
+}
+
 void Runner::consider_bucket(std::uint32_t i, std::uint32_t bucket)
 {
     for (std::uint32_t j = cells_.head(bucket); j != none; j = world_.bodies[j].next) {
@@ -269,6 +285,7 @@ void Runner::predict(std::uint32_t i)
     pending.t = pending.crossing = no_instant;
     pending.kind = Pending::Kind::nothing;
     const Body& body = world_.bodies[i];
+    if (!world_.motions.empty()) consider_moving(i);
     if (body.asleep) {
         if (celled_) offer(i);
     } else {
@@ -409,7 +426,7 @@ void Runner::happen(std::uint32_t i)
         case Kind::edge: return leave_edge(i);
         case Kind::face: return impact(i);
         case Kind::presses_face:
-            if (rests_on_face(i)) return predict(i);
+            if (!world_.moves(pending.other) && rests_on_face(i)) return predict(i);
             return press(i, presses_on(i, world_.faces[pending.other]));
         case Kind::pair:
         case Kind::presses: break;

@@ -65,6 +65,7 @@ private:
     void consider_walls(std::uint32_t i);
     void consider_bucket(std::uint32_t i, std::uint32_t bucket);
     void consider_faces(std::uint32_t i);
+    void consider_moving(std::uint32_t i);
     void consider_own(std::uint32_t i);
     void offer(std::uint32_t i);
     void predict_crossing(std::uint32_t i);
@@ -98,6 +99,7 @@ private:
     }
     void gather(std::uint32_t i, const Pending& seed);
     void gather_faces(std::uint32_t slot, std::uint32_t sure);
+    [[nodiscard]] double loose_motion(std::uint32_t face, double size) const;
     [[nodiscard]] std::vector<Side> sides_of(std::uint32_t i, std::uint32_t sure) const;
     void gather_pairs(std::uint32_t slot, std::uint32_t sure);
     void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);

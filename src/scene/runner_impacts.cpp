@@ -122,6 +122,33 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     if (body.radius > 0 && celled_ && cells_.any_faces()) {
         for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
     }
+    const auto count = static_cast<std::uint32_t>(world_.faces.size());
+    for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
+        const FaceGap at = world_.moving_gap(f, body.radius, p, now_);
+        const Vector2 w = world_.surface_velocity(f, now_);
+        double tolerance = World::rounding(p, body.radius) +
+                           World::rounding(world_.faces[f].at, 0) +
+                           2 * resolution(now_) * std::fabs(dot(v - w, at.normal));
+        if (known_to_group(i, true, f)) tolerance += loose_motion(f, body.radius + norm(p));
+        if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) continue;
+        // Where two segments meet, both have the corner.
+        const bool again = std::ranges::any_of(cluster_.contacts, [&](const Contact& c) {
+            return c.a == i && c.moving && c.normal == at.normal &&
+                   world_.faces[c.b].surface == world_.faces[f].surface;
+        });
+        if (again) continue;
+        touch(f, at.normal);
+        cluster_.contacts.back().moving = true;
+        cluster_.contacts.back().surface_velocity = w;
+    }
+}
+
+/// [m] What a group in lasting contact leaves of a gap: in a step of its own, surfaces move on
+/// straight lines.
+double Runner::loose_motion(std::uint32_t face, double size) const
+{
+    const double h = world_.options.contact_step;
+    return loose * size + 0.125 * world_.moving(face).bounds.acceleration * h * h;
 }
 
 void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
@@ -198,8 +225,7 @@ bool Runner::collapses(std::uint32_t slot)
     for (const Contact& contact : cluster_.contacts) {
         if (contact.a != i && (contact.surface || contact.b != i)) continue;
         meets_body = meets_body || !contact.surface;
-        const Vector2& a = cluster_.before[contact.slot_a];
-        const Vector2 v = contact.surface ? a : a - cluster_.before[contact.slot_b];
+        const Vector2 v = relative_velocity(cluster_.before, contact);
         fastest = std::max(fastest, std::fabs(dot(v, contact.normal)));
     }
     return meets_body &&
@@ -216,7 +242,7 @@ bool Runner::hops_below_rounding(std::uint32_t slot)
     const Body& body = world_.bodies[i];
     Series& series = series_[i];
     const bool may_last = std::ranges::any_of(cluster_.contacts, [&](const Contact& c) {
-        return c.a == i && c.surface && c.friction > 0 && c.restitution == 1;
+        return c.a == i && c.surface && !c.moving && c.friction > 0 && c.restitution == 1;
     });
     const double height = low * World::rounding(world_.position(i, now_), body.radius);
     const Vector2& v = cluster_.before[slot];

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "checks/require.hpp"
+#include "scene/motion.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"
 #include "scene/vector2.hpp"
@@ -102,7 +103,9 @@ BodyId Scene::add(const Disc& body, std::string_view kind)
         refuse("there are more bodies than handles");
     }
     require_room(1);
-    for (const Surface& surface : surfaces_) require_outside(body, surface);
+    for (const Surface& surface : surfaces_) {
+        if (!moves(surface.motion)) require_outside(body, surface);
+    }
     take_name(body.name, "body");
     bodies_.push_back(body);
     return {static_cast<std::uint32_t>(bodies_.size() - 1)};
@@ -133,12 +136,14 @@ SurfaceId Scene::wall(const Wall& wall)
     const double length = norm(wall.normal);
     if (!(length > 0) || !std::isfinite(length)) refuse("the normal of a wall has no length");
     require_material(wall.material, "a wall");
+    check_motion(wall.motion, wall.name.empty() ? "a wall" : wall.name);
     take_name(wall.name, "surface");
     surfaces_.push_back({.name = wall.name,
                          .is_wall = true,
                          .points = {wall.point},
                          .normal = {wall.normal[0] / length, wall.normal[1] / length},
-                         .material = wall.material});
+                         .material = wall.material,
+                         .motion = wall.motion});
     return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
 }
 
@@ -149,6 +154,7 @@ SurfaceId Scene::terrain(const Terrain& terrain)
     }
     for (const Vector2& point : terrain.points) require_vector(point, "point of terrain");
     require_material(terrain.material, "terrain");
+    check_motion(terrain.motion, terrain.name.empty() ? "terrain" : terrain.name);
     std::vector<Vector2> points = terrain.points;
     if (terrain.closed) points.push_back(points.front());
     for (std::size_t i = 1; i < points.size(); ++i) {
@@ -160,7 +166,8 @@ SurfaceId Scene::terrain(const Terrain& terrain)
     surfaces_.push_back({.name = terrain.name,
                          .is_wall = false,
                          .points = std::move(points),
-                         .material = terrain.material});
+                         .material = terrain.material,
+                         .motion = terrain.motion});
     return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
 }
 
@@ -229,9 +236,22 @@ void Scene::require_outside(const Disc& body, const Surface& surface) const
     }
 }
 
-void Scene::check() const
+void Scene::check(double t_start) const
 {
-    for (const Surface& surface : surfaces_) {
+    for (std::uint32_t s = 0; s < surfaces_.size(); ++s) {
+        Surface surface = surfaces_[s];
+        if (moves(surface.motion)) {
+            check_motion_at(surface.motion, t_start, name_of(SurfaceId{s}));
+            const Vector2 moved = displacement(surface.motion, t_start);
+            for (Vector2& point : surface.points) point = point + moved;
+            const auto is_point = [](const Disc& body) { return body.radius == 0; };
+            if (!surface.is_wall && std::ranges::any_of(bodies_, is_point)) {
+                refuse(
+                    fmt::format("{} is terrain that moves, which discs alone can meet, and "
+                                "there is a point",
+                                name_of(SurfaceId{s})));
+            }
+        }
         for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
             try {
                 require_outside(bodies_[i], surface);

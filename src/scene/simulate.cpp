@@ -169,7 +169,7 @@ SceneRun simulate(const Scene& scene, const SceneOptions& wanted)
     SceneOptions options = wanted;
     // Their times tell which is the last.
     options.record_events |= wanted.max_events != SceneOptions{}.max_events;
-    scene.check();
+    scene.check(options.t_start);
     scene.require_room(0);
     Failure failure;
     SceneRun run = run_until(scene, options, options.t_end, &failure);

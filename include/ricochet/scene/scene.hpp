@@ -13,6 +13,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "ricochet/scene/motion.hpp"
+
 namespace ricochet {
 
 /// (x, y)
@@ -69,6 +71,7 @@ struct Wall {
     Vector2 point{};   ///< [m]
     Vector2 normal{};  ///< of any length but zero; points to where bodies are
     MaterialId material{};
+    SurfaceMotion motion{};
 };
 
 /// A chain of segments, met from both sides.
@@ -77,6 +80,7 @@ struct Terrain {
     std::vector<Vector2> points{};  ///< [m] two or more
     bool closed = false;            ///< whether the last is joined to the first
     MaterialId material{};
+    SurfaceMotion motion{};  ///< discs alone can meet terrain that moves
 };
 
 /// Between the centres of two bodies: pulls with stiffness (length - rest) + damping d(length)/dt.
@@ -115,9 +119,10 @@ public:
     void require_room(double bodies) const;
 
     /// Refuses bodies that overlap at the start (which, and by how much), or lie behind walls or
-    /// across terrain that came after them. Called by `simulate` and `explain`.
+    /// across terrain that came after them, or that is there at `t_start` [s]. Called by `simulate`
+    /// and `explain`.
     /// @throws std::invalid_argument
-    void check() const;
+    void check(double t_start = 0) const;
 
     [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
     /// A point is a disc of radius 0 here.
@@ -132,6 +137,7 @@ public:
         std::vector<Vector2> points;  ///< of a wall its one point; closed terrain repeats the first
         Vector2 normal{};             ///< of a wall, of length 1
         MaterialId material{};
+        SurfaceMotion motion{};
     };
     [[nodiscard]] std::span<const Surface> surfaces() const noexcept { return surfaces_; }
 
