@@ -205,9 +205,9 @@ Groups groups_of(const World& world)
     if (world.bodies.empty()) return groups;
     groups.order_.resize(world.bodies.size());
     std::iota(groups.order_.begin(), groups.order_.end(), 0U);
-    if (world.faces.size() > world.wall_count) {
-        // Terrain lies in the cells of a group, and what moves may drive bodies anywhere: one group
-        // for all.
+    if (world.faces.size() > world.wall_count || !world.scene.systems().empty()) {
+        // Terrain lies in the cells of a group, and what moves by itself may drive bodies anywhere:
+        // one group for all.
         groups.ends_ = {world.bodies.size()};
         return groups;
     }

@@ -43,11 +43,55 @@ double Impacts::noise(const Cluster& cluster, const Contact& contact) const
 
 void Impacts::push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const
 {
+    if (!cluster.couplings.empty()) return push_coupled(cluster, contact, impulse);
     Vector2& a = cluster.after[contact.slot_a];
     a = a + world_.bodies[contact.a].inverse_mass * impulse;
     if (contact.surface) return;
     Vector2& b = cluster.after[contact.slot_b];
     b = b - world_.bodies[contact.b].inverse_mass * impulse;
+}
+
+/// The same where a body may be one of a system, whose other ones it moves, too.
+void Impacts::push_coupled(Cluster& cluster, const Contact& contact, const Vector2& impulse) const
+{
+    const auto apply = [&](std::uint32_t body, std::uint32_t slot, const Vector2& p) {
+        cluster.impulses[slot] = cluster.impulses[slot] + p;
+        if (!world_.bodies[body].mapped) {
+            cluster.after[slot] = cluster.after[slot] + world_.bodies[body].inverse_mass * p;
+            return;
+        }
+        for (const Coupling& coupling : cluster.couplings) {
+            if (coupling.by != slot) continue;
+            Vector2& v = cluster.after[coupling.of];
+            v = v + coupling.times(p);
+        }
+    };
+    apply(contact.a, contact.slot_a, impulse);
+    if (!contact.surface) apply(contact.b, contact.slot_b, -1.0 * impulse);
+}
+
+/// Effective masses of contacts along the normal and across.
+void Impacts::set_masses(Cluster& cluster) const
+{
+    const auto inverse_of = [&](std::uint32_t body, std::uint32_t slot, const Vector2& direction) {
+        if (!world_.bodies[body].mapped) return world_.bodies[body].inverse_mass;
+        for (const Coupling& coupling : cluster.couplings) {
+            if (coupling.of == slot && coupling.by == slot) {
+                return dot(direction, coupling.times(direction));
+            }
+        }
+        return 0.0;
+    };
+    const auto mass_along = [&](const Contact& contact, const Vector2& direction) {
+        double inverse = inverse_of(contact.a, contact.slot_a, direction);
+        if (!contact.surface) inverse += inverse_of(contact.b, contact.slot_b, direction);
+        return 1 / inverse;
+    };
+    for (Contact& contact : cluster.contacts) {
+        contact.mass = mass_along(contact, contact.normal);
+        contact.tangential_mass =
+            cluster.couplings.empty() ? contact.mass : mass_along(contact, turned(contact.normal));
+    }
 }
 
 /// One contact alone, in closed form.
@@ -60,7 +104,7 @@ void Impacts::strike(Cluster& cluster, Contact& contact) const
         const Vector2 tangent = turned(contact.normal);
         const double slip = dot(relative_velocity(cluster.after, contact), tangent);
         const double most = contact.friction * contact.impulse;
-        contact.tangential = std::clamp(-slip * contact.mass, -most, most);
+        contact.tangential = std::clamp(-slip * contact.tangential_mass, -most, most);
         push(cluster, contact, contact.impulse * contact.normal + contact.tangential * tangent);
     } else {
         push(cluster, contact, contact.impulse * contact.normal);
@@ -119,7 +163,8 @@ void Impacts::solve(Cluster& cluster) const
         contact.target = contact.restitution * std::max(u, 0.0);
         friction = friction || contact.friction > 0;
     }
-    if (!friction && struck_.size() > few && struck_.size() <= most_exact) {
+    const bool coupled = !cluster.couplings.empty();
+    if (!friction && !coupled && struck_.size() > few && struck_.size() <= most_exact) {
         const std::vector<Vector2> start = cluster.after;
         sweep(cluster, 0.5 * epsilon * fastest, few_sweeps);
         cluster.after = start;
@@ -134,6 +179,12 @@ double Impacts::kinetic_energy(const Cluster& cluster) const
 {
     double twice = 0;
     for (std::size_t i = 0; i < cluster.bodies.size(); ++i) {
+        if (world_.bodies[cluster.bodies[i]].mapped) {
+            // Of a system: what its impulses in this wave have given it.
+            twice +=
+                dot(cluster.impulses[i] - impulses_before_[i], before_wave_[i] + cluster.after[i]);
+            continue;
+        }
         twice +=
             dot(cluster.after[i], cluster.after[i]) / world_.bodies[cluster.bodies[i]].inverse_mass;
     }
@@ -155,15 +206,17 @@ double Impacts::work_of_surfaces(const Cluster& cluster) const
 
 /// Newton's restitution and Coulomb's friction at several contacts may gain energy together. Then
 /// restitution is spent, and where the sweeps still gain, friction is left out.
-void Impacts::solve_without_gain(Cluster& cluster) const
+void Impacts::solve_without_gain(Cluster& cluster)
 {
     const std::vector<Vector2> start = cluster.after;
+    impulses_before_ = cluster.impulses;
     const double most = kinetic_energy(cluster) * (1 + 1e-12);
     solve(cluster);
     std::vector<std::pair<double, double>> laws;
     for (const bool with_friction : {true, false}) {
         if (kinetic_energy(cluster) - work_of_surfaces(cluster) <= most) break;
         cluster.after = start;
+        cluster.impulses = impulses_before_;
         for (const std::uint32_t k : struck_) {
             Contact& contact = cluster.contacts[k];
             if (with_friction) laws.emplace_back(contact.restitution, contact.friction);
@@ -196,7 +249,7 @@ void Impacts::sweep(Cluster& cluster, double smallest, int most) const
                 const double slip = dot(relative_velocity(cluster.after, contact), tangent);
                 const double most = contact.friction * contact.impulse;
                 const double held =
-                    std::clamp(contact.tangential - slip * contact.mass, -most, most);
+                    std::clamp(contact.tangential - slip * contact.tangential_mass, -most, most);
                 impulse = impulse + (held - contact.tangential) * tangent;
                 contact.tangential = held;
             }
@@ -223,7 +276,8 @@ bool Impacts::wave(Cluster& cluster)
     }
     ++world_.statistics.waves;
     before_wave_ = cluster.after;
-    if (struck_.size() == 1) {
+    const auto rubs = [&] { return cluster.contacts[struck_[0]].friction > 0; };
+    if (struck_.size() == 1 && (cluster.couplings.empty() || !rubs())) {
         strike(cluster, cluster.contacts[struck_[0]]);
     } else {
         solve_without_gain(cluster);
@@ -268,11 +322,7 @@ bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
     if (cluster.contacts.size() > 1) {
         std::ranges::sort(cluster.contacts, {}, &Contact::at);
     }
-    for (Contact& contact : cluster.contacts) {
-        double inverse = world_.bodies[contact.a].inverse_mass;
-        if (!contact.surface) inverse += world_.bodies[contact.b].inverse_mass;
-        contact.mass = 1 / inverse;
-    }
+    set_masses(cluster);
     const std::size_t each = cluster.lasting ? lasting_patience : patience;
     const std::size_t most = each * cluster.contacts.size();
     for (std::size_t waves = 0; !spend; ++waves) {

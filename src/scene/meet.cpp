@@ -70,6 +70,13 @@ Path World::path(std::uint32_t i, const Instant& t) const
         path.degree = is_zero(b.a) ? 1 : 2;
         return path;
     }
+    if (b.mapped) {
+        path.c[0] = islands->position(i, t);
+        path.c[1] = islands->velocity(i, t);
+        path.degree = 1;
+        path.until = std::max(0.0, seconds(t, islands->end(b.island)));
+        return path;
+    }
     const auto& [c3, c4] = bends[i];
     const Vector2 c2 = 0.5 * b.a;
     path.c[0] = b.p + s * (b.v + s * (c2 + s * (c3 + s * c4)));
@@ -106,6 +113,7 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
 {
     const Body& a = world.bodies[i];
     const Body& b = world.bodies[j];
+    if (a.mapped || b.mapped) return meet_mapped(world, i, j);
     const Instant from = later(a.t, b.t);
     const Path first = world.path(i, from);
     const Path second = world.path(j, from);

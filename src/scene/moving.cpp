@@ -48,7 +48,9 @@ void check_bounds(const World& world, const MovingFace& of, std::uint32_t surfac
     } else {
         return;
     }
-    world.broken = BrokenBound{!is_finite(now.moved + now.v), surface, now.t, what};
+    world.broken = {!is_finite(now.moved + now.v),
+                    fmt::format("the motion of {} {}, at t = {} s",
+                                world.scene.name_of(SurfaceId{surface}), what, now.t)};
 }
 
 [[nodiscard]] Vector2 along_path(const Path& path, double s) noexcept
@@ -165,6 +167,104 @@ private:
 };
 
 }  // namespace
+
+namespace {
+
+/// Two bodies on the maps of their motions, of which bounds on accelerations are known.
+class BodyPair {
+public:
+    BodyPair(const World& world, std::uint32_t i, std::uint32_t j)
+        : world_(world), i_(i), j_(j), from_(later(world.bodies[i].t, world.bodies[j].t))
+    {
+        reach_ = world.bodies[i].radius + world.bodies[j].radius;
+        most_ = bound_of(i) + bound_of(j);
+    }
+
+    [[nodiscard]] OpenGap look(double s)
+    {
+        const Instant t = from_.after(s);
+        const Evaluated now{t.plus(0), world_.position(i_, t), world_.heading(i_, t)};
+        const Evaluated other{t.plus(0), world_.position(j_, t), world_.heading(j_, t)};
+        keeps_bound(i_, first_, now);
+        keeps_bound(j_, second_, other);
+        first_ = now;
+        second_ = other;
+        const Vector2 apart = now.moved - other.moved;
+        const double distance = norm(apart);
+        return {
+            .gap = distance - reach_,
+            .rate = dot(apart, now.v - other.v) / distance,
+            .noise = noise(now.v, other.v),
+            .closed = World::rounding(now.moved, reach_) + World::rounding(other.moved, reach_)};
+    }
+    [[nodiscard]] double safe(const OpenGap& now) const
+    {
+        return falls_after(now.gap, now.rate, -most_, 0);
+    }
+    [[nodiscard]] double linger(const OpenGap& now) const
+    {
+        if (most_ == 0) return never;
+        return std::max(std::sqrt(2 * now.closed / most_), 2 * now.rate / most_);
+    }
+    [[nodiscard]] static double next_jump(double /*s*/) { return never; }
+
+    [[nodiscard]] const Instant& from() const noexcept { return from_; }
+    [[nodiscard]] double until() const noexcept { return until_; }
+
+private:
+    double bound_of(std::uint32_t i)
+    {
+        const Body& body = world_.bodies[i];
+        if (!body.quartic) return norm(body.a);
+        until_ = std::min(until_, std::max(0.0, seconds(from_, world_.islands->end(body.island))));
+        if (body.mapped) return world_.accelerations[i];
+        // The map differs from the polynomial by the error of the step.
+        return 1.001 * acceleration_of(world_.path(i, from_));
+    }
+
+    /// The velocities of a map have the error of its step.
+    void keeps_bound(std::uint32_t i, const Evaluated& then, const Evaluated& now) const
+    {
+        if (!world_.bodies[i].mapped || world_.broken || !(then.t <= now.t)) return;
+        const double change = norm(now.v - then.v);
+        const double most = world_.accelerations[i];
+        const double rounding = 1e-4 * (norm(now.v) + norm(then.v)) + world_.options.atol;
+        const bool finite = is_finite(now.moved) && is_finite(now.v);
+        if (finite && change <= most * (now.t - then.t) + rounding) return;
+        world_.broken = {
+            !finite,
+            fmt::format("{} has changed its velocity by {} m/s in {} s, and no acceleration above "
+                        "{} m/s^2 was declared, at t = {} s",
+                        world_.scene.name_of(BodyId{i}), change, now.t - then.t, most, now.t)};
+    }
+
+    const World& world_;
+    std::uint32_t i_, j_;
+    Instant from_;
+    double until_ = never;
+    double reach_ = 0;
+    double most_ = 0;
+    Evaluated first_{never}, second_{never};
+};
+
+}  // namespace
+
+Meeting meet_mapped(const World& world, std::uint32_t i, std::uint32_t j)
+{
+    const Body& a = world.bodies[i];
+    const Body& b = world.bodies[j];
+    if (a.mapped && b.mapped && a.island == b.island) return {};
+    BodyPair pair(world, i, j);
+    const Closing closing = first_closing(pair.until(), pair);
+    Meeting meeting{.from = pair.from(), .after = closing.after};
+    if (!(closing.after > 0) || !(closing.after < never)) return meeting;
+    if (!closing.opened) return {.from = pair.from(), .after = 0, .presses = true};
+    meeting.after = on_map(closing.after, pair.until(), [&](double s) {
+        const OpenGap now = pair.look(s);
+        return GapAndRate{now.gap, now.rate};
+    });
+    return meeting;
+}
 
 Meeting meet_moving(const World& world, std::uint32_t i, std::uint32_t which, const Instant& t_end)
 {

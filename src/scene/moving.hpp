@@ -80,6 +80,9 @@ template <class Gap>
 [[nodiscard]] FaceGap displaced_gap(const Face& face, const Vector2& moved, double radius,
                                     const Vector2& p);
 
+/// First contact of two bodies of which one at least is mapped, in their current steps.
+[[nodiscard]] Meeting meet_mapped(const World& world, std::uint32_t i, std::uint32_t j);
+
 /// First contact of a body with a face that moves, before `t_end`.
 [[nodiscard]] Meeting meet_moving(const World& world, std::uint32_t i, std::uint32_t face,
                                   const Instant& t_end);

@@ -134,6 +134,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
     settle_at_start();
     for (const std::uint32_t island : islands_) step_island(island);
     for (const std::uint32_t i : members_) predict(i);
+    fail_where_broken();
     const auto bodies = static_cast<std::uint32_t>(world_.bodies.size());
     const SceneOptions& options = world_.options;
     while (!result_.failure && !calendar_.empty()) {
@@ -156,6 +157,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
         } else {
             happen(who);
         }
+        if (world_.broken) fail_where_broken();
         if (options.cancelled && options.cancelled->load(std::memory_order_relaxed)) {
             fail(Outcome::cancelled, {}, "the run was cancelled");
         }
@@ -185,15 +187,23 @@ void Runner::sample_until(const Instant& t, bool inclusive, Samples& samples)
     }
 }
 
+void Runner::fail_island(std::uint32_t island)
+{
+    const Islands& islands = *world_.islands;
+    const std::string first = called(islands.members(island)[0]);
+    if (const auto& trouble = islands.trouble()) {
+        return fail(trouble->outcome, islands.members(island),
+                    fmt::format("{} {}", first, trouble->what));
+    }
+    fail(Outcome::step_underflow, islands.members(island),
+         fmt::format("the step of the island of {} fell below what the time resolves", first));
+}
+
 void Runner::step_island(std::uint32_t island)
 {
     Islands& islands = *world_.islands;
     const auto id = static_cast<std::uint32_t>(world_.bodies.size()) + island;
-    if (!islands.advance(island)) {
-        return fail(Outcome::step_underflow, islands.members(island),
-                    fmt::format("the step of the island of {} fell below what the time resolves",
-                                called(islands.members(island)[0])));
-    }
+    if (!islands.advance(island)) return fail_island(island);
     if (islands.stalls(island)) {
         return fail(Outcome::stalled, islands.members(island),
                     fmt::format("the steps of the island of {} are shorter than 1e-8 of the run: "
@@ -253,11 +263,13 @@ void Runner::consider_moving(std::uint32_t i)
         if (known_to_group(i, true, f)) continue;
         consider(i, meet_moving(world_, i, f, t_end_), true, f);
     }
+}
+
+void Runner::fail_where_broken()
+{
     if (!world_.broken) return;
     const BrokenBound& broken = *world_.broken;
-    fail(broken.non_finite ? Outcome::non_finite : Outcome::wrong_bound, {i},
-         fmt::format("the motion of {} {}, at t = {} s",
-                     world_.scene.name_of(SurfaceId{broken.surface}), broken.what, broken.t));
+    fail(broken.non_finite ? Outcome::non_finite : Outcome::wrong_bound, {}, broken.sentence);
 }
 
 void Runner::consider_bucket(std::uint32_t i, std::uint32_t bucket)
@@ -285,15 +297,17 @@ void Runner::predict(std::uint32_t i)
     pending.t = pending.crossing = no_instant;
     pending.kind = Pending::Kind::nothing;
     const Body& body = world_.bodies[i];
-    if (!world_.motions.empty()) consider_moving(i);
+    if (!world_.motions.empty() && !body.mapped) consider_moving(i);
     if (body.asleep) {
         if (celled_) offer(i);
     } else {
-        consider_own(i);
-        consider_walls(i);
+        if (!body.mapped) {
+            consider_own(i);
+            consider_walls(i);
+        }
         if (celled_) {
             if (body.quartic) move_to_cell(i);
-            consider_faces(i);
+            if (!body.mapped) consider_faces(i);
             const auto& cell = pending.cell;
             for (int x = -1; x <= 1; ++x) {
                 for (int y = -1; y <= 1; ++y) {
@@ -337,6 +351,7 @@ void Runner::predict_crossing(std::uint32_t i)
                               static_cast<double>(pending.cell.y) * side};
     pending.across_x = pending.across_y = 0;
     pending.crossing = no_instant;
+    if (body.mapped) return predict_crossing_mapped(i);
     if (body.quartic) {
         const Path path = world_.path(i, now_);
         // A tenth of a cell outside of it.
@@ -374,6 +389,24 @@ void Runner::predict_crossing(std::uint32_t i)
         }
     }
     if (first < never) pending.crossing = now_.after(first);
+}
+
+/// A tenth of a cell outside of it, as the bound proves.
+void Runner::predict_crossing_mapped(std::uint32_t i)
+{
+    Pending& pending = pending_[i];
+    const double side = cells_.side();
+    const double most = world_.accelerations[i];
+    const Path path = world_.path(i, now_);
+    double first = path.until;
+    for (std::size_t c = 0; c < 2; ++c) {
+        const double cell = static_cast<double>(c == 0 ? pending.cell.x : pending.cell.y);
+        const double into = path.c[0][c] - cell * side;
+        const double v = path.c[1][c];
+        first = std::min(first, falls_after(std::max(into, 0.0) + 0.1 * side, v, -most, 0));
+        first = std::min(first, falls_after(std::max(side - into, 0.0) + 0.1 * side, -v, -most, 0));
+    }
+    if (first < path.until) pending.crossing = now_.after(first);
 }
 
 /// Into the cell where a step has led it.

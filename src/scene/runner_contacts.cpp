@@ -106,6 +106,12 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
     }
     patience_.resize(world_.bodies.size());
     std::vector<std::uint32_t> members = contacts_.closure(bodies);
+    for (const std::uint32_t i : members) {
+        if (!world_.bodies[i].mapped) continue;
+        return fail(
+            Outcome::zeno, bodies,
+            fmt::format("{} is in lasting contact, which of systems is not followed", called(i)));
+    }
     std::vector<std::uint32_t> patience;
     std::vector<std::uint32_t> joined;
     for (const std::uint32_t i : members) {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "checks/require.hpp"
+#include "ricochet/scene/any_system.hpp"
 #include "scene/motion.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"
@@ -104,7 +105,7 @@ BodyId Scene::add(const Disc& body, std::string_view kind)
     }
     require_room(1);
     for (const Surface& surface : surfaces_) {
-        if (!moves(surface.motion)) require_outside(body, surface);
+        if (kind == "body" && !moves(surface.motion)) require_outside(body, surface);
     }
     take_name(body.name, "body");
     bodies_.push_back(body);
@@ -178,6 +179,9 @@ void Scene::spring(const Spring& spring)
             refuse(fmt::format("a spring ends at body {}, and there are {}", end.index,
                                bodies_.size()));
         }
+        if (system_of(end.index)) {
+            refuse(fmt::format("a spring ends at {}, which is part of a system", name_of(end)));
+        }
     }
     if (spring.between[0] == spring.between[1]) {
         refuse(fmt::format("a spring joins {} to itself", name_of(spring.between[0])));
@@ -186,6 +190,39 @@ void Scene::spring(const Spring& spring)
     require_not_negative(who, "stiffness of a spring", spring.stiffness);
     require_not_negative(who, "damping of a spring", spring.damping);
     springs_.push_back(spring);
+}
+
+SystemId Scene::system(const SystemBody& body)
+{
+    const std::string label =
+        body.name.empty() ? fmt::format("system {}", systems_.size()) : body.name;
+    if (!body.motion) refuse(fmt::format("{} has no motion; expected system_body(...)", label));
+    const auto count = static_cast<std::uint32_t>(body.motion->shape_count());
+    const auto first = static_cast<std::uint32_t>(bodies_.size());
+    const std::vector<double> x = body.motion->start();
+    for (const double component : x) require_finite(who, label + ": state", component);
+    for (std::uint32_t k = 0; k < count; ++k) {
+        const double radius = body.motion->radius(k);
+        require_positive(who, label + ": shape_radius", radius);
+        const SystemDisc disc = body.motion->shape(k, body.motion->start_mode(), 0, x);
+        const std::string name = count == 1 ? label : fmt::format("{} {}", label, k);
+        add({.name = name,
+             .at = disc.at,
+             .velocity = disc.velocity,
+             .radius = radius,
+             .material = body.material},
+            "system");
+    }
+    systems_.push_back({body.motion, first, count});
+    return {static_cast<std::uint32_t>(systems_.size() - 1)};
+}
+
+const Scene::System* Scene::system_of(std::uint32_t body) const noexcept
+{
+    for (const System& system : systems_) {
+        if (body >= system.first && body - system.first < system.count) return &system;
+    }
+    return nullptr;
 }
 
 std::string Scene::name_of(BodyId body) const
@@ -253,6 +290,7 @@ void Scene::check(double t_start) const
             }
         }
         for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+            if (!systems_.empty() && system_of(i)) continue;
             try {
                 require_outside(bodies_[i], surface);
             } catch (const std::invalid_argument& error) {
@@ -274,6 +312,7 @@ void Scene::check(double t_start) const
             const Disc& b = bodies_[j];
             const double reach = a.radius + b.radius;
             if (reach == 0 || std::fabs(a.at[1] - b.at[1]) > reach) continue;
+            if (!systems_.empty() && system_of(i) && system_of(i) == system_of(j)) continue;
             const double overlap = reach - norm(a.at - b.at);
             if (overlap > rounding_of(a.at, a.radius) + rounding_of(b.at, b.radius)) {
                 const auto [first, second] = std::minmax(i, j);

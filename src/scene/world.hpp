@@ -58,6 +58,7 @@ struct alignas(64) Body {
     std::array<std::uint32_t, 3> sides{none, none, none};
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4
+    bool mapped = false;   ///< of a system: its step has no polynomial, but a bound
 };
 static_assert(sizeof(Body) == 128);
 
@@ -89,9 +90,7 @@ struct MovingFace {
 /// A bound of a motion that is found broken, or a motion that is not finite.
 struct BrokenBound {
     bool non_finite = false;
-    std::uint32_t surface = 0;
-    double t = 0;
-    std::string what;
+    std::string sentence;
 };
 
 /// Links the segments of open terrain whose ends are the same point, of two and no more, and turns
@@ -124,11 +123,12 @@ struct World {
     Vector2 gravity{};
     std::vector<Body> bodies;
     std::vector<std::array<Vector2, 2>>
-        bends;                        ///< terms of degree 3 and 4, where there are islands
-    std::vector<Face> faces;          ///< walls first, then terrain, then what moves
-    std::uint32_t wall_count = 0;     ///< walls that do not move
-    std::uint32_t fixed_count = 0;    ///< with the terrain that does not
-    std::vector<MovingFace> motions;  ///< of the faces from there on
+        bends;                          ///< terms of degree 3 and 4, where there are islands
+    std::vector<Face> faces;            ///< walls first, then terrain, then what moves
+    std::uint32_t wall_count = 0;       ///< walls that do not move
+    std::uint32_t fixed_count = 0;      ///< with the terrain that does not
+    std::vector<MovingFace> motions;    ///< of the faces from there on
+    std::vector<double> accelerations;  ///< [m/s^2] of mapped bodies in their steps, at most
     mutable std::optional<BrokenBound> broken;
     std::unique_ptr<Islands> islands;
     struct Drift {

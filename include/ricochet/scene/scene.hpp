@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -35,6 +36,16 @@ struct SurfaceId {
     std::uint32_t index = 0;
     friend bool operator==(SurfaceId, SurfaceId) = default;
 };
+
+/// Handle of a system.
+struct SystemId {
+    std::uint32_t index = 0;
+    friend bool operator==(SystemId, SystemId) = default;
+};
+
+namespace detail {
+class SceneSystem;
+}
 
 /// Where two materials meet, the smaller of the two restitutions and of the two coefficients of
 /// friction hold. `MaterialId{}` is elastic and smooth.
@@ -91,6 +102,13 @@ struct Spring {
     double damping = 0;    ///< [N s/m]
 };
 
+/// A hybrid system whose discs others can meet. It meets no surfaces: its guards are its own.
+struct SystemBody {
+    std::string name{};  ///< its discs are called by it: "arm", or "arm 0" and "arm 1"
+    std::shared_ptr<const detail::SceneSystem> motion{};  ///< `system_body(system, x0)`
+    MaterialId material{};
+};
+
 /// Description of a scene: bodies, the surfaces and springs between them, and materials.
 class Scene {
 public:
@@ -114,6 +132,7 @@ public:
     SurfaceId wall(const Wall& wall);
     SurfaceId terrain(const Terrain& terrain);
     void spring(const Spring& spring);
+    SystemId system(const SystemBody& system);
 
     /// Refuses `bodies` more bodies where they would need more memory than is allowed.
     void require_room(double bodies) const;
@@ -129,6 +148,16 @@ public:
     [[nodiscard]] std::span<const Disc> bodies() const noexcept { return bodies_; }
     [[nodiscard]] std::span<const Material> materials() const noexcept { return materials_; }
     [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }
+
+    /// Systems; their discs are among the bodies, with a mass that says nothing.
+    struct System {
+        std::shared_ptr<const detail::SceneSystem> motion;
+        std::uint32_t first = 0;  ///< of its discs
+        std::uint32_t count = 0;
+    };
+    [[nodiscard]] std::span<const System> systems() const noexcept { return systems_; }
+    /// Whose disc a body is; null where it is one of its own.
+    [[nodiscard]] const System* system_of(std::uint32_t body) const noexcept;
 
     /// Walls first, then terrain, each in the order in which it came.
     struct Surface {
@@ -161,6 +190,7 @@ private:
     std::vector<Disc> bodies_;
     std::vector<Surface> surfaces_;
     std::vector<Spring> springs_;
+    std::vector<System> systems_;
     std::unordered_map<std::string, std::uint32_t> names_;
 };
 
