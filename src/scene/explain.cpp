@@ -101,6 +101,11 @@ std::string explain(const Scene& scene, const SceneOptions& options)
                    plural(world.islands->count(), "island"),
                    plural(world.fixed_count - world.wall_count, "piece"));
     describe_islands(world, out);
+    if (!world.motions.empty()) {
+        fmt::format_to(to,
+                       "  {} of surfaces that move: met where bounds on their motion let them\n",
+                       plural(world.motions.size(), "face"));
+    }
     const auto groups = groups_of(world);
     std::size_t asleep = 0;
     std::size_t alone = 0;

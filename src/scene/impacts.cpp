@@ -70,7 +70,7 @@ void Impacts::push_coupled(Cluster& cluster, const Contact& contact, const Vecto
     if (!contact.surface) apply(contact.b, contact.slot_b, -1.0 * impulse);
 }
 
-/// Effective masses of contacts along the normal and across.
+/// Effective masses of contacts along the normal and across, where there are systems.
 void Impacts::set_masses(Cluster& cluster) const
 {
     const auto inverse_of = [&](std::uint32_t body, std::uint32_t slot, const Vector2& direction) {
@@ -85,12 +85,11 @@ void Impacts::set_masses(Cluster& cluster) const
     const auto mass_along = [&](const Contact& contact, const Vector2& direction) {
         double inverse = inverse_of(contact.a, contact.slot_a, direction);
         if (!contact.surface) inverse += inverse_of(contact.b, contact.slot_b, direction);
-        return 1 / inverse;
+        return inverse > 0 ? 1 / inverse : 0;  // neither can be moved
     };
     for (Contact& contact : cluster.contacts) {
         contact.mass = mass_along(contact, contact.normal);
-        contact.tangential_mass =
-            cluster.couplings.empty() ? contact.mass : mass_along(contact, turned(contact.normal));
+        contact.tangential_mass = mass_along(contact, turned(contact.normal));
     }
 }
 
@@ -322,7 +321,12 @@ bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
     if (cluster.contacts.size() > 1) {
         std::ranges::sort(cluster.contacts, {}, &Contact::at);
     }
-    set_masses(cluster);
+    for (Contact& contact : cluster.contacts) {
+        double inverse = world_.bodies[contact.a].inverse_mass;
+        if (!contact.surface) inverse += world_.bodies[contact.b].inverse_mass;
+        contact.mass = contact.tangential_mass = 1 / inverse;
+    }
+    if (!cluster.couplings.empty()) set_masses(cluster);
     const std::size_t each = cluster.lasting ? lasting_patience : patience;
     const std::size_t most = each * cluster.contacts.size();
     for (std::size_t waves = 0; !spend; ++waves) {
