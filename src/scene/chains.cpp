@@ -2,6 +2,7 @@
 // the same rules, whether one surface has both of its sides or each is a surface of its own.
 #include <map>
 
+#include "scene/motion.hpp"
 #include "scene/world.hpp"
 
 namespace ricochet::detail {
@@ -43,7 +44,7 @@ public:
     {
         std::uint32_t first = wall_count;
         for (const Scene::Surface& surface : scene.surfaces()) {
-            if (surface.is_wall) continue;
+            if (surface.is_wall || moves(surface.motion)) continue;
             const auto count = static_cast<std::uint32_t>(surface.points.size());
             const bool closed = surface.points.front() == surface.points.back();
             if (!closed) chains_.push_back({.points = &surface.points, .first = first});

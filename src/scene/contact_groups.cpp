@@ -22,7 +22,8 @@ public:
     Plan plan(double longest) override
     {
         const auto [outcome, length] = island_.plan(island_.t() + longest);
-        return {outcome, length, island_.planned_step(), island_.failure().residual};
+        return {outcome, length, island_.planned_step(), island_.failure().residual,
+                island_.wake_time() - island_.t()};
     }
     void commit(double s) override { island_.commit(s); }
     std::array<double, 2> chord(std::uint32_t id) const override { return island_.chord(id); }

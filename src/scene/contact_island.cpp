@@ -323,6 +323,11 @@ ContactIsland::Plan ContactIsland::plan(double until)
     planned_until_ = until;
     // A wall begins to move where a step ends.
     if (wakes > t_) planned_until_ = std::min(planned_until_, wakes);
+    for (const IslandWall& wall : walls_) {
+        if (!wall.motion || !wall.motion->next_break) continue;
+        const double jump = wall.motion->next_break(t_);
+        if (jump > t_) planned_until_ = std::min(planned_until_, jump);
+    }
     if (planned_until_ - t_ > options_.step * (1 + 1e-9)) planned_until_ = t_ + options_.step;
     if (!fit_step(planned_until_ - t_)) {
         const bool finite = problem_.momentum.allFinite() && v_next_.allFinite();
@@ -356,7 +361,8 @@ void ContactIsland::commit(double s)
     if (!(s > 0)) return;
     const bool whole = s >= planned_;
     if (asleep_) {
-        t_ = whole ? planned_until_ : t_ + s;
+        const double wakes = wake_time();
+        t_ = s >= wakes - t_ ? wakes : s == planned_ ? planned_until_ : t_ + s;
         return;
     }
     const double free = free_speed();
@@ -375,6 +381,9 @@ void ContactIsland::commit(double s)
     statistics_.largest_residual = std::max(statistics_.largest_residual, failure_.residual);
     if (whole) try_to_sleep(free);
     planned_ = 0;
+    // A wall is not where the straight line of a step leads, when it is cut.
+    const auto moving = [](const IslandWall& wall) { return wall.motion != nullptr; };
+    if (!whole && std::ranges::any_of(walls_, moving)) project();
 }
 
 /// The largest change of velocity by forces alone in the current step.

@@ -25,6 +25,8 @@ struct WallMotion {
     std::function<std::array<double, 2>(double t)> displacement;  ///< [m]
     /// Until when the wall stands still that does so at t; t where it moves.
     std::function<double(double t)> still_until;
+    /// When its velocity jumps next after t, infinite where it does not. May be empty.
+    std::function<double(double t)> next_break{};
 };
 
 /// A line that bodies are on one side of, or a segment that is met from both, its ends included.

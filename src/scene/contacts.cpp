@@ -73,6 +73,43 @@ IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
     return setup;
 }
 
+/// Motions of walls by the clock of a group, which begins now.
+void Contacts::set_motions(IslandSetup& setup, Group& group, const Instant& now) const
+{
+    for (IslandWall& wall : setup.walls) {
+        if (!world_.moves(wall.id)) continue;
+        const SurfaceMotion* motion = world_.moving(wall.id).motion;
+        auto own = std::make_unique<WallMotion>();
+        own->displacement = [=](double s) { return displacement(*motion, now.plus(s)); };
+        own->still_until = [=](double s) {
+            const double t = now.plus(s);
+            const double until = ricochet::detail::still_until(*motion, t);
+            return until > t ? now.until(until) : s;
+        };
+        own->next_break = [=](double s) { return now.until(next_break(*motion, now.plus(s))); };
+        wall.motion = own.get();
+        group.motions.push_back(std::move(own));
+    }
+}
+
+/// Of the coordinates: rounding and, where walls move, how far they leave the straight lines of a
+/// step.
+double Contacts::largest_overlap(const Group& group) const
+{
+    double most = IslandOptions{}.largest_overlap;
+    const double h = world_.options.contact_step;
+    for (const std::uint32_t f : group.faces) {
+        if (!world_.moves(f)) continue;
+        const double bend = world_.moving(f).bounds.acceleration * h * h;
+        for (const std::uint32_t i : group.members) {
+            const Body& body = world_.bodies[i];
+            const double size = body.radius + std::fabs(body.p[0]) + std::fabs(body.p[1]);
+            most = std::max(most, size > 0 ? bend / size : never);
+        }
+    }
+    return most;
+}
+
 std::uint32_t Contacts::join(std::vector<std::uint32_t> members, std::vector<std::uint32_t> faces,
                              const std::vector<std::uint32_t>& patience, const Instant& now)
 {
@@ -99,10 +136,12 @@ std::uint32_t Contacts::join(std::vector<std::uint32_t> members, std::vector<std
     IslandSetup setup = setup_of(members, faces);
     for (std::size_t k = 0; k < members.size(); ++k) setup.bodies[k].patience = patience[k];
     auto group = std::make_unique<Group>();
-    group->motion =
-        world_.options.contacts->make(std::move(setup), {.step = world_.options.contact_step});
+    set_motions(setup, *group, now);
     group->members = std::move(members);
     group->faces = std::move(faces);
+    group->motion = world_.options.contacts->make(
+        std::move(setup),
+        {.step = world_.options.contact_step, .largest_overlap = largest_overlap(*group)});
     group->start = group->end = now;
     const auto free = std::ranges::find_if(groups_, [](const auto& g) { return !g; });
     const auto number = static_cast<std::uint32_t>(free - groups_.begin());
@@ -120,8 +159,10 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
 {
     Group& group = *groups_[which];
     const double left = seconds(now, t_end);
-    const auto [outcome, length, step, defect] =
+    const auto [outcome, planned, step, defect, wakes] =
         group.motion->plan(std::min(world_.options.contact_step, left));
+    const bool asleep = outcome == IslandOutcome::asleep;
+    const double length = asleep && wakes < never ? wakes : planned;
     group.outcome = outcome;
     double& largest = world_.statistics.contact_defect;
     if (step > 0) largest = std::max(largest, defect);
@@ -132,7 +173,7 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
     // No step is as short as what rounding leaves of the run.
     const bool over = seconds(group.end, t_end) <= resolution(t_end);
     if (length == left || (over && outcome != IslandOutcome::impact)) group.end = t_end;
-    const bool asleep = outcome == IslandOutcome::asleep;
+    if (asleep && !(wakes < never)) group.end = t_end;
     const bool moves =
         step > 0 && (outcome == IslandOutcome::reached || outcome == IslandOutcome::impact);
     for (const std::uint32_t i : group.members) {
@@ -157,7 +198,7 @@ void Contacts::commit(std::uint32_t which, const Instant& now)
     const bool asleep = group.outcome == IslandOutcome::asleep;
     const bool whole = group.end.value == now.value && group.end.remainder == now.remainder;
     const double s = whole ? group.length : seconds(group.start, now);
-    if (!asleep) group.motion->commit(s);
+    if (!asleep || !group.motions.empty()) group.motion->commit(s);
     world_.statistics.contact_steps += !asleep && s > 0;
     group.start = group.end = now;
     for (const std::uint32_t i : group.members) {

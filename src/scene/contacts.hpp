@@ -44,7 +44,8 @@ public:
     struct Group {
         std::unique_ptr<LastingContact> motion;
         std::vector<std::uint32_t> members;
-        std::vector<std::uint32_t> faces;  ///< those it meets itself
+        std::vector<std::uint32_t> faces;                    ///< those it meets itself
+        std::vector<std::unique_ptr<WallMotion>> motions{};  ///< of those that move
         Instant start{}, end{};
         double length = 0;  ///< [s] from start to end
         IslandOutcome outcome = IslandOutcome::reached;
@@ -61,6 +62,8 @@ public:
 private:
     [[nodiscard]] IslandSetup setup_of(const std::vector<std::uint32_t>& members,
                                        const std::vector<std::uint32_t>& faces) const;
+    void set_motions(IslandSetup& setup, Group& group, const Instant& now) const;
+    [[nodiscard]] double largest_overlap(const Group& group) const;
 
     World& world_;
     std::vector<std::unique_ptr<Group>> groups_;

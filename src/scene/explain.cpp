@@ -87,7 +87,7 @@ void describe_islands(const World& world, fmt::memory_buffer& out)
 std::string explain(const Scene& scene, const SceneOptions& options)
 {
     validate(options);
-    scene.check();
+    scene.check(options.t_start);
     scene.require_room(0);
     World world(scene, options);
     fmt::memory_buffer out;
@@ -99,8 +99,13 @@ std::string explain(const Scene& scene, const SceneOptions& options)
                    n == 1 ? "1 body" : fmt::format("{} bodies", n), plural(walls, "wall"),
                    plural(scene.springs().size(), "spring"),
                    plural(world.islands->count(), "island"),
-                   plural(world.faces.size() - world.wall_count, "piece"));
+                   plural(world.fixed_count - world.wall_count, "piece"));
     describe_islands(world, out);
+    if (!world.motions.empty()) {
+        fmt::format_to(to,
+                       "  {} of surfaces that move: met where bounds on their motion let them\n",
+                       plural(world.motions.size(), "face"));
+    }
     const auto groups = groups_of(world);
     std::size_t asleep = 0;
     std::size_t alone = 0;

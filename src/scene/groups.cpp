@@ -182,7 +182,7 @@ std::vector<Reach> reaches(const World& world)
 {
     const double until = world.options.t_end - world.options.t_start;
     std::vector<Reach> out(world.bodies.size());
-    const bool terrain = world.faces.size() > world.wall_count;
+    const bool terrain = world.fixed_count > world.wall_count;
     for (std::size_t i = 0; i < out.size(); ++i) {
         const Body& body = world.bodies[i];
         // Springs may drive their bodies anywhere; drag alone only slows.
@@ -205,8 +205,9 @@ Groups groups_of(const World& world)
     if (world.bodies.empty()) return groups;
     groups.order_.resize(world.bodies.size());
     std::iota(groups.order_.begin(), groups.order_.end(), 0U);
-    if (world.faces.size() > world.wall_count) {
-        // Terrain lies in the cells of a group: one group for all.
+    if (world.faces.size() > world.wall_count || !world.scene.systems().empty()) {
+        // Terrain lies in the cells of a group, and what moves by itself may drive bodies anywhere:
+        // one group for all.
         groups.ends_ = {world.bodies.size()};
         return groups;
     }

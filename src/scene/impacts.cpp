@@ -26,31 +26,71 @@ constexpr std::size_t most_exact = 600;
 constexpr int few_sweeps = 30;
 constexpr int most_sweeps = 10'000;
 
-Vector2 velocity_of(const std::vector<Vector2>& v, const Contact& contact)
-{
-    return contact.surface ? v[contact.slot_a] : v[contact.slot_a] - v[contact.slot_b];
-}
-
 }  // namespace
 
 double Impacts::approach(const Cluster& cluster, const Contact& contact) const
 {
-    return -dot(velocity_of(cluster.after, contact), contact.normal);
+    return -dot(relative_velocity(cluster.after, contact), contact.normal);
 }
 
 double Impacts::noise(const Cluster& cluster, const Contact& contact) const
 {
-    const double other = contact.surface ? 0 : norm(cluster.after[contact.slot_b]);
+    const double other = !contact.surface ? norm(cluster.after[contact.slot_b])
+                         : contact.moving ? norm(contact.surface_velocity)
+                                          : 0;
     return 8 * epsilon * (norm(cluster.after[contact.slot_a]) + other);
 }
 
 void Impacts::push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const
 {
+    if (!cluster.couplings.empty()) return push_coupled(cluster, contact, impulse);
     Vector2& a = cluster.after[contact.slot_a];
     a = a + world_.bodies[contact.a].inverse_mass * impulse;
     if (contact.surface) return;
     Vector2& b = cluster.after[contact.slot_b];
     b = b - world_.bodies[contact.b].inverse_mass * impulse;
+}
+
+/// The same where a body may be one of a system, whose other ones it moves, too.
+void Impacts::push_coupled(Cluster& cluster, const Contact& contact, const Vector2& impulse) const
+{
+    const auto apply = [&](std::uint32_t body, std::uint32_t slot, const Vector2& p) {
+        cluster.impulses[slot] = cluster.impulses[slot] + p;
+        if (!world_.bodies[body].mapped) {
+            cluster.after[slot] = cluster.after[slot] + world_.bodies[body].inverse_mass * p;
+            return;
+        }
+        for (const Coupling& coupling : cluster.couplings) {
+            if (coupling.by != slot) continue;
+            Vector2& v = cluster.after[coupling.of];
+            v = v + coupling.times(p);
+        }
+    };
+    apply(contact.a, contact.slot_a, impulse);
+    if (!contact.surface) apply(contact.b, contact.slot_b, -1.0 * impulse);
+}
+
+/// Effective masses of contacts along the normal and across, where there are systems.
+void Impacts::set_masses(Cluster& cluster) const
+{
+    const auto inverse_of = [&](std::uint32_t body, std::uint32_t slot, const Vector2& direction) {
+        if (!world_.bodies[body].mapped) return world_.bodies[body].inverse_mass;
+        for (const Coupling& coupling : cluster.couplings) {
+            if (coupling.of == slot && coupling.by == slot) {
+                return dot(direction, coupling.times(direction));
+            }
+        }
+        return 0.0;
+    };
+    const auto mass_along = [&](const Contact& contact, const Vector2& direction) {
+        double inverse = inverse_of(contact.a, contact.slot_a, direction);
+        if (!contact.surface) inverse += inverse_of(contact.b, contact.slot_b, direction);
+        return inverse > 0 ? 1 / inverse : 0;  // neither can be moved
+    };
+    for (Contact& contact : cluster.contacts) {
+        contact.mass = mass_along(contact, contact.normal);
+        contact.tangential_mass = mass_along(contact, turned(contact.normal));
+    }
 }
 
 /// One contact alone, in closed form.
@@ -61,9 +101,9 @@ void Impacts::strike(Cluster& cluster, Contact& contact) const
     contact.tangential = 0;
     if (contact.friction > 0) {
         const Vector2 tangent = turned(contact.normal);
-        const double slip = dot(velocity_of(cluster.after, contact), tangent);
+        const double slip = dot(relative_velocity(cluster.after, contact), tangent);
         const double most = contact.friction * contact.impulse;
-        contact.tangential = std::clamp(-slip * contact.mass, -most, most);
+        contact.tangential = std::clamp(-slip * contact.tangential_mass, -most, most);
         push(cluster, contact, contact.impulse * contact.normal + contact.tangential * tangent);
     } else {
         push(cluster, contact, contact.impulse * contact.normal);
@@ -122,7 +162,8 @@ void Impacts::solve(Cluster& cluster) const
         contact.target = contact.restitution * std::max(u, 0.0);
         friction = friction || contact.friction > 0;
     }
-    if (!friction && struck_.size() > few && struck_.size() <= most_exact) {
+    const bool coupled = !cluster.couplings.empty();
+    if (!friction && !coupled && struck_.size() > few && struck_.size() <= most_exact) {
         const std::vector<Vector2> start = cluster.after;
         sweep(cluster, 0.5 * epsilon * fastest, few_sweeps);
         cluster.after = start;
@@ -137,23 +178,44 @@ double Impacts::kinetic_energy(const Cluster& cluster) const
 {
     double twice = 0;
     for (std::size_t i = 0; i < cluster.bodies.size(); ++i) {
+        if (world_.bodies[cluster.bodies[i]].mapped) {
+            // Of a system: what its impulses in this wave have given it.
+            twice +=
+                dot(cluster.impulses[i] - impulses_before_[i], before_wave_[i] + cluster.after[i]);
+            continue;
+        }
         twice +=
             dot(cluster.after[i], cluster.after[i]) / world_.bodies[cluster.bodies[i]].inverse_mass;
     }
     return 0.5 * twice;
 }
 
+/// [J] By surfaces that move, in the current solve.
+double Impacts::work_of_surfaces(const Cluster& cluster) const
+{
+    double work = 0;
+    for (const std::uint32_t k : struck_) {
+        const Contact& contact = cluster.contacts[k];
+        if (!contact.moving) continue;
+        work += contact.impulse * dot(contact.normal, contact.surface_velocity) +
+                contact.tangential * dot(turned(contact.normal), contact.surface_velocity);
+    }
+    return work;
+}
+
 /// Newton's restitution and Coulomb's friction at several contacts may gain energy together. Then
 /// restitution is spent, and where the sweeps still gain, friction is left out.
-void Impacts::solve_without_gain(Cluster& cluster) const
+void Impacts::solve_without_gain(Cluster& cluster)
 {
     const std::vector<Vector2> start = cluster.after;
+    impulses_before_ = cluster.impulses;
     const double most = kinetic_energy(cluster) * (1 + 1e-12);
     solve(cluster);
     std::vector<std::pair<double, double>> laws;
     for (const bool with_friction : {true, false}) {
-        if (kinetic_energy(cluster) <= most) break;
+        if (kinetic_energy(cluster) - work_of_surfaces(cluster) <= most) break;
         cluster.after = start;
+        cluster.impulses = impulses_before_;
         for (const std::uint32_t k : struck_) {
             Contact& contact = cluster.contacts[k];
             if (with_friction) laws.emplace_back(contact.restitution, contact.friction);
@@ -183,10 +245,10 @@ void Impacts::sweep(Cluster& cluster, double smallest, int most) const
             Vector2 impulse = change * contact.normal;
             if (contact.friction > 0) {
                 const Vector2 tangent = turned(contact.normal);
-                const double slip = dot(velocity_of(cluster.after, contact), tangent);
+                const double slip = dot(relative_velocity(cluster.after, contact), tangent);
                 const double most = contact.friction * contact.impulse;
                 const double held =
-                    std::clamp(contact.tangential - slip * contact.mass, -most, most);
+                    std::clamp(contact.tangential - slip * contact.tangential_mass, -most, most);
                 impulse = impulse + (held - contact.tangential) * tangent;
                 contact.tangential = held;
             }
@@ -213,7 +275,8 @@ bool Impacts::wave(Cluster& cluster)
     }
     ++world_.statistics.waves;
     before_wave_ = cluster.after;
-    if (struck_.size() == 1) {
+    const auto rubs = [&] { return cluster.contacts[struck_[0]].friction > 0; };
+    if (struck_.size() == 1 && (cluster.couplings.empty() || !rubs())) {
         strike(cluster, cluster.contacts[struck_[0]]);
     } else {
         solve_without_gain(cluster);
@@ -237,6 +300,7 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
         event.after[0] = cluster.after[contact.slot_a];
         if (contact.surface) {
             event.other = {true, world_.faces[contact.b].surface};
+            event.before[1] = event.after[1] = contact.surface_velocity;
         } else {
             event.other = {false, contact.b};
             event.before[1] = before_wave_[contact.slot_b];
@@ -260,8 +324,9 @@ bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
     for (Contact& contact : cluster.contacts) {
         double inverse = world_.bodies[contact.a].inverse_mass;
         if (!contact.surface) inverse += world_.bodies[contact.b].inverse_mass;
-        contact.mass = 1 / inverse;
+        contact.mass = contact.tangential_mass = 1 / inverse;
     }
+    if (!cluster.couplings.empty()) set_masses(cluster);
     const std::size_t each = cluster.lasting ? lasting_patience : patience;
     const std::size_t most = each * cluster.contacts.size();
     for (std::size_t waves = 0; !spend; ++waves) {

@@ -1,6 +1,7 @@
 // Impacts of one cluster: contacts that are struck at one instant, or touch one that is.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -20,7 +21,29 @@ struct Contact {
     double impulse = 0;  ///< of the current solve, normal and tangential
     double tangential = 0;
     double target = 0;  ///< [m/s] separation that is asked for
-    double mass = 0;    ///< effective
+    double mass = 0;    ///< effective, along the normal and across
+    double tangential_mass = 0;
+    bool moving = false;         ///< whether its surface moves
+    Vector2 surface_velocity{};  ///< [m/s]
+};
+
+/// Of body a relative to what it touches, where `v` are the velocities of the cluster.
+[[nodiscard]] inline Vector2 relative_velocity(const std::vector<Vector2>& v,
+                                               const Contact& contact)
+{
+    if (!contact.surface) return v[contact.slot_a] - v[contact.slot_b];
+    return contact.moving ? v[contact.slot_a] - contact.surface_velocity : v[contact.slot_a];
+}
+
+/// How a push of one body of a system moves another one, or itself.
+struct Coupling {
+    std::uint32_t of = 0, by = 0;      ///< slots
+    std::array<Vector2, 2> changes{};  ///< [1/kg] of the velocity, by impulses along x and y
+
+    [[nodiscard]] Vector2 times(const Vector2& impulse) const noexcept
+    {
+        return impulse[0] * changes[0] + impulse[1] * changes[1];
+    }
 };
 
 struct Cluster {
@@ -29,6 +52,8 @@ struct Cluster {
     std::vector<Vector2> after;
     std::vector<Contact> contacts;
     std::vector<std::vector<Side>> sides;  ///< of bodies that are points
+    std::vector<Coupling> couplings;       ///< where there are systems
+    std::vector<Vector2> impulses;         ///< the same, on each body
     bool lasting = false;                  ///< whether one of the bodies is in lasting contact
 
     void clear()
@@ -38,6 +63,8 @@ struct Cluster {
         after.clear();
         contacts.clear();
         sides.clear();
+        couplings.clear();
+        impulses.clear();
     }
 };
 
@@ -56,10 +83,13 @@ private:
     [[nodiscard]] double approach(const Cluster& cluster, const Contact& contact) const;
     [[nodiscard]] double noise(const Cluster& cluster, const Contact& contact) const;
     void push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
+    void push_coupled(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
+    void set_masses(Cluster& cluster) const;
     void strike(Cluster& cluster, Contact& contact) const;
     void solve(Cluster& cluster) const;
-    void solve_without_gain(Cluster& cluster) const;
+    void solve_without_gain(Cluster& cluster);
     [[nodiscard]] double kinetic_energy(const Cluster& cluster) const;
+    [[nodiscard]] double work_of_surfaces(const Cluster& cluster) const;
     bool solve_exactly(Cluster& cluster) const;
     void sweep(Cluster& cluster, double smallest, int most) const;
     bool wave(Cluster& cluster);
@@ -68,6 +98,7 @@ private:
     World& world_;
     std::vector<std::uint32_t> struck_;  ///< contacts of the current wave
     std::vector<Vector2> before_wave_;
+    std::vector<Vector2> impulses_before_;
 };
 
 }  // namespace ricochet::detail

@@ -30,8 +30,10 @@ Islands::Islands(World& world)
     : world_(world), place_(world.bodies.size(), 0), stages_(Dopri5::kept_stages)
 {
     join(world);
+    add_systems();
     for (std::uint32_t k = 0; k < islands_.size(); ++k) {
         Island& island = islands_[k];
+        if (island.system) continue;
         const std::size_t n = 4 * island.members.size();
         island.x.resize(n);
         island.remainder.assign(n, 0);
@@ -85,9 +87,10 @@ void Islands::join(World& world)
     }
 }
 
-void Islands::flow(const Island& island, const State& x, State& rate) const
+void Islands::flow(const Island& island, const State& x, State& rate, double s) const
 {
     ++world_.statistics.flow_calls;
+    if (island.system) return island.system->flow(island.mode, island.start.plus(s), x, rate);
     const std::size_t n = island.members.size();
     for (std::size_t m = 0; m < n; ++m) {
         const double damping = island.drag[m] * island.inverse_mass[m];
@@ -158,13 +161,13 @@ void Islands::depart(const Island& island, double h, bool with_error) const
         for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_}) state->resize(n);
         for (State& stage : stages_) stage.resize(n);
     }
-    if (n == 4) return depart_alone(island, h, with_error);
+    if (n == 4 && !island.system) return depart_alone(island, h, with_error);
     State point(n);
     const auto departure = [&](const auto& w, State& rate, double s) {
         for (std::size_t i = 0; i < n; ++i) {
             point[i] = island.x[i] + (s * island.rate[i] + (w[i] + island.remainder[i]));
         }
-        flow(island, point, rate);
+        flow(island, point, rate, s);
         for (std::size_t i = 0; i < n; ++i) rate[i] -= island.rate[i];
     };
     if (with_error) {
@@ -201,7 +204,7 @@ double Islands::first_step(const Island& island) const
     State moved(island.x);
     for (std::size_t i = 0; i < moved.size(); ++i) moved[i] += euler * island.rate[i];
     State rate(moved.size());
-    flow(island, moved, rate);
+    flow(island, moved, rate, euler);
     double bend = 0;
     for (std::size_t i = 0; i < moved.size(); ++i) {
         const double scale = world_.options.atol + world_.options.rtol * std::fabs(island.x[i]);
@@ -216,7 +219,8 @@ double Islands::first_step(const Island& island) const
 bool Islands::attempt(std::uint32_t which)
 {
     Island& island = islands_[which];
-    const Instant t_end{world_.options.t_end, 0};
+    Instant t_end{world_.options.t_end, 0};
+    if (island.events) t_end.value = std::min(t_end.value, island.events->must_stop_at());
     for (;;) {
         const double left = seconds(island.start, t_end);
         const double least = 4 * epsilon * std::max(std::fabs(island.start.value), 1e-300);
@@ -240,8 +244,9 @@ bool Islands::attempt(std::uint32_t which)
     }
 }
 
-/// Quartics through the middle and the end of the current step.
-void Islands::record(Island& island)
+/// Quartics through the middle and the end of the current step. False where a system does not go
+/// on.
+bool Islands::record(Island& island)
 {
     const double h = island.h;
     for (std::size_t i = 0; i < island.x.size(); ++i) {
@@ -250,12 +255,17 @@ void Islands::record(Island& island)
         island.remainder_end[i] = sum.remainder;
         island.rate_end[i] = island.rate[i] + end_rate_[i];
     }
+    if (island.system) {
+        if (!find_events(island)) return false;
+        record_system(island);
+        return !trouble_;
+    }
     if (island.unseen) {
         Body& body = world_.bodies[island.members[0]];
         ++body.version;
         body.t = island.start;
         body.quartic = true;
-        return;
+        return true;
     }
     Dopri5::dense(0.5 * h, h, stages_.data(), end_rate_, middle_);
     for (std::size_t m = 0; m < island.members.size(); ++m) {
@@ -276,24 +286,36 @@ void Islands::record(Island& island)
             world_.bends[i][1][c] = (16 * middle - 8 * end + 2 * slope) / (h * h * h * h);
         }
     }
+    return true;
 }
 
 bool Islands::advance(std::uint32_t which)
 {
     Island& island = islands_[which];
     if (!island.begun) {
-        flow(island, island.x, island.rate);
+        flow(island, island.x, island.rate, 0);
         island.next = first_step(island);
         island.begun = true;
-    } else {
+        if (island.events) {
+            const StepVerdict verdict =
+                island.events->start(island.start, island.x, island.next, island.mode);
+            if (!follow(island, verdict)) return false;
+        }
+    }
+    if (island.cut) {
+        island.cut = false;
+        island.x = island.x_end;
+        std::ranges::fill(island.remainder, 0.0);
+        island.mode = island.mode_after;
+        island.start = island.end;
+        flow(island, island.x, island.rate, 0);
+    } else if (before(island.start, island.end)) {
         std::swap(island.x, island.x_end);
         std::swap(island.remainder, island.remainder_end);
         std::swap(island.rate, island.rate_end);
         island.start = island.end;
     }
-    if (!attempt(which)) return false;
-    record(island);
-    return true;
+    return attempt(which) && record(island);
 }
 
 bool Islands::stalls(std::uint32_t which) const
@@ -319,6 +341,7 @@ void Islands::look_at(const Island& island, const Instant& t) const
 
 Vector2 Islands::position(std::uint32_t body, const Instant& t) const
 {
+    if (world_.bodies[body].mapped) return disc(body, t).at;
     look_at(islands_[world_.bodies[body].island], t);
     const std::size_t k = 4 * place_[body];
     return {at_[k], at_[k + 1]};
@@ -326,6 +349,7 @@ Vector2 Islands::position(std::uint32_t body, const Instant& t) const
 
 Vector2 Islands::velocity(std::uint32_t body, const Instant& t) const
 {
+    if (world_.bodies[body].mapped) return disc(body, t).velocity;
     look_at(islands_[world_.bodies[body].island], t);
     const std::size_t k = 4 * place_[body];
     return {at_[k + 2], at_[k + 3]};
@@ -345,10 +369,8 @@ bool Islands::restart(std::uint32_t which, const Instant& t,
         island.x[k + 3] = velocity[1];
     }
     island.start = t;
-    flow(island, island.x, island.rate);
-    if (!attempt(which)) return false;
-    record(island);
-    return true;
+    flow(island, island.x, island.rate, 0);
+    return attempt(which) && record(island);
 }
 
 void Islands::suspend(std::uint32_t which)
@@ -369,12 +391,10 @@ bool Islands::resume(std::uint32_t which, const Instant& t,
     std::ranges::fill(island.remainder, 0.0);
     island.start = t;
     seen_ = nullptr;
-    flow(island, island.x, island.rate);
+    flow(island, island.x, island.rate, 0);
     if (!island.begun) island.next = first_step(island);
     island.begun = true;
-    if (!attempt(which)) return false;
-    record(island);
-    return true;
+    return attempt(which) && record(island);
 }
 
 std::vector<Islands::Join> Islands::springs(std::uint32_t which) const

@@ -1,11 +1,16 @@
-// Bodies joined by springs, or slowed by drag: each island advances by its own steps of dopri5.
+// Bodies joined by springs, or slowed by drag, and systems: each island advances by its own steps
+// of dopri5.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "ricochet/scene/any_system.hpp"
 #include "scene/world.hpp"
 
 namespace ricochet::detail {
@@ -54,7 +59,28 @@ public:
     [[nodiscard]] std::vector<Join> springs(std::uint32_t island) const;
 
     /// The island of one body that neither a body nor a surface can meet.
-    void set_unseen(std::uint32_t island) { islands_[island].unseen = true; }
+    void set_unseen(std::uint32_t island) { islands_[island].unseen = !islands_[island].system; }
+
+    // --- systems: islands whose members are the discs of one ---
+
+    [[nodiscard]] bool is_system(std::uint32_t island) const
+    {
+        return islands_[island].system != nullptr;
+    }
+    /// On the method's own map.
+    [[nodiscard]] const std::vector<double>& state(std::uint32_t island, const Instant& t) const;
+    /// A system goes on from t with its discs pushed by these impulses, as by `restart`.
+    bool push(std::uint32_t island, const Instant& t,
+              const std::vector<std::pair<std::uint32_t, Vector2>>& impulses);
+    /// Velocities of disc `of` where disc `by` is pushed by (1, 0) and (0, 1), as changes.
+    [[nodiscard]] std::array<Vector2, 2> mobility(std::uint32_t of, std::uint32_t by,
+                                                  const Instant& t) const;
+    /// Why an island did not go on, if there is more to say than that its steps have become short.
+    struct Trouble {
+        Outcome outcome = Outcome::step_underflow;
+        std::string what;  ///< of its first member
+    };
+    [[nodiscard]] const std::optional<Trouble>& trouble() const noexcept { return trouble_; }
 
 private:
     using State = std::vector<double>;
@@ -74,17 +100,29 @@ private:
         std::uint32_t short_steps = 0;         ///< in a row
         State x, remainder, rate;              ///< at the start of the current step
         State x_end, remainder_end, rate_end;  ///< at its end
+        std::shared_ptr<const SceneSystem> system;
+        std::unique_ptr<SystemEvents> events;
+        Mode mode = 0;
+        Mode mode_after = 0;
+        bool cut = false;  ///< whether its step ends at events, which have led to x_end
     };
+    class Step;
 
     void join(World& world);
-    void flow(const Island& island, const State& x, State& rate) const;
+    void flow(const Island& island, const State& x, State& rate, double s) const;
+    void add_systems();
+    void record_system(Island& island);
+    bool find_events(Island& island);
+    bool follow(Island& island, StepVerdict verdict);
+    void restep(const Island& island, double s, std::span<double> x) const;
+    [[nodiscard]] SystemDisc disc(std::uint32_t body, const Instant& t) const;
     void depart(const Island& island, double h, bool with_error) const;
     void depart_alone(const Island& island, double h, bool with_error) const;
     [[nodiscard]] double error_of(const Island& island, double h) const;
     void look_at(const Island& island, const Instant& t) const;
     [[nodiscard]] double first_step(const Island& island) const;
     bool attempt(std::uint32_t which);
-    void record(Island& island);
+    bool record(Island& island);
 
     World& world_;
     std::vector<Island> islands_;
@@ -94,6 +132,9 @@ private:
     mutable const Island* seen_ = nullptr;  ///< whose state at `seen_at_` lies in `at_`
     mutable Instant seen_at_{};
     mutable Instant seen_from_{};
+    mutable std::vector<State> spare_stages_;
+    mutable State spare_w_, spare_end_rate_;
+    std::optional<Trouble> trouble_;
 };
 
 }  // namespace ricochet::detail

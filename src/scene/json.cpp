@@ -187,11 +187,15 @@ public:
             ends.push_back(file.scene.bodies().size());
         });
         try {
-            file.scene.check();
+            double t_start = 0;
+            if (top.has("run")) top.part("run", "\"run\"").number("t_start", t_start);
+            file.scene.check(t_start);
         } catch (const Misplaced& error) {
             const auto entry = std::ranges::upper_bound(ends, std::size_t{error.body});
             const auto index = static_cast<std::size_t>(entry - ends.begin());
             throw Trouble{{"bodies", index}, error.what()};
+        } catch (const std::invalid_argument& error) {
+            throw Trouble{{}, error.what()};
         }
         top.each("springs", [&](const json& value, const JsonPath& path) {
             spring({value, path, "a spring"}, file.scene);
@@ -230,19 +234,55 @@ private:
                      fmt::format("there is no material \"{}\"{}", name, nearest_name(name, known)));
     }
 
-    static void wall_keys(const Part& part) { part.only({"name", "point", "normal", "material"}); }
+    [[nodiscard]] static SurfaceMotion motion_of(const Part& of)
+    {
+        if (!of.has("motion")) return {};
+        const Part part = of.part("motion", "a motion");
+        if (part.has("amplitude")) {
+            part.only({"amplitude", "frequency", "phase"});
+            Oscillation motion{.amplitude = part.vector("amplitude")};
+            part.number("frequency", motion.frequency);
+            part.number("phase", motion.phase);
+            return motion;
+        }
+        if (part.has("velocity")) {
+            part.only({"velocity", "since"});
+            ConstantVelocity motion{.velocity = part.vector("velocity")};
+            part.number("since", motion.since);
+            return motion;
+        }
+        part.only(
+            {"times", "displacements", "amplitude", "frequency", "phase", "velocity", "since"});
+        if (!part.has("times") || !part.has("displacements")) {
+            part.fail(
+                "expected \"amplitude\", \"velocity\", or \"times\" and "
+                "\"displacements\" in a motion");
+        }
+        part.only({"times", "displacements"});
+        PiecewiseLinear motion;
+        part.each("times", [&](const json& value, const JsonPath&) {
+            if (!value.is_number()) part.expected("numbers", "times", value);
+            motion.times.push_back(value.get<double>());
+        });
+        part.each("displacements", [&](const json& value, const JsonPath& path) {
+            motion.displacements.push_back(Part::vector_of(value, path, "displacements"));
+        });
+        return motion;
+    }
+
     void wall(const Part& part, Scene& scene) const
     {
-        wall_keys(part);
+        part.only({"name", "point", "normal", "material", "motion"});
         Wall wall{.point = part.vector("point"), .normal = part.vector("normal")};
         part.text("name", wall.name);
         wall.material = material_of(part);
+        wall.motion = motion_of(part);
         part.ask([&] { return scene.wall(wall); });
     }
 
     void terrain(const Part& part, Scene& scene) const
     {
-        part.only({"name", "points", "closed", "material"});
+        part.only({"name", "points", "closed", "material", "motion"});
         Terrain terrain;
         part.text("name", terrain.name);
         part.truth("closed", terrain.closed);
@@ -251,6 +291,7 @@ private:
             terrain.points.push_back(Part::vector_of(value, path, "points"));
         });
         terrain.material = material_of(part);
+        terrain.motion = motion_of(part);
         part.ask([&] { return scene.terrain(terrain); });
     }
 

@@ -26,6 +26,7 @@ public:
         double length = 0;  ///< [s] until it ends, or an arrival ends it
         double step = 0;    ///< [s] in which velocities go over into those of the chords
         double defect = 0;  ///< of the contact law, as a fraction
+        double wakes = 0;   ///< [s] until a wall begins to move, infinite where none does
     };
     virtual Plan plan(double longest) = 0;
     /// Goes s seconds on into the step that was planned.

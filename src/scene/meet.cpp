@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "scene/islands.hpp"
-#include "scene/world.hpp"
+#include "scene/moving.hpp"
 
 namespace ricochet::detail {
 
@@ -56,29 +56,6 @@ namespace {
     return out;
 }
 
-/// The root of a gap on the steps' polynomials, moved to where the gap closes on the methods' own
-/// maps. `gap` returns the gap there and its rate.
-template <class Gap>
-[[nodiscard]] double on_map(double after, double until, const Gap& gap)
-{
-    for (int i = 0; i < 3; ++i) {
-        const auto [value, rate] = gap(after);
-        if (!(rate < 0)) break;
-        const double change = -value / rate;
-        // The map differs from the polynomial by the error of a step.
-        if (std::fabs(change) > 0.1 * until) break;
-        after = std::clamp(after + change, 0.0, until);
-        // Newton's method doubles the digits: the next change would be below rounding.
-        if (std::fabs(change) <= 1e-9 * after) break;
-    }
-    return after;
-}
-
-struct GapAndRate {
-    double gap = 0;
-    double rate = 0;
-};
-
 }  // namespace
 
 Path World::path(std::uint32_t i, const Instant& t) const
@@ -91,6 +68,13 @@ Path World::path(std::uint32_t i, const Instant& t) const
         path.c[1] = speed(b, s);
         path.c[2] = 0.5 * b.a;
         path.degree = is_zero(b.a) ? 1 : 2;
+        return path;
+    }
+    if (b.mapped) {
+        path.c[0] = islands->position(i, t);
+        path.c[1] = islands->velocity(i, t);
+        path.degree = 1;
+        path.until = std::max(0.0, seconds(t, islands->end(b.island)));
         return path;
     }
     const auto& [c3, c4] = bends[i];
@@ -129,6 +113,7 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
 {
     const Body& a = world.bodies[i];
     const Body& b = world.bodies[j];
+    if (a.mapped || b.mapped) return meet_mapped(world, i, j);
     const Instant from = later(a.t, b.t);
     const Path first = world.path(i, from);
     const Path second = world.path(j, from);

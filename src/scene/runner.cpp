@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "scene/large_pages.hpp"
+#include "scene/moving.hpp"
 
 namespace ricochet::detail {
 
@@ -63,7 +64,7 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
 /// times as fast at a fraction of 0.3 as one body in each.
 void Runner::place_all()
 {
-    celled_ = members_.size() > 1 || world_.faces.size() > world_.wall_count;
+    celled_ = members_.size() > 1 || world_.fixed_count > world_.wall_count;
     if (!celled_) return;
     Vector2 low{never, never};
     Vector2 high{-never, -never};
@@ -83,7 +84,7 @@ void Runner::place_all()
     const double slack = islands_.empty() ? 1.0001 : 1.3;
     double side = std::max(2 * radius * slack, 0.65 * std::sqrt(width * height / count));
     if (!(side > 0)) side = std::max({width, height, 1.0});
-    if (members_.size() <= few_bodies && world_.faces.size() - world_.wall_count <= few_faces) {
+    if (members_.size() <= few_bodies && world_.fixed_count - world_.wall_count <= few_faces) {
         side = 0x1p200;  // so few are all asked, and none pays for the cells that it crosses
     }
     const auto buckets = [&](double extent) {
@@ -105,7 +106,7 @@ void Runner::place_faces()
     double radius = 0;
     for (const std::uint32_t i : members_) radius = std::max(radius, world_.bodies[i].radius);
     const double reach = 1.001 * radius + 0.15 * cells_.side();
-    for (std::uint32_t f = world_.wall_count; f < world_.faces.size(); ++f) {
+    for (std::uint32_t f = world_.wall_count; f < world_.fixed_count; ++f) {
         const Face& face = world_.faces[f];
         const Vector2 end = face.at - face.length * turned(face.normal);
         const auto from = cells_.cell_of(
@@ -133,6 +134,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
     settle_at_start();
     for (const std::uint32_t island : islands_) step_island(island);
     for (const std::uint32_t i : members_) predict(i);
+    fail_where_broken();
     const auto bodies = static_cast<std::uint32_t>(world_.bodies.size());
     const SceneOptions& options = world_.options;
     while (!result_.failure && !calendar_.empty()) {
@@ -155,6 +157,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
         } else {
             happen(who);
         }
+        if (world_.broken) fail_where_broken();
         if (options.cancelled && options.cancelled->load(std::memory_order_relaxed)) {
             fail(Outcome::cancelled, {}, "the run was cancelled");
         }
@@ -184,15 +187,23 @@ void Runner::sample_until(const Instant& t, bool inclusive, Samples& samples)
     }
 }
 
+void Runner::fail_island(std::uint32_t island)
+{
+    const Islands& islands = *world_.islands;
+    const std::string first = called(islands.members(island)[0]);
+    if (const auto& trouble = islands.trouble()) {
+        return fail(trouble->outcome, islands.members(island),
+                    fmt::format("{} {}", first, trouble->what));
+    }
+    fail(Outcome::step_underflow, islands.members(island),
+         fmt::format("the step of the island of {} fell below what the time resolves", first));
+}
+
 void Runner::step_island(std::uint32_t island)
 {
     Islands& islands = *world_.islands;
     const auto id = static_cast<std::uint32_t>(world_.bodies.size()) + island;
-    if (!islands.advance(island)) {
-        return fail(Outcome::step_underflow, islands.members(island),
-                    fmt::format("the step of the island of {} fell below what the time resolves",
-                                called(islands.members(island)[0])));
-    }
+    if (!islands.advance(island)) return fail_island(island);
     if (islands.stalls(island)) {
         return fail(Outcome::stalled, islands.members(island),
                     fmt::format("the steps of the island of {} are shorter than 1e-8 of the run: "
@@ -244,6 +255,23 @@ void Runner::consider_walls(std::uint32_t i)
     }
 }
 
+/// Surfaces that move, which wake sleepers, too.
+void Runner::consider_moving(std::uint32_t i)
+{
+    const auto count = static_cast<std::uint32_t>(world_.faces.size());
+    for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
+        if (known_to_group(i, true, f)) continue;
+        consider(i, meet_moving(world_, i, f, t_end_), true, f);
+    }
+}
+
+void Runner::fail_where_broken()
+{
+    if (!world_.broken) return;
+    const BrokenBound& broken = *world_.broken;
+    fail(broken.non_finite ? Outcome::non_finite : Outcome::wrong_bound, {}, broken.sentence);
+}
+
 void Runner::consider_bucket(std::uint32_t i, std::uint32_t bucket)
 {
     for (std::uint32_t j = cells_.head(bucket); j != none; j = world_.bodies[j].next) {
@@ -269,14 +297,17 @@ void Runner::predict(std::uint32_t i)
     pending.t = pending.crossing = no_instant;
     pending.kind = Pending::Kind::nothing;
     const Body& body = world_.bodies[i];
+    if (!world_.motions.empty() && !body.mapped) consider_moving(i);
     if (body.asleep) {
         if (celled_) offer(i);
     } else {
-        consider_own(i);
-        consider_walls(i);
+        if (!body.mapped) {
+            consider_own(i);
+            consider_walls(i);
+        }
         if (celled_) {
             if (body.quartic) move_to_cell(i);
-            consider_faces(i);
+            if (!body.mapped) consider_faces(i);
             const auto& cell = pending.cell;
             for (int x = -1; x <= 1; ++x) {
                 for (int y = -1; y <= 1; ++y) {
@@ -320,6 +351,7 @@ void Runner::predict_crossing(std::uint32_t i)
                               static_cast<double>(pending.cell.y) * side};
     pending.across_x = pending.across_y = 0;
     pending.crossing = no_instant;
+    if (body.mapped) return predict_crossing_mapped(i);
     if (body.quartic) {
         const Path path = world_.path(i, now_);
         // A tenth of a cell outside of it.
@@ -357,6 +389,24 @@ void Runner::predict_crossing(std::uint32_t i)
         }
     }
     if (first < never) pending.crossing = now_.after(first);
+}
+
+/// A tenth of a cell outside of it, as the bound proves.
+void Runner::predict_crossing_mapped(std::uint32_t i)
+{
+    Pending& pending = pending_[i];
+    const double side = cells_.side();
+    const double most = world_.accelerations[i];
+    const Path path = world_.path(i, now_);
+    double first = path.until;
+    for (std::size_t c = 0; c < 2; ++c) {
+        const double cell = static_cast<double>(c == 0 ? pending.cell.x : pending.cell.y);
+        const double into = path.c[0][c] - cell * side;
+        const double v = path.c[1][c];
+        first = std::min(first, falls_after(std::max(into, 0.0) + 0.1 * side, v, -most, 0));
+        first = std::min(first, falls_after(std::max(side - into, 0.0) + 0.1 * side, -v, -most, 0));
+    }
+    if (first < path.until) pending.crossing = now_.after(first);
 }
 
 /// Into the cell where a step has led it.
@@ -409,7 +459,7 @@ void Runner::happen(std::uint32_t i)
         case Kind::edge: return leave_edge(i);
         case Kind::face: return impact(i);
         case Kind::presses_face:
-            if (rests_on_face(i)) return predict(i);
+            if (!world_.moves(pending.other) && rests_on_face(i)) return predict(i);
             return press(i, presses_on(i, world_.faces[pending.other]));
         case Kind::pair:
         case Kind::presses: break;

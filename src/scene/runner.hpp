@@ -65,13 +65,17 @@ private:
     void consider_walls(std::uint32_t i);
     void consider_bucket(std::uint32_t i, std::uint32_t bucket);
     void consider_faces(std::uint32_t i);
+    void consider_moving(std::uint32_t i);
     void consider_own(std::uint32_t i);
     void offer(std::uint32_t i);
     void predict_crossing(std::uint32_t i);
+    void predict_crossing_mapped(std::uint32_t i);
     void put_in_calendar(std::uint32_t i);
     void move_to_cell(std::uint32_t i);
     void cross(std::uint32_t i);
     void step_island(std::uint32_t island);
+    void fail_island(std::uint32_t island);
+    void fail_where_broken();
     void happen(std::uint32_t i);
     [[nodiscard]] std::string presses_on(std::uint32_t i, const Face& face) const;
     void impact(std::uint32_t i);
@@ -98,6 +102,7 @@ private:
     }
     void gather(std::uint32_t i, const Pending& seed);
     void gather_faces(std::uint32_t slot, std::uint32_t sure);
+    [[nodiscard]] double loose_motion(std::uint32_t face, double size) const;
     [[nodiscard]] std::vector<Side> sides_of(std::uint32_t i, std::uint32_t sure) const;
     void gather_pairs(std::uint32_t slot, std::uint32_t sure);
     void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);
@@ -109,6 +114,8 @@ private:
     bool collapses(std::uint32_t slot);
     bool hops_below_rounding(std::uint32_t slot);
     void restart_island(std::uint32_t island);
+    bool push_system(std::uint32_t island);
+    void add_couplings();
     void settle(std::uint32_t i, std::uint32_t was);
     bool rests_on_face(std::uint32_t i);
     void halt(std::uint32_t i);

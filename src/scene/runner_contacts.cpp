@@ -43,9 +43,7 @@ std::vector<std::uint32_t> Runner::joining(double least, double most) const
     std::vector<std::uint32_t> bodies;
     for (const Contact& contact : cluster_.contacts) {
         if (!across(contact)) continue;
-        const Vector2& a = cluster_.before[contact.slot_a];
-        const Vector2 v = contact.surface ? a : a - cluster_.before[contact.slot_b];
-        const double approach = -dot(v, contact.normal);
+        const double approach = -dot(relative_velocity(cluster_.before, contact), contact.normal);
         if (approach <= least || approach >= most) continue;
         bodies.push_back(contact.a);
         if (!contact.surface) bodies.push_back(contact.b);
@@ -57,6 +55,17 @@ std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& 
 {
     std::vector<std::uint32_t> faces;
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) faces.push_back(f);
+    const auto count = static_cast<std::uint32_t>(world_.faces.size());
+    for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
+        // Those that are not touched stay the scene's, and keep no group awake.
+        const bool touched = std::ranges::any_of(members, [&](std::uint32_t i) {
+            const double radius = world_.bodies[i].radius;
+            const Vector2 p = world_.position(i, now_);
+            const double gap = world_.moving_gap(f, radius, p, now_).gap;
+            return gap <= loose_motion(f, radius + norm(p));
+        });
+        if (touched) faces.push_back(f);
+    }
     if (!celled_ || !cells_.any_faces()) return faces;
     for (const std::uint32_t i : members) {
         const auto& cell = pending_[i].cell;
@@ -97,6 +106,12 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
     }
     patience_.resize(world_.bodies.size());
     std::vector<std::uint32_t> members = contacts_.closure(bodies);
+    for (const std::uint32_t i : members) {
+        if (!world_.bodies[i].mapped) continue;
+        return fail(
+            Outcome::zeno, bodies,
+            fmt::format("{} is in lasting contact, which of systems is not followed", called(i)));
+    }
     std::vector<std::uint32_t> patience;
     std::vector<std::uint32_t> joined;
     for (const std::uint32_t i : members) {
@@ -116,7 +131,8 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
         patience.push_back(patience_[i].steps);
     }
     std::vector<std::uint32_t> faces = faces_near(members);
-    const bool segments = faces.size() > world_.wall_count;
+    const bool segments = std::ranges::any_of(
+        faces, [&](std::uint32_t f) { return world_.faces[f].kind != Face::Kind::wall; });
     for (const std::uint32_t i : members) {
         if (segments && world_.bodies[i].radius == 0) {
             return fail(Outcome::zeno, {i},
@@ -161,7 +177,8 @@ void Runner::plan_group(std::uint32_t number)
                 fmt::format("the group of {} in lasting contact could not go on: {}",
                             called(group.members[0]), group.motion->failure()));
         case IslandOutcome::asleep:
-            calendar_.set(entry_of_group(number), no_instant);
+            calendar_.set(entry_of_group(number),
+                          before(group.end, t_end_) ? group.end : no_instant);
             if (!slept) {
                 for (const std::uint32_t i : group.members) {
                     note_group(SceneEvent::Kind::slept, i);
@@ -214,12 +231,13 @@ void Runner::restart_group(std::uint32_t number)
 }
 
 /// Whether a body that no other one of its group touches can go on without it: in flight, on a wall
-/// or on the inside of a segment.
+/// or on the inside of a segment that does not move.
 bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
 {
     const Body& body = world_.bodies[i];
     if (body.island != none) return false;
     for (const std::uint32_t f : faces_near({i})) {
+        if (world_.moves(f)) return false;  // which carries it
         const Face& face = world_.faces[f];
         if (face.kind != Face::Kind::vertex) continue;
         const double gap = norm(body.p - face.at) - body.radius;

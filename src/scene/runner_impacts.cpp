@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "scene/runner.hpp"
@@ -44,13 +45,47 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
     cluster_.clear();
     slot_of(i);
     for (std::uint32_t slot = 0; slot < cluster_.bodies.size(); ++slot) {
+        const Body& body = world_.bodies[cluster_.bodies[slot]];
+        if (body.mapped) {
+            for (const std::uint32_t other : world_.islands->members(body.island)) slot_of(other);
+        }
         const bool first = slot == 0;
         const bool pair = seed.kind == Pending::Kind::pair || seed.kind == Pending::Kind::presses;
         gather_faces(slot, first && !pair ? seed.other : none);
         if (celled_) gather_pairs(slot, first && pair ? seed.other : none);
     }
     cluster_.after = cluster_.before;
+    if (!world_.accelerations.empty()) add_couplings();
     for (const std::uint32_t body : cluster_.bodies) slots_[body] = none;
+}
+
+/// How pushes move the discs of systems. All discs of one are in a cluster, or none.
+void Runner::add_couplings()
+{
+    for (std::uint32_t by = 0; by < cluster_.bodies.size(); ++by) {
+        const Body& pushed = world_.bodies[cluster_.bodies[by]];
+        if (!pushed.mapped) continue;
+        for (std::uint32_t of = 0; of < cluster_.bodies.size(); ++of) {
+            const Body& moved = world_.bodies[cluster_.bodies[of]];
+            if (!moved.mapped || moved.island != pushed.island) continue;
+            const auto changes =
+                world_.islands->mobility(cluster_.bodies[of], cluster_.bodies[by], now_);
+            cluster_.couplings.push_back({of, by, changes});
+            if (of != by) continue;
+            const auto& [x, y] = changes;
+            const double size = std::fabs(x[0]) + std::fabs(y[1]);
+            const bool positive = x[0] >= 0 && y[1] >= 0 &&
+                                  x[0] * y[1] - x[1] * y[0] >= -1e-9 * size * size &&
+                                  std::fabs(x[1] - y[0]) <= 1e-6 * size;
+            if (positive) continue;
+            throw std::invalid_argument(fmt::format(
+                "simulate: push of {} changes its velocity by ({}, {}) and ({}, {}) for impulses "
+                "of "
+                "1 N s along x and y; expected a symmetric inverse mass that is not negative",
+                called(cluster_.bodies[by]), x[0], x[1], y[0], y[1]));
+        }
+    }
+    if (!cluster_.couplings.empty()) cluster_.impulses.assign(cluster_.bodies.size(), {});
 }
 
 /// Segments that a point touches now, and on which side, from a record that has led there; `sure`
@@ -90,6 +125,7 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     const Body& body = world_.bodies[i];
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = cluster_.before[slot];
+    if (body.mapped) return cluster_.sides.emplace_back(), void();  // its guards are its own
     const auto touch = [&](std::uint32_t f, const Vector2& normal) {
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = normal;
@@ -122,6 +158,33 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     if (body.radius > 0 && celled_ && cells_.any_faces()) {
         for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
     }
+    const auto count = static_cast<std::uint32_t>(world_.faces.size());
+    for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
+        const FaceGap at = world_.moving_gap(f, body.radius, p, now_);
+        const Vector2 w = world_.surface_velocity(f, now_);
+        double tolerance = World::rounding(p, body.radius) +
+                           World::rounding(world_.faces[f].at, 0) +
+                           2 * resolution(now_) * std::fabs(dot(v - w, at.normal));
+        if (known_to_group(i, true, f)) tolerance += loose_motion(f, body.radius + norm(p));
+        if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) continue;
+        // Where two segments meet, both have the corner.
+        const bool again = std::ranges::any_of(cluster_.contacts, [&](const Contact& c) {
+            return c.a == i && c.moving && c.normal == at.normal &&
+                   world_.faces[c.b].surface == world_.faces[f].surface;
+        });
+        if (again) continue;
+        touch(f, at.normal);
+        cluster_.contacts.back().moving = true;
+        cluster_.contacts.back().surface_velocity = w;
+    }
+}
+
+/// [m] What a group in lasting contact leaves of a gap: in a step of its own, surfaces move on
+/// straight lines.
+double Runner::loose_motion(std::uint32_t face, double size) const
+{
+    const double h = world_.options.contact_step;
+    return loose * size + 0.125 * world_.moving(face).bounds.acceleration * h * h;
 }
 
 void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
@@ -155,7 +218,7 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     const Body& a = world_.bodies[i];
     const Body& b = world_.bodies[j];
     const double reach = a.radius + b.radius;
-    if (reach == 0) return;
+    if (reach == 0 || (a.mapped && b.mapped && a.island == b.island)) return;
     if (!sure && (a.quartic || b.quartic)) {
         // On the polynomials first: the maps are expensive.
         const Vector2 near = world_.path(i, now_).c[0] - world_.path(j, now_).c[0];
@@ -198,8 +261,7 @@ bool Runner::collapses(std::uint32_t slot)
     for (const Contact& contact : cluster_.contacts) {
         if (contact.a != i && (contact.surface || contact.b != i)) continue;
         meets_body = meets_body || !contact.surface;
-        const Vector2& a = cluster_.before[contact.slot_a];
-        const Vector2 v = contact.surface ? a : a - cluster_.before[contact.slot_b];
+        const Vector2 v = relative_velocity(cluster_.before, contact);
         fastest = std::max(fastest, std::fabs(dot(v, contact.normal)));
     }
     return meets_body &&
@@ -216,7 +278,7 @@ bool Runner::hops_below_rounding(std::uint32_t slot)
     const Body& body = world_.bodies[i];
     Series& series = series_[i];
     const bool may_last = std::ranges::any_of(cluster_.contacts, [&](const Contact& c) {
-        return c.a == i && c.surface && c.friction > 0 && c.restitution == 1;
+        return c.a == i && c.surface && !c.moving && c.friction > 0 && c.restitution == 1;
     });
     const double height = low * World::rounding(world_.position(i, now_), body.radius);
     const Vector2& v = cluster_.before[slot];
@@ -427,8 +489,40 @@ void Runner::bounce(std::uint32_t i)
     if (leaves == 0) settle(i, none);
 }
 
+/// A system goes on from where its discs have been pushed.
+bool Runner::push_system(std::uint32_t island)
+{
+    velocities_.clear();
+    for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
+        const std::uint32_t i = cluster_.bodies[k];
+        if (world_.bodies[i].island == island) velocities_.emplace_back(i, cluster_.impulses[k]);
+    }
+    if (!world_.islands->push(island, now_, velocities_)) return false;
+    for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
+        const std::uint32_t i = cluster_.bodies[k];
+        if (world_.bodies[i].island != island) continue;
+        const Vector2 expected = cluster_.after[k];
+        const Vector2 found = world_.bodies[i].v;
+        const double size = norm(expected) + norm(found) + norm(cluster_.before[k]);
+        const bool same_time =
+            !before(world_.bodies[i].t, now_) && !before(now_, world_.bodies[i].t);
+        if (!same_time || norm(found - expected) <= 1e-6 * size) continue;
+        throw std::invalid_argument(fmt::format(
+            "simulate: push of {} gives it the velocity ({}, {}), and unit impulses have told "
+            "({}, {}); expected a push that is linear in the impulse",
+            called(i), found[0], found[1], expected[0], expected[1]));
+    }
+    return true;
+}
+
 void Runner::restart_island(std::uint32_t island)
 {
+    if (world_.islands->is_system(island)) {
+        if (!push_system(island)) return fail_island(island);
+        const Instant& end = world_.islands->end(island);
+        return calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + island,
+                             before(end, t_end_) ? end : no_instant);
+    }
     velocities_.clear();
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         const std::uint32_t i = cluster_.bodies[k];

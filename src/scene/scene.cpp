@@ -8,6 +8,8 @@
 #include <stdexcept>
 
 #include "checks/require.hpp"
+#include "ricochet/scene/any_system.hpp"
+#include "scene/motion.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"
 #include "scene/vector2.hpp"
@@ -102,7 +104,9 @@ BodyId Scene::add(const Disc& body, std::string_view kind)
         refuse("there are more bodies than handles");
     }
     require_room(1);
-    for (const Surface& surface : surfaces_) require_outside(body, surface);
+    for (const Surface& surface : surfaces_) {
+        if (kind == "body" && !moves(surface.motion)) require_outside(body, surface);
+    }
     take_name(body.name, "body");
     bodies_.push_back(body);
     return {static_cast<std::uint32_t>(bodies_.size() - 1)};
@@ -133,12 +137,14 @@ SurfaceId Scene::wall(const Wall& wall)
     const double length = norm(wall.normal);
     if (!(length > 0) || !std::isfinite(length)) refuse("the normal of a wall has no length");
     require_material(wall.material, "a wall");
+    check_motion(wall.motion, wall.name.empty() ? "a wall" : wall.name);
     take_name(wall.name, "surface");
     surfaces_.push_back({.name = wall.name,
                          .is_wall = true,
                          .points = {wall.point},
                          .normal = {wall.normal[0] / length, wall.normal[1] / length},
-                         .material = wall.material});
+                         .material = wall.material,
+                         .motion = wall.motion});
     return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
 }
 
@@ -149,6 +155,7 @@ SurfaceId Scene::terrain(const Terrain& terrain)
     }
     for (const Vector2& point : terrain.points) require_vector(point, "point of terrain");
     require_material(terrain.material, "terrain");
+    check_motion(terrain.motion, terrain.name.empty() ? "terrain" : terrain.name);
     std::vector<Vector2> points = terrain.points;
     if (terrain.closed) points.push_back(points.front());
     for (std::size_t i = 1; i < points.size(); ++i) {
@@ -160,7 +167,8 @@ SurfaceId Scene::terrain(const Terrain& terrain)
     surfaces_.push_back({.name = terrain.name,
                          .is_wall = false,
                          .points = std::move(points),
-                         .material = terrain.material});
+                         .material = terrain.material,
+                         .motion = terrain.motion});
     return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
 }
 
@@ -171,6 +179,9 @@ void Scene::spring(const Spring& spring)
             refuse(fmt::format("a spring ends at body {}, and there are {}", end.index,
                                bodies_.size()));
         }
+        if (system_of(end.index)) {
+            refuse(fmt::format("a spring ends at {}, which is part of a system", name_of(end)));
+        }
     }
     if (spring.between[0] == spring.between[1]) {
         refuse(fmt::format("a spring joins {} to itself", name_of(spring.between[0])));
@@ -179,6 +190,39 @@ void Scene::spring(const Spring& spring)
     require_not_negative(who, "stiffness of a spring", spring.stiffness);
     require_not_negative(who, "damping of a spring", spring.damping);
     springs_.push_back(spring);
+}
+
+SystemId Scene::system(const SystemBody& body)
+{
+    const std::string label =
+        body.name.empty() ? fmt::format("system {}", systems_.size()) : body.name;
+    if (!body.motion) refuse(fmt::format("{} has no motion; expected system_body(...)", label));
+    const auto count = static_cast<std::uint32_t>(body.motion->shape_count());
+    const auto first = static_cast<std::uint32_t>(bodies_.size());
+    const std::vector<double> x = body.motion->start();
+    for (const double component : x) require_finite(who, label + ": state", component);
+    for (std::uint32_t k = 0; k < count; ++k) {
+        const double radius = body.motion->radius(k);
+        require_positive(who, label + ": shape_radius", radius);
+        const SystemDisc disc = body.motion->shape(k, body.motion->start_mode(), 0, x);
+        const std::string name = count == 1 ? label : fmt::format("{} {}", label, k);
+        add({.name = name,
+             .at = disc.at,
+             .velocity = disc.velocity,
+             .radius = radius,
+             .material = body.material},
+            "system");
+    }
+    systems_.push_back({body.motion, first, count});
+    return {static_cast<std::uint32_t>(systems_.size() - 1)};
+}
+
+const Scene::System* Scene::system_of(std::uint32_t body) const noexcept
+{
+    for (const System& system : systems_) {
+        if (body >= system.first && body - system.first < system.count) return &system;
+    }
+    return nullptr;
 }
 
 std::string Scene::name_of(BodyId body) const
@@ -229,10 +273,24 @@ void Scene::require_outside(const Disc& body, const Surface& surface) const
     }
 }
 
-void Scene::check() const
+void Scene::check(double t_start) const
 {
-    for (const Surface& surface : surfaces_) {
+    for (std::uint32_t s = 0; s < surfaces_.size(); ++s) {
+        Surface surface = surfaces_[s];
+        if (moves(surface.motion)) {
+            check_motion_at(surface.motion, t_start, name_of(SurfaceId{s}));
+            const Vector2 moved = displacement(surface.motion, t_start);
+            for (Vector2& point : surface.points) point = point + moved;
+            const auto is_point = [](const Disc& body) { return body.radius == 0; };
+            if (!surface.is_wall && std::ranges::any_of(bodies_, is_point)) {
+                refuse(
+                    fmt::format("{} is terrain that moves, which discs alone can meet, and "
+                                "there is a point",
+                                name_of(SurfaceId{s})));
+            }
+        }
         for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+            if (!systems_.empty() && system_of(i)) continue;
             try {
                 require_outside(bodies_[i], surface);
             } catch (const std::invalid_argument& error) {
@@ -254,6 +312,7 @@ void Scene::check() const
             const Disc& b = bodies_[j];
             const double reach = a.radius + b.radius;
             if (reach == 0 || std::fabs(a.at[1] - b.at[1]) > reach) continue;
+            if (!systems_.empty() && system_of(i) && system_of(i) == system_of(j)) continue;
             const double overlap = reach - norm(a.at - b.at);
             if (overlap > rounding_of(a.at, a.radius) + rounding_of(b.at, b.radius)) {
                 const auto [first, second] = std::minmax(i, j);

@@ -100,6 +100,9 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, double t_end
     for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
         run.bodies[i] = {world.position(i, end), world.velocity(i, end), world.bodies[i].asleep};
     }
+    for (std::uint32_t k = 0; k < world.islands->count(); ++k) {
+        if (world.islands->is_system(k)) run.systems.push_back(world.islands->state(k, end));
+    }
     run.statistics = world.statistics;
     return run;
 }
@@ -169,7 +172,7 @@ SceneRun simulate(const Scene& scene, const SceneOptions& wanted)
     SceneOptions options = wanted;
     // Their times tell which is the last.
     options.record_events |= wanted.max_events != SceneOptions{}.max_events;
-    scene.check();
+    scene.check(options.t_start);
     scene.require_room(0);
     Failure failure;
     SceneRun run = run_until(scene, options, options.t_end, &failure);
@@ -209,6 +212,7 @@ double energy(const Scene& scene, const std::vector<BodyState>& bodies)
     }
     double sum = 0;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (scene.system_of(static_cast<std::uint32_t>(i))) continue;
         const double mass = scene.bodies()[i].mass;
         sum += mass * (0.5 * dot(bodies[i].velocity, bodies[i].velocity) -
                        dot(scene.settings().gravity, bodies[i].at));

@@ -1,7 +1,10 @@
 #include "scene/world.hpp"
 
+#include <algorithm>
+
 #include "scene/islands.hpp"
 #include "scene/large_pages.hpp"
+#include "scene/moving.hpp"
 
 namespace ricochet::detail {
 
@@ -66,18 +69,55 @@ World::World(const Scene& from, const SceneOptions& with)
     for (const bool walls : {true, false}) {
         std::uint32_t index = 0;
         for (const Scene::Surface& surface : from.surfaces()) {
-            if (surface.is_wall == walls) add_faces(surface, index, faces);
+            const bool fixed = !detail::moves(surface.motion);
+            if (fixed && surface.is_wall == walls) add_faces(surface, index, faces);
             ++index;
         }
         if (walls) wall_count = static_cast<std::uint32_t>(faces.size());
     }
     join_chains(from, wall_count, faces);
+    fixed_count = static_cast<std::uint32_t>(faces.size());
+    add_moving_faces();
     islands = std::make_unique<Islands>(*this);
     if (islands->count() > 0) bends.resize(bodies.size());
     put_to_sleep();
 }
 
 World::~World() = default;
+
+/// Segments with their ends, which need no faces of their own where no point meets them.
+void World::add_moving_faces()
+{
+    std::uint32_t index = 0;
+    for (const Scene::Surface& surface : scene.surfaces()) {
+        const std::size_t first = faces.size();
+        if (detail::moves(surface.motion)) add_faces(surface, index, faces);
+        ++index;
+        const auto from = faces.begin() + static_cast<std::ptrdiff_t>(first);
+        faces.erase(
+            std::remove_if(from, faces.end(),
+                           [](const Face& face) { return face.kind == Face::Kind::vertex; }),
+            faces.end());
+        for (std::size_t f = first; f < faces.size(); ++f) {
+            faces[f].previous = faces[f].next = none;
+            motions.push_back({.motion = &surface.motion,
+                               .bounds = bounds_of(surface.motion),
+                               .given = std::holds_alternative<GivenMotion>(surface.motion)});
+        }
+    }
+}
+
+Vector2 World::surface_velocity(std::uint32_t face, const Instant& t) const
+{
+    return moves(face) ? ricochet::velocity(*moving(face).motion, t.plus(0)) : Vector2{};
+}
+
+FaceGap World::moving_gap(std::uint32_t face, double radius, const Vector2& p,
+                          const Instant& t) const
+{
+    const Vector2 moved = displacement(*moving(face).motion, t.plus(0));
+    return displaced_gap(faces[face], moved, radius, p);
+}
 
 Vector2 World::push_of(const Body& body, std::uint32_t face) const
 {

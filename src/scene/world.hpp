@@ -9,10 +9,13 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/scene/simulate.hpp"
+#include "scene/motion.hpp"
 #include "scene/roots.hpp"
 #include "scene/vector2.hpp"
 
@@ -55,6 +58,7 @@ struct alignas(64) Body {
     std::array<std::uint32_t, 3> sides{none, none, none};
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4
+    bool mapped = false;   ///< of a system: its step has no polynomial, but a bound
 };
 static_assert(sizeof(Body) == 128);
 
@@ -68,6 +72,25 @@ struct Face {
     std::uint32_t surface = 0;
     std::uint32_t material = 0;
     std::uint32_t previous = none, next = none;  ///< segments of the same chain
+};
+
+/// Gap between a face and a body, and the direction in which the face pushes.
+struct FaceGap {
+    double gap = never;
+    Vector2 normal{};
+};
+
+/// How a face moves.
+struct MovingFace {
+    const SurfaceMotion* motion = nullptr;
+    MotionBounds bounds{};
+    bool given = false;  ///< by functions
+};
+
+/// A bound of a motion that is found broken, or a motion that is not finite.
+struct BrokenBound {
+    bool non_finite = false;
+    std::string sentence;
 };
 
 /// Links the segments of open terrain whose ends are the same point, of two and no more, and turns
@@ -100,9 +123,13 @@ struct World {
     Vector2 gravity{};
     std::vector<Body> bodies;
     std::vector<std::array<Vector2, 2>>
-        bends;                ///< terms of degree 3 and 4, where there are islands
-    std::vector<Face> faces;  ///< walls first
-    std::uint32_t wall_count = 0;
+        bends;                          ///< terms of degree 3 and 4, where there are islands
+    std::vector<Face> faces;            ///< walls first, then terrain, then what moves
+    std::uint32_t wall_count = 0;       ///< walls that do not move
+    std::uint32_t fixed_count = 0;      ///< with the terrain that does not
+    std::vector<MovingFace> motions;    ///< of the faces from there on
+    std::vector<double> accelerations;  ///< [m/s^2] of mapped bodies in their steps, at most
+    mutable std::optional<BrokenBound> broken;
     std::unique_ptr<Islands> islands;
     struct Drift {
         Vector2 v{}, rate{};  ///< where the step of its group began
@@ -125,6 +152,17 @@ struct World {
     {
         return std::min(scene.materials()[a].friction, scene.materials()[b].friction);
     }
+
+    [[nodiscard]] bool moves(std::uint32_t face) const noexcept { return face >= fixed_count; }
+    [[nodiscard]] const MovingFace& moving(std::uint32_t face) const
+    {
+        return motions[face - fixed_count];
+    }
+    /// Of a face that moves, at t.
+    [[nodiscard]] FaceGap moving_gap(std::uint32_t face, double radius, const Vector2& p,
+                                     const Instant& t) const;
+    /// Zero where it does not move.
+    [[nodiscard]] Vector2 surface_velocity(std::uint32_t face, const Instant& t) const;
 
     /// The direction in which a face pushes a body that slides on it.
     [[nodiscard]] Vector2 push_of(const Body& body, std::uint32_t face) const;
@@ -168,6 +206,7 @@ struct World {
     }
 
 private:
+    void add_moving_faces();
     void put_to_sleep();
 };
 
@@ -259,12 +298,7 @@ struct Squares {
 }
 [[nodiscard]] Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t face);
 
-/// Gap between a face and a body that its flight has led to p, and the direction in which the face
-/// pushes.
-struct FaceGap {
-    double gap = never;
-    Vector2 normal{};
-};
+/// Between a face and a body that its flight has led to p.
 [[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above);
 /// Whether the foot of p on the line lies on the segment.
 [[nodiscard]] bool lies_on(const Face& face, const Vector2& p, double slack);

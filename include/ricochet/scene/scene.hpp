@@ -7,11 +7,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
 #include <vector>
+
+#include "ricochet/scene/motion.hpp"
 
 namespace ricochet {
 
@@ -33,6 +36,16 @@ struct SurfaceId {
     std::uint32_t index = 0;
     friend bool operator==(SurfaceId, SurfaceId) = default;
 };
+
+/// Handle of a system.
+struct SystemId {
+    std::uint32_t index = 0;
+    friend bool operator==(SystemId, SystemId) = default;
+};
+
+namespace detail {
+class SceneSystem;
+}
 
 /// Where two materials meet, the smaller of the two restitutions and of the two coefficients of
 /// friction hold. `MaterialId{}` is elastic and smooth.
@@ -69,6 +82,7 @@ struct Wall {
     Vector2 point{};   ///< [m]
     Vector2 normal{};  ///< of any length but zero; points to where bodies are
     MaterialId material{};
+    SurfaceMotion motion{};
 };
 
 /// A chain of segments, met from both sides.
@@ -77,6 +91,7 @@ struct Terrain {
     std::vector<Vector2> points{};  ///< [m] two or more
     bool closed = false;            ///< whether the last is joined to the first
     MaterialId material{};
+    SurfaceMotion motion{};  ///< discs alone can meet terrain that moves
 };
 
 /// Between the centres of two bodies: pulls with stiffness (length - rest) + damping d(length)/dt.
@@ -85,6 +100,13 @@ struct Spring {
     double rest = 0;       ///< [m] length without force
     double stiffness = 0;  ///< [N/m]
     double damping = 0;    ///< [N s/m]
+};
+
+/// A hybrid system whose discs others can meet. It meets no surfaces: its guards are its own.
+struct SystemBody {
+    std::string name{};  ///< its discs are called by it: "arm", or "arm 0" and "arm 1"
+    std::shared_ptr<const detail::SceneSystem> motion{};  ///< `system_body(system, x0)`
+    MaterialId material{};
 };
 
 /// Description of a scene: bodies, the surfaces and springs between them, and materials.
@@ -110,20 +132,32 @@ public:
     SurfaceId wall(const Wall& wall);
     SurfaceId terrain(const Terrain& terrain);
     void spring(const Spring& spring);
+    SystemId system(const SystemBody& system);
 
     /// Refuses `bodies` more bodies where they would need more memory than is allowed.
     void require_room(double bodies) const;
 
     /// Refuses bodies that overlap at the start (which, and by how much), or lie behind walls or
-    /// across terrain that came after them. Called by `simulate` and `explain`.
+    /// across terrain that came after them, or that is there at `t_start` [s]. Called by `simulate`
+    /// and `explain`.
     /// @throws std::invalid_argument
-    void check() const;
+    void check(double t_start = 0) const;
 
     [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
     /// A point is a disc of radius 0 here.
     [[nodiscard]] std::span<const Disc> bodies() const noexcept { return bodies_; }
     [[nodiscard]] std::span<const Material> materials() const noexcept { return materials_; }
     [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }
+
+    /// Systems; their discs are among the bodies, with a mass that says nothing.
+    struct System {
+        std::shared_ptr<const detail::SceneSystem> motion;
+        std::uint32_t first = 0;  ///< of its discs
+        std::uint32_t count = 0;
+    };
+    [[nodiscard]] std::span<const System> systems() const noexcept { return systems_; }
+    /// Whose disc a body is; null where it is one of its own.
+    [[nodiscard]] const System* system_of(std::uint32_t body) const noexcept;
 
     /// Walls first, then terrain, each in the order in which it came.
     struct Surface {
@@ -132,6 +166,7 @@ public:
         std::vector<Vector2> points;  ///< of a wall its one point; closed terrain repeats the first
         Vector2 normal{};             ///< of a wall, of length 1
         MaterialId material{};
+        SurfaceMotion motion{};
     };
     [[nodiscard]] std::span<const Surface> surfaces() const noexcept { return surfaces_; }
 
@@ -155,6 +190,7 @@ private:
     std::vector<Disc> bodies_;
     std::vector<Surface> surfaces_;
     std::vector<Spring> springs_;
+    std::vector<System> systems_;
     std::unordered_map<std::string, std::uint32_t> names_;
 };
 

@@ -110,6 +110,7 @@ struct SceneRun {
     std::vector<std::uint32_t> involved;          ///< bodies that the message is about
     double t = 0;                                 ///< [s] time reached, by all bodies
     std::vector<BodyState> bodies;                ///< at that time
+    std::vector<std::vector<double>> systems;     ///< states of systems at that time
     std::vector<SceneEvent> events;               ///< in the order of time
     std::vector<double> sample_times;             ///< those reached
     std::vector<std::vector<BodyState>> samples;  ///< a row for each
@@ -125,7 +126,8 @@ struct SceneRun {
 /// @throws as `simulate`
 [[nodiscard]] std::string explain(const Scene& scene, const SceneOptions& options);
 
-/// Kinetic energy, and potential energy of gravity and springs [J].
+/// Kinetic energy, and potential energy of gravity and springs [J]; of bodies that are not part of
+/// systems.
 [[nodiscard]] double energy(const Scene& scene, const std::vector<BodyState>& bodies);
 
 }  // namespace ricochet

@@ -24,6 +24,16 @@ struct Frame {
     [[nodiscard]] double height() const { return high[1] - low[1]; }
 };
 
+/// Of a surface at the sample times; of one that stays, or without samples, one.
+std::vector<Vector2> displacements(const Scene::Surface& surface, const SceneRun& run)
+{
+    if (std::holds_alternative<Fixed>(surface.motion)) return {{}};
+    if (run.sample_times.empty()) return {displacement(surface.motion, run.t)};
+    std::vector<Vector2> out;
+    for (const double t : run.sample_times) out.push_back(displacement(surface.motion, t));
+    return out;
+}
+
 /// Around all that is seen of bodies and terrain, with a margin.
 Frame frame_of(const SceneFile& file, const SceneRun& run)
 {
@@ -43,7 +53,9 @@ Frame frame_of(const SceneFile& file, const SceneRun& run)
     include_all(run.bodies);
     for (const Scene::Surface& surface : file.scene.surfaces()) {
         if (surface.is_wall) continue;
-        for (const Vector2& p : surface.points) include(p, 0);
+        for (const Vector2& moved : displacements(surface, run)) {
+            for (const Vector2& p : surface.points) include({p[0] + moved[0], p[1] + moved[1]}, 0);
+        }
     }
     if (!(frame.low[0] <= frame.high[0])) frame = {{-1, -1}, {1, 1}};
     const double margin = 0.04 * std::max({frame.width(), frame.height(), 1e-9});
@@ -54,9 +66,10 @@ Frame frame_of(const SceneFile& file, const SceneRun& run)
     return frame;
 }
 
-/// A surface as a chain of points; of a wall what the frame shows of it.
-std::vector<Vector2> line_of(const Scene::Surface& surface, const Frame& frame)
+/// A surface that is displaced, as a chain of points; of a wall what the frame shows of it.
+std::vector<Vector2> line_of(Scene::Surface surface, const Vector2& moved, const Frame& frame)
 {
+    for (Vector2& p : surface.points) p = {p[0] + moved[0], p[1] + moved[1]};
     if (!surface.is_wall) return surface.points;
     const Vector2 along{-surface.normal[1], surface.normal[0]};
     const Vector2& from = surface.points[0];
@@ -130,20 +143,43 @@ void keep_between(Track& track, const std::vector<double>& times, std::size_t fi
     keep_between(track, times, worst, last);
 }
 
-void animate(fmt::memory_buffer& out, std::string_view attribute, const Track& track,
-             std::size_t coordinate, const std::vector<double>& times)
+bool is_still(const Track& track)
+{
+    return track.kept.size() <= 2 && track.at.front() == track.at.back();
+}
+
+/// Length and key times of what is animated, up to its values.
+void key_times(fmt::memory_buffer& out, const Track& track, const std::vector<double>& times)
 {
     const auto to = std::back_inserter(out);
     const double start = times.front();
     const double length = times.back() - start;
-    fmt::format_to(
-        to, "<animate attributeName=\"{}\" dur=\"{:.4g}s\" repeatCount=\"indefinite\" keyTimes=\"",
-        attribute, length);
+    fmt::format_to(to, " dur=\"{:.4g}s\" repeatCount=\"indefinite\" keyTimes=\"", length);
     for (const std::size_t k : track.kept) {
         const bool last = k + 1 == times.size();
         fmt::format_to(to, "{}{:.5g}", k == 0 ? "" : ";", last ? 1 : (times[k] - start) / length);
     }
     fmt::format_to(to, "\" values=\"");
+}
+
+/// Of a surface that moves without turning.
+void animate_shift(fmt::memory_buffer& out, const Track& track, const std::vector<double>& times)
+{
+    const auto to = std::back_inserter(out);
+    fmt::format_to(to, "<animateTransform attributeName=\"transform\" type=\"translate\"");
+    key_times(out, track, times);
+    for (const std::size_t k : track.kept) {
+        fmt::format_to(to, "{}{:.1f} {:.1f}", k == 0 ? "" : ";", track.at[k][0], track.at[k][1]);
+    }
+    fmt::format_to(to, "\"/>");
+}
+
+void animate(fmt::memory_buffer& out, std::string_view attribute, const Track& track,
+             std::size_t coordinate, const std::vector<double>& times)
+{
+    const auto to = std::back_inserter(out);
+    fmt::format_to(to, "<animate attributeName=\"{}\"", attribute);
+    key_times(out, track, times);
     for (const std::size_t k : track.kept) {
         fmt::format_to(to, "{}{:.1f}", k == 0 ? "" : ";", track.at[k][coordinate]);
     }
@@ -169,7 +205,8 @@ void plot_scene(const SceneFile& file, const SceneRun& run, const std::filesyste
             fmt::format("{:.6g} {:.6g} {:.6g}\n", run.bodies[i].at[0], run.bodies[i].at[1], shown);
     }
     for (const Scene::Surface& surface : file.scene.surfaces()) {
-        for (const Vector2& p : line_of(surface, frame)) {
+        const Vector2 moved = displacements(surface, run).back();
+        for (const Vector2& p : line_of(surface, moved, frame)) {
             surfaces += fmt::format("{:.6g} {:.6g}\n", p[0], p[1]);
         }
         surfaces += '\n';
@@ -208,13 +245,28 @@ std::string animated_scene(const SceneFile& file, const SceneRun& run)
                    "<g fill=\"none\" stroke=\"#404040\" stroke-width=\"3\">\n",
                    scale * frame.width(), scale * frame.height());
     for (const Scene::Surface& surface : file.scene.surfaces()) {
-        const auto points = line_of(surface, frame);
+        const auto moved = displacements(surface, run);
+        const auto points = line_of(surface, moved.front(), frame);
         if (points.empty()) continue;
         fmt::format_to(to, "<polyline points=\"");
         for (const Vector2& p : points) {
             fmt::format_to(to, "{:.1f},{:.1f} ", pixel(p)[0], pixel(p)[1]);
         }
-        fmt::format_to(to, "\"/>\n");
+        fmt::format_to(to, "\"");
+        Track track;
+        for (const Vector2& d : moved) {
+            track.at.push_back(
+                {scale * (d[0] - moved.front()[0]), scale * (moved.front()[1] - d[1])});
+        }
+        track.kept.push_back(0);
+        if (track.at.size() > 1) keep_between(track, run.sample_times, 0, track.at.size() - 1);
+        if (track.at.size() < 2 || is_still(track)) {
+            fmt::format_to(to, "/>\n");
+            continue;
+        }
+        fmt::format_to(to, ">");
+        animate_shift(out, track, run.sample_times);
+        fmt::format_to(to, "</polyline>\n");
     }
     fmt::format_to(to, "</g>\n<g stroke=\"#404040\" fill-opacity=\"0.7\">\n");
     constexpr std::array colours{"#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"};
@@ -227,10 +279,8 @@ std::string animated_scene(const SceneFile& file, const SceneRun& run)
         fmt::format_to(to, "<circle r=\"{:.1f}\" cx=\"{:.1f}\" cy=\"{:.1f}\" fill=\"{}\"",
                        std::max(2.0, scale * file.scene.bodies()[i].radius), track.at[0][0],
                        track.at[0][1], colours[i % colours.size()]);
-        const auto& from = track.at.front();
-        const bool still = track.kept.size() <= 2 && from == track.at.back();
-        fmt::format_to(to, "{}", still ? "/>\n" : ">");
-        if (still) continue;
+        fmt::format_to(to, "{}", is_still(track) ? "/>\n" : ">");
+        if (is_still(track)) continue;
         animate(out, "cx", track, 0, run.sample_times);
         animate(out, "cy", track, 1, run.sample_times);
         fmt::format_to(to, "</circle>\n");

@@ -1,0 +1,90 @@
+// First contacts with what moves by a motion that only its bounds tell of: the gap is followed by
+// steps within which these bounds prove it open.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/motion.hpp"
+#include "scene/world.hpp"
+
+namespace ricochet::detail {
+
+struct GapAndRate {
+    double gap = 0;
+    double rate = 0;
+};
+
+/// A gap now, and what is known of it.
+struct OpenGap {
+    double gap = 0;
+    double rate = 0;
+    double noise = 0;   ///< rates as small are the rounding of others
+    double closed = 0;  ///< gaps as small are closed
+};
+
+/// When a gap closes.
+struct Closing {
+    double after = never;
+    bool opened = false;  ///< whether it has been more than closed before, or its rate has jumped
+};
+
+/// The first s in [0, until] at which a gap is closed and closes further. `pair` has
+///
+///     look(s)       the gap at s
+///     safe(gap)     [s] for how long after the last look a gap that is open cannot close, proved
+///     linger(gap)   [s] the same where it is closed, until it can be over by as much again
+///     next_jump(s)  when next the rate may jump; the bounds hold up to there
+///
+/// With a bound on second derivatives the steps converge to a root as Newton's method does, and
+/// never pass one.
+template <class Pair>
+[[nodiscard]] Closing first_closing(double until, Pair& pair)
+{
+    bool opened = false;
+    double s = 0;
+    for (;;) {
+        const OpenGap now = pair.look(s);
+        if (!std::isfinite(now.gap + now.rate)) return {};
+        opened = opened || now.gap > 4 * now.closed;
+        const bool closed = now.gap <= now.closed;
+        const double ahead = closed ? pair.linger(now) : pair.safe(now);
+        if ((closed || !(s + ahead > s)) && now.rate < -now.noise) return {s, opened};
+        const double jump = pair.next_jump(s);
+        const double next = std::max(std::min(s + ahead, jump), std::nextafter(s, never));
+        opened = opened || next >= jump;
+        if (!(next <= until) || !(next < never)) return {};
+        s = next;
+    }
+}
+
+/// The root of a gap moved to where the gap closes on the exact motion. `gap` returns the gap there
+/// and its rate.
+template <class Gap>
+[[nodiscard]] double on_map(double after, double until, const Gap& gap)
+{
+    for (int i = 0; i < 3; ++i) {
+        const auto [value, rate] = gap(after);
+        if (!(rate < 0)) break;
+        const double change = -value / rate;
+        // The map differs from the polynomial by the error of a step.
+        if (std::fabs(change) > 0.1 * until) break;
+        after = std::clamp(after + change, 0.0, until);
+        // Newton's method doubles the digits: the next change would be below rounding.
+        if (std::fabs(change) <= 1e-9 * after) break;
+    }
+    return after;
+}
+
+/// Gap between a body at p and a face that is displaced by `moved`.
+[[nodiscard]] FaceGap displaced_gap(const Face& face, const Vector2& moved, double radius,
+                                    const Vector2& p);
+
+/// First contact of two bodies of which one at least is mapped, in their current steps.
+[[nodiscard]] Meeting meet_mapped(const World& world, std::uint32_t i, std::uint32_t j);
+
+/// First contact of a body with a face that moves, before `t_end`.
+[[nodiscard]] Meeting meet_moving(const World& world, std::uint32_t i, std::uint32_t face,
+                                  const Instant& t_end);
+
+}  // namespace ricochet::detail
