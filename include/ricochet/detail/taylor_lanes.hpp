@@ -1,0 +1,403 @@
+// Internal: what it declares may change without notice.
+//
+// Quiet steps of several runs by Taylor's method together, each with a length of its own.
+//
+// What is done here is what `TaylorKernel` does in its quiet runs, operation by operation, so that
+// every run has the bits that it has alone. A lane takes a step here only where that one would take
+// it without a second look at its guard; in front of any other step it is handed back to its own
+// loop, which has the series of that step already.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "ricochet/detail/guard_view.hpp"
+#include "ricochet/detail/lane_pack.hpp"
+#include "ricochet/detail/quiet_run.hpp"
+#include "ricochet/detail/step_state.hpp"
+#include "ricochet/detail/taylor_door.hpp"
+#include "ricochet/detail/taylor_series.hpp"
+#include "ricochet/detail/taylor_step.hpp"
+
+// The same code is compiled for registers of four doubles, too, where the processor may have them.
+#if defined(__x86_64__) && !defined(__AVX2__)
+#define RICOCHET_WIDE_LANES 1
+#else
+#define RICOCHET_WIDE_LANES 0
+#endif
+
+namespace ricochet::detail {
+
+/// As `find_reach`.
+/// @param each  absolute tolerances of the components in the place of `atol`, or null
+template <std::size_t n>
+[[nodiscard, gnu::always_inline]] inline LanePack find_reach(const std::array<LanePack, n>& x0,
+                                                             const double* each, const LanePack* c,
+                                                             int order, double rtol, double atol)
+{
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    constexpr double least = std::numeric_limits<double>::min();
+    constexpr double most = std::numeric_limits<double>::max();
+    const double by_last = -1.0 / order, by_before = -1.0 / (order - 1);
+    std::array<LanePack, n> size;
+    const auto clamped = [](const LanePack& a) __attribute__((always_inline))
+    {
+        return select(a < least, least, select(most < a, most, a));
+    };
+    const auto longest = [&]() __attribute__((always_inline))
+    {
+        LanePack last(0.0), before(0.0);
+        const LanePack* const cp = c + static_cast<std::size_t>(order) * n;
+        for (std::size_t i = 0; i < n; ++i) {
+            const LanePack scale = 1.0 / ((each ? each[i] : atol) + rtol * size[i]);
+            last = larger_of(last, size_of(cp[i]) * scale);
+            before = larger_of(before, size_of(*(cp + i - n)) * scale);
+        }
+        const LaneMask is_series = (last > least) | (before > least);
+        const LanePack h = rough_exp2(smaller_of(rough_log2(clamped(last)) * by_last,
+                                                 rough_log2(clamped(before)) * by_before));
+        return select(is_series, h, infinity);
+    };
+    for (std::size_t i = 0; i < n; ++i) size[i] = size_of(x0[i]);
+    LanePack h = longest();
+    LaneMask going = h < infinity;
+    for (int again = 0; again < 3; ++again) {
+        LaneMask larger = LanePack(0.0) < 0.0;
+        const LanePack ahead = smaller_of(h, 1e100);
+        for (std::size_t i = 0; i < n; ++i) {
+            const LanePack end = size_of(x0[i] + ahead * c[n + i]);
+            larger = larger | (end > 16.0 * size[i]);
+            size[i] = larger_of(size[i], end);
+        }
+        going = going & larger;
+        if (!going.any()) break;
+        h = select(going, longest(), h);
+        going = going & (h < infinity);
+    }
+    return h;
+}
+
+/// As `last_terms`, of one guard.
+[[nodiscard, gnu::always_inline]] inline LanePack last_terms(const LanePack* g, int order,
+                                                             const LanePack& h) noexcept
+{
+    const LanePack h2 = h * h;
+    const LanePack h4 = h2 * h2;
+    LanePack power = h4 / h;
+    for (int k = 8; k <= order; k += 4) power *= h4;
+    return power * (size_of(g[order]) * h + size_of(g[order - 1]));
+}
+
+/// As `series_clears`, above 0, of one guard that does not start on its surface.
+[[nodiscard, gnu::always_inline]] inline LaneMask series_clears(const LanePack* g, int order,
+                                                                const LanePack& sign,
+                                                                const LanePack& h,
+                                                                const LanePack& last) noexcept
+{
+    const LanePack h2 = h * h;
+    const LanePack h4 = h2 * h2;
+    LanePack tail = size_of(g[order]);
+    for (int k = order - 4; k >= 4; k -= 4) {
+        tail = tail * h4 + ((size_of(g[k]) + h * size_of(g[k + 1])) +
+                            h2 * (size_of(g[k + 2]) + h * size_of(g[k + 3])));
+    }
+    tail *= h4;
+    const LanePack q0 = sign * g[0];
+    const LanePack q1 = sign * g[1] * h;
+    const LanePack q2 = sign * g[2] * h2;
+    const LanePack q3 = sign * g[3] * (h * h2);
+    const LanePack size = ((size_of(q0) + size_of(q1)) + (size_of(q2) + size_of(q3))) + tail;
+    const LanePack less = (tail + 4.0 * last) + 0x1p-47 * size;
+    const LanePack b1 = q0 + (1.0 / 3) * q1;
+    const LanePack b2 = q0 + (1.0 / 3) * (2.0 * q1 + q2);
+    const LanePack b3 = q0 + (q1 + (q2 + q3));
+    return ((q0 - less > 0.0) & (b1 - less > 0.0)) & ((b2 - less > 0.0) & (b3 - less > 0.0));
+}
+
+/// Whether quiet steps of such runs can be taken together: the compiler unrolls the series of the
+/// flow, which has no modes, is no polynomial, and has one guard with a series at most.
+template <class System, class X>
+[[nodiscard]] constexpr bool fits_lanes() noexcept
+{
+    constexpr std::size_t n = fixed_size<X>();
+    if constexpr (tape_count<System, n>() != 1) {
+        return false;
+    } else {
+        constexpr const auto& tape = taylor_tape<System, n, 0>;
+        constexpr bool one = !Guarded<System, X> || (fixed_guard_count<System, X>() == 1 &&
+                                                     guards_with_series<System, n>() == 1);
+        return one && is_unrolled<tape> && polynomial_order(tape) > least_taylor_order;
+    }
+}
+
+/// Up to `lane_count` runs of `System` from starts like X.
+template <class System, class X>
+class TaylorLanes {
+    static constexpr std::size_t n = fixed_size<X>();
+    using D = TaylorDoor<System, X, n>;
+    using C = CoreState<X>;
+    using State = StepState<C>;
+    using Y = typename D::Room::Guarded;
+    using Guard = GuardView<System, Y>;
+    static constexpr const auto& tape = taylor_tape<System, n, 0>;
+    static constexpr bool guarded = tape.guards == 1;
+    using Series = TaylorSeries<tape, most_taylor_order, true, LanePack>;
+
+public:
+    using Door = D;
+
+    /// Sets what all runs have in common.
+    /// @param order  of their series
+    TaylorLanes(const Options& options, int order)
+        : options_(options), order_(order), backward_(options.t_end < options.t_start)
+    {
+    }
+
+    [[nodiscard]] bool is_active(std::size_t lane) const noexcept { return active_[lane]; }
+    [[nodiscard]] std::size_t active_count() const noexcept
+    {
+        std::size_t count = 0;
+        for (std::size_t lane = 0; lane < lane_count; ++lane) count += active_[lane] ? 1 : 0;
+        return count;
+    }
+
+    /// Takes over a run in front of steps that may be quiet.
+    void load(std::size_t lane, D& door, State& state, const QuietRun& quiet)
+    {
+        // The lanes that were never used get the numbers of a run, too: these do no harm.
+        for (std::size_t to = 0; to < lane_count; ++to) {
+            if (to == lane || !used_[to]) put(to, door, state, quiet);
+        }
+        runs_[lane] = {&door, &state};
+        used_[lane] = true;
+        active_.set(lane, true);
+    }
+
+    /// Gives it back in front of the step that it does not take here. `expanded`: its series is
+    /// known, as after `advance`.
+    void store(std::size_t lane, QuietRun& quiet, bool expanded)
+    {
+        const auto& [door, state] = runs_[lane];
+        active_.set(lane, false);
+        quiet.why = QuietEnd::due;
+        quiet.repeated = false;
+        quiet.steps = static_cast<std::uint64_t>(steps_[lane]);
+        quiet.guard_calls = guarded ? quiet.steps : 0;
+        quiet.h_next = h_next_[lane];
+        if (quiet.steps > 0) {
+            quiet.g0 = quiet.g1 = g0_[lane];
+            state->h = h_[lane];
+            state->flow_calls += quiet.steps;
+            state->has_middle = false;
+            state->asked_alone = 0;
+        }
+        state->start = {start_[lane], start_remainder_[lane]};
+        auto& step = door->step;
+        for (std::size_t i = 0; i < n; ++i) {
+            state->x0[i] = step.x[i] = x0_[i][lane];
+            state->remainder[i] = remainder_[i][lane];
+            state->rate0[i] = rate0_[i][lane];
+        }
+        step.start = state->start;
+        step.mode = state->mode;
+        step.backward = backward_;
+        step.asked = order_;
+        step.order = expanded ? order_ : 0;
+        step.is_motion = false;
+        step.reach = std::numeric_limits<double>::quiet_NaN();
+        if (!expanded) return;
+        const auto terms = static_cast<std::size_t>(order_) + 1;
+        for (std::size_t k = 0; k < terms * n; ++k) step.coefficients[k] = coefficients_[k][lane];
+        if constexpr (guarded) {
+            for (std::size_t k = 0; k < terms; ++k) step.guards[k] = guards_[k][lane];
+        }
+    }
+
+    /// Takes steps of the active runs until there is one that does not take its next step here.
+    /// Returns these runs, a bit each.
+    [[nodiscard]] unsigned advance()
+    {
+#if RICOCHET_WIDE_LANES
+        if (__builtin_cpu_supports("avx2")) return advance_wide();
+#endif
+        return advance_here();
+    }
+
+private:
+    void put(std::size_t lane, D& door, const State& state, const QuietRun& quiet)
+    {
+        const auto& constants = door.constants(0);
+        for (std::size_t i = 0; i < constants.size(); ++i) constants_[i].set(lane, constants[i]);
+        for (std::size_t i = 0; i < n; ++i) {
+            x0_[i].set(lane, state.x0[i]);
+            remainder_[i].set(lane, state.remainder[i]);
+            rate0_[i].set(lane, state.rate0[i]);
+        }
+        start_.set(lane, state.start.value);
+        start_remainder_.set(lane, state.start.remainder);
+        end_.set(lane, quiet.end);
+        h_next_.set(lane, quiet.h_next);
+        h_.set(lane, 0);
+        sign_.set(lane, quiet.sign);
+        g0_.set(lane, quiet.g0);
+        steps_.set(lane, 0);
+        constexpr std::uint64_t most = std::uint64_t{1} << 52;
+        most_steps_.set(lane, static_cast<double>(quiet.most_steps < most ? quiet.most_steps : most));
+    }
+
+    [[gnu::noinline]] unsigned advance_here() { return advance_inline(); }
+#if RICOCHET_WIDE_LANES
+    [[gnu::noinline, gnu::target("avx2")]] unsigned advance_wide() { return advance_inline(); }
+#endif
+
+    [[nodiscard, gnu::always_inline]] LanePack in_time(const LanePack& s) const noexcept
+    {
+        return backward_ ? -s : s;
+    }
+
+    [[nodiscard, gnu::always_inline]] unsigned advance_inline()
+    {
+        LaneMask taken;
+        do {
+            expand();
+            taken = active_ & take_step();
+        } while (!(active_ & !taken).any());
+        unsigned out = 0;
+        for (unsigned lane = 0; lane < lane_count; ++lane) {
+            if (active_[lane] && !taken[lane]) out |= 1U << lane;
+        }
+        return out;
+    }
+
+    [[gnu::always_inline]] void expand()
+    {
+        Series::compute_inline(constants_.data(), start_, x0_.data(), order_, coefficients_.data(),
+                               guards_.data());
+        if (!backward_) return;
+        for (std::size_t k = 1; k <= static_cast<std::size_t>(order_); k += 2) {
+            for (std::size_t i = 0; i < n; ++i) {
+                coefficients_[k * n + i] = -coefficients_[k * n + i];
+            }
+            if constexpr (guarded) guards_[k] = -guards_[k];
+        }
+    }
+
+    /// Whether each lane has taken its step.
+    [[nodiscard, gnu::always_inline]] LaneMask take_step()
+    {
+        const double* const each =
+            options_.component_atol.empty() ? nullptr : options_.component_atol.data();
+        const LanePack* const c = coefficients_.data();
+        const LanePack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol);
+        const LanePack ulp = std::numeric_limits<double>::epsilon() * size_of(start_);
+        const LanePack smallest =
+            larger_of(options_.h_min, larger_of(4.0 * ulp, std::numeric_limits<double>::min()));
+        const LanePack h = smaller_of(h_next_, reach);
+        const LanePack until = in_time((end_ - start_) - start_remainder_);
+        LaneMask fine = ((reach >= smallest) & !(h * (1 + 1e-6) >= until)) & (steps_ < most_steps_);
+        if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
+            fine = fine & !fine;
+        }
+
+        std::array<LanePack, n> w, rate, x1, remainder;
+        evaluate_departure<true>(c, order_, h, w, rate);
+        LanePack sum(0.0);
+        for (std::size_t i = 0; i < n; ++i) {
+            const LanePack rate0 = c[n + i];
+            two_sum(x0_[i], h * rate0 + (w[i] + remainder_[i]), x1[i], remainder[i]);
+            rate[i] = rate0 + rate[i];
+            sum += 0.0 * (x1[i] + rate[i]);
+        }
+        fine = fine & (sum == 0.0);
+        LanePack g1 = g0_;
+        if constexpr (guarded) {
+            sample_guards(x1, start_ + (start_remainder_ + in_time(h)), g1, fine);
+            fine = fine & clears(h, g1);
+        }
+        accept(fine, h, x1, remainder, rate, g1);
+        return fine;
+    }
+
+    /// As the function for two doubles.
+    [[gnu::always_inline]] static void two_sum(const LanePack& a, const LanePack& b, LanePack& sum,
+                                               LanePack& remainder) noexcept
+    {
+        sum = a + b;
+        const LanePack b_part = sum - a;
+        remainder = (a - (sum - b_part)) + (b - b_part);
+    }
+
+    /// The guards of the lanes that are `fine` at the ends of their steps. What one throws it
+    /// throws again in its own loop.
+    [[gnu::always_inline]] void sample_guards(const std::array<LanePack, n>& x1, const LanePack& t,
+                                              LanePack& g1, LaneMask& fine)
+    {
+        for (std::size_t lane = 0; lane < lane_count; ++lane) {
+            if (!(fine[lane] && active_[lane])) continue;
+            Y x;
+            for (std::size_t i = 0; i < n; ++i) x[own(i, x)] = x1[i][lane];
+            const auto& [door, state] = runs_[lane];
+            std::uint64_t calls = 0;
+            try {
+                const Guard guard(door->system(), calls, 0, state->mode, Crossing::falling,
+                                  backward_);
+                g1.set(lane, guard.value(t[lane], x));
+            } catch (...) {
+                fine.set(lane, false);
+            }
+        }
+    }
+
+    /// As `TaylorKernel::is_clear`, without its second look.
+    [[nodiscard, gnu::always_inline]] LaneMask clears(const LanePack& h, const LanePack& g1) const
+    {
+        const LanePack* const g = guards_.data();
+        const LanePack last = last_terms(g, order_, h);
+        const LaneMask converges = last <= 0x1p-20 * larger_of(size_of(g0_), size_of(g1));
+        const LaneMask above = (sign_ * g0_ > 0.0) & (sign_ * g1 > 0.0);
+        return (above & converges) & series_clears(g, order_, sign_, h, last);
+    }
+
+    [[gnu::always_inline]] void accept(const LaneMask& fine, const LanePack& h,
+                                       const std::array<LanePack, n>& x1,
+                                       const std::array<LanePack, n>& remainder,
+                                       const std::array<LanePack, n>& rate1, const LanePack& g1)
+    {
+        LanePack start, start_remainder;
+        two_sum(start_, start_remainder_ + in_time(h), start, start_remainder);
+        start_ = select(fine, start, start_);
+        start_remainder_ = select(fine, start_remainder, start_remainder_);
+        for (std::size_t i = 0; i < n; ++i) {
+            x0_[i] = select(fine, x1[i], x0_[i]);
+            remainder_[i] = select(fine, remainder[i], remainder_[i]);
+            rate0_[i] = select(fine, rate1[i], rate0_[i]);
+        }
+        h_ = select(fine, h, h_);
+        h_next_ = select(fine, smaller_of(10.0 * h, options_.h_max), h_next_);
+        g0_ = select(fine, g1, g0_);
+        steps_ = select(fine, steps_ + 1.0, steps_);
+    }
+
+    struct LaneRun {
+        D* door = nullptr;
+        State* state = nullptr;
+    };
+
+    const Options& options_;
+    int order_;
+    bool backward_;
+    std::array<LaneRun, lane_count> runs_{};
+    std::array<bool, lane_count> used_{};
+    LaneMask active_{};
+    std::array<LanePack, tape.ops_count> constants_;
+    std::array<LanePack, n> x0_, remainder_, rate0_;
+    LanePack start_, start_remainder_, end_, h_, h_next_, sign_, g0_;
+    LanePack steps_, most_steps_;  ///< whole numbers
+    std::array<LanePack, (most_taylor_order + 1) * n> coefficients_;
+    std::array<LanePack, guarded ? most_taylor_order + 1 : 1> guards_;
+};
+
+}  // namespace ricochet::detail
