@@ -51,9 +51,7 @@ inline bool Loop<X, single>::go_to_quiet_steps(QuietRun& quiet, bool beyond)
     for (bool here = !beyond; !ended_; here = true) {
         if (may_run_quietly()) {
             quiet = quiet_orders();
-            const bool off_surface =
-                bank_.size() == 0 || (!quiet.departs && quiet.sign * quiet.g0 > 0);
-            if (here && off_surface) return true;
+            if (here) return true;
             quiet.most_steps = 1;
             run_quietly(quiet);
             if (quiet.steps > 0 || quiet.why != QuietEnd::due) continue;

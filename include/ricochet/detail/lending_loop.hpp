@@ -13,8 +13,8 @@ namespace ricochet::detail {
 template <class X>
 class LendingLoop : public AnyLoop<X> {
 public:
-    /// Goes on to a step that may be quiet, with no guard on its surface. `beyond`: to one after
-    /// the current step. False: the run has ended.
+    /// Goes on to a step that may be quiet. `beyond`: to one after the current step. False: the run
+    /// has ended.
     virtual bool go_to_quiet_steps(QuietRun& quiet, bool beyond) = 0;
     /// Takes over what was done in quiet steps elsewhere, from where they began; the step in hand
     /// is in front of the next.

@@ -91,11 +91,14 @@ template <std::size_t n>
     return power * (size_of(g[order]) * h + size_of(g[order - 1]));
 }
 
-/// As `series_clears`, above 0, of one guard that does not start on its surface.
+/// As `series_clears`, above 0, of one guard.
+/// @param last  its `last_terms`
 [[nodiscard, gnu::always_inline]] inline LaneMask series_clears(const LanePack* g, int order,
                                                                 const LanePack& sign,
                                                                 const LanePack& h,
-                                                                const LanePack& last) noexcept
+                                                                const LanePack& last,
+                                                                const LaneMask& from_surface)
+    noexcept
 {
     const LanePack h2 = h * h;
     const LanePack h4 = h2 * h2;
@@ -114,7 +117,14 @@ template <std::size_t n>
     const LanePack b1 = q0 + (1.0 / 3) * q1;
     const LanePack b2 = q0 + (1.0 / 3) * (2.0 * q1 + q2);
     const LanePack b3 = q0 + (q1 + (q2 + q3));
-    return ((q0 - less > 0.0) & (b1 - less > 0.0)) & ((b2 - less > 0.0) & (b3 - less > 0.0));
+    const LaneMask ends = b3 - less > 0.0;
+    const LaneMask stays = (q0 - less > 0.0) & ((b1 - less > 0.0) & (b2 - less > 0.0));
+    // The root at the start is divided out.
+    const LanePack middle = q1 + 0.5 * q2;
+    const LaneMask rises = (q1 - less > 0.0) & ((middle - less > 0.0) &
+                                                (q1 + (q2 + q3) - less > 0.0));
+    const LaneMask departs = rises & !(size_of(q0) > 0x1p-44 * size);
+    return ends & ((from_surface & departs) | (stays & !from_surface));
 }
 
 /// Whether quiet steps of such runs can be taken together: the compiler unrolls the series of the
@@ -189,6 +199,7 @@ public:
         quiet.h_next = h_next_[lane];
         if (quiet.steps > 0) {
             quiet.g0 = quiet.g1 = g0_[lane];
+            quiet.rate0 = std::numeric_limits<double>::quiet_NaN();  // until it is asked for
             state->h = h_[lane];
             state->flow_calls += quiet.steps;
             state->has_middle = false;
@@ -243,6 +254,7 @@ private:
         h_.set(lane, 0);
         sign_.set(lane, quiet.sign);
         g0_.set(lane, quiet.g0);
+        departs_.set(lane, quiet.departs);
         steps_.set(lane, 0);
         constexpr std::uint64_t most = std::uint64_t{1} << 52;
         most_steps_.set(lane, static_cast<double>(quiet.most_steps < most ? quiet.most_steps : most));
@@ -357,8 +369,10 @@ private:
         const LanePack* const g = guards_.data();
         const LanePack last = last_terms(g, order_, h);
         const LaneMask converges = last <= 0x1p-20 * larger_of(size_of(g0_), size_of(g1));
-        const LaneMask above = (sign_ * g0_ > 0.0) & (sign_ * g1 > 0.0);
-        return (above & converges) & series_clears(g, order_, sign_, h, last);
+        const LanePack q0 = sign_ * g0_;
+        const LaneMask armed = (sign_ * g1 > 0.0) & !(!departs_ & (q0 < 0.0));
+        const LaneMask from_surface = departs_ | (q0 <= 0.0);
+        return (armed & converges) & series_clears(g, order_, sign_, h, last, from_surface);
     }
 
     [[gnu::always_inline]] void accept(const LaneMask& fine, const LanePack& h,
@@ -378,6 +392,7 @@ private:
         h_ = select(fine, h, h_);
         h_next_ = select(fine, smaller_of(10.0 * h, options_.h_max), h_next_);
         g0_ = select(fine, g1, g0_);
+        departs_ = departs_ & !fine;
         steps_ = select(fine, steps_ + 1.0, steps_);
     }
 
@@ -392,6 +407,7 @@ private:
     std::array<LaneRun, lane_count> runs_{};
     std::array<bool, lane_count> used_{};
     LaneMask active_{};
+    LaneMask departs_{};  ///< the guard starts on its surface
     std::array<LanePack, tape.ops_count> constants_;
     std::array<LanePack, n> x0_, remainder_, rate0_;
     LanePack start_, start_remainder_, end_, h_, h_next_, sign_, g0_;
