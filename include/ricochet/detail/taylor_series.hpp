@@ -314,7 +314,8 @@ private:
             inverse_[i] = 0.5 / out;
         } else if constexpr (op.op == TaylorOp::power) {
             out = of_a([](double v) {
-                return op.exponent == 1.0 / 3 ? std::cbrt(v) : std::pow(v, op.exponent);
+                constexpr double exponent = op_at(i).exponent;
+                return exponent == 1.0 / 3 ? std::cbrt(v) : std::pow(v, exponent);
             });
             inverse_[i] = 1 / a;
         } else if constexpr (op.op == TaylorOp::exponential) {
