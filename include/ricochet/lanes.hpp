@@ -18,6 +18,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -77,12 +78,13 @@ private:
 
 /// Runs in lanes, whose next one takes the place of one that has ended.
 /// @tparam SystemOf  gives the system of a row
-template <class System, class X, class SystemOf, class Detector, class Locator>
+/// @tparam wide  as of `TaylorLanes`
+template <class System, class X, bool wide, class SystemOf, class Detector, class Locator>
 class LaneRuns {
     using Stepping = ErrorControlled<Taylor>;
     using Parts = PartsOfRun<System, X, Stepping, Detector, Locator>;
     using C = CoreState<X>;
-    using Lanes = TaylorLanes<System, X>;
+    using Lanes = TaylorLanes<System, X, wide>;
 
 public:
     LaneRuns(const SystemOf& system_of, const std::vector<X>& starts, const Options& options,
@@ -202,10 +204,16 @@ template <class System, class X, class SystemOf, class Detector, class Locator>
                                             const Detector& detector, const Locator& locator)
 {
     if constexpr (fits_lanes<System, X>()) {
-        if (!fuses_products()) {
-            return LaneRuns<System, X, SystemOf, Detector, Locator>(system_of, starts, options,
-                                                                    stepping, detector, locator)
+        const auto run = [&]<bool wide>(std::bool_constant<wide>) {
+            return LaneRuns<System, X, wide, SystemOf, Detector, Locator>(
+                       system_of, starts, options, stepping, detector, locator)
                 .take();
+        };
+        if (!fuses_products()) {
+            if constexpr (!lanes_are_wide) {
+                if (!has_wide_lanes()) return run(std::false_type());
+            }
+            if constexpr (lanes_may_be_wide) return run(std::true_type());
         }
     }
     LaneResults<X> results(starts.size());

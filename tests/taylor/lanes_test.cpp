@@ -392,17 +392,19 @@ TEST(Lanes, FourRunsTakeTheirStepsInTurns)
     EXPECT_GT(turns, 200U);
 }
 
+/// In registers of two doubles: those of four are those of the runs above, where there are any.
 TEST(Lanes, RoughPowersHaveTheBitsOfTheirDoubles)
 {
+    using Pack = detail::LanePack<false>;
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> exponent(-1000, 1000), part(1, 2);
     for (int k = 0; k < 1000; ++k) {
-        detail::LanePack x, y;
+        Pack x, y;
         for (std::size_t lane = 0; lane < detail::lane_count; ++lane) {
             y.set(lane, exponent(random));
             x.set(lane, std::ldexp(part(random), static_cast<int>(y[lane])));
         }
-        const detail::LanePack log = detail::rough_log2(x), power = detail::rough_exp2(y);
+        const Pack log = rough_log2(x), power = rough_exp2(y);
         for (std::size_t lane = 0; lane < detail::lane_count; ++lane) {
             ASSERT_TRUE(same_bits(log[lane], detail::rough_log2(x[lane]))) << x[lane];
             ASSERT_TRUE(same_bits(power[lane], detail::rough_exp2(y[lane]))) << y[lane];

@@ -33,42 +33,42 @@ namespace ricochet::detail {
 
 /// As `find_reach`.
 /// @param each  absolute tolerances of the components in the place of `atol`, or null
-template <std::size_t n>
-[[nodiscard, gnu::always_inline]] inline LanePack find_reach(const std::array<LanePack, n>& x0,
-                                                             const double* each, const LanePack* c,
-                                                             int order, double rtol, double atol)
+template <class Pack, std::size_t n>
+[[nodiscard, gnu::always_inline]] inline Pack find_reach(const std::array<Pack, n>& x0,
+                                                         const double* each, const Pack* c,
+                                                         int order, double rtol, double atol)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     constexpr double least = std::numeric_limits<double>::min();
     constexpr double most = std::numeric_limits<double>::max();
     const double by_last = -1.0 / order, by_before = -1.0 / (order - 1);
-    std::array<LanePack, n> size;
-    const auto clamped = [](const LanePack& a) __attribute__((always_inline))
+    std::array<Pack, n> size;
+    const auto clamped = [](const Pack& a) __attribute__((always_inline))
     {
         return select(a < least, least, select(most < a, most, a));
     };
     const auto longest = [&]() __attribute__((always_inline))
     {
-        LanePack last(0.0), before(0.0);
-        const LanePack* const cp = c + static_cast<std::size_t>(order) * n;
+        Pack last(0.0), before(0.0);
+        const Pack* const cp = c + static_cast<std::size_t>(order) * n;
         for (std::size_t i = 0; i < n; ++i) {
-            const LanePack scale = 1.0 / ((each ? each[i] : atol) + rtol * size[i]);
+            const Pack scale = 1.0 / ((each ? each[i] : atol) + rtol * size[i]);
             last = larger_of(last, size_of(cp[i]) * scale);
             before = larger_of(before, size_of(*(cp + i - n)) * scale);
         }
-        const LaneMask is_series = (last > least) | (before > least);
-        const LanePack h = rough_exp2(smaller_of(rough_log2(clamped(last)) * by_last,
+        const auto is_series = (last > least) | (before > least);
+        const Pack h = rough_exp2(smaller_of(rough_log2(clamped(last)) * by_last,
                                                  rough_log2(clamped(before)) * by_before));
         return select(is_series, h, infinity);
     };
     for (std::size_t i = 0; i < n; ++i) size[i] = size_of(x0[i]);
-    LanePack h = longest();
-    LaneMask going = h < infinity;
+    Pack h = longest();
+    auto going = h < infinity;
     for (int again = 0; again < 3; ++again) {
-        LaneMask larger = LanePack(0.0) < 0.0;
-        const LanePack ahead = smaller_of(h, 1e100);
+        auto larger = Pack(0.0) < 0.0;
+        const Pack ahead = smaller_of(h, 1e100);
         for (std::size_t i = 0; i < n; ++i) {
-            const LanePack end = size_of(x0[i] + ahead * c[n + i]);
+            const Pack end = size_of(x0[i] + ahead * c[n + i]);
             larger = larger | (end > 16.0 * size[i]);
             size[i] = larger_of(size[i], end);
         }
@@ -81,50 +81,50 @@ template <std::size_t n>
 }
 
 /// As `last_terms`, of one guard.
-[[nodiscard, gnu::always_inline]] inline LanePack last_terms(const LanePack* g, int order,
-                                                             const LanePack& h) noexcept
+template <class Pack>
+[[nodiscard, gnu::always_inline]] inline Pack last_terms(const Pack* g, int order,
+                                                         const Pack& h) noexcept
 {
-    const LanePack h2 = h * h;
-    const LanePack h4 = h2 * h2;
-    LanePack power = h4 / h;
+    const Pack h2 = h * h;
+    const Pack h4 = h2 * h2;
+    Pack power = h4 / h;
     for (int k = 8; k <= order; k += 4) power *= h4;
     return power * (size_of(g[order]) * h + size_of(g[order - 1]));
 }
 
 /// As `series_clears`, above 0, of one guard.
 /// @param last  its `last_terms`
-[[nodiscard, gnu::always_inline]] inline LaneMask series_clears(const LanePack* g, int order,
-                                                                const LanePack& sign,
-                                                                const LanePack& h,
-                                                                const LanePack& last,
-                                                                const LaneMask& from_surface)
-    noexcept
+template <class Pack, class Mask = typename Pack::Mask>
+[[nodiscard, gnu::always_inline]] inline Mask series_clears(const Pack* g, int order,
+                                                            const Pack& sign, const Pack& h,
+                                                            const Pack& last,
+                                                            const Mask& from_surface) noexcept
 {
-    const LanePack h2 = h * h;
-    const LanePack h4 = h2 * h2;
-    LanePack tail = size_of(g[order]);
+    const Pack h2 = h * h;
+    const Pack h4 = h2 * h2;
+    Pack tail = size_of(g[order]);
     for (int k = order - 4; k >= 4; k -= 4) {
         tail = tail * h4 + ((size_of(g[k]) + h * size_of(g[k + 1])) +
                             h2 * (size_of(g[k + 2]) + h * size_of(g[k + 3])));
     }
     tail *= h4;
-    const LanePack q0 = sign * g[0];
-    const LanePack q1 = sign * g[1] * h;
-    const LanePack q2 = sign * g[2] * h2;
-    const LanePack q3 = sign * g[3] * (h * h2);
-    const LanePack size = ((size_of(q0) + size_of(q1)) + (size_of(q2) + size_of(q3))) + tail;
-    const LanePack less = (tail + 4.0 * last) + 0x1p-47 * size;
-    const LanePack b1 = q0 + (1.0 / 3) * q1;
-    const LanePack b2 = q0 + (1.0 / 3) * (2.0 * q1 + q2);
-    const LanePack b3 = q0 + (q1 + (q2 + q3));
-    const LaneMask ends = b3 - less > 0.0;
-    const LaneMask stays = (q0 - less > 0.0) & ((b1 - less > 0.0) & (b2 - less > 0.0));
+    const Pack q0 = sign * g[0];
+    const Pack q1 = sign * g[1] * h;
+    const Pack q2 = sign * g[2] * h2;
+    const Pack q3 = sign * g[3] * (h * h2);
+    const Pack size = ((size_of(q0) + size_of(q1)) + (size_of(q2) + size_of(q3))) + tail;
+    const Pack less = (tail + 4.0 * last) + 0x1p-47 * size;
+    const Pack b1 = q0 + (1.0 / 3) * q1;
+    const Pack b2 = q0 + (1.0 / 3) * (2.0 * q1 + q2);
+    const Pack b3 = q0 + (q1 + (q2 + q3));
+    const Mask ends = b3 - less > 0.0;
+    const Mask stays = (q0 - less > 0.0) & ((b1 - less > 0.0) & (b2 - less > 0.0));
     // The root at the start is divided out.
-    const LanePack middle = q1 + 0.5 * q2;
-    const LaneMask rises = (q1 - less > 0.0) & ((middle - less > 0.0) &
+    const Pack middle = q1 + 0.5 * q2;
+    const Mask rises = (q1 - less > 0.0) & ((middle - less > 0.0) &
                                                 (q1 + (q2 + q3) - less > 0.0));
-    const LaneMask departs = rises & !(size_of(q0) > 0x1p-44 * size);
-    return ends & ((from_surface & departs) | (stays & !from_surface));
+    const Mask departs = rises & ~(size_of(q0) > 0x1p-44 * size);
+    return ends & ((from_surface & departs) | (stays & ~from_surface));
 }
 
 /// Whether quiet steps of such runs can be taken together: the compiler unrolls the series of the
@@ -143,9 +143,29 @@ template <class System, class X>
     }
 }
 
+#if defined(__AVX2__)
+constexpr bool lanes_are_wide = true;
+#else
+constexpr bool lanes_are_wide = false;
+#endif
+constexpr bool lanes_may_be_wide = lanes_are_wide || RICOCHET_WIDE_LANES;
+
+/// Whether the processor has registers of four doubles.
+[[nodiscard]] inline bool has_wide_lanes() noexcept
+{
+#if RICOCHET_WIDE_LANES
+    return __builtin_cpu_supports("avx2");
+#else
+    return lanes_are_wide;
+#endif
+}
+
 /// Up to `lane_count` runs of `System` from starts like X.
-template <class System, class X>
+/// @tparam wide  in registers of four doubles, which the processor has
+template <class System, class X, bool wide>
 class TaylorLanes {
+    using Pack = LanePack<wide>;
+    using Mask = LaneMask<wide>;
     static constexpr std::size_t n = fixed_size<X>();
     using D = TaylorDoor<System, X, n>;
     using C = CoreState<X>;
@@ -154,7 +174,7 @@ class TaylorLanes {
     using Guard = GuardView<System, Y>;
     static constexpr const auto& tape = taylor_tape<System, n, 0>;
     static constexpr bool guarded = tape.guards == 1;
-    using Series = TaylorSeries<tape, most_taylor_order, true, LanePack>;
+    using Series = TaylorSeries<tape, most_taylor_order, true, Pack>;
 
 public:
     using Door = D;
@@ -229,13 +249,13 @@ public:
 
     /// Takes steps of the active runs until there is one that does not take its next step here.
     /// Returns these runs, a bit each.
-    [[nodiscard]] unsigned advance()
+    [[nodiscard]] unsigned advance() requires(!wide || !RICOCHET_WIDE_LANES)
     {
-#if RICOCHET_WIDE_LANES
-        if (__builtin_cpu_supports("avx2")) return advance_wide();
-#endif
-        return advance_here();
+        return advance_inline();
     }
+#if RICOCHET_WIDE_LANES
+    [[nodiscard, gnu::target("avx2")]] unsigned advance() requires wide { return advance_inline(); }
+#endif
 
 private:
     void put(std::size_t lane, D& door, const State& state, const QuietRun& quiet)
@@ -260,23 +280,18 @@ private:
         most_steps_.set(lane, static_cast<double>(quiet.most_steps < most ? quiet.most_steps : most));
     }
 
-    [[gnu::noinline]] unsigned advance_here() { return advance_inline(); }
-#if RICOCHET_WIDE_LANES
-    [[gnu::noinline, gnu::target("avx2")]] unsigned advance_wide() { return advance_inline(); }
-#endif
-
-    [[nodiscard, gnu::always_inline]] LanePack in_time(const LanePack& s) const noexcept
+    [[nodiscard, gnu::always_inline]] Pack in_time(const Pack& s) const noexcept
     {
         return backward_ ? -s : s;
     }
 
     [[nodiscard, gnu::always_inline]] unsigned advance_inline()
     {
-        LaneMask taken;
+        Mask taken;
         do {
             expand();
             taken = active_ & take_step();
-        } while (!(active_ & !taken).any());
+        } while (!(active_ & ~taken).any());
         unsigned out = 0;
         for (unsigned lane = 0; lane < lane_count; ++lane) {
             if (active_[lane] && !taken[lane]) out |= 1U << lane;
@@ -298,33 +313,33 @@ private:
     }
 
     /// Whether each lane has taken its step.
-    [[nodiscard, gnu::always_inline]] LaneMask take_step()
+    [[nodiscard, gnu::always_inline]] Mask take_step()
     {
         const double* const each =
             options_.component_atol.empty() ? nullptr : options_.component_atol.data();
-        const LanePack* const c = coefficients_.data();
-        const LanePack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol);
-        const LanePack ulp = std::numeric_limits<double>::epsilon() * size_of(start_);
-        const LanePack smallest =
+        const Pack* const c = coefficients_.data();
+        const Pack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol);
+        const Pack ulp = std::numeric_limits<double>::epsilon() * size_of(start_);
+        const Pack smallest =
             larger_of(options_.h_min, larger_of(4.0 * ulp, std::numeric_limits<double>::min()));
-        const LanePack h = smaller_of(h_next_, reach);
-        const LanePack until = in_time((end_ - start_) - start_remainder_);
-        LaneMask fine = ((reach >= smallest) & !(h * (1 + 1e-6) >= until)) & (steps_ < most_steps_);
+        const Pack h = smaller_of(h_next_, reach);
+        const Pack until = in_time((end_ - start_) - start_remainder_);
+        Mask fine = ((reach >= smallest) & ~(h * (1 + 1e-6) >= until)) & (steps_ < most_steps_);
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
-            fine = fine & !fine;
+            fine = fine & ~fine;
         }
 
-        std::array<LanePack, n> w, rate, x1, remainder;
+        std::array<Pack, n> w, rate, x1, remainder;
         evaluate_departure<true>(c, order_, h, w, rate);
-        LanePack sum(0.0);
+        Pack sum(0.0);
         for (std::size_t i = 0; i < n; ++i) {
-            const LanePack rate0 = c[n + i];
+            const Pack rate0 = c[n + i];
             two_sum(x0_[i], h * rate0 + (w[i] + remainder_[i]), x1[i], remainder[i]);
             rate[i] = rate0 + rate[i];
             sum += 0.0 * (x1[i] + rate[i]);
         }
         fine = fine & (sum == 0.0);
-        LanePack g1 = g0_;
+        Pack g1 = g0_;
         if constexpr (guarded) {
             sample_guards(x1, start_ + (start_remainder_ + in_time(h)), g1, fine);
             fine = fine & clears(h, g1);
@@ -334,18 +349,18 @@ private:
     }
 
     /// As the function for two doubles.
-    [[gnu::always_inline]] static void two_sum(const LanePack& a, const LanePack& b, LanePack& sum,
-                                               LanePack& remainder) noexcept
+    [[gnu::always_inline]] static void two_sum(const Pack& a, const Pack& b, Pack& sum,
+                                               Pack& remainder) noexcept
     {
         sum = a + b;
-        const LanePack b_part = sum - a;
+        const Pack b_part = sum - a;
         remainder = (a - (sum - b_part)) + (b - b_part);
     }
 
     /// The guards of the lanes that are `fine` at the ends of their steps. What one throws it
     /// throws again in its own loop.
-    [[gnu::always_inline]] void sample_guards(const std::array<LanePack, n>& x1, const LanePack& t,
-                                              LanePack& g1, LaneMask& fine)
+    [[gnu::always_inline]] void sample_guards(const std::array<Pack, n>& x1, const Pack& t,
+                                              Pack& g1, Mask& fine)
     {
         for (std::size_t lane = 0; lane < lane_count; ++lane) {
             if (!(fine[lane] && active_[lane])) continue;
@@ -364,23 +379,23 @@ private:
     }
 
     /// As `TaylorKernel::is_clear`, without its second look.
-    [[nodiscard, gnu::always_inline]] LaneMask clears(const LanePack& h, const LanePack& g1) const
+    [[nodiscard, gnu::always_inline]] Mask clears(const Pack& h, const Pack& g1) const
     {
-        const LanePack* const g = guards_.data();
-        const LanePack last = last_terms(g, order_, h);
-        const LaneMask converges = last <= 0x1p-20 * larger_of(size_of(g0_), size_of(g1));
-        const LanePack q0 = sign_ * g0_;
-        const LaneMask armed = (sign_ * g1 > 0.0) & !(!departs_ & (q0 < 0.0));
-        const LaneMask from_surface = departs_ | (q0 <= 0.0);
+        const Pack* const g = guards_.data();
+        const Pack last = last_terms(g, order_, h);
+        const Mask converges = last <= 0x1p-20 * larger_of(size_of(g0_), size_of(g1));
+        const Pack q0 = sign_ * g0_;
+        const Mask armed = (sign_ * g1 > 0.0) & ~(~departs_ & (q0 < 0.0));
+        const Mask from_surface = departs_ | (q0 <= 0.0);
         return (armed & converges) & series_clears(g, order_, sign_, h, last, from_surface);
     }
 
-    [[gnu::always_inline]] void accept(const LaneMask& fine, const LanePack& h,
-                                       const std::array<LanePack, n>& x1,
-                                       const std::array<LanePack, n>& remainder,
-                                       const std::array<LanePack, n>& rate1, const LanePack& g1)
+    [[gnu::always_inline]] void accept(const Mask& fine, const Pack& h,
+                                       const std::array<Pack, n>& x1,
+                                       const std::array<Pack, n>& remainder,
+                                       const std::array<Pack, n>& rate1, const Pack& g1)
     {
-        LanePack start, start_remainder;
+        Pack start, start_remainder;
         two_sum(start_, start_remainder_ + in_time(h), start, start_remainder);
         start_ = select(fine, start, start_);
         start_remainder_ = select(fine, start_remainder, start_remainder_);
@@ -392,7 +407,7 @@ private:
         h_ = select(fine, h, h_);
         h_next_ = select(fine, smaller_of(10.0 * h, options_.h_max), h_next_);
         g0_ = select(fine, g1, g0_);
-        departs_ = departs_ & !fine;
+        departs_ = departs_ & ~fine;
         steps_ = select(fine, steps_ + 1.0, steps_);
     }
 
@@ -406,14 +421,14 @@ private:
     bool backward_;
     std::array<LaneRun, lane_count> runs_{};
     std::array<bool, lane_count> used_{};
-    LaneMask active_{};
-    LaneMask departs_{};  ///< the guard starts on its surface
-    std::array<LanePack, tape.ops_count> constants_;
-    std::array<LanePack, n> x0_, remainder_, rate0_;
-    LanePack start_, start_remainder_, end_, h_, h_next_, sign_, g0_;
-    LanePack steps_, most_steps_;  ///< whole numbers
-    std::array<LanePack, (most_taylor_order + 1) * n> coefficients_;
-    std::array<LanePack, guarded ? most_taylor_order + 1 : 1> guards_;
+    Mask active_{};
+    Mask departs_{};  ///< the guard starts on its surface
+    std::array<Pack, tape.ops_count> constants_;
+    std::array<Pack, n> x0_, remainder_, rate0_;
+    Pack start_, start_remainder_, end_, h_, h_next_, sign_, g0_;
+    Pack steps_, most_steps_;  ///< whole numbers
+    std::array<Pack, (most_taylor_order + 1) * n> coefficients_;
+    std::array<Pack, guarded ? most_taylor_order + 1 : 1> guards_;
 };
 
 }  // namespace ricochet::detail
