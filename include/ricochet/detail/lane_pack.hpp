@@ -7,7 +7,7 @@
 // compiled for another machine than its file has them inlined.
 #pragma once
 
-#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -196,6 +196,18 @@ template <bool wide, class F>
     LanePack<wide> out;
     for (std::size_t lane = 0; lane < lane_count; ++lane) out.set(lane, f(x[lane], y[lane]));
     return out;
+}
+
+/// sin(x) and cos(x), lane by lane: one call for both.
+template <bool wide>
+[[gnu::always_inline]] inline void map_circle(const LanePack<wide>& x, LanePack<wide>& sine,
+                                              LanePack<wide>& cosine)
+{
+    for (std::size_t lane = 0; lane < lane_count; ++lane) {
+        const double angle = x[lane];
+        sine.set(lane, std::sin(angle));
+        cosine.set(lane, std::cos(angle));
+    }
 }
 
 /// |x|

@@ -323,10 +323,14 @@ private:
         } else if constexpr (op.op == TaylorOp::logarithm) {
             out = of_a([](double v) { return std::log(v); });
             inverse_[i] = 1 / a;
-        } else if constexpr (op.op == TaylorOp::sine) {
-            out = of_a([](double v) { return std::sin(v); });
-        } else if constexpr (op.op == TaylorOp::cosine) {
-            out = of_a([](double v) { return std::cos(v); });
+        } else if constexpr (op.op == TaylorOp::sine || op.op == TaylorOp::cosine) {
+            constexpr bool is_sine = op.op == TaylorOp::sine;
+            if constexpr (std::is_same_v<S, double>) {
+                out = is_sine ? std::sin(a) : std::cos(a);
+            } else if constexpr (op.b > i) {
+                S& other = c_[op.b][0];
+                map_circle(a, is_sine ? out : other, is_sine ? other : out);
+            }  // else its partner has computed both
         } else if constexpr (op.op == TaylorOp::hyperbolic_sine) {
             out = of_a([](double v) { return std::sinh(v); });
         } else if constexpr (op.op == TaylorOp::hyperbolic_cosine) {
