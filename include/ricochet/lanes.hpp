@@ -219,8 +219,8 @@ template <class System, class X, class SystemOf, class Detector, class Locator>
     LaneResults<X> results(starts.size());
     for (std::size_t row = 0; row < starts.size(); ++row) {
         results.attempt(row, [&] {
-            results.keep(row, integrate(system_of(row), starts[row], options, stepping, detector,
-                                        locator));
+            results.keep(
+                row, integrate(system_of(row), starts[row], options, stepping, detector, locator));
         });
     }
     return results.take();

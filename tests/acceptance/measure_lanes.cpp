@@ -112,12 +112,11 @@ double compare_lanes(const char* name, Measured& out)
     const double ratio = times[0].p10 / times[1].p10;
     const double each = 1e9 / static_cast<double>(steps);
     out.pass = out.pass && differ == 0;
-    out.details.push_back(
-        fmt::format("{}: {:.2f} times, {:.0f} ns a step instead of {:.0f}, {:.0f} steps an event, "
-                    "{} of {} runs differ",
-                    name, ratio, times[1].p10 * each, times[0].p10 * each,
-                    static_cast<double>(steps) / static_cast<double>(events), differ,
-                    starts.size()));
+    out.details.push_back(fmt::format(
+        "{}: {:.2f} times, {:.0f} ns a step instead of {:.0f}, {:.0f} steps an event, "
+        "{} of {} runs differ",
+        name, ratio, times[1].p10 * each, times[0].p10 * each,
+        static_cast<double>(steps) / static_cast<double>(events), differ, starts.size()));
     return ratio;
 }
 

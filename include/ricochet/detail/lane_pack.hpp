@@ -41,22 +41,21 @@ struct LaneParts<T, false> {
 };
 
 // An expression of a and b, the parts of x and y, for each part.
-#define RICOCHET_BOTH(Result, expression)                                               \
-    Result out;                                                                         \
-    {                                                                                   \
-        const auto &a = x.parts.low, &b = y.parts.low;                                  \
-        out.parts.low = expression;                                                     \
-    }                                                                                   \
-    if constexpr (!wide) {                                                              \
-        const auto &a = x.parts.high, &b = y.parts.high;                                \
-        out.parts.high = expression;                                                    \
-    }                                                                                   \
+#define RICOCHET_BOTH(Result, expression)                \
+    Result out;                                          \
+    {                                                    \
+        const auto &a = x.parts.low, &b = y.parts.low;   \
+        out.parts.low = expression;                      \
+    }                                                    \
+    if constexpr (!wide) {                               \
+        const auto &a = x.parts.high, &b = y.parts.high; \
+        out.parts.high = expression;                     \
+    }                                                    \
     return out
-#define RICOCHET_LANES(Result, T, op)                                                   \
-    [[nodiscard, gnu::always_inline]] friend Result operator op(const T& x,             \
-                                                                const T& y) noexcept    \
-    {                                                                                   \
-        RICOCHET_BOTH(Result, a op b);                                                  \
+#define RICOCHET_LANES(Result, T, op)                                                            \
+    [[nodiscard, gnu::always_inline]] friend Result operator op(const T& x, const T& y) noexcept \
+    {                                                                                            \
+        RICOCHET_BOTH(Result, a op b);                                                           \
     }
 
 /// A truth for each lane.
@@ -144,7 +143,7 @@ struct LanePack {
         if constexpr (!wide) out.parts.high = which.parts.high ? x.parts.high : y.parts.high;
         return out;
     }
-    /// As std::max and std::min, where one of both is no number, too.
+    /// As std::max and std::min, where one of both is NaN, too.
     [[nodiscard, gnu::always_inline]] friend LanePack larger_of(const LanePack& x,
                                                                 const LanePack& y) noexcept
     {

@@ -16,8 +16,8 @@ public:
     /// Goes on to a step that may be quiet. `beyond`: to one after the current step. False: the run
     /// has ended.
     virtual bool go_to_quiet_steps(QuietRun& quiet, bool beyond) = 0;
-    /// Takes over what was done in quiet steps elsewhere, from where they began; the step in hand
-    /// is in front of the next.
+    /// Takes over what was done in quiet steps elsewhere, from where they began; the current step
+    /// is the next one.
     virtual void take_back(const QuietRun& quiet) = 0;
     [[nodiscard]] virtual StepState<X>& lend() noexcept = 0;
 };

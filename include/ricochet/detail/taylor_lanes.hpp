@@ -58,7 +58,7 @@ template <class Pack, std::size_t n>
         }
         const auto is_series = (last > least) | (before > least);
         const Pack h = rough_exp2(smaller_of(rough_log2(clamped(last)) * by_last,
-                                                 rough_log2(clamped(before)) * by_before));
+                                             rough_log2(clamped(before)) * by_before));
         return select(is_series, h, infinity);
     };
     for (std::size_t i = 0; i < n; ++i) size[i] = size_of(x0[i]);
@@ -121,8 +121,7 @@ template <class Pack, class Mask = typename Pack::Mask>
     const Mask stays = (q0 - less > 0.0) & ((b1 - less > 0.0) & (b2 - less > 0.0));
     // The root at the start is divided out.
     const Pack middle = q1 + 0.5 * q2;
-    const Mask rises = (q1 - less > 0.0) & ((middle - less > 0.0) &
-                                                (q1 + (q2 + q3) - less > 0.0));
+    const Mask rises = (q1 - less > 0.0) & ((middle - less > 0.0) & (q1 + (q2 + q3) - less > 0.0));
     const Mask departs = rises & ~(size_of(q0) > 0x1p-44 * size);
     return ends & ((from_surface & departs) | (stays & ~from_surface));
 }
@@ -254,7 +253,10 @@ public:
         return advance_inline();
     }
 #if RICOCHET_WIDE_LANES
-    [[nodiscard, gnu::target("avx2")]] unsigned advance() requires wide { return advance_inline(); }
+    [[nodiscard, gnu::target("avx2")]] unsigned advance() requires wide
+    {
+        return advance_inline();
+    }
 #endif
 
 private:
@@ -277,7 +279,8 @@ private:
         departs_.set(lane, quiet.departs);
         steps_.set(lane, 0);
         constexpr std::uint64_t most = std::uint64_t{1} << 52;
-        most_steps_.set(lane, static_cast<double>(quiet.most_steps < most ? quiet.most_steps : most));
+        most_steps_.set(lane,
+                        static_cast<double>(quiet.most_steps < most ? quiet.most_steps : most));
     }
 
     [[nodiscard, gnu::always_inline]] Pack in_time(const Pack& s) const noexcept
@@ -290,7 +293,7 @@ private:
         Mask taken;
         do {
             expand();
-            taken = active_ & take_step();
+            taken = take_step();
         } while (!(active_ & ~taken).any());
         unsigned out = 0;
         for (unsigned lane = 0; lane < lane_count; ++lane) {
@@ -312,7 +315,7 @@ private:
         }
     }
 
-    /// Whether each lane has taken its step.
+    /// Whether each active lane has taken its step.
     [[nodiscard, gnu::always_inline]] Mask take_step()
     {
         const double* const each =
@@ -324,7 +327,8 @@ private:
             larger_of(options_.h_min, larger_of(4.0 * ulp, std::numeric_limits<double>::min()));
         const Pack h = smaller_of(h_next_, reach);
         const Pack until = in_time((end_ - start_) - start_remainder_);
-        Mask fine = ((reach >= smallest) & ~(h * (1 + 1e-6) >= until)) & (steps_ < most_steps_);
+        Mask fine =
+            (active_ & (steps_ < most_steps_)) & ((reach >= smallest) & ~(h * (1 + 1e-6) >= until));
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
             fine = fine & ~fine;
         }
@@ -363,7 +367,7 @@ private:
                                               Pack& g1, Mask& fine)
     {
         for (std::size_t lane = 0; lane < lane_count; ++lane) {
-            if (!(fine[lane] && active_[lane])) continue;
+            if (!fine[lane]) continue;
             Y x;
             for (std::size_t i = 0; i < n; ++i) x[own(i, x)] = x1[i][lane];
             const auto& [door, state] = runs_[lane];

@@ -280,8 +280,10 @@ private:
         const S c = has_constant(op.op) ? constants_[i] : S(0.0);
         const S a = op.a >= 0 ? c_[op.a][0] : S(0.0);
         const S b = op.b >= 0 ? c_[op.b][0] : S(0.0);
-        const auto of_a = [&](const auto& f)
-            __attribute__((always_inline)) { return map_lanes(a, f); };
+        const auto of_a = [&](const auto& f) __attribute__((always_inline))
+        {
+            return map_lanes(a, f);
+        };
         if constexpr (op.op == TaylorOp::constant) {
             out = c;
         } else if constexpr (op.op == TaylorOp::sum) {
@@ -432,20 +434,17 @@ private:
             // b g' = a', or -a'
             constexpr bool log = op.op == TaylorOp::logarithm;
             constexpr int d = log ? da : db;
-            const S sum =
-                Sum::template convolve<larger(1, k - d), k - 1>(slope<i>(), log ? a : b) *
-                (1.0 / k);
+            const S sum = Sum::template convolve<larger(1, k - d), k - 1>(slope<i>(), log ? a : b) *
+                          (1.0 / k);
             S first(0.0);
             if constexpr (k <= da) first = op.op == TaylorOp::arc_cosine ? -a[k] : a[k];
             return (first - sum) * inverse_[i];
         } else if constexpr (op.op == TaylorOp::angle) {
             // c g' = a' b - b' a
             constexpr int dc = degree(larger(op.c, 0));
-            const S turn =
-                Sum::template convolve<larger(1, k - db), upto_a>(slope<op.a>(), b) -
-                Sum::template convolve<larger(1, k - da), upto_b>(slope<op.b>(), a);
-            const S sum =
-                Sum::template convolve<larger(1, k - dc), k - 1>(slope<i>(), c_[op.c]);
+            const S turn = Sum::template convolve<larger(1, k - db), upto_a>(slope<op.a>(), b) -
+                           Sum::template convolve<larger(1, k - da), upto_b>(slope<op.b>(), a);
+            const S sum = Sum::template convolve<larger(1, k - dc), k - 1>(slope<i>(), c_[op.c]);
             return (turn - sum) * (inverse_[i] * (1.0 / k));
         }
     }
@@ -579,9 +578,8 @@ private:
                        inverse_[i];
             case TaylorOp::angle: {
                 const double* const c = c_[larger(op.c, 0)];
-                const S turn =
-                    convolve(k, larger(1, k - db), upto_a, slope<larger(op.a, 0)>(), b) -
-                    convolve(k, larger(1, k - da), upto_b, slope<larger(op.b, 0)>(), a);
+                const S turn = convolve(k, larger(1, k - db), upto_a, slope<larger(op.a, 0)>(), b) -
+                               convolve(k, larger(1, k - da), upto_b, slope<larger(op.b, 0)>(), a);
                 const int from = larger(1, k - degree(larger(op.c, 0)));
                 return (turn - convolve(k, from, k - 1, slope<i>(), c)) * inverse_[i] / k;
             }

@@ -145,7 +145,7 @@ template <bool with_rate, class S, class Array>
     // Four coefficients at a time: a quarter of Horner's additions wait for each other.
     const S s2 = s * s;
     const S s4 = s2 * s2;
-    const auto at = [c, n](int k, std::size_t i) __attribute__((always_inline))
+    const auto at = [ c, n ](int k, std::size_t i) __attribute__((always_inline))
     {
         return c[static_cast<std::size_t>(k) * n + i];
     };
