@@ -44,22 +44,36 @@ struct KeptSetup {
 };
 template <class X, bool single>
 struct KeptLoop final : KeptSetup<X>, Loop<X, single> {
-    KeptLoop(const RunSetup<X>& setup, const X& x0, const Options& options)
+    KeptLoop(const RunSetup<X>& setup, const X& x0, const Options& options, bool resumable)
         : KeptSetup<X>{setup}, Loop<X, single>(this->kept, x0, options)
     {
-        this->keep_resumable();
+        if (resumable) this->keep_resumable();
     }
 };
 
 template <class X>
-std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0, const Options& options)
+std::unique_ptr<LendingLoop<X>> make_kept_loop(const RunSetup<X>& setup, const X& x0,
+                                               const Options& options, bool resumable)
 {
     if constexpr (fixed_size<X>() > 0) {
         if (has_single_guard(setup)) {
-            return std::make_unique<KeptLoop<X, true>>(setup, x0, options);
+            return std::make_unique<KeptLoop<X, true>>(setup, x0, options, resumable);
         }
     }
-    return std::make_unique<KeptLoop<X, false>>(setup, x0, options);
+    return std::make_unique<KeptLoop<X, false>>(setup, x0, options, resumable);
+}
+
+template <class X>
+std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0, const Options& options)
+{
+    return make_kept_loop(setup, x0, options, true);
+}
+
+template <class X>
+std::unique_ptr<LendingLoop<X>> make_lending_loop(const RunSetup<X>& setup, const X& x0,
+                                                  const Options& options)
+{
+    return make_kept_loop(setup, x0, options, false);
 }
 
 template <class X, bool single>
@@ -166,6 +180,8 @@ QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
     template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(const RunSetup<CoreStateHere>&,    \
                                                                const CoreStateHere&,              \
                                                                const Options&);                   \
+    template std::unique_ptr<LendingLoop<CoreStateHere>> make_lending_loop(                       \
+        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                    \
     template std::unique_ptr<AnyMonitor<CoreStateHere>> make_monitor(                             \
         const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, bool);              \
     template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \

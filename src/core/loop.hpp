@@ -28,6 +28,7 @@
 #include "core/engine.hpp"
 #include "core/initial_step.hpp"
 #include "ricochet/detail/core.hpp"
+#include "ricochet/detail/lending_loop.hpp"
 #include "ricochet/detail/step_control.hpp"
 
 namespace ricochet::detail {
@@ -37,7 +38,7 @@ template <class X>
 [[nodiscard]] QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept;
 
 template <class X, bool single>
-class Loop : public AnyLoop<X>, private EventEngine<X, single> {
+class Loop : public LendingLoop<X>, private EventEngine<X, single> {
     using Engine = EventEngine<X, single>;
 
 public:
@@ -123,6 +124,12 @@ public:
         shown_events_ = run_.statistics.events;
         showing_sample_ = false;
     }
+
+    // --- quiet steps that are taken elsewhere ---
+
+    bool go_to_quiet_steps(QuietRun& quiet, bool beyond) override;
+    void take_back(const QuietRun& quiet) override { take_over(quiet); }
+    [[nodiscard]] StepState<X>& lend() noexcept override { return step_.lend(); }
 
     /// Advances to the end and returns the result.
     [[nodiscard]] Run<X> take() override
@@ -286,6 +293,10 @@ private:
     bool run_quietly();
     [[gnu::noinline]] bool run_quietly_resumably();
     [[gnu::always_inline]] bool run_quietly_from_here();
+    /// What the quiet steps from here on are to heed.
+    [[nodiscard, gnu::always_inline]] QuietRun quiet_orders() const;
+    [[gnu::always_inline]] void run_quietly(QuietRun& quiet);
+    [[gnu::always_inline]] void take_over(const QuietRun& quiet);
     [[gnu::always_inline]] void end_quiet_run(const QuietRun& quiet);
 
     /// Whether the limits of the options allow further steps; also sets when to ask next.

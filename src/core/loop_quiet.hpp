@@ -12,7 +12,7 @@ inline bool Loop<X, single>::run_quietly()
 }
 
 template <class X, bool single>
-inline bool Loop<X, single>::run_quietly_from_here()
+inline QuietRun Loop<X, single>::quiet_orders() const
 {
     const bool time_event_first = timed_ && step_.until(time_event_) <= step_.until(options_.t_end);
     QuietRun quiet{.end = time_event_first ? time_event_ : options_.t_end,
@@ -26,7 +26,44 @@ inline bool Loop<X, single>::run_quietly_from_here()
                    .system = system_.operator->(),
                    .h_next = h_next_};
     bank_.lend(quiet, step_.time(0));
+    return quiet;
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::run_quietly_from_here()
+{
+    QuietRun quiet = quiet_orders();
+    run_quietly(quiet);
+    return quiet.why != QuietEnd::due;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::run_quietly(QuietRun& quiet)
+{
     quiet_(system_.door(), step_.lend(), quiet);
+    take_over(quiet);
+    if (quiet.why != QuietEnd::due) end_quiet_run(quiet);
+}
+
+template <class X, bool single>
+inline bool Loop<X, single>::go_to_quiet_steps(QuietRun& quiet, bool beyond)
+{
+    for (bool here = !beyond; !ended_; here = true) {
+        if (may_run_quietly()) {
+            quiet = quiet_orders();
+            if (here) return true;
+            quiet.most_steps = 1;
+            run_quietly(quiet);
+            if (quiet.steps > 0 || quiet.why != QuietEnd::due) continue;
+        }
+        advance_one({});
+    }
+    return false;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::take_over(const QuietRun& quiet)
+{
     if (this->on_series_) {
         bank_.take_back_on_series(quiet, step_);
     } else {
@@ -41,9 +78,6 @@ inline bool Loop<X, single>::run_quietly_from_here()
     if (bank_.size() > 0)
         this->add_evidence(this->on_series_ ? Evidence::proved : finders_.detector.evidence,
                            quiet.steps);
-    if (quiet.why == QuietEnd::due) return false;
-    end_quiet_run(quiet);
-    return true;
 }
 
 template <class X, bool single>

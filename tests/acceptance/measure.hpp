@@ -43,6 +43,7 @@ struct Check {
 
 /// Taylor's method.
 [[nodiscard]] std::vector<Check> taylor_checks();
+[[nodiscard]] Measured time_taylor_lanes();
 
 /// The network: kernels, models, training, gate.
 [[nodiscard]] std::vector<Check> network_checks();

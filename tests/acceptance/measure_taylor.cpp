@@ -543,6 +543,8 @@ std::vector<Check> taylor_checks()
          compare_taylor_outer_system, false},
         {"taylor", "taylor-random", "100000 random systems against long double",
          "0 missed, 0 spurious, 0 misplaced", check_taylor_random_systems},
+        {"taylor", "taylor-lanes", "63 pendulums and orbits of Henon-Heiles in lanes of four",
+         ">= 2.5 times the runs in a second, the same bits", time_taylor_lanes},
     };
 }
 

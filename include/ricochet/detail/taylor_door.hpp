@@ -207,6 +207,12 @@ struct TaylorDoor : Door<System, X> {
         return false;
     }
 
+    /// Those of the operations that the compiler has unrolled, each at its number.
+    [[nodiscard]] const auto& constants(std::size_t mode) const noexcept
+    {
+        return constants_[mode];
+    }
+
     int given_order = 0;
     Step step;
     [[no_unique_address]] std::conditional_t<n == 0, Room, std::tuple<>> room;

@@ -10,6 +10,9 @@
 // Sums begin with their middle terms and end with the newest coefficients, so that only two
 // additions wait for the operation before. Short tapes are unrolled over operations and orders;
 // longer ones over operations alone.
+//
+// The scalar S of the coefficients is double, or several doubles side by side, one for each of
+// several motions: then each has the bits that it has alone.
 #pragma once
 
 #include <algorithm>
@@ -38,11 +41,11 @@ struct AtOrder {
     static constexpr int value = k;
 
     /// sum of a_j b_{k-j} for j from lo to hi
-    template <int lo, int hi>
-    [[nodiscard, gnu::always_inline]] static double convolve(const double* a, const double* b)
+    template <int lo, int hi, class S>
+    [[nodiscard, gnu::always_inline]] static S convolve(const S* a, const S* b)
     {
         if constexpr (lo > hi) {
-            return 0;
+            return S(0.0);
         } else {
             return [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
             {
@@ -52,9 +55,8 @@ struct AtOrder {
         }
     }
     /// sum of ((exponent + 1) j / k - 1) a_j p_{k-j} for j from 1 to hi
-    template <int hi>
-    [[nodiscard, gnu::always_inline]] static double power(double exponent, const double* a,
-                                                          const double* p)
+    template <int hi, class S>
+    [[nodiscard, gnu::always_inline]] static S power(double exponent, const S* a, const S* p)
     {
         return [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
         {
@@ -88,10 +90,23 @@ inline constexpr std::size_t most_unrolled_ops = 30;
 template <const auto& tape>
 inline constexpr bool is_unrolled = tape.ops.size() - tape.states - 1 <= most_unrolled_ops;
 
+/// f(a), of each double in it.
+template <class F>
+[[nodiscard, gnu::always_inline]] inline double map_lanes(double a, const F& f)
+{
+    return f(a);
+}
+template <class F>
+[[nodiscard, gnu::always_inline]] inline double map_lanes(double a, double b, const F& f)
+{
+    return f(a, b);
+}
+
 /// The coefficients of one motion: `constants`, time and state in, those of the state out.
 /// @tparam tape  of type `TaylorTape`
 /// @tparam most  the largest order
-template <const auto& tape, int most, bool unrolled = is_unrolled<tape>>
+/// @tparam S  double, or several, where operations are unrolled
+template <const auto& tape, int most, bool unrolled = is_unrolled<tape>, class S = double>
 class TaylorSeries {
     using Tape = std::remove_cvref_t<decltype(tape)>;
     static constexpr int n = static_cast<int>(Tape::states);
@@ -132,8 +147,13 @@ class TaylorSeries {
 public:
     /// out[k n + i] = coefficient k of component i, up to `order`: `most`, or one of those that are
     /// 4 and 8 less. The same of the m guards in `guards`.
-    static void compute(const double* constants, double t, const double* x, int order, double* out,
-                        double* guards)
+    static void compute(const S* constants, S t, const S* x, int order, S* out, S* guards)
+    {
+        compute_inline(constants, t, x, order, out, guards);
+    }
+    /// The same, for callers that are compiled for another machine.
+    [[gnu::always_inline]] static void compute_inline(const S* constants, const S& t, const S* x,
+                                                      int order, S* out, S* guards)
     {
         TaylorSeries series(constants, guards);
         for (int i = 0; i < n; ++i) out[i] = series.c_[i][0] = x[i];
@@ -152,11 +172,11 @@ public:
 
 private:
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): see below
-    TaylorSeries(const double* constants, double* guards) noexcept
+    [[gnu::always_inline]] TaylorSeries(const S* constants, S* guards) noexcept
         : constants_(constants), guards_(guards)
     {
         if constexpr (!unrolled) {
-            std::fill(c_[n], c_[n] + most + 1, 0.0);  // the time; all others are written
+            std::fill(c_[n], c_[n] + most + 1, S(0.0));  // the time; all others are written
         }
     }
 
@@ -172,14 +192,14 @@ private:
     [[nodiscard]] static constexpr int larger(int a, int b) noexcept { return a > b ? a : b; }
 
     template <int... k>
-    [[gnu::always_inline]] void unroll(int order, double* out, std::integer_sequence<int, k...>)
+    [[gnu::always_inline]] void unroll(int order, S* out, std::integer_sequence<int, k...>)
     {
         // Stops where the coefficient k + 1 of the state was the last one wanted.
         static_cast<void>((... || at_order<k>(order, out)));
     }
 
     template <int k>
-    [[gnu::always_inline]] bool at_order(int order, double* out)
+    [[gnu::always_inline]] bool at_order(int order, S* out)
     {
         run<k>(std::make_integer_sequence<int, ops>{});
         [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline))
@@ -212,7 +232,7 @@ private:
     [[gnu::always_inline]] void keep_guard()
     {
         constexpr int guard = tape.outputs[static_cast<std::size_t>(n + i)];
-        double value = 0;
+        S value(0.0);
         if constexpr (k <= degree(guard)) value = c_[guard][k];
         guards_[k * m + i] = value;
     }
@@ -235,10 +255,10 @@ private:
 
     /// x_{k+1} = f_k / (k + 1)
     template <int k, int i>
-    [[gnu::always_inline]] void advance(double* out)
+    [[gnu::always_inline]] void advance(S* out)
     {
         constexpr int rate = tape.outputs[static_cast<std::size_t>(i)];
-        double next = 0;
+        S next(0.0);
         if constexpr (k <= degree(rate)) next = c_[rate][k] * (1.0 / (k + 1));
         c_[i][k + 1] = next;
         out[(k + 1) * n + i] = next;
@@ -246,7 +266,7 @@ private:
 
     /// j times coefficient j of series a
     template <int a>
-    [[nodiscard, gnu::always_inline]] const double* slope() const noexcept
+    [[nodiscard, gnu::always_inline]] const S* slope() const noexcept
     {
         return slope_[a];
     }
@@ -256,10 +276,14 @@ private:
     [[gnu::always_inline]] void begin_op()
     {
         constexpr TapeOp op = op_at(i);
-        double& out = c_[i][0];
-        const double c = has_constant(op.op) ? constants_[i] : 0;
-        const double a = op.a >= 0 ? c_[op.a][0] : 0;
-        const double b = op.b >= 0 ? c_[op.b][0] : 0;
+        S& out = c_[i][0];
+        const S c = has_constant(op.op) ? constants_[i] : S(0.0);
+        const S a = op.a >= 0 ? c_[op.a][0] : S(0.0);
+        const S b = op.b >= 0 ? c_[op.b][0] : S(0.0);
+        const auto of_a = [&](const auto& f) __attribute__((always_inline))
+        {
+            return map_lanes(a, f);
+        };
         if constexpr (op.op == TaylorOp::constant) {
             out = c;
         } else if constexpr (op.op == TaylorOp::sum) {
@@ -288,39 +312,46 @@ private:
             out = c / a;
             inverse_[i] = -1 / a;
         } else if constexpr (op.op == TaylorOp::square_root) {
-            out = std::sqrt(a);
+            out = of_a([](double v) { return std::sqrt(v); });
             inverse_[i] = 0.5 / out;
         } else if constexpr (op.op == TaylorOp::power) {
-            out = op.exponent == 1.0 / 3 ? std::cbrt(a) : std::pow(a, op.exponent);
+            out = of_a([](double v) {
+                constexpr double exponent = op_at(i).exponent;
+                return exponent == 1.0 / 3 ? std::cbrt(v) : std::pow(v, exponent);
+            });
             inverse_[i] = 1 / a;
         } else if constexpr (op.op == TaylorOp::exponential) {
-            out = std::exp(a);
+            out = of_a([](double v) { return std::exp(v); });
         } else if constexpr (op.op == TaylorOp::logarithm) {
-            out = std::log(a);
+            out = of_a([](double v) { return std::log(v); });
             inverse_[i] = 1 / a;
-        } else if constexpr (op.op == TaylorOp::sine) {
-            out = std::sin(a);
-        } else if constexpr (op.op == TaylorOp::cosine) {
-            out = std::cos(a);
+        } else if constexpr (op.op == TaylorOp::sine || op.op == TaylorOp::cosine) {
+            constexpr bool is_sine = op.op == TaylorOp::sine;
+            if constexpr (std::is_same_v<S, double>) {
+                out = is_sine ? std::sin(a) : std::cos(a);
+            } else if constexpr (op.b > i) {
+                S& other = c_[op.b][0];
+                map_circle(a, is_sine ? out : other, is_sine ? other : out);
+            }  // else its partner has computed both
         } else if constexpr (op.op == TaylorOp::hyperbolic_sine) {
-            out = std::sinh(a);
+            out = of_a([](double v) { return std::sinh(v); });
         } else if constexpr (op.op == TaylorOp::hyperbolic_cosine) {
-            out = std::cosh(a);
+            out = of_a([](double v) { return std::cosh(v); });
         } else if constexpr (op.op == TaylorOp::tangent) {
-            out = std::tan(a);
+            out = of_a([](double v) { return std::tan(v); });
         } else if constexpr (op.op == TaylorOp::hyperbolic_tangent) {
-            out = std::tanh(a);
+            out = of_a([](double v) { return std::tanh(v); });
         } else if constexpr (op.op == TaylorOp::arc_sine) {
-            out = std::asin(a);
+            out = of_a([](double v) { return std::asin(v); });
             inverse_[i] = 1 / b;
         } else if constexpr (op.op == TaylorOp::arc_cosine) {
-            out = std::acos(a);
+            out = of_a([](double v) { return std::acos(v); });
             inverse_[i] = 1 / b;
         } else if constexpr (op.op == TaylorOp::arc_tangent) {
-            out = std::atan(a);
+            out = of_a([](double v) { return std::atan(v); });
             inverse_[i] = 1 / b;
         } else if constexpr (op.op == TaylorOp::angle) {
-            out = std::atan2(a, b);
+            out = map_lanes(a, b, [](double y, double x) { return std::atan2(y, x); });
             inverse_[i] = 1 / c_[op.c][0];
         }
     }
@@ -339,15 +370,15 @@ private:
     }
 
     template <int k, int i>
-    [[nodiscard, gnu::always_inline]] double coefficient() const
+    [[nodiscard, gnu::always_inline]] S coefficient() const
     {
         using Sum = AtOrder<k>;
         constexpr TapeOp op = op_at(i);
         constexpr int da = degree(larger(op.a, 0));
         constexpr int db = degree(larger(op.b, 0));
-        const double* const a = c_[larger(op.a, 0)];
-        const double* const b = c_[larger(op.b, 0)];
-        const double* const own = c_[i];
+        const S* const a = c_[larger(op.a, 0)];
+        const S* const b = c_[larger(op.b, 0)];
+        const S* const own = c_[i];
         // Ranges of j in sums of a_j b_{k-j}; with i's own coefficients, up to k - 1.
         constexpr int upto_a = smaller(da, k);
         constexpr int upto_b = smaller(db, k);
@@ -372,13 +403,13 @@ private:
         } else if constexpr (op.op == TaylorOp::square) {
             return square<k, larger(0, k - da)>(a);
         } else if constexpr (op.op == TaylorOp::quotient) {
-            const double sum = Sum::template convolve<1, upto_b>(b, own);
+            const S sum = Sum::template convolve<1, upto_b>(b, own);
             if constexpr (k > da) return -sum * inverse_[i];
             if constexpr (k <= da) return (a[k] - sum) * inverse_[i];
         } else if constexpr (op.op == TaylorOp::constant_over) {
             return Sum::template convolve<1, upto_a>(a, own) * inverse_[i];
         } else if constexpr (op.op == TaylorOp::square_root) {
-            const double sum = square<k, 1>(own);
+            const S sum = square<k, 1>(own);
             if constexpr (k > da) return -sum * inverse_[i];
             if constexpr (k <= da) return (a[k] - sum) * inverse_[i];
         } else if constexpr (op.op == TaylorOp::power) {
@@ -391,11 +422,11 @@ private:
         } else if constexpr (op.op == TaylorOp::cosine) {
             return Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (-1.0 / k);
         } else if constexpr (op.op == TaylorOp::tangent) {
-            const double sum = Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (1.0 / k);
+            const S sum = Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (1.0 / k);
             if constexpr (k > da) return sum;
             if constexpr (k <= da) return a[k] + sum;
         } else if constexpr (op.op == TaylorOp::hyperbolic_tangent) {
-            const double sum = Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (1.0 / k);
+            const S sum = Sum::template convolve<1, upto_a>(slope<op.a>(), b) * (1.0 / k);
             if constexpr (k > da) return -sum;
             if constexpr (k <= da) return a[k] - sum;
         } else if constexpr (op.op == TaylorOp::logarithm || op.op == TaylorOp::arc_sine ||
@@ -403,29 +434,26 @@ private:
             // b g' = a', or -a'
             constexpr bool log = op.op == TaylorOp::logarithm;
             constexpr int d = log ? da : db;
-            const double sum =
-                Sum::template convolve<larger(1, k - d), k - 1>(slope<i>(), log ? a : b) *
-                (1.0 / k);
-            double first = 0;
+            const S sum = Sum::template convolve<larger(1, k - d), k - 1>(slope<i>(), log ? a : b) *
+                          (1.0 / k);
+            S first(0.0);
             if constexpr (k <= da) first = op.op == TaylorOp::arc_cosine ? -a[k] : a[k];
             return (first - sum) * inverse_[i];
         } else if constexpr (op.op == TaylorOp::angle) {
             // c g' = a' b - b' a
             constexpr int dc = degree(larger(op.c, 0));
-            const double turn =
-                Sum::template convolve<larger(1, k - db), upto_a>(slope<op.a>(), b) -
-                Sum::template convolve<larger(1, k - da), upto_b>(slope<op.b>(), a);
-            const double sum =
-                Sum::template convolve<larger(1, k - dc), k - 1>(slope<i>(), c_[op.c]);
+            const S turn = Sum::template convolve<larger(1, k - db), upto_a>(slope<op.a>(), b) -
+                           Sum::template convolve<larger(1, k - da), upto_b>(slope<op.b>(), a);
+            const S sum = Sum::template convolve<larger(1, k - dc), k - 1>(slope<i>(), c_[op.c]);
             return (turn - sum) * (inverse_[i] * (1.0 / k));
         }
     }
 
     /// sum of a_j a_{k-j} for j from lo to k - lo
     template <int k, int lo>
-    [[nodiscard, gnu::always_inline]] static double square(const double* a)
+    [[nodiscard, gnu::always_inline]] static S square(const S* a)
     {
-        const double twice = 2 * AtOrder<k>::template convolve<lo, (k - 1) / 2>(a, a);
+        const S twice = 2 * AtOrder<k>::template convolve<lo, (k - 1) / 2>(a, a);
         if constexpr (k % 2 == 0 && lo <= k / 2) return twice + a[k / 2] * a[k / 2];
         return twice;
     }
@@ -433,22 +461,22 @@ private:
     // --- loops over the orders ---
 
     template <int... i>
-    [[gnu::always_inline]] void start(double* out, std::integer_sequence<int, i...>)
+    [[gnu::always_inline]] void start(S* out, std::integer_sequence<int, i...>)
     {
         (compute_op<0, i>(), ...);
         advance_all(0, out);
     }
     template <int... i>
-    [[gnu::always_inline]] void loop(int k, double* out, std::integer_sequence<int, i...>)
+    [[gnu::always_inline]] void loop(int k, S* out, std::integer_sequence<int, i...>)
     {
         (compute_at<i>(k), ...);
         advance_all(k, out);
     }
-    void advance_all(int k, double* out)
+    void advance_all(int k, S* out)
     {
         for (int i = 0; i < n; ++i) {
             const int rate = tape.outputs[static_cast<std::size_t>(i)];
-            const double next = c_[rate][k] / (k + 1);
+            const S next = c_[rate][k] / (k + 1);
             c_[i][k + 1] = next;
             out[(k + 1) * n + i] = next;
         }
@@ -502,9 +530,9 @@ private:
         constexpr TapeOp op = op_at(i);
         constexpr int da = degree(larger(op.a, 0));
         constexpr int db = degree(larger(op.b, 0));
-        const double* const a = c_[larger(op.a, 0)];
-        const double* const b = c_[larger(op.b, 0)];
-        const double* const own = c_[i];
+        const S* const a = c_[larger(op.a, 0)];
+        const S* const b = c_[larger(op.b, 0)];
+        const S* const own = c_[i];
         const int upto_a = smaller(da, k);
         const int upto_b = smaller(db, k);
         switch (op.op) {
@@ -550,9 +578,8 @@ private:
                        inverse_[i];
             case TaylorOp::angle: {
                 const double* const c = c_[larger(op.c, 0)];
-                const double turn =
-                    convolve(k, larger(1, k - db), upto_a, slope<larger(op.a, 0)>(), b) -
-                    convolve(k, larger(1, k - da), upto_b, slope<larger(op.b, 0)>(), a);
+                const S turn = convolve(k, larger(1, k - db), upto_a, slope<larger(op.a, 0)>(), b) -
+                               convolve(k, larger(1, k - da), upto_b, slope<larger(op.b, 0)>(), a);
                 const int from = larger(1, k - degree(larger(op.c, 0)));
                 return (turn - convolve(k, from, k - 1, slope<i>(), c)) * inverse_[i] / k;
             }
@@ -562,12 +589,12 @@ private:
         return 0;
     }
 
-    const double* constants_;
-    double* guards_;
+    const S* constants_;
+    S* guards_;
     // Unrolled, no coefficient is read that was not written.
-    double c_[ops][most + 1];      // NOLINT(*-avoid-c-arrays): indices are int
-    double slope_[ops][most + 1];  // NOLINT(*-avoid-c-arrays)
-    double inverse_[ops];          // NOLINT(*-avoid-c-arrays)
+    S c_[ops][most + 1];      // NOLINT(*-avoid-c-arrays): indices are int
+    S slope_[ops][most + 1];  // NOLINT(*-avoid-c-arrays)
+    S inverse_[ops];          // NOLINT(*-avoid-c-arrays)
 };
 
 }  // namespace ricochet::detail

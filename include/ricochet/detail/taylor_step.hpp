@@ -136,17 +136,21 @@ private:
 };
 
 /// w(s) = sum of coefficients k of degree 2 and more, and its derivative.
-template <bool with_rate, class Array>
-[[gnu::always_inline]] inline void evaluate_departure(const double* c, int order, double s,
-                                                      Array& w, Array& rate)
+/// @tparam S  double, or several
+template <bool with_rate, class S, class Array>
+[[gnu::always_inline]] inline void evaluate_departure(const S* c, int order, const S& s, Array& w,
+                                                      Array& rate)
 {
     const std::size_t n = w.size();
     // Four coefficients at a time: a quarter of Horner's additions wait for each other.
-    const double s2 = s * s;
-    const double s4 = s2 * s2;
-    const auto at = [c, n](int k, std::size_t i) { return c[static_cast<std::size_t>(k) * n + i]; };
+    const S s2 = s * s;
+    const S s4 = s2 * s2;
+    const auto at = [ c, n ](int k, std::size_t i) __attribute__((always_inline))
+    {
+        return c[static_cast<std::size_t>(k) * n + i];
+    };
     for (std::size_t i = 0; i < n; ++i) w[i] = at(order, i);
-    if constexpr (with_rate) std::fill(rate.begin(), rate.end(), 0);
+    if constexpr (with_rate) std::fill(rate.begin(), rate.end(), S(0.0));
     for (int k = order - 4; k > 0; k -= 4) {
         for (std::size_t i = 0; i < n; ++i) {
             w[i] = w[i] * s4 +
