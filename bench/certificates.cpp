@@ -14,6 +14,7 @@
 #include <ctime>
 #include <filesystem>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -342,6 +343,24 @@ std::vector<Scene> scenes()
 }
 
 }  // namespace
+
+Model certified_network(std::string_view scene, std::size_t iterations,
+                        learn::CertifyOptions options)
+{
+    for (const Scene& one : scenes()) {
+        if (one.name != scene) continue;
+        const Model model = Training(one).run(iterations > 0 ? iterations : one.iterations);
+        options.margin = one.margin;
+        learn::CertifiedModel out = learn::certify(model, one.problem, options);
+        if (!out.proved()) {
+            throw std::runtime_error(fmt::format("certified_network: {}: {}", scene,
+                                                 learn::describe(out.report.outcome)));
+        }
+        return std::move(out.model);
+    }
+    throw std::invalid_argument(fmt::format(
+        "certified_network: scene must be cavern, arm2, arm3, arm4 or eigenvalue, got {}", scene));
+}
 
 bool certify_scenes(const std::string& only, const std::string& models, std::size_t iterations,
                     const learn::CertifyOptions& options)

@@ -10,6 +10,8 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "bench/report"))
 sys.dont_write_bytecode = True
 
+import compare  # noqa: E402
+import guard_map  # noqa: E402
 import page  # noqa: E402
 import run  # noqa: E402
 from score import score, scored_as_wrong  # noqa: E402
@@ -37,6 +39,13 @@ class Scores(unittest.TestCase):
 
     def test_an_event_of_another_guard_is_no_event_of_this_one(self):
         row = score(answer([1.0, 2.0, 3.0], [0, 0, 0]), EVENTS)
+        self.assertEqual((row["missed"], row["invented"]), (1, 1))
+
+    def test_events_after_the_end_of_scoring_are_not_compared(self):
+        problem = EVENTS | {"scored_until": 2.5, "times": [1.0, 2.0], "guards": [0, 0]}
+        row = score(answer([1.0, 2.0, 2.4, 2.6], [0, 0, 1, 1]), problem)
+        self.assertEqual((row["missed"], row["invented"]), (0, 1))
+        row = score(answer([1.0, 2.6, float("nan")], [0, 0, 0]), problem)
         self.assertEqual((row["missed"], row["invented"]), (1, 1))
 
     def test_times_that_are_no_numbers_are_wrong(self):
@@ -111,9 +120,41 @@ class Reports(unittest.TestCase):
     def test_a_machine_of_another_speed_does_not_change_ratios(self):
         one = report([("a", "ricochet", 1.0), ("b", "GSL", 4.0)], [1e-9])
         slower = report([("a", "ricochet", 2.0), ("b", "GSL", 8.0)], [2e-9])
-        self.assertLess(page.agreement(one, slower)[0][0], 1e-12)
+        self.assertLess(compare.agreement(one, slower)[0][0], 1e-12)
         other = report([("a", "ricochet", 1.0), ("b", "GSL", 8.0)], [1e-9])
-        self.assertGreater(page.agreement(one, other)[0][0], page.AGREEMENT)
+        self.assertGreater(compare.agreement(one, other)[0][0], compare.AGREEMENT)
+
+    def test_two_reports_agree_or_disagree_or_the_machine_was_too_noisy(self):
+        quiet, noisy = [1e-9] * 10, [1e-9] * 5 + [2e-9] * 5
+        one = report([("a", "ricochet", 1.0), ("b", "GSL", 4.0)], quiet)
+        # Times 1 : 4 and 1 : 4.8 depart by sqrt(1.2) = 1.10 from their geometric means, 1 : 4 and
+        # 1 : 5.6 by sqrt(1.4) = 1.18.
+        near = report([("a", "ricochet", 1.0), ("b", "GSL", 4.8)], quiet)
+        far = report([("a", "ricochet", 1.0), ("b", "GSL", 5.6)], quiet)
+        loud = report([("a", "ricochet", 1.0), ("b", "GSL", 5.6)], noisy)
+        self.assertEqual([compare.verdict(one, other)[0] for other in (near, far, loud)], [0, 1, 3])
+        self.assertEqual(compare.verdict(loud, one)[0], 3)
+        self.assertIn("All 2 ratios", " ".join(page.remarks(one, near)))
+        self.assertIn("They disagree", " ".join(page.remarks(one, far)))
+        self.assertIn("too noisy to tell", " ".join(page.remarks(one, loud)))
+
+    def test_reports_of_other_commits_or_rows_are_said_to_be(self):
+        one = report([("a", "ricochet", 1.0), ("b", "GSL", 4.0)], [1e-9])
+        other = report([("c", "ricochet", 1.0), ("d", "GSL", 4.0)], [1e-9])
+        other["machine"]["commit"] = "e"
+        status, said = compare.verdict(one, other)
+        self.assertEqual(status, 1)
+        self.assertIn("of commit e, not of c", said[0])
+        self.assertIn("no times of the same rows", said[1])
+
+    def test_curves_of_one_panel_have_colours_of_their_own(self):
+        names = ["ricochet: dopri5", "ricochet: scene", "Bullet: contacts", "ODE: contacts"]
+        shown = page.panel("", "", "", [page.curve(name, [(1.0, 1.0)]) for name in names])
+        self.assertEqual(len({curve["colour"] for curve in shown["curves"]}), len(names))
+
+    def test_the_change_of_energy_is_a_remark(self):
+        row = report([("a", "ricochet", 1.0)], [1e-9])["rows"][0] | {"energy_change": -2e-15}
+        self.assertEqual(page.why(row), "energy changes by -2e-15")
 
     def test_the_pages_have_every_row_and_its_command(self):
         with tempfile.TemporaryDirectory() as directory:
@@ -128,6 +169,46 @@ class Reports(unittest.TestCase):
             self.assertIn("No figures", text)
         self.assertIn("| P | 1e-08 | 1 s | h | 4 |", markdown)
         self.assertIn("width=device-width", html)
+
+
+def guard_ways(rate, *ways):
+    return {"rate": rate, "ways": [{"name": name, "time": time, "calls": calls, "events": 5,
+                                    "same": same} for name, time, calls, same in ways]}
+
+
+class GuardMap(unittest.TestCase):
+    # A look at every step costs 1 us and a call of 1; planned 2 us and 0.01, every 50 loses events.
+    row = guard_ways(2.0, ("every step", 1e-6, 1.0, True), ("every 50", 1e-6, 0.02, False),
+                     ("planned", 2e-6, 0.01, True))
+    found = {"panels": [{"known": "bounds", "rows": [row]}], "seconds": 3, "proof_seconds": 1,
+             "training_seconds": 1, "command": "ricochet_map"}
+
+    def test_who_wins_depends_on_the_price_of_a_call(self):
+        way, gain, other = guard_map.winner(self.row, 0)
+        self.assertEqual((way["name"], gain, other), ("every step", 1.0, None))
+        # 1001 us against 12 us, and against 1 + 20 us.
+        way, gain, other = guard_map.winner(self.row, 1e-3)
+        self.assertEqual(way["name"], "planned")
+        self.assertAlmostEqual(gain, 1001 / 12)
+        self.assertIsNone(other)
+
+    def test_what_is_faster_but_changes_events_is_in_brackets(self):
+        # 11 us against 2.1 us, and against 1.2 us.
+        self.assertEqual(guard_map.text(self.row, 1e-5), "planned 5.24x (every 50 9.17x)")
+
+    def test_a_panel_has_a_tile_for_every_price_and_rate(self):
+        tiles = guard_map.panels(self.found)[0]["tiles"]
+        self.assertEqual(len(tiles["value"]), len(tiles["x"]) * len(tiles["y"]))
+        marks = guard_map.panels(self.found)[0]["curves"]
+        self.assertEqual(sum(len(curve["x"]) for curve in marks), len(tiles["value"]))
+
+    def test_the_pages_have_the_map(self):
+        with tempfile.TemporaryDirectory() as directory:
+            out = Path(directory)
+            given = report([("a", "ricochet", 1.0)], [1e-9]) | {"map": self.found}
+            page.write(given, None, out, out)
+            for file in ("report.md", "index.html"):
+                self.assertIn("planned 5.24x (every 50 9.17x)", (out / file).read_text())
 
 
 if __name__ == "__main__":

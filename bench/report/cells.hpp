@@ -13,7 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "gas.hpp"
 #include "problems.hpp"
+#include "sliding.hpp"
 
 namespace ricochet::report {
 
@@ -26,7 +28,8 @@ struct Answer {
     std::optional<std::uint64_t> steps{};
     std::optional<std::uint64_t> flow_calls{};
     std::optional<std::uint64_t> guard_calls{};
-    std::string note{};  ///< why it did not finish
+    std::optional<double> energy_change{};  ///< relative, over the run, where none should be
+    std::string note{};                     ///< why it did not finish
 
     void add(double t, std::size_t guard)
     {
@@ -49,6 +52,7 @@ struct Reference {
     std::string problem;
     std::string title;
     double t_end = 0;
+    double scored_until = INFINITY;  ///< [s] later events are not compared
     std::vector<Expected> events{};
     std::vector<double> sample_times{};
     std::vector<std::vector<double>> samples{};
@@ -117,6 +121,10 @@ void for_each_problem(Visit visit)
         visit("balls-" + std::to_string(n), std::to_string(n) + " balls",
               [n] { return std::vector{balls(n)}; });
     }
+    visit("block", "Block that slides to rest", [] { return std::vector{sliding_block()}; });
+    visit("rolling", "Ball that slides, then rolls", [] { return std::vector{rolling_ball()}; });
+    visit("gas-" + std::to_string(gas_in_one_state), gas_title(gas_in_one_state),
+          [] { return std::vector{gas(gas_in_one_state)}; });
     for (const std::size_t n : {10U, 100U}) {
         visit("thermostats-" + std::to_string(n), "Bank of " + std::to_string(n) + " thermostats",
               [n] { return std::vector{thermostats(n)}; });
@@ -135,13 +143,25 @@ template <class S>
 [[nodiscard]] Reference reference_of(std::string name, std::string title,
                                      const std::vector<Task<S>>& tasks)
 {
-    Reference out{.problem = std::move(name), .title = std::move(title), .t_end = tasks[0].t_end};
+    Reference out{.problem = std::move(name),
+                  .title = std::move(title),
+                  .t_end = tasks[0].t_end,
+                  .scored_until = tasks[0].scored_until};
     for (std::size_t k = 0; k < tasks.size(); ++k) {
         for (const Expected& event : tasks[k].events) {
             out.events.push_back({event.t, event.guard + guards_of_a_run * k});
         }
     }
     return out;
+}
+
+/// Notes how far the energy of a system that keeps it has changed at its last state.
+template <class S, class X>
+void note_energy(const Task<S>& task, const X& x, Answer& answer)
+{
+    if constexpr (requires { task.system.energy(x); }) {
+        answer.energy_change = task.system.energy(x) / task.system.energy(task.x0) - 1;
+    }
 }
 
 /// Runs `solve(task, answer, offset)` for every task.
@@ -176,6 +196,10 @@ void add_ode(Cells& cells);
 void add_bullet(Cells& cells);
 #endif
 void add_scene(Cells& cells);
+void add_gas(Cells& cells);
+void add_sliding(Cells& cells);
+void add_slider(Cells& cells);
+void add_fault(Cells& cells);
 void add_set_valued(Cells& cells);
 void add_stiff(Cells& cells);
 

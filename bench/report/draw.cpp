@@ -4,7 +4,11 @@
 //     ricochet_report_draw <file.svg>
 //
 //     {"title": ..., "panels": [{"title": ..., "x": ..., "y": ..., "log_x": true, "log_y": true,
-//      "curves": [{"name": ..., "dashed": false, "x": [...], "y": [...]}]}]}
+//      "curves": [{"name": ..., "dashed": false, "points": false, "x": [...], "y": [...]}],
+//      "tiles": {"x": [...], "y": [...], "value": [...]}}]}
+//
+// Tiles are optional, and bear their numbers; curves of a panel with tiles are in its columns and
+// rows, 0, 1, ...
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -17,6 +21,12 @@ namespace ricochet::app {
 
 namespace {
 
+Curve::Style style_of(const Json& curve)
+{
+    if (curve.value("points", false)) return Curve::Style::points;
+    return curve.value("dashed", false) ? Curve::Style::marked_dashed : Curve::Style::marked;
+}
+
 Exhibit exhibit_of(const Json& given)
 {
     Exhibit out;
@@ -27,12 +37,19 @@ Exhibit exhibit_of(const Json& given)
         to.y_label = panel.at("y");
         to.log_x = panel.value("log_x", true);
         to.log_y = panel.value("log_y", true);
+        if (panel.contains("tiles")) {
+            const Json& tiles = panel.at("tiles");
+            to.tiles = Tiles{.x = tiles.at("x"),
+                             .y = tiles.at("y"),
+                             .value = tiles.at("value"),
+                             .numbered = true,
+                             .log_colour = true};
+        }
         for (const Json& curve : panel.at("curves")) {
             to.curves.push_back({.name = curve.at("name"),
                                  .x = curve.at("x"),
                                  .y = curve.at("y"),
-                                 .style = curve.value("dashed", false) ? Curve::Style::marked_dashed
-                                                                       : Curve::Style::marked,
+                                 .style = style_of(curve),
                                  .colour = curve.value("colour", -1)});
         }
     }

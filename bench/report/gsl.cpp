@@ -90,6 +90,7 @@ public:
                 before_.swap(after_);
             }
         }
+        note_energy(task_, x, answer);
         *answer.flow_calls += system_.flow_calls;
         *answer.guard_calls += system_.guard_calls;
         return true;

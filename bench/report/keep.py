@@ -1,6 +1,7 @@
 """Keeps a report in docs/benchmarks.md: its table at equal error, and its figures beside it."""
 import shutil
 
+import guard_map
 import page
 
 BEGIN = "<!-- by scripts/bench --keep -->"
@@ -14,6 +15,9 @@ def keep(report, directory, root):
         old.unlink()
     text = [BEGIN, "## The report", page.heading(report), *page.remarks(report, None),
             "### At equal error", page.LEAD, page.markdown_table(*page.equal_error_table(report))]
+    if report.get("map"):
+        text += ["### Ways to check a guard", guard_map.LEAD, guard_map.remark(report["map"]),
+                 page.markdown_table(*guard_map.table(report["map"]))]
     if report["pays"]:
         text += ["### What a scene pays for", page.PAYS,
                  page.markdown_table(*page.pays_table(report))]

@@ -43,6 +43,7 @@ Json json(const Answer& answer)
             {"steps", json(answer.steps)},
             {"flow_calls", json(answer.flow_calls)},
             {"guard_calls", json(answer.guard_calls)},
+            {"energy_change", answer.energy_change ? Json(*answer.energy_change) : Json(nullptr)},
             {"note", answer.note}};
 }
 
@@ -57,6 +58,7 @@ Json json(const Reference& reference)
     return {{"problem", reference.problem},
             {"title", reference.title},
             {"t_end", reference.t_end},
+            {"scored_until", reference.scored_until},  // null where it is infinite
             {"times", times},
             {"guards", guards},
             {"sample_times", reference.sample_times},
@@ -85,8 +87,12 @@ Cells all_cells()
     add_ours(cells);
     add_taylor(cells);
     add_scene(cells);
+    add_sliding(cells);
+    add_gas(cells);
     add_set_valued(cells);
     add_stiff(cells);
+    add_slider(cells);
+    add_fault(cells);
     add_odeint(cells);
 #ifdef RICOCHET_REPORT_CVODE
     add_cvode(cells);

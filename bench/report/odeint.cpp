@@ -135,6 +135,7 @@ bool on_step_map(const Task<S>& task, double tolerance, Answer& answer, std::siz
             watch.before.swap(watch.after);
         }
     }
+    note_energy(task, x, answer);
     *answer.flow_calls += system.flow_calls;
     *answer.guard_calls += system.guard_calls;
     return true;
@@ -183,6 +184,7 @@ bool on_dense_output(const Task<S>& task, double tolerance, Answer& answer, std:
             watch.before.swap(watch.after);
         }
     }
+    note_energy(task, stepper.current_state(), answer);
     *answer.flow_calls += system.flow_calls;
     *answer.guard_calls += system.guard_calls;
     return true;

@@ -17,6 +17,7 @@ bool solve(const Task<S>& task, double tolerance, Answer& answer, std::size_t of
     for (const auto& event : run.events) {
         if (event.kind != EventKind::touch) answer.add(event.t, event.guard + offset);
     }
+    note_energy(task, run.x, answer);
     *answer.steps += run.statistics.steps;
     *answer.flow_calls += run.statistics.flow_calls;
     *answer.guard_calls += run.statistics.guard_calls;

@@ -7,18 +7,14 @@ import shutil
 import statistics
 import subprocess
 
+import guard_map
+from compare import NOISY, minimum, spread, verdict
 from score import scored_as_wrong
 
-NOISY = 0.30
-AGREEMENT = 0.15
 BOUNDS = (1e-4, 1e-6, 1e-8, 1e-10)
 PALETTE = ["ricochet: dopri5", "ricochet: fehlberg78", "ricochet: Taylor", "odeint: step map",
            "odeint: vector, dense output", "GSL: rk8pd, bisection", "CVODE: Adams, root finding",
            "ARKODE: DP5, root finding", "SciPy: RK45", "SciPy: DOP853"]
-
-
-def minimum(row):
-    return min(row["samples"]) if row["samples"] else math.nan
 
 
 def median(row):
@@ -69,11 +65,16 @@ def curve(name, points):
     points = [(x, y) for x, y in points if x == x and y == y and x > 0 and y > 0]
     return {"name": name, "x": [x for x, _ in points], "y": [y for _, y in points],
             "dashed": not name.startswith("ricochet"),
-            "colour": PALETTE.index(name) if name in PALETTE else 10 + sum(map(ord, name)) % 2}
+            "colour": PALETTE.index(name) if name in PALETTE else None}
 
 
 def panel(title, x, y, curves, **axes):
-    return {"title": title, "x": x, "y": y, "curves": [c for c in curves if c["x"]]} | axes
+    """Curves that have no place in the palette take those after it, one each."""
+    curves = [c for c in curves if c["x"]]
+    others = [c for c in curves if c["colour"] is None]
+    for k, other in enumerate(others):
+        other["colour"] = len(PALETTE) + k
+    return {"title": title, "x": x, "y": y, "curves": curves} | axes
 
 
 def work_precision(title, rows, unit):
@@ -150,6 +151,9 @@ def figures(report):
             curves.append(curve(name, points))
         out.append(("guards", "Guards that never fire: time over that without guards",
                     [panel("Idle guards, tolerance 1e-8", "guards", "time over none", curves)]))
+    if report.get("map"):
+        out.append(("map", "Guards: the fastest way with the same events, and how many times as fast "
+                    "as a check at every step", guard_map.panels(report["map"])))
     return [figure for figure in out if any(p["curves"] for p in figure[2])]
 
 
@@ -211,12 +215,15 @@ def equal_error_table(report):
 
 
 def why(row):
-    """What is wrong with a row, or nothing."""
+    """What is wrong with a row, and what is known of its energy; or nothing."""
     if "failed" in row:
         return row["failed"]
     if not row["finished"]:
         return "did not reach the end" + (f": {row['note']}" if row["note"] else "")
-    return "wrong" if scored_as_wrong(row) else ""
+    said = ["wrong"] if scored_as_wrong(row) else []
+    if row.get("energy_change") is not None:
+        said.append(f"energy changes by {row['energy_change']:.1g}")
+    return "; ".join(said)
 
 
 def cell_table(rows):
@@ -256,29 +263,6 @@ def pays_table(report):
     return header, rows
 
 
-def spread(samples):
-    ordered = sorted(samples)
-    return (ordered[round(0.9 * (len(ordered) - 1))] / ordered[0] - 1) if ordered else math.inf
-
-
-def agreement(report, older):
-    """Largest departure of the ratios of two reports: each time is taken over the geometric mean
-    of those of its problem that both have."""
-    def times(of):
-        return {row["name"]: minimum(row) for row in of["rows"] if row["samples"]}
-    new, old = times(report), times(older)
-    problem_of = {row["name"]: row["problem"] for row in report["rows"]}
-    worst = []
-    for problem in report["problems"]:
-        names = [name for name in new if name in old and problem_of[name] == problem]
-        if len(names) < 2:
-            continue
-        shift = statistics.fmean(math.log(new[name] / old[name]) for name in names)
-        worst += [(abs(math.expm1(math.log(new[name] / old[name]) - shift)), name)
-                  for name in names]
-    return sorted(worst, reverse=True)
-
-
 def remarks(report, older):
     """Sentences about how far the report can be relied upon."""
     out = []
@@ -290,12 +274,7 @@ def remarks(report, older):
         out.append(f"That is more than {100 * NOISY:.0f} %: **the machine was too noisy**, and "
                    "ratios of this report are not to be quoted.")
     if older:
-        worst = agreement(report, older)
-        if worst:
-            apart = [pair for pair in worst if pair[0] > AGREEMENT]
-            out.append(f"Beside the other report on this commit, {len(worst) - len(apart)} of "
-                       f"{len(worst)} ratios agree within {100 * AGREEMENT:.0f} %; the largest "
-                       f"departure is {100 * worst[0][0]:.0f} % ({worst[0][1]}).")
+        out += verdict(report, older)[1]
     for peer, reason in sorted(report["absent"].items()):
         out.append(f"{peer} is not in this report: {reason}.")
     return out
@@ -371,6 +350,9 @@ def write(report, older, directory, root):
     table = equal_error_table(report)
     text = ["# Run time against error, beside the peers", heading(report), EXPLANATION, *said,
             "## At equal error", LEAD, markdown_table(*table)]
+    if report.get("map"):
+        text += ["## Ways to check a guard", guard_map.LEAD, guard_map.remark(report["map"]),
+                 markdown_table(*guard_map.table(report["map"]))]
     if report["pays"]:
         text += ["## What a scene pays for", PAYS, markdown_table(*pays_table(report))]
     text += ["## Figures"]
@@ -378,6 +360,9 @@ def write(report, older, directory, root):
     text += ["## Every cell"]
     for title, cells in sections(report):
         text += [f"### {title}", markdown_table(*cells)]
+    if report.get("map"):
+        text += ["### Ways to check a guard",
+                 markdown_table(*guard_map.ways_table(report["map"]))]
     (directory / "report.md").write_text("\n\n".join(text) + "\n")
 
     def paragraph(sentence):
@@ -389,6 +374,10 @@ def write(report, older, directory, root):
             "<body><h1>Run time against error, beside the peers</h1>",
             *map(paragraph, [heading(report), EXPLANATION, *said]),
             "<h2>At equal error</h2>", paragraph(LEAD), html_table(*table)]
+    if report.get("map"):
+        page += ["<h2>Ways to check a guard</h2>", paragraph(guard_map.LEAD),
+                 paragraph(guard_map.remark(report["map"])),
+                 html_table(*guard_map.table(report["map"]))]
     if report["pays"]:
         page += ["<h2>What a scene pays for</h2>", paragraph(PAYS),
                  html_table(*pays_table(report))]
@@ -401,6 +390,9 @@ def write(report, older, directory, root):
     for title, cells in sections(report):
         page.append(f"<details><summary>{html.escape(title)}</summary>{html_table(*cells)}"
                     "</details>")
+    if report.get("map"):
+        page.append(f"<details><summary>Ways to check a guard</summary>"
+                    f"{html_table(*guard_map.ways_table(report['map']))}</details>")
     page.append("</body></html>")
     (directory / "index.html").write_text("\n".join(page) + "\n")
     if (directory / "report.json").exists():

@@ -8,7 +8,7 @@ import time
 def answer(**known):
     """An answer as main.cpp writes it; what is not given is not counted."""
     out = {"finished": False, "times": [], "guards": [], "samples": [], "steps": None,
-           "flow_calls": None, "guard_calls": None, "note": ""}
+           "flow_calls": None, "guard_calls": None, "energy_change": None, "note": ""}
     return out | known
 
 

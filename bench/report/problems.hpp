@@ -34,6 +34,7 @@ struct Task {
     typename System::State x0{};
     double t_end = 0;                            ///< [s]
     std::vector<Expected> events{};              ///< ascending for each guard
+    double scored_until = INFINITY;              ///< [s] later events are not compared
     std::vector<double> sample_times{};          ///< [s]; empty: events are compared
     std::vector<std::vector<double>> samples{};  ///< states there
     double first_step = 1e-2;  ///< [s] for peers that do not choose one themselves

@@ -20,6 +20,7 @@ import time
 from pathlib import Path
 
 import page
+from compare import verdict
 from keep import keep
 from score import score, scored_as_wrong
 
@@ -27,6 +28,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 PYTHON = "/usr/bin/python3"  # Debian's, which has Debian's SciPy and Siconos
 PROGRAM = "build/release/bin/ricochet_report"
+MAP = "build/release/bin/ricochet_map"
 PROGRAMS = [[PROGRAM], [PYTHON, "bench/report/scipy_peer.py"],
             [PYTHON, "bench/report/siconos_peer.py"]]
 PACKAGES = {"CVODE": "libsundials-dev", "ARKODE": "libsundials-dev", "GSL": "libgsl-dev",
@@ -111,9 +113,9 @@ def listing():
     return problems, cells, versions, absent
 
 
-def key_of_programs():
+def key_of(files):
     digest = hashlib.sha256()
-    for file in [ROOT / PROGRAM, *sorted(HERE.glob("*_peer.py"))]:
+    for file in files:
         digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 
@@ -143,7 +145,8 @@ def solve(cell, problem, core):
         row["failed"] = str(failure)
         worker.close()
         return row, None
-    row |= {count: answer[count] for count in ("steps", "flow_calls", "guard_calls")}
+    row |= {count: answer[count]
+            for count in ("steps", "flow_calls", "guard_calls", "energy_change")}
     row |= score(answer, problem)
     if scored_as_wrong(row) and not cell["problem"].startswith("near-tangent"):
         worker.close()
@@ -259,6 +262,30 @@ def pays():
     return out
 
 
+def guard_map(options):
+    """What ricochet_map says, which is kept; nothing where it is not asked for, or not there."""
+    program = ROOT / MAP
+    if options.only not in "map" or not program.exists():
+        return None
+    file = ROOT / "build/bench/cells" / f"map-{key_of([program])}.json"
+    if file.exists() and not options.fresh:
+        return json.loads(file.read_text())
+    command = ["taskset", "-c", str(options.core), MAP]
+    print("map ", end="", flush=True)
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    try:
+        found = json.loads(run.stdout) | {"command": " ".join(command)}
+    except ValueError:
+        said = (run.stderr.strip().splitlines() or ["no answer"])[-1]
+        print(f"left out: {said}", flush=True)
+        return None
+    part = file.with_suffix(".part")
+    part.write_text(json.dumps(found))
+    part.rename(file)
+    print(f"{found['seconds']:.0f} s", flush=True)
+    return found
+
+
 def machine():
     model = ""
     try:
@@ -304,7 +331,8 @@ def arguments():
 def main():
     options = arguments()
     problems, cells, versions, absent = listing()
-    directory = ROOT / "build/bench/cells" / key_of_programs()
+    programs = [ROOT / PROGRAM, *sorted(HERE.glob("*_peer.py"))]
+    directory = ROOT / "build/bench/cells" / key_of(programs)
     directory.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     clock = Clock(options)
@@ -323,12 +351,15 @@ def main():
     yardstick = ([float(line) for line in spread_file.read_text().split()]
                  if spread_file.exists() else [])
     report = {"machine": machine(), "versions": versions, "absent": absent, "rows": rows,
-              "yardstick": yardstick, "pays": pays(), "seconds": time.monotonic() - began,
+              "yardstick": yardstick, "pays": pays(),
+              "map": guard_map(options), "seconds": time.monotonic() - began,
               "problems": {name: {"title": problem["title"], "events": len(problem["times"]),
                                   "t_end": problem["t_end"]}
                            for name, problem in problems.items()}}
     older = json.loads(options.compare.read_text()) if options.compare else None
     page.write(report, older, options.out, ROOT)
+    if older:
+        print("\n".join(verdict(report, older)[1]).replace("**", ""))
     if options.keep:
         keep(report, options.out, ROOT)
     print(f"{options.out / 'index.html'}, {options.out / 'report.md'}: {len(rows)} cells, "

@@ -6,7 +6,8 @@
 
 Events as its manual says: `events` with `direction`, `terminal` where there is a reset, and a new
 call after it with the first step left to solve_ivp. LSODA takes the inclusions with smoothed signs,
-since SciPy has no integrator for inclusions. The problems are those of problems.hpp; a slip in one
+since SciPy has no integrator for inclusions; the rate-and-state slider, which is stiff, is taken by
+LSODA, Radau and BDF. The problems are those of problems.hpp; a slip in one
 of them would be an error against the reference that no tolerance removes.
 """
 import math
@@ -151,6 +152,42 @@ class Balls(Problem):
         return x
 
 
+class Block(Problem):
+    """Slides with v' = -braking, then rests; the mode is the flow that is taken."""
+
+    x0, t_end = [0.0, 4.0], 2
+    braking = 0.3 * 9.81
+
+    def __init__(self):
+        self.slides = True
+
+    def flow(self, t, x):
+        return [x[1], -self.braking if self.slides else 0.0]
+
+    def guard(self, which, t, x):
+        return x[1] if self.slides else 1.0
+
+    def reset(self, which, t, x):
+        self.slides = False
+        return [x[0], 0.0]
+
+
+class Rolling(Block):
+    x0 = [0.0, 4.0, 0.0]
+
+    def flow(self, t, x):
+        if self.slides:
+            return [x[1], -self.braking, 2.5 * self.braking]
+        return [x[1], 0.0, 0.0]
+
+    def guard(self, which, t, x):
+        return x[1] - x[2] if self.slides else 1.0
+
+    def reset(self, which, t, x):
+        self.slides = False
+        return [x[0], x[1], x[1]]
+
+
 class Thermostats(Problem):
     t_end = 20
 
@@ -186,7 +223,7 @@ class Watched(Problem):
 
 
 PROBLEMS = {"ball": Ball, "impacts": Impacts, "henon-heiles": HenonHeiles,
-            "arenstorf": Arenstorf, "stick-slip": Belt}
+            "arenstorf": Arenstorf, "stick-slip": Belt, "block": Block, "rolling": Rolling}
 PROBLEMS |= {f"near-tangent-1e-{d}": lambda d=d: NearTangent(10.0 ** -d) for d in range(2, 13, 2)}
 PROBLEMS |= {f"balls-{n}": lambda n=n: Balls(n) for n in (1, 10, 100)}
 PROBLEMS |= {f"thermostats-{n}": lambda n=n: Thermostats(n) for n in (10, 100)}
@@ -243,6 +280,31 @@ def hybrid(name, method, tolerance):
     return solve
 
 
+def slider_rate(t, x):
+    """Of slip over D_RS, log(V / V*) and xi; rate-and-state friction with the ageing law."""
+    v = 1e-4 * math.exp(x[1])
+    stiffness, normal = 3e4, 9.81
+    pull = stiffness * (normal * 0.5109 / stiffness + 1.5e-4 * t - 1e-6 * x[0])
+    friction = 0.5109 + 0.011 * x[1] + 0.016 * x[2]
+    return [v / 1e-6, (pull - normal * friction) / v, (1e-4 * math.exp(-x[2]) - v) / 1e-6]
+
+
+def slider(method, tolerance):
+    level = math.log(2e-4 / 1e-4)
+
+    def threshold(t, x):
+        return x[1] - level
+
+    def solve():
+        run = solve_ivp(slider_rate, (0, 1), [0.0, 0.0, 0.0], method=method, events=threshold,
+                        rtol=max(tolerance, 2.3e-14), atol=tolerance)
+        rising = [float(slider_rate(t, x)[1]) > 0 for t, x in zip(run.t_events[0], run.y_events[0])]
+        return answer(finished=bool(run.success), times=[float(t) for t in run.t_events[0]],
+                      guards=[0 if up else 1 for up in rising], steps=len(run.t) - 1,
+                      flow_calls=run.nfev, note="" if run.success else run.message)
+    return solve
+
+
 def smoothed(w, eps):
     return w / (abs(w) + eps)
 
@@ -280,6 +342,9 @@ CELLS = [(name, "SciPy", method, tolerance, hybrid(name, method, tolerance))
 CELLS += [(name, "SciPy", "LSODA, sign smoothed over the tolerance", eps, inclusion(make, eps))
           for name, make in (("sliding-mode", sliding_mode), ("diode-circuit", diode_circuit))
           for eps in (1e-4, 1e-6, 1e-8, 1e-10)]
+CELLS += [("slider", "SciPy", method, tolerance, slider(method, tolerance))
+          for method in ("LSODA", "Radau", "BDF") for tolerance in TOLERANCES
+          if method == "LSODA" or tolerance > 1e-11]  # where Radau and BDF take tens of seconds
 
 if __name__ == "__main__":
     sys.exit(main({"SciPy": scipy.__version__}, CELLS))

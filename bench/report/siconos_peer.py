@@ -5,7 +5,8 @@
 The inclusions as its manual says: a relay on a linear or a nonlinear first-order system, the
 implicit Euler-Moreau scheme with theta = 1/2 (its default is 1, of first order too), constant steps.
 The ball: Moreau-Jean's time stepping of a Lagrangian system with Newton's impact law; an impact is
-the step after which the velocity has turned.
+the step after which the velocity has turned. Sliding bodies: the same with Coulomb's law, by
+Siconos' solver of contact problems with friction.
 """
 import math
 import subprocess
@@ -80,13 +81,49 @@ def ball(step):
     return out
 
 
+def slide(inertia, radius, step):
+    """A body of 1 kg on a floor, coordinates x, height and angle: when it ceases to slide."""
+    start, friction, t_end = 4.0, 0.3, 2.0
+    body = sk.LagrangianLinearTIDS([0.0, 0.0, 0.0], [start, 0.0, 0.0],
+                                   np.diag([1.0, 1.0, inertia]))
+    body.setFExtPtr(np.array([0.0, -9.81, 0.0]))
+    relation = sk.LagrangianLinearTIR(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, -radius]]))
+    interaction = sk.Interaction(sk.NewtonImpactFrictionNSL(0.0, 0.0, friction, 2), relation)
+    model = sk.NonSmoothDynamicalSystem(0, t_end)
+    model.insertDynamicalSystem(body)
+    model.link(interaction, body)
+    simulation = sk.TimeStepping(model, sk.TimeDiscretisation(0, step), sk.MoreauJeanOSI(0.5),
+                                 sk.FrictionContact(2))
+    out = answer(finished=True, steps=0)
+    slides = True
+    while simulation.hasNextEvent():
+        simulation.computeOneStep()
+        simulation.nextStep()
+        out["steps"] += 1
+        velocity = body.velocity()
+        now = abs(float(velocity[0]) - radius * float(velocity[2])) > 1e-6 * start
+        if slides and not now:
+            out["times"].append(float(simulation.startingTime()))
+            out["guards"].append(0)
+        slides = now
+    return out
+
+
+def block(step):
+    return slide(1.0, 0.0, step)
+
+
+def rolling(step):
+    return slide(0.4 * 0.125 ** 2, 0.125, step)
+
+
 WAYS = (("sliding-mode", sliding_mode, (5e-3, 1e-3, 1e-4)),
         ("diode-circuit", diode_circuit, (0.2, 0.05, 0.0125)))
 CELLS = [(name, "Siconos", "Euler-Moreau, theta 1/2", step, lambda run=run, step=step: run(step))
          for name, run, steps in WAYS for step in steps]
-CELLS += [("ball", "Siconos", "Moreau-Jean", step, lambda step=step: ball(step))
+CELLS += [(name, "Siconos", "Moreau-Jean", step, lambda run=run, step=step: run(step))
+          for name, run in (("ball", ball), ("block", block), ("rolling", rolling))
           for step in (1e-2, 1e-3)]
-
 
 
 def version():

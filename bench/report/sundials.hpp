@@ -93,6 +93,7 @@ bool drive(Seen<S>& system, const Task<S>& task, N_Vector state, Answer& answer,
         }
         if (Seen<S>::acts) again(t);
     }
+    note_energy(task, x, answer);
     *answer.flow_calls += system.flow_calls;
     *answer.guard_calls += system.guard_calls;
     return finished;

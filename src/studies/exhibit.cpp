@@ -97,7 +97,8 @@ std::string script(const Panel& panel, std::size_t which, PlotFiles& files)
     if (panel.tiles) {
         const std::string file = fmt::format("tiles{}", which);
         files.emplace_back(file, data(*panel.tiles));
-        out += tics("x", panel.tiles->x) + tics("y", panel.tiles->y) + "unset grid\n";
+        out += tics("x", panel.tiles->x) + tics("y", panel.tiles->y) +
+               fmt::format("unset grid\n{}set logscale cb\n", panel.tiles->log_colour ? "" : "un");
         parts.push_back(fmt::format("'{}' using 1:2:3 with image pixels notitle", file));
         if (panel.tiles->numbered) {
             parts.push_back(fmt::format("'{}' using 1:2:4 with labels notitle", file));

@@ -31,6 +31,7 @@ struct Tiles {
     std::vector<double> x{}, y{};
     std::vector<double> value{};  ///< y.size() rows of x.size(); NaN: none
     bool numbered = false;        ///< with their numbers written on them
+    bool log_colour = false;      ///< colours follow the logarithm of the values
 };
 
 struct Panel {
