@@ -196,6 +196,12 @@ class GuardMap(unittest.TestCase):
         # 11 us against 2.1 us, and against 1.2 us.
         self.assertEqual(guard_map.text(self.row, 1e-5), "planned 5.24x (every 50 9.17x)")
 
+    def test_the_next_one_is_named(self):
+        # 11 us against 2.1 us and 2.6 us.
+        row = guard_ways(2.0, *[(way["name"], way["time"], way["calls"], way["same"])
+                                for way in self.row["ways"]], ("certified", 2.5e-6, 0.01, True))
+        self.assertIn("planned 5.24x, then certified 4.23x", guard_map.text(row, 1e-5))
+
     def test_a_panel_has_a_tile_for_every_price_and_rate(self):
         tiles = guard_map.panels(self.found)[0]["tiles"]
         self.assertEqual(len(tiles["value"]), len(tiles["x"]) * len(tiles["y"]))
