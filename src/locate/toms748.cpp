@@ -4,6 +4,7 @@
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "jump.hpp"
 
@@ -30,6 +31,9 @@ Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double
     const auto halve = [&] { (void)sample_at(lo.s + (hi.s - lo.s) / 2); };
     // A step that begins on the surface, or behind it by rounding, has no sign there.
     while (path.has_left(lo) && !narrow_enough(lo.s, hi.s)) halve();
+    // After an event the start has a sign and no value, from which the first secant would lead nowhere.
+    constexpr double least = std::numeric_limits<double>::min();
+    while (std::fabs(lo.value) <= least && !narrow_enough(lo.s, hi.s)) halve();
     if (lo.value * hi.value < 0 && std::isfinite(lo.value * hi.value) &&
         !narrow_enough(lo.s, hi.s)) {
         std::uintmax_t iterations = 200;

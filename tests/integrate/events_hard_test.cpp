@@ -15,6 +15,7 @@
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/filippov.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/locate/locators.hpp"
 
 namespace ricochet::events_hard_test {
 namespace {
@@ -682,6 +683,27 @@ TEST(HardEvents, ARateThatContradictsASurfaceOfRoundingIsNotFollowedForEver)
     EXPECT_EQ(run.outcome, Outcome::reached_end);
     // Nine of a row, and a doubling of what is left out after each: 30 of them span the step.
     EXPECT_LE(run.events.size(), 3 * 30 * 9U);
+}
+
+/// Two roots close to each other, passed at unit speed.
+struct CloseRoots {
+    using State = std::array<double, 1>;
+    void flow(double, const State&, State& dxdt) const { dxdt[0] = 1; }
+    [[nodiscard]] double guard(double, const State& x) const
+    {
+        return (x[0] - 1.111) * (x[0] - 1.114);
+    }
+    [[nodiscard]] GuardInfo guard_info() const { return {.crossing = Crossing::either}; }
+};
+
+TEST(HardEvents, TomsFindsEachOfTwoCloseRootsOnce)
+{
+    const auto run = integrate(CloseRoots{}, X1{0.0}, {.t_end = 3, .step = 0.25}, FixedStep<Rk4>{},
+                               Extremum{}, Toms748{});
+    ASSERT_EQ(run.events.size(), 2U);
+    // The guard's slope is 0.003, so its rounding, some 1e-19, moves a root by less than 1e-15.
+    EXPECT_NEAR(run.events[0].t, 1.111, 2e-15);
+    EXPECT_NEAR(run.events[1].t, 1.114, 2e-15);
 }
 
 }  // namespace
