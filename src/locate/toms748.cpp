@@ -31,7 +31,8 @@ Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double
     const auto halve = [&] { (void)sample_at(lo.s + (hi.s - lo.s) / 2); };
     // A step that begins on the surface, or behind it by rounding, has no sign there.
     while (path.has_left(lo) && !narrow_enough(lo.s, hi.s)) halve();
-    // After an event the start has a sign and no value, from which the first secant would lead nowhere.
+    // After an event the start has a sign and no value, from which the first secant would lead
+    // nowhere.
     constexpr double least = std::numeric_limits<double>::min();
     while (std::fabs(lo.value) <= least && !narrow_enough(lo.s, hi.s)) halve();
     if (lo.value * hi.value < 0 && std::isfinite(lo.value * hi.value) &&
