@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "scene/calendar.hpp"
-#include "scene/cells.hpp"
 #include "scene/contacts.hpp"
+#include "scene/grid.hpp"
 #include "scene/impacts.hpp"
 #include "scene/islands.hpp"
 #include "scene/world.hpp"
@@ -58,12 +58,11 @@ private:
     };
 
     void place_all();
-    void place_faces();
     void settle_at_start();
     void predict(std::uint32_t i);
     void consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other);
     void consider_walls(std::uint32_t i);
-    void consider_bucket(std::uint32_t i, std::uint32_t bucket);
+    void consider_body(std::uint32_t i, std::uint32_t j);
     void consider_faces(std::uint32_t i);
     void consider_own(std::uint32_t i);
     void offer(std::uint32_t i);
@@ -125,7 +124,7 @@ private:
     World& world_;
     std::vector<std::uint32_t> members_;
     Instant t_end_;
-    Cells cells_;
+    Grid grid_;
     bool celled_ = false;
     Calendar calendar_;
     std::vector<Pending> pending_;

@@ -13,6 +13,7 @@
 
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/scene/simulate.hpp"
+#include "scene/options.hpp"
 #include "scene/roots.hpp"
 #include "scene/vector2.hpp"
 
@@ -55,6 +56,7 @@ struct alignas(64) Body {
     std::array<std::uint32_t, 3> sides{none, none, none};
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4
+    bool big = false;      ///< in the second grid (grid.hpp)
 };
 static_assert(sizeof(Body) == 128);
 
@@ -97,6 +99,7 @@ struct World {
 
     const Scene& scene;
     const SceneOptions& options;
+    SceneTuning tuning;
     Vector2 gravity{};
     std::vector<Body> bodies;
     std::vector<std::array<Vector2, 2>>
