@@ -77,9 +77,11 @@ private:
     };
 
     void join(World& world);
-    void flow(const Island& island, const State& x, State& rate) const;
+    template <class AnyState>
+    void flow(const Island& island, const AnyState& x, AnyState& rate) const;
     void depart(const Island& island, double h, bool with_error) const;
-    void depart_alone(const Island& island, double h, bool with_error) const;
+    template <std::size_t n, class Flow>
+    void depart_few(const Island& island, double h, bool with_error, const Flow& flow) const;
     [[nodiscard]] double error_of(const Island& island, double h) const;
     void look_at(const Island& island, const Instant& t) const;
     [[nodiscard]] double first_step(const Island& island) const;
@@ -90,7 +92,7 @@ private:
     std::vector<Island> islands_;
     std::vector<std::uint32_t> place_;  ///< of a body in its island
     mutable std::vector<State> stages_;
-    mutable State w_, end_rate_, error_, middle_, at_;
+    mutable State w_, end_rate_, error_, middle_, at_, point_;
     mutable const Island* seen_ = nullptr;  ///< whose state at `seen_at_` lies in `at_`
     mutable Instant seen_at_{};
     mutable Instant seen_from_{};

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/large_pages.hpp"
-
 namespace ricochet::detail {
 
 namespace {
@@ -26,15 +24,13 @@ Runner::Runner(World& world, double t_end)
       impacts_(world),
       contacts_(world)
 {
-    reserve_large(pending_, world.bodies.size());
-    pending_.resize(world.bodies.size());
-    reserve_large(series_, world.bodies.size());
-    series_.resize(world.bodies.size());
 }
 
 void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events)
 {
     members_.assign(bodies.begin(), bodies.end());
+    pending_.begin(bodies);
+    series_.begin(bodies);
     islands_.clear();
     for (const std::uint32_t i : members_) {
         if (world_.bodies[i].island != none) islands_.push_back(world_.bodies[i].island);
@@ -251,10 +247,14 @@ void Runner::predict_crossing(std::uint32_t i)
         for (std::size_t c = 0; c < 2; ++c) {
             const double into = path.c[0][c] - corner[c];
             Polynomial gap{};
-            for (std::size_t k = 1; k < 5; ++k) gap[k] = path.c[k][c];
+            double reach = 0;
+            for (std::size_t k = 4; k > 0; --k) {
+                gap[k] = path.c[k][c];
+                reach = (reach + std::fabs(gap[k])) * path.until;
+            }
             for (const double way : {into, side - into}) {
                 gap[0] = std::max(way, 0.0) + grid_.outside();
-                first = std::min(first, falls_within(gap, 4, first, 0));
+                if (reach >= gap[0]) first = std::min(first, falls_within(gap, 4, first, 0));
                 for (std::size_t k = 1; k < 5; ++k) gap[k] = -gap[k];
             }
         }

@@ -12,6 +12,7 @@
 #include "scene/grid.hpp"
 #include "scene/impacts.hpp"
 #include "scene/islands.hpp"
+#include "scene/large_pages.hpp"
 #include "scene/world.hpp"
 
 namespace ricochet::detail {
@@ -33,6 +34,30 @@ struct GroupResult {
 
 /// State of all bodies of a group at a sample time.
 using Samples = std::vector<std::vector<BodyState>>;
+
+/// A value for each body of a group, in room for the labels between its first and its last: those
+/// of a body that is alone are always in the same place.
+template <class Value>
+class OfGroup {
+public:
+    /// @param members  ascending
+    void begin(std::span<const std::uint32_t> members)
+    {
+        first_ = members.front();
+        const std::size_t room = members.back() - first_ + std::size_t{1};
+        if (list_.size() < room) {
+            reserve_large(list_, room);
+            list_.resize(room);
+        }
+        for (const std::uint32_t i : members) (*this)[i] = {};
+    }
+    [[nodiscard]] Value& operator[](std::uint32_t body) { return list_[body - first_]; }
+    [[nodiscard]] const Value& operator[](std::uint32_t body) const { return list_[body - first_]; }
+
+private:
+    std::vector<Value> list_;
+    std::uint32_t first_ = 0;
+};
 
 class Runner {
 public:
@@ -127,7 +152,7 @@ private:
     Grid grid_;
     bool celled_ = false;
     Calendar calendar_;
-    std::vector<Pending> pending_;
+    OfGroup<Pending> pending_;
     std::vector<std::uint32_t> slots_;
     std::vector<std::uint32_t> islands_;
     Impacts impacts_;
@@ -148,7 +173,7 @@ private:
         std::uint32_t count = 0;
         std::uint32_t low = 0;  ///< hops in a row that rise by less than rounding
     };
-    std::vector<Series> series_;  ///< of impacts of a body
+    OfGroup<Series> series_;  ///< of impacts of a body
     Instant now_{};
     std::uint32_t fruitless_ = 0;  ///< predicted impacts in a row that moved nothing
     std::uint64_t idle_ = 0;       ///< acts in a row at one time
