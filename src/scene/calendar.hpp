@@ -1,6 +1,10 @@
-// Next body to act: a heap of four children a node, with one entry for each body that is awake.
+// Next body to act, with one entry for each body that is awake: a heap of four children a node or,
+// where there are many, a ring of lists of which the present one alone is in the heap (G. Paul, A
+// complexity O(1) priority queue for event driven molecular dynamics simulations, Journal of
+// Computational Physics 221, 2007). Both have the same order.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -12,23 +16,147 @@ class Calendar {
 public:
     explicit Calendar(std::size_t bodies) : place_(bodies, none) {}
 
-    void clear()
+    /// No entries; with a ring if there are to be many.
+    void clear(bool with_ring)
     {
         for (const Entry& entry : heap_) place_[entry.body] = none;
         heap_.clear();
+        ring_ = with_ring;
+        if (!ring_) return;
+        times_.resize(place_.size(), no_instant);
+        is_late_.resize(place_.size(), 0);
+        for (const std::uint32_t body : late_) is_late_[body] = 0;
+        late_.clear();
+        lists_.clear();
+        nodes_.clear();
+        free_ = none;
+        present_ = 0;
+        origin_ = inverse_ = 0;
     }
-    [[nodiscard]] bool empty() const noexcept { return heap_.empty(); }
+    /// Whether there is no entry. `first` is what precedes all others after a call that says no.
+    [[nodiscard]] bool empty()
+    {
+        while (ring_ && heap_.empty()) {
+            if (present_ + 1 >= lists_.size()) {
+                if (!turn()) break;
+            } else {
+                pour(++present_);
+            }
+        }
+        return heap_.empty();
+    }
     [[nodiscard]] std::uint32_t first() const noexcept { return heap_[0].body; }
     [[nodiscard]] const Instant& first_time() const noexcept { return heap_[0].t; }
 
     /// The entry of a body; an infinite time takes it out.
     void set(std::uint32_t body, const Instant& t)
     {
-        std::uint32_t at = place_[body];
-        if (!(t.value < never)) {
-            if (at != none) erase(at);
-            return;
+        if (ring_) return set_in_ring(body, t);
+        if (!(t.value < never)) return take_out(body);
+        set_in_heap(body, t);
+    }
+
+private:
+    /// Entries in a list when it becomes the present one: few lists are empty, and the heap stays
+    /// in the nearest cache.
+    static constexpr double in_a_list = 16;
+
+    /// What a list says counts if `times_` agrees when it is poured: nothing is ever taken out.
+    struct Node {
+        std::uint32_t body = none;
+        std::uint32_t next = none;
+    };
+
+    [[nodiscard]] double list_of(const Instant& t) const noexcept
+    {
+        return (t.value - origin_) * inverse_;
+    }
+    void set_in_ring(std::uint32_t body, const Instant& t)
+    {
+        times_[body] = t;
+        if (!(t.value < never)) return take_out(body);
+        const double list = list_of(t);
+        if (list < static_cast<double>(present_ + 1) && !lists_.empty()) {
+            return set_in_heap(body, t);
         }
+        take_out(body);
+        put_in_list(body, list);
+    }
+    void put_in_list(std::uint32_t body, double list)
+    {
+        if (list < static_cast<double>(lists_.size())) {
+            std::uint32_t node = free_;
+            if (node == none) {
+                node = static_cast<std::uint32_t>(nodes_.size());
+                nodes_.emplace_back();
+            } else {
+                free_ = nodes_[node].next;
+            }
+            std::uint32_t& head = lists_[static_cast<std::size_t>(list)];
+            nodes_[node] = {body, head};
+            head = node;
+        } else if (!is_late_[body]) {
+            is_late_[body] = 1;
+            late_.push_back(body);
+        }
+    }
+    /// The entries of a list into the heap.
+    void pour(std::size_t list)
+    {
+        std::uint32_t node = lists_[list];
+        lists_[list] = none;
+        while (node != none) {
+            const auto [body, next] = nodes_[node];
+            const Instant& t = times_[body];
+            const bool due = t.value < never && list_of(t) < static_cast<double>(list + 1);
+            if (due && place_[body] == none) set_in_heap(body, t);
+            nodes_[node].next = free_;
+            free_ = node;
+            node = next;
+        }
+    }
+    /// All entries are late: new lists, as long as a quarter of the entries fill in a quarter of
+    /// the lists of as many. So a turn of the ring has at least a quarter of them, and its cost is
+    /// shared by as many events. False if there are none.
+    bool turn()
+    {
+        std::erase_if(late_, [&](std::uint32_t body) {
+            is_late_[body] = times_[body].value < never;
+            return !is_late_[body];
+        });
+        if (late_.empty()) return false;
+        const std::size_t stride = late_.size() / 1024 + 1;
+        some_.clear();
+        origin_ = never;
+        for (std::size_t k = 0; k < late_.size(); ++k) {
+            const double t = times_[late_[k]].value;
+            origin_ = std::min(origin_, t);
+            if (k % stride == 0) some_.push_back(t);
+        }
+        const auto quarter = some_.begin() + static_cast<std::ptrdiff_t>(some_.size() / 4);
+        std::ranges::nth_element(some_, quarter);
+        double until = *quarter - origin_;
+        if (!(until > 0)) until = std::ranges::max(some_) - origin_;
+        const double count = static_cast<double>(late_.size()) / in_a_list;
+        inverse_ = 0.25 * count / until;
+        if (!std::isfinite(inverse_)) inverse_ = 0;  // at one time: all in the heap
+        lists_.assign(static_cast<std::size_t>(2 * count) + 2, none);
+        present_ = 0;
+        waiting_.swap(late_);
+        late_.clear();
+        for (const std::uint32_t body : waiting_) is_late_[body] = 0;
+        for (const std::uint32_t body : waiting_) put_in_list(body, list_of(times_[body]));
+        pour(0);
+        return true;
+    }
+
+    void take_out(std::uint32_t body)
+    {
+        if (place_[body] != none) erase(place_[body]);
+    }
+    void set_in_heap(std::uint32_t body, const Instant& t)
+    {
+        std::uint32_t at = place_[body];
         if (at == none) {
             at = static_cast<std::uint32_t>(heap_.size());
             heap_.push_back({t, body});
@@ -41,7 +169,6 @@ public:
         earlier ? up(at) : down(at);
     }
 
-private:
     struct Entry {
         Instant t;
         std::uint32_t body;
@@ -99,7 +226,19 @@ private:
     }
 
     std::vector<Entry> heap_;
-    std::vector<std::uint32_t> place_;
+    std::vector<std::uint32_t> place_;  ///< in the heap
+
+    bool ring_ = false;
+    std::vector<Instant> times_;  ///< of all entries, in the heap or not
+    std::vector<std::uint32_t>
+        lists_;  ///< their first nodes; list k begins at origin + k / inverse
+    std::vector<Node> nodes_;
+    std::uint32_t free_ = none;
+    std::size_t present_ = 0;
+    double origin_ = 0, inverse_ = 0;
+    std::vector<std::uint32_t> late_, waiting_;  ///< entries behind the last list
+    std::vector<char> is_late_;
+    std::vector<double> some_;
 };
 
 }  // namespace ricochet::detail

@@ -15,7 +15,7 @@ class Cells {
 public:
     Cells() = default;
 
-    /// Cells of at least `side`, about `per_cell` of `bodies` in each where they fill the box.
+    /// Empty cells of this side. Numbers of buckets are powers of two.
     void size(double side, std::uint32_t buckets_x, std::uint32_t buckets_y)
     {
         side_ = side;
@@ -24,7 +24,8 @@ public:
         mask_y_ = buckets_y - 1;
         width_ = buckets_x;
         heads_.assign(static_cast<std::size_t>(buckets_x) * buckets_y, none);
-        fixed_.assign(heads_.size(), {});
+        fixed_.clear();
+        any_fixed_ = false;
     }
 
     struct Cell {
@@ -60,10 +61,27 @@ public:
         if (body.next != none) bodies[body.next].previous = body.previous;
     }
     [[nodiscard]] std::uint32_t head(std::uint32_t bucket) const noexcept { return heads_[bucket]; }
+    [[nodiscard]] std::size_t buckets() const noexcept { return heads_.size(); }
 
-    /// Faces that reach into a bucket.
+    /// The cell and its neighbours.
+    template <class Visit>
+    void around(const Cell& cell, const Visit& visit) const
+    {
+        for (int x = -1; x <= 1; ++x) {
+            for (int y = -1; y <= 1; ++y) visit(bucket_of(cell.x + x, cell.y + y));
+        }
+    }
+    /// Bodies in a bucket.
+    template <class Visit>
+    void each_in(std::uint32_t bucket, const std::vector<Body>& bodies, const Visit& visit) const
+    {
+        for (std::uint32_t j = heads_[bucket]; j != none; j = bodies[j].next) visit(j);
+    }
+
+    /// Faces that reach into a bucket; there are none to ask for unless `any_faces()`.
     void add_face(std::uint32_t bucket, std::uint32_t face)
     {
+        if (fixed_.empty()) fixed_.resize(heads_.size());
         auto& list = fixed_[bucket];
         if (std::ranges::find(list, face) == list.end()) list.push_back(face);
         any_fixed_ = true;

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "scene/islands.hpp"
+#include "scene/large_pages.hpp"
 
 namespace ricochet::detail {
 
@@ -181,7 +182,9 @@ private:
 std::vector<Reach> reaches(const World& world)
 {
     const double until = world.options.t_end - world.options.t_start;
-    std::vector<Reach> out(world.bodies.size());
+    std::vector<Reach> out;
+    reserve_large(out, world.bodies.size());
+    out.resize(world.bodies.size());
     const bool terrain = world.fixed_count > world.wall_count;
     for (std::size_t i = 0; i < out.size(); ++i) {
         const Body& body = world.bodies[i];

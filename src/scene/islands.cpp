@@ -87,10 +87,13 @@ void Islands::join(World& world)
     }
 }
 
-void Islands::flow(const Island& island, const State& x, State& rate, double s) const
+template <class AnyState>
+void Islands::flow(const Island& island, const AnyState& x, AnyState& rate, double s) const
 {
     ++world_.statistics.flow_calls;
-    if (island.system) return island.system->flow(island.mode, island.start.plus(s), x, rate);
+    if constexpr (std::is_same_v<AnyState, State>) {
+        if (island.system) return island.system->flow(island.mode, island.start.plus(s), x, rate);
+    }
     const std::size_t n = island.members.size();
     for (std::size_t m = 0; m < n; ++m) {
         const double damping = island.drag[m] * island.inverse_mass[m];
@@ -115,42 +118,46 @@ void Islands::flow(const Island& island, const State& x, State& rate, double s) 
     }
 }
 
-/// One body without springs, in registers; the bits are those of `depart`.
-void Islands::depart_alone(const Island& island, double h, bool with_error) const
+// Of systems as well (island_systems.cpp).
+template void Islands::flow(const Island&, const State&, State&, double) const;
+
+/// A state of few numbers, in registers; the bits are those of `depart`.
+template <std::size_t n, class Flow>
+void Islands::depart_few(const Island& island, double h, bool with_error, const Flow& flow) const
 {
-    using Alone = std::array<double, 4>;
-    using Method = RungeKutta<Dopri5Tableau, Alone>;
-    const double damping = island.drag[0] * island.inverse_mass[0];
-    const auto four = [](const State& state) {
-        return Alone{state[0], state[1], state[2], state[3]};
+    using Few = std::array<double, n>;
+    using Method = RungeKutta<Dopri5Tableau, Few>;
+    const auto few = [](const State& state) {
+        Few out;
+        std::copy_n(state.begin(), n, out.begin());
+        return out;
     };
-    const Alone x = four(island.x);
-    const Alone remainder = four(island.remainder);
-    const Alone start = four(island.rate);
-    const Vector2 pull = world_.gravity;
-    const auto departure = [&](const auto& w, Alone& rate, double s) {
-        ++world_.statistics.flow_calls;
-        Alone point;
-        for (std::size_t i = 0; i < 4; ++i) {
+    const Few x = few(island.x);
+    const Few remainder = few(island.remainder);
+    const Few start = few(island.rate);
+    const auto departure = [&](const auto& w, Few& rate, double s) {
+        Few point;
+        for (std::size_t i = 0; i < n; ++i) {
             point[i] = x[i] + (s * start[i] + (w[i] + remainder[i]));
         }
-        rate = {point[2], point[3], pull[0] - damping * point[2], pull[1] - damping * point[3]};
-        for (std::size_t i = 0; i < 4; ++i) rate[i] -= start[i];
+        flow(point, rate);
+        for (std::size_t i = 0; i < n; ++i) rate[i] -= start[i];
     };
-    std::array<Alone, Method::kept_stages> stages;
-    Alone w;
-    Alone end_rate;
-    Alone error{};
+    std::array<Few, Method::kept_stages> stages;
+    Few w;
+    Few end_rate;
+    Few error{};
     if (with_error) {
-        Method::depart<true>(departure, x, h, stages.data(), w, end_rate, error);
+        Method::template depart<true>(departure, x, h, stages.data(), w, end_rate, error);
     } else {
-        Method::depart<false>(departure, x, h, stages.data(), w, end_rate, error);
+        Method::template depart<false>(departure, x, h, stages.data(), w, end_rate, error);
     }
     std::ranges::copy(w, w_.begin());
     std::ranges::copy(end_rate, end_rate_.begin());
     std::ranges::copy(error, error_.begin());
-    for (std::size_t k = 0; k < stages.size() && !island.unseen; ++k)
+    for (std::size_t k = 0; k < stages.size() && !island.unseen; ++k) {
         std::ranges::copy(stages[k], stages_[k].begin());
+    }
     seen_ = nullptr;
 }
 
@@ -158,16 +165,27 @@ void Islands::depart(const Island& island, double h, bool with_error) const
 {
     const std::size_t n = island.x.size();
     if (w_.size() != n) {
-        for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_}) state->resize(n);
+        for (State* state : {&w_, &end_rate_, &error_, &middle_, &at_, &point_}) state->resize(n);
         for (State& stage : stages_) stage.resize(n);
     }
-    if (n == 4 && !island.system) return depart_alone(island, h, with_error);
-    State point(n);
+    if (n == 4 && !island.system) {
+        // One body has no springs.
+        const double damping = island.drag[0] * island.inverse_mass[0];
+        const Vector2 pull = world_.gravity;
+        return depart_few<4>(island, h, with_error, [&](const auto& x, auto& rate) {
+            ++world_.statistics.flow_calls;
+            rate = {x[2], x[3], pull[0] - damping * x[2], pull[1] - damping * x[3]};
+        });
+    }
+    if (n == 8 && !island.system) {
+        return depart_few<8>(island, h, with_error,
+                             [&](const auto& x, auto& rate) { flow(island, x, rate, 0); });
+    }
     const auto departure = [&](const auto& w, State& rate, double s) {
         for (std::size_t i = 0; i < n; ++i) {
-            point[i] = island.x[i] + (s * island.rate[i] + (w[i] + island.remainder[i]));
+            point_[i] = island.x[i] + (s * island.rate[i] + (w[i] + island.remainder[i]));
         }
-        flow(island, point, rate, s);
+        flow(island, point_, rate, s);
         for (std::size_t i = 0; i < n; ++i) rate[i] -= island.rate[i];
     };
     if (with_error) {

@@ -109,7 +109,8 @@ private:
     class Step;
 
     void join(World& world);
-    void flow(const Island& island, const State& x, State& rate, double s) const;
+    template <class AnyState>
+    void flow(const Island& island, const AnyState& x, AnyState& rate, double s) const;
     void add_systems();
     void record_system(Island& island);
     bool find_events(Island& island);
@@ -117,7 +118,8 @@ private:
     void restep(const Island& island, double s, std::span<double> x) const;
     [[nodiscard]] SystemDisc disc(std::uint32_t body, const Instant& t) const;
     void depart(const Island& island, double h, bool with_error) const;
-    void depart_alone(const Island& island, double h, bool with_error) const;
+    template <std::size_t n, class Flow>
+    void depart_few(const Island& island, double h, bool with_error, const Flow& flow) const;
     [[nodiscard]] double error_of(const Island& island, double h) const;
     void look_at(const Island& island, const Instant& t) const;
     [[nodiscard]] double first_step(const Island& island) const;
@@ -128,7 +130,7 @@ private:
     std::vector<Island> islands_;
     std::vector<std::uint32_t> place_;  ///< of a body in its island
     mutable std::vector<State> stages_;
-    mutable State w_, end_rate_, error_, middle_, at_;
+    mutable State w_, end_rate_, error_, middle_, at_, point_;
     mutable const Island* seen_ = nullptr;  ///< whose state at `seen_at_` lies in `at_`
     mutable Instant seen_at_{};
     mutable Instant seen_from_{};

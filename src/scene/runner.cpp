@@ -4,19 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
-#include "scene/large_pages.hpp"
 #include "scene/moving.hpp"
 
 namespace ricochet::detail {
 
 namespace {
-
-/// With no more than these there are no cells.
-constexpr std::size_t few_bodies = 16;
-constexpr std::size_t few_faces = 64;
 
 /// Acts in a row at one time, and 64 for each body: by trial, far more than any collapse takes.
 constexpr std::uint64_t most_idle = 100'000;
@@ -32,15 +26,13 @@ Runner::Runner(World& world, double t_end)
       impacts_(world),
       contacts_(world)
 {
-    reserve_large(pending_, world.bodies.size());
-    pending_.resize(world.bodies.size());
-    reserve_large(series_, world.bodies.size());
-    series_.resize(world.bodies.size());
 }
 
 void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events)
 {
     members_.assign(bodies.begin(), bodies.end());
+    pending_.begin(bodies);
+    series_.begin(bodies);
     islands_.clear();
     for (const std::uint32_t i : members_) {
         if (world_.bodies[i].island != none) islands_.push_back(world_.bodies[i].island);
@@ -51,7 +43,7 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
     if (members_.size() == 1 && world_.faces.empty()) {
         for (const std::uint32_t island : islands_) world_.islands->set_unseen(island);
     }
-    calendar_.clear();
+    calendar_.clear(members_.size() >= world_.tuning.ring_from);
     now_ = {world_.options.t_start, 0};
     fruitless_ = 0;
     idle_ = 0;
@@ -60,69 +52,13 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
     result_.events = std::move(events);
 }
 
-/// Cells as large as two of the largest discs, or as leave some 0.4 bodies in each: by trial, 1.2
-/// times as fast at a fraction of 0.3 as one body in each.
 void Runner::place_all()
 {
     celled_ = members_.size() > 1 || world_.fixed_count > world_.wall_count;
     if (!celled_) return;
-    Vector2 low{never, never};
-    Vector2 high{-never, -never};
-    double radius = 0;
+    grid_.size(world_, members_, !islands_.empty());
     for (const std::uint32_t i : members_) {
-        const Body& body = world_.bodies[i];
-        for (std::size_t c = 0; c < 2; ++c) {
-            low[c] = std::min(low[c], body.p[c]);
-            high[c] = std::max(high[c], body.p[c]);
-        }
-        radius = std::max(radius, body.radius);
-    }
-    const auto count = static_cast<double>(members_.size());
-    const double width = high[0] - low[0] + 2 * radius;
-    const double height = high[1] - low[1] + 2 * radius;
-    // Steps are asked where they are only now and then, and may lie a tenth outside their cell.
-    const double slack = islands_.empty() ? 1.0001 : 1.3;
-    double side = std::max(2 * radius * slack, 0.65 * std::sqrt(width * height / count));
-    if (!(side > 0)) side = std::max({width, height, 1.0});
-    if (members_.size() <= few_bodies && world_.fixed_count - world_.wall_count <= few_faces) {
-        side = 0x1p200;  // so few are all asked, and none pays for the cells that it crosses
-    }
-    const auto buckets = [&](double extent) {
-        const double wanted = std::clamp(extent / side, 4.0, 4 * std::sqrt(count) + 1e3);
-        return std::bit_ceil(static_cast<std::uint32_t>(wanted));
-    };
-    cells_.size(side, buckets(width), buckets(height));
-    place_faces();
-    for (const std::uint32_t i : members_) {
-        Pending& pending = pending_[i];
-        pending.cell = cells_.cell_of(world_.bodies[i].p);
-        cells_.insert(world_.bodies, i, pending.cell);
-    }
-}
-
-/// A face lies in every bucket from which a body can touch it.
-void Runner::place_faces()
-{
-    double radius = 0;
-    for (const std::uint32_t i : members_) radius = std::max(radius, world_.bodies[i].radius);
-    const double reach = 1.001 * radius + 0.15 * cells_.side();
-    for (std::uint32_t f = world_.wall_count; f < world_.fixed_count; ++f) {
-        const Face& face = world_.faces[f];
-        const Vector2 end = face.at - face.length * turned(face.normal);
-        const auto from = cells_.cell_of(
-            {std::min(face.at[0], end[0]) - reach, std::min(face.at[1], end[1]) - reach});
-        const auto to = cells_.cell_of(
-            {std::max(face.at[0], end[0]) + reach, std::max(face.at[1], end[1]) + reach});
-        for (std::int64_t x = from.x; x <= to.x; ++x) {
-            for (std::int64_t y = from.y; y <= to.y; ++y) {
-                const Vector2 middle{(static_cast<double>(x) + 0.5) * cells_.side(),
-                                     (static_cast<double>(y) + 0.5) * cells_.side()};
-                const double apart = norm(middle - nearest_on(face.at, end, middle));
-                if (apart <= reach + 0.7072 * cells_.side()) {
-                    cells_.add_face(cells_.bucket_of(x, y), f);
-                }
-            }
-        }
+        pending_[i].cell = grid_.insert(world_.bodies, i, world_.bodies[i].p);
     }
 }
 
@@ -272,20 +208,18 @@ void Runner::fail_where_broken()
     fail(broken.non_finite ? Outcome::non_finite : Outcome::wrong_bound, {}, broken.sentence);
 }
 
-void Runner::consider_bucket(std::uint32_t i, std::uint32_t bucket)
+void Runner::consider_body(std::uint32_t i, std::uint32_t j)
 {
-    for (std::uint32_t j = cells_.head(bucket); j != none; j = world_.bodies[j].next) {
-        if (j == i) continue;
-        const std::uint32_t group = world_.bodies[i].contact;
-        if (group != none && group == world_.bodies[j].contact) continue;
-        consider(i, meet(world_, i, j), false, j);
-    }
+    if (j == i) return;
+    const std::uint32_t group = world_.bodies[i].contact;
+    if (group != none && group == world_.bodies[j].contact) return;
+    consider(i, meet(world_, i, j), false, j);
 }
 
 void Runner::consider_faces(std::uint32_t i)
 {
-    if (!cells_.any_faces()) return;
-    for (const std::uint32_t f : cells_.faces(world_.bodies[i].bucket)) {
+    if (!grid_.any_faces()) return;
+    for (const std::uint32_t f : grid_.faces(world_.bodies[i])) {
         if (known_to_group(i, true, f)) continue;
         consider(i, meet_face(world_, i, f), true, f);
     }
@@ -308,12 +242,8 @@ void Runner::predict(std::uint32_t i)
         if (celled_) {
             if (body.quartic) move_to_cell(i);
             if (!body.mapped) consider_faces(i);
-            const auto& cell = pending.cell;
-            for (int x = -1; x <= 1; ++x) {
-                for (int y = -1; y <= 1; ++y) {
-                    consider_bucket(i, cells_.bucket_of(cell.x + x, cell.y + y));
-                }
-            }
+            grid_.each_near(world_.bodies, i, pending.cell,
+                            [&](std::uint32_t j) { consider_body(i, j); });
             predict_crossing(i);
         }
     }
@@ -323,17 +253,11 @@ void Runner::predict(std::uint32_t i)
 /// A sleeper has no entry in the calendar: those that are awake around it may meet it now.
 void Runner::offer(std::uint32_t i)
 {
-    const auto& cell = pending_[i].cell;
-    for (int x = -1; x <= 1; ++x) {
-        for (int y = -1; y <= 1; ++y) {
-            std::uint32_t j = cells_.head(cells_.bucket_of(cell.x + x, cell.y + y));
-            for (; j != none; j = world_.bodies[j].next) {
-                if (j == i || world_.bodies[j].asleep) continue;
-                consider(j, meet(world_, j, i), false, i);
-                put_in_calendar(j);
-            }
-        }
-    }
+    grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
+        if (j == i || world_.bodies[j].asleep) return;
+        consider(j, meet(world_, j, i), false, i);
+        put_in_calendar(j);
+    });
 }
 
 void Runner::put_in_calendar(std::uint32_t i)
@@ -346,23 +270,24 @@ void Runner::predict_crossing(std::uint32_t i)
 {
     Pending& pending = pending_[i];
     const Body& body = world_.bodies[i];
-    const double side = cells_.side();
-    const double corner[2] = {static_cast<double>(pending.cell.x) * side,
-                              static_cast<double>(pending.cell.y) * side};
+    const auto [corner, side] = grid_.square_of(body, i, pending.cell);
     pending.across_x = pending.across_y = 0;
     pending.crossing = no_instant;
     if (body.mapped) return predict_crossing_mapped(i);
     if (body.quartic) {
         const Path path = world_.path(i, now_);
-        // A tenth of a cell outside of it.
         double first = path.until;
         for (std::size_t c = 0; c < 2; ++c) {
             const double into = path.c[0][c] - corner[c];
             Polynomial gap{};
-            for (std::size_t k = 1; k < 5; ++k) gap[k] = path.c[k][c];
+            double reach = 0;
+            for (std::size_t k = 4; k > 0; --k) {
+                gap[k] = path.c[k][c];
+                reach = (reach + std::fabs(gap[k])) * path.until;
+            }
             for (const double way : {into, side - into}) {
-                gap[0] = std::max(way, 0.0) + 0.1 * side;
-                first = std::min(first, falls_within(gap, 4, first, 0));
+                gap[0] = std::max(way, 0.0) + grid_.outside();
+                if (reach >= gap[0]) first = std::min(first, falls_within(gap, 4, first, 0));
                 for (std::size_t k = 1; k < 5; ++k) gap[k] = -gap[k];
             }
         }
@@ -395,16 +320,17 @@ void Runner::predict_crossing(std::uint32_t i)
 void Runner::predict_crossing_mapped(std::uint32_t i)
 {
     Pending& pending = pending_[i];
-    const double side = cells_.side();
+    const auto [corner, side] = grid_.square_of(world_.bodies[i], i, pending.cell);
     const double most = world_.accelerations[i];
     const Path path = world_.path(i, now_);
     double first = path.until;
     for (std::size_t c = 0; c < 2; ++c) {
-        const double cell = static_cast<double>(c == 0 ? pending.cell.x : pending.cell.y);
-        const double into = path.c[0][c] - cell * side;
+        const double into = path.c[0][c] - corner[c];
         const double v = path.c[1][c];
-        first = std::min(first, falls_after(std::max(into, 0.0) + 0.1 * side, v, -most, 0));
-        first = std::min(first, falls_after(std::max(side - into, 0.0) + 0.1 * side, -v, -most, 0));
+        const double down = std::max(into, 0.0) + grid_.outside();
+        const double up = std::max(side - into, 0.0) + grid_.outside();
+        first = std::min(first, falls_after(down, v, -most, 0));
+        first = std::min(first, falls_after(up, -v, -most, 0));
     }
     if (first < path.until) pending.crossing = now_.after(first);
 }
@@ -413,12 +339,7 @@ void Runner::predict_crossing_mapped(std::uint32_t i)
 void Runner::move_to_cell(std::uint32_t i)
 {
     const Instant& t = world_.bodies[i].t;
-    const auto there = cells_.cell_of(world_.path(i, before(now_, t) ? t : now_).c[0]);
-    Cells::Cell& cell = pending_[i].cell;
-    if (there == cell) return;
-    cells_.remove(world_.bodies, i);
-    cell = there;
-    cells_.insert(world_.bodies, i, cell);
+    grid_.move(world_.bodies, i, pending_[i].cell, world_.path(i, before(now_, t) ? t : now_).c[0]);
 }
 
 void Runner::cross(std::uint32_t i)
@@ -426,18 +347,17 @@ void Runner::cross(std::uint32_t i)
     ++world_.statistics.crossings;
     Pending& pending = pending_[i];
     const Body& body = world_.bodies[i];
-    Cells::Cell& cell = pending.cell;
     if (body.quartic) return predict(i);
-    cells_.remove(world_.bodies, i);
-    cell.x += pending.across_x;
-    cell.y += pending.across_y;
-    cells_.insert(world_.bodies, i, cell);
-    consider_faces(i);
-    for (int k = -1; k <= 1; ++k) {
-        const std::int64_t x = pending.across_x != 0 ? cell.x + pending.across_x : cell.x + k;
-        const std::int64_t y = pending.across_y != 0 ? cell.y + pending.across_y : cell.y + k;
-        consider_bucket(i, cells_.bucket_of(x, y));
+    if (body.big) {
+        grid_.lay_again(world_.bodies, i, pending.cell, place(body, seconds(body.t, now_)));
+        return predict(i);
     }
+    const int x = pending.across_x;
+    const int y = pending.across_y;
+    grid_.step(world_.bodies, i, pending.cell, x, y);
+    consider_faces(i);
+    grid_.each_ahead(world_.bodies, i, pending.cell, x, y,
+                     [&](std::uint32_t j) { consider_body(i, j); });
     predict_crossing(i);
     put_in_calendar(i);
 }

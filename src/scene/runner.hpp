@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "scene/calendar.hpp"
-#include "scene/cells.hpp"
 #include "scene/contacts.hpp"
+#include "scene/grid.hpp"
 #include "scene/impacts.hpp"
 #include "scene/islands.hpp"
+#include "scene/large_pages.hpp"
 #include "scene/world.hpp"
 
 namespace ricochet::detail {
@@ -33,6 +34,30 @@ struct GroupResult {
 
 /// State of all bodies of a group at a sample time.
 using Samples = std::vector<std::vector<BodyState>>;
+
+/// A value for each body of a group, in room for the labels between its first and its last: those
+/// of a body that is alone are always in the same place.
+template <class Value>
+class OfGroup {
+public:
+    /// @param members  ascending
+    void begin(std::span<const std::uint32_t> members)
+    {
+        first_ = members.front();
+        const std::size_t room = members.back() - first_ + std::size_t{1};
+        if (list_.size() < room) {
+            reserve_large(list_, room);
+            list_.resize(room);
+        }
+        for (const std::uint32_t i : members) (*this)[i] = {};
+    }
+    [[nodiscard]] Value& operator[](std::uint32_t body) { return list_[body - first_]; }
+    [[nodiscard]] const Value& operator[](std::uint32_t body) const { return list_[body - first_]; }
+
+private:
+    std::vector<Value> list_;
+    std::uint32_t first_ = 0;
+};
 
 class Runner {
 public:
@@ -58,12 +83,11 @@ private:
     };
 
     void place_all();
-    void place_faces();
     void settle_at_start();
     void predict(std::uint32_t i);
     void consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other);
     void consider_walls(std::uint32_t i);
-    void consider_bucket(std::uint32_t i, std::uint32_t bucket);
+    void consider_body(std::uint32_t i, std::uint32_t j);
     void consider_faces(std::uint32_t i);
     void consider_moving(std::uint32_t i);
     void consider_own(std::uint32_t i);
@@ -132,10 +156,10 @@ private:
     World& world_;
     std::vector<std::uint32_t> members_;
     Instant t_end_;
-    Cells cells_;
+    Grid grid_;
     bool celled_ = false;
     Calendar calendar_;
-    std::vector<Pending> pending_;
+    OfGroup<Pending> pending_;
     std::vector<std::uint32_t> slots_;
     std::vector<std::uint32_t> islands_;
     Impacts impacts_;
@@ -156,7 +180,7 @@ private:
         std::uint32_t count = 0;
         std::uint32_t low = 0;  ///< hops in a row that rise by less than rounding
     };
-    std::vector<Series> series_;  ///< of impacts of a body
+    OfGroup<Series> series_;  ///< of impacts of a body
     Instant now_{};
     std::uint32_t fruitless_ = 0;  ///< predicted impacts in a row that moved nothing
     std::uint64_t idle_ = 0;       ///< acts in a row at one time

@@ -66,15 +66,10 @@ std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& 
         });
         if (touched) faces.push_back(f);
     }
-    if (!celled_ || !cells_.any_faces()) return faces;
+    if (!celled_ || !grid_.any_faces()) return faces;
     for (const std::uint32_t i : members) {
-        const auto& cell = pending_[i].cell;
-        for (int x = -1; x <= 1; ++x) {
-            for (int y = -1; y <= 1; ++y) {
-                const auto& near = cells_.faces(cells_.bucket_of(cell.x + x, cell.y + y));
-                faces.insert(faces.end(), near.begin(), near.end());
-            }
-        }
+        grid_.each_face_near(world_.bodies[i], pending_[i].cell,
+                             [&](std::uint32_t face) { faces.push_back(face); });
     }
     std::ranges::sort(faces);
     const auto repeated = std::ranges::unique(faces);

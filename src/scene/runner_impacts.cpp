@@ -94,13 +94,13 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
 {
     std::vector<Side> sides;
     const Body& body = world_.bodies[i];
-    if (body.radius > 0 || !celled_ || !cells_.any_faces()) return sides;
+    if (body.radius > 0 || !celled_ || !grid_.any_faces()) return sides;
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = world_.velocity(i, now_);
     // A long flight and its height round more than its end.
     const double s = seconds(body.t, now_);
     const double flown = 4 * epsilon * s * (norm(body.v) + s * norm(body.a));
-    for (const std::uint32_t f : cells_.faces(body.bucket)) {
+    for (const std::uint32_t f : grid_.faces(body)) {
         const Face& face = world_.faces[f];
         if (face.kind != Face::Kind::segment) continue;
         const bool above = world_.arrives_above(body, f, p, v);
@@ -155,8 +155,8 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         if (side.face != sure && world_.passes_end(body, side.face, side.above, p, v)) continue;
         touch(side.face, side.above ? face.normal : -1.0 * face.normal);
     }
-    if (body.radius > 0 && celled_ && cells_.any_faces()) {
-        for (const std::uint32_t f : cells_.faces(body.bucket)) look(f);
+    if (body.radius > 0 && celled_ && grid_.any_faces()) {
+        for (const std::uint32_t f : grid_.faces(body)) look(f);
     }
     const auto count = static_cast<std::uint32_t>(world_.faces.size());
     for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
@@ -193,22 +193,16 @@ void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
     const Body& a = world_.bodies[i];
     const Vector2 p = world_.position(i, now_);
     const double slack = 1e-9 * (a.radius + std::fabs(p[0]) + std::fabs(p[1]));
-    const auto& cell = pending_[i].cell;
-    for (int x = -1; x <= 1; ++x) {
-        for (int y = -1; y <= 1; ++y) {
-            std::uint32_t j = cells_.head(cells_.bucket_of(cell.x + x, cell.y + y));
-            for (; j != none; j = world_.bodies[j].next) {
-                if (j == i) continue;
-                const Body& b = world_.bodies[j];
-                if (j != sure && !b.quartic) {
-                    const Vector2 near = p - place(b, seconds(b.t, now_));
-                    const double limit = a.radius + b.radius + slack;
-                    if (dot(near, near) > limit * limit) continue;
-                }
-                try_pair(slot, j, j == sure);
-            }
+    grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
+        if (j == i) return;
+        const Body& b = world_.bodies[j];
+        if (j != sure && !b.quartic) {
+            const Vector2 near = p - place(b, seconds(b.t, now_));
+            const double limit = a.radius + b.radius + slack;
+            if (dot(near, near) > limit * limit) return;
         }
-    }
+        try_pair(slot, j, j == sure);
+    });
 }
 
 void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)

@@ -81,16 +81,18 @@ namespace {
 
 /// One pass over all groups; what failed in one group ends the others at that time, in a pass of
 /// their own.
-SceneRun run_until(const Scene& scene, const SceneOptions& options, double t_end, Failure* first)
+SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneTuning& tuning,
+                   double t_end, Failure* first)
 {
     SceneRun run;
     World world(scene, options);
+    world.tuning = tuning;
     const auto failure = run_groups(world, t_end, run);
     if (failure && failure->t.value < t_end &&
         world.statistics.groups + world.statistics.alone > 1 &&
         failure->outcome != Outcome::cancelled) {
         *first = *failure;
-        return run_until(scene, options, failure->t.value, first);
+        return run_until(scene, options, tuning, failure->t.value, first);
     }
     if (failure) *first = *failure;
     const Instant end = failure ? failure->t : Instant{t_end, 0};
@@ -166,7 +168,12 @@ void sort_events(SceneRun& run)
 
 }  // namespace
 
-SceneRun simulate(const Scene& scene, const SceneOptions& wanted)
+SceneRun simulate(const Scene& scene, const SceneOptions& options)
+{
+    return detail::simulate(scene, options, {});
+}
+
+SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const SceneTuning& tuning)
 {
     validate(wanted);
     SceneOptions options = wanted;
@@ -175,7 +182,7 @@ SceneRun simulate(const Scene& scene, const SceneOptions& wanted)
     scene.check(options.t_start);
     scene.require_room(0);
     Failure failure;
-    SceneRun run = run_until(scene, options, options.t_end, &failure);
+    SceneRun run = run_until(scene, options, tuning, options.t_end, &failure);
     if (run.statistics.events > options.max_events) {
         // Each group has counted for itself: the time of the last event that is wanted ends all.
         std::vector<double> times;
@@ -189,7 +196,7 @@ SceneRun simulate(const Scene& scene, const SceneOptions& wanted)
         const double end = times[static_cast<std::size_t>(nth)];
         failure = {Outcome::step_limit, {end, 0}, {}, "max_events events have happened"};
         Failure later;
-        run = run_until(scene, options, end, &later);
+        run = run_until(scene, options, tuning, end, &later);
     }
     run.outcome = failure.outcome;
     run.message = failure.message;

@@ -16,6 +16,7 @@
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/scene/simulate.hpp"
 #include "scene/motion.hpp"
+#include "scene/options.hpp"
 #include "scene/roots.hpp"
 #include "scene/vector2.hpp"
 
@@ -59,6 +60,7 @@ struct alignas(64) Body {
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4
     bool mapped = false;   ///< of a system: its step has no polynomial, but a bound
+    bool big = false;      ///< in the second grid (grid.hpp)
 };
 static_assert(sizeof(Body) == 128);
 
@@ -120,6 +122,7 @@ struct World {
 
     const Scene& scene;
     const SceneOptions& options;
+    SceneTuning tuning;
     Vector2 gravity{};
     std::vector<Body> bodies;
     std::vector<std::array<Vector2, 2>>
