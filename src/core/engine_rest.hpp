@@ -64,8 +64,11 @@ inline bool EventEngine<X, single>::is_away(std::size_t i, double rounding)
 {
     GuardRecord& record = bank_[i];
     const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
-    if (!(sign_of(record.last_side) * g > 1024 * rounding)) return false;
-    record.turned = true;
+    // The reset of another guard may carry it far across its surface, which is no motion towards
+    // it.
+    const double away = located_ ? sign_of(record.last_side) * g : std::fabs(g);
+    if (!(away > 1024 * rounding)) return false;
+    record.turned = sign_of(record.last_side) * g > 0;
     return true;
 }
 

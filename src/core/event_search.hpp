@@ -366,7 +366,15 @@ private:
             return true;
         }
         if (is_plateau(probe, watch)) {
-            record.next = record.awaited = Side::plateau;
+            // After a crossing it is none where the guard moves by no more than its rounding.
+            const double moves = std::fabs(watch.start.rate) * (watch.end.s - watch.start.s);
+            const bool rated = std::fabs(watch.start.rate) > std::numeric_limits<double>::min();
+            const bool crossing = record.from > 0 && rated && moves <= probe.blur(watch.end.s);
+            if (crossing) {
+                record.next = record.side;
+            } else {
+                record.next = record.awaited = Side::plateau;
+            }
             return true;
         }
         return false;

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ricochet/detect/bernstein.hpp"
@@ -704,6 +705,72 @@ TEST(HardEvents, TomsFindsEachOfTwoCloseRootsOnce)
     // The guard's slope is 0.003, so its rounding, some 1e-19, moves a root by less than 1e-15.
     EXPECT_NEAR(run.events[0].t, 1.111, 2e-15);
     EXPECT_NEAR(run.events[1].t, 1.114, 2e-15);
+}
+
+/// Two roots, the first of which lies at the end of a step to half a unit in the last place.
+struct RootAtAnEnd {
+    using State = X1;
+    double first = 0;
+    double second = 0;
+    void flow(double, const X1&, X1& dxdt) const { dxdt[0] = 1; }
+    [[nodiscard]] double guard(double, const X1& x) const
+    {
+        return (x[0] - first) * (x[0] - second);
+    }
+    [[nodiscard]] GuardInfo guard_info() const { return {.crossing = Crossing::either}; }
+};
+
+TEST(HardEvents, ACrossingAtTheEndOfAStepLeavesTheGuardArmedForTheNext)
+{
+    // Where x is off + s, its rounding hides the guard's sign in the rest of the step; its rate
+    // tells that it goes on.
+    for (const double off : {0.0, 1.0, 10.0, 100.0, 1e4}) {
+        for (const double gap : {0.02, 0.2}) {
+            for (const double step : {0.25, 0.125}) {
+                const RootAtAnEnd system{.first = off + 0.25, .second = off + 0.25 + gap};
+                const auto run =
+                    integrate(system, X1{off}, {.t_end = 3, .step = step}, FixedStep<Rk4>{});
+                ASSERT_EQ(run.events.size(), 2U) << off << ' ' << gap << ' ' << step;
+                // Roots are located to the rounding of x, half a unit each of x and of the guard's
+                // two factors.
+                const double rounding = 4 * std::numeric_limits<double>::epsilon() * (off + 1);
+                EXPECT_NEAR(run.events[0].t, 0.25, rounding);
+                EXPECT_NEAR(run.events[1].t, 0.25 + gap, rounding);
+            }
+        }
+    }
+}
+
+/// A guard that stands still between the resets of another, which carry it across its surface.
+struct Flag {
+    using State = X;
+    static constexpr std::size_t guard_count = 2;
+    Crossing crossing = Crossing::either;
+    void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const X& x) const
+    {
+        return which == 0 ? 1 - x[0] : x[1];
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.crossing = which == 0 ? Crossing::falling : crossing};
+    }
+    void reset(std::size_t which, double, X& x) const
+    {
+        if (which == 0) x = {0, -x[1]};
+    }
+};
+
+TEST(HardEvents, AGuardThatStandsStillBetweenFlipsDoesNotAccumulate)
+{
+    // The first guard has 20 events; the other falls at ten of them and rises at ten.
+    for (const auto [crossing, events] :
+         {std::pair{Crossing::either, 40U}, std::pair{Crossing::falling, 30U},
+          std::pair{Crossing::rising, 30U}}) {
+        const auto run = integrate(Flag{crossing}, X{0, 1}, {.t_end = 20.5});
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_EQ(run.events.size(), events);
+    }
 }
 
 }  // namespace
