@@ -1,19 +1,27 @@
 #!/usr/bin/env python3
-"""Writes include/ricochet/detail/misspellings.inc: the likely misspellings of the names
-that a system may declare.
+"""Writes the likely misspellings of the names that a hybrid system, or an inclusion, may declare.
 
 usage: misspellings.py > include/ricochet/detail/misspellings.inc
+       misspellings.py inclusion > include/ricochet/detail/inclusion_misspellings.inc
 """
+
+import sys
 
 # Functions first, then values; of the latter a data member is meant, too.
 FUNCTIONS = """flow guard guards guard_rate guard_rates guard_curvature guard_info reset rest enabled
     next_time_event previous_time_event time_reset mode_name speed_bound acceleration_bound
     lipschitz lower_bound upper_bound set_valued""".split()
 VALUES = "guard_count mode_count crossing unilateral changes_dimension forward_only".split()
+WHAT = "a system"
+if sys.argv[1:] == ["inclusion"]:
+    FUNCTIONS = """smooth_jacobian mass observe act offset offset_rate branch_bound
+        bound_gradient""".split()
+    VALUES = "confines affine".split()
+    WHAT = "an inclusion"
 KNOWN = set(FUNCTIONS + VALUES)
 # Words of their own, and names of C++.
 OTHERS = {"rest", "gard", "resets", "enable", "enables", "crossings", "crossin", "lower", "upper",
-          "flows"}
+          "flows", "cat", "acts"}
 
 
 def one_slip(name):
@@ -61,7 +69,7 @@ def rows(kind, names, seen):
 
 def main():
     seen = set()
-    print("// Likely misspellings of the names that a system may declare, each with the name that")
+    print(f"// Likely misspellings of the names that {WHAT} may declare, each with the name that")
     print("// was meant. Written by scripts/misspellings.py. Included once for every use, with the")
     print("// two macros defined.")
     print("\n// clang-format off")

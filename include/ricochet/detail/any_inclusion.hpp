@@ -15,6 +15,7 @@
 
 #include "ricochet/detail/branch_terms.hpp"
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/inclusion_declarations.hpp"
 #include "ricochet/detail/linear_cases.hpp"
 #include "ricochet/detail/owned.hpp"
 #include "ricochet/detail/step_layout.hpp"
@@ -108,6 +109,7 @@ using AnyOf = AnyInclusion<state_size<System>, reaction_size<System>>;
 
 template <class System>
 class RICOCHET_ALIGNED TypedInclusion final : public AnyOf<System> {
+    static_assert(check_inclusion<System>());
     using Any = AnyOf<System>;
     using Set = SetOf<System>;
     using State = typename Any::State;

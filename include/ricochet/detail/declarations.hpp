@@ -56,6 +56,9 @@ struct Only {
 struct Names {
     int flow, guard, guards, guard_rate, guard_rates, guard_info, guard_count, reset, rest, enabled;
     int next_time_event, previous_time_event, time_reset, mode_count, crossing, unilateral;
+    // Those of inclusions, see inclusion_declarations.hpp.
+    int smooth, smooth_jacobian, mass, observe, act, offset, offset_rate, branch_bound, bound_gradient;
+    int confines, affine;
 };
 
 template <class System, bool final = std::is_final_v<System>>
@@ -130,6 +133,17 @@ RICOCHET_NAME(time_reset)
 RICOCHET_NAME(mode_count)
 RICOCHET_NAME(crossing)
 RICOCHET_NAME(unilateral)
+RICOCHET_NAME(smooth)
+RICOCHET_NAME(smooth_jacobian)
+RICOCHET_NAME(mass)
+RICOCHET_NAME(observe)
+RICOCHET_NAME(act)
+RICOCHET_NAME(offset)
+RICOCHET_NAME(offset_rate)
+RICOCHET_NAME(branch_bound)
+RICOCHET_NAME(bound_gradient)
+RICOCHET_NAME(confines)
+RICOCHET_NAME(affine)
 #undef RICOCHET_NAME
 
 /// Callable with these, after up to four and before up to one of whatever it likes.

@@ -15,6 +15,7 @@
 
 #include "ricochet/detail/any_hand_over.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
+#include "ricochet/detail/refused_calls.hpp"
 #include "ricochet/nonsmooth/hand_over_run.hpp"
 
 namespace ricochet {
@@ -23,6 +24,7 @@ namespace ricochet {
 /// `set_valued.step`.
 template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
 class HandOver {
+    static_assert(detail::check_inclusion<System>());
     static constexpr int N = state_size<System>;
     static constexpr int M = reaction_size<System>;
 
@@ -69,6 +71,15 @@ template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
                                             const Stepping& /*stepping*/ = {})
 {
     return HandOver<System, Stepping>(system, w0, options).take();
+}
+
+/// A system that is no inclusion is refused with a sentence; never called.
+template <class System, class... Stepping>
+requires(!Inclusion<System>)  //
+    auto hand_over(const System& /*system*/, const detail::AnyStartGiven& /*w0*/,
+                   const HandOverOptions& /*options*/, const Stepping&... /*stepping*/)
+{
+    return detail::refuse_no_inclusion<System>();
 }
 
 }  // namespace ricochet

@@ -1,0 +1,86 @@
+// What inclusions refuse at compile time; see refused.cpp.
+
+#include <Eigen/Core>
+
+#include "ricochet/nonsmooth/hand_over.hpp"
+
+using namespace ricochet;
+using State = Eigen::Vector2d;
+using Reaction = Eigen::Matrix<double, 1, 1>;
+
+// CASE 1: found a member `offest`, which nothing calls; rename it to `offset`
+// CASE 2: found a member `offset` whose parameters or result do not fit
+// CASE 3: found a member `observe` that is not const
+// CASE 4: found a member `observe` whose parameters or result do not fit
+// CASE 5: found a member `offset` that changes a copy
+// CASE 6: found a member `branch_bound` whose parameters or result do not fit
+// CASE 7: found no `smooth` that fits
+// CASE 8: found no `reaction_set` that fits
+// CASE 9: found a system that is no inclusion
+struct Block {
+#if CASE != 9
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 1;
+#endif
+#if CASE == 7
+    State smooth(double, const State& w) const
+    {
+        return {w[1], -w[0]};
+    }
+#else
+    void smooth(double, const State& w, State& f) const
+    {
+        f = {w[1], -w[0]};
+    }
+#endif
+#if CASE == 8
+    sets::IntervalSet reaction_set(const State&) const
+#else
+    sets::IntervalSet reaction_set(double, const State&) const
+#endif
+    {
+        return {-0.3, 0.3};
+    }
+#if CASE == 3
+    void observe(Eigen::Matrix<double, 1, 2>& E)
+#elif CASE == 4
+    void observe(Eigen::Matrix<double, 2, 1>& E) const
+#else
+    void observe(Eigen::Matrix<double, 1, 2>& E) const
+#endif
+    {
+        E << 0, 1;
+    }
+#if CASE == 1
+    void offest(double, Reaction& s) const
+    {
+        s[0] = 0.2;
+    }
+#elif CASE == 2
+    double offset(double) const
+    {
+        return 0.2;
+    }
+#elif CASE == 5
+    void offset(double, Reaction s) const
+    {
+        s[0] = 0.2;
+    }
+#else
+    void offset(double, Reaction& s) const
+    {
+        s[0] = 0.2;
+    }
+#endif
+#if CASE == 6
+    double branch_bound(double, const State&) const
+    {
+        return 0.3;
+    }
+#endif
+};
+
+void run()
+{
+    (void)hand_over(Block{}, State(0, 0), {.t_end = 1});
+}
