@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "checks/require.hpp"
-#include "ricochet/scene/any_system.hpp"
+#include "ricochet/detail/any_scene_system.hpp"
 #include "scene/motion.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"

@@ -41,7 +41,7 @@ struct HenonHeiles {
     }
 };
 
-/// A pendulum beside a wall, which asks who is calling.
+/// A pendulum beside a wall that records the object of every call.
 struct Pendulum {
     using State = Two;
     static constexpr bool unilateral = true;

@@ -4,7 +4,7 @@
 //                    equation (branch_modes.hpp), any explicit stepper, changes located to the
 //                    step map
 //     set-valued     where that ends: changes that coincide, reactions that y' = 0 does not
-//     set-valued     where that ends: changes that coincide, reactions that y' = 0 does not
+//                    determine, switching that accumulates, and sets that have no such
 //                    branches at all. Bathe's steps, until the branches are plain again
 //
 // The reaction with which a phase starts is the minimal selection. Systems that declare no

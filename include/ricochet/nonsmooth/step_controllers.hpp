@@ -96,7 +96,8 @@ struct ClassicStep {
 /// rejected where that is below c1, and at most c2. With equal gammas only the ratio of
 /// two errors enters: nothing draws the error to 1, and with c1 = 1.8 a step is accepted
 /// only if the next may be nearly twice as long. It is included for comparison; use
-/// `FilteredStep`. A rejected step is cut to 0.6 at most, lest it repeat forever.
+/// `FilteredStep`. A rejected step is cut to 0.6 at most, so that it cannot repeat
+/// forever.
 struct PrintedPiStep {
     int order = 1;
     double gamma1 = 1.0 / 6;

@@ -24,8 +24,8 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detail/any_scene_system.hpp"
 #include "ricochet/monitor.hpp"
-#include "ricochet/scene/any_system.hpp"
 
 namespace ricochet {
 
