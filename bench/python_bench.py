@@ -1,6 +1,9 @@
 """Python against SciPy at equal error, and ready systems against C++.
 
-usage: PYTHONPATH=build/release/python python3 bench/python_bench.py
+usage: PYTHONPATH=build/release/python python3 bench/python_bench.py [--lines MEASURE]
+
+With --lines one line for each target, as scripts/measure prints them; MEASURE is the program
+ricochet_measure, whose time of the ball in C++ stands beside Python's.
 
 Processor time of one run, the least of several; errors are the largest of any event's time, against
 the closed form (ball) and against a run of tolerance 1e-13 (pendulum). SciPy restarts at
@@ -8,6 +11,9 @@ every event, since it has no resets; that is part of its time. Compare rows of e
 """
 
 import math
+import re
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -103,33 +109,92 @@ def compiled_pendulum():
     return ricochet.Compiled(flow), guard
 
 
-print(f"{'':48}{'us a run':>10}{'error':>10}")
-for name, *problem, exact in (ball(), pendulum()):
-    for who, solve in (("SciPy", by_scipy), ("ricochet", by_ricochet)):
+def table():
+    print(f"{'':48}{'us a run':>10}{'error':>10}")
+    for name, *problem, exact in (ball(), pendulum()):
+        for who, solve in (("SciPy", by_scipy), ("ricochet", by_ricochet)):
+            for method in ("RK45", "DOP853"):
+                for rtol in (1e-6, 1e-9, 1e-10):
+                    options = dict(method=method, rtol=rtol, atol=rtol)
+                    times = solve(*problem, **options)
+                    error = (abs(times - exact).max() if times.shape == exact.shape
+                             else f"{times.size} events")
+                    took = least_time(lambda: solve(*problem, **options), 3)
+                    print(f"{name}: {who} {method} {rtol:g}".ljust(48) + f"{took:10.0f}{error:>10.2}")
+
+    compiled = compiled_pendulum()
+    if compiled is not None:
+        *_, exact = pendulum()
         for method in ("RK45", "DOP853"):
-            for rtol in (1e-6, 1e-9, 1e-10):
-                options = dict(method=method, rtol=rtol, atol=rtol)
-                times = solve(*problem, **options)
-                error = (abs(times - exact).max() if times.shape == exact.shape
-                         else f"{times.size} events")
-                took = least_time(lambda: solve(*problem, **options), 3)
-                print(f"{name}: {who} {method} {rtol:g}".ljust(48) + f"{took:10.0f}{error:>10.2}")
+            for rtol in (1e-9, 1e-10):
+                def run():
+                    return ricochet.solve_ivp(compiled[0], (0, 10.0), [1.0, 0.0], events=compiled[1],
+                                              t_eval=[], method=method, rtol=rtol, atol=rtol)
+                error = abs(run().t_events[0] - exact).max()
+                print(f"{'the same, compiled'}: {method} {rtol:g}".ljust(48)
+                      + f"{least_time(run):10.0f}{error:>10.2}")
 
-compiled = compiled_pendulum()
-if compiled is not None:
-    *_, exact = pendulum()
+    print()
+    for system, start, t_end in ((ricochet.BouncingBall(), (10.0, 0.0), 20.5),
+                                 (ricochet.StickSlip(), (1.0, 0.2), 120.0),
+                                 (ricochet.ImpactOscillator(), (0.0, 0.0), 1795.0)):
+        took = least_time(lambda: ricochet.integrate(system, start, t_end))
+        print(f"{system!r}, {t_end:g} s".ljust(96) + f"{took:10.1f} us")
+
+
+def line(good, what, target, measured):
+    print(f"{'pass' if good else 'FAIL':11} {what} | target: {target} | measured: {measured} | "
+          "scripts/measure python")
+
+
+def beside_scipy(problem):
+    """The least factor between SciPy and Python callbacks here at equal method and tolerance."""
+    name, *problem, exact = problem
+    rows = []
     for method in ("RK45", "DOP853"):
-        for rtol in (1e-9, 1e-10):
-            def run():
-                return ricochet.solve_ivp(compiled[0], (0, 10.0), [1.0, 0.0], events=compiled[1],
-                                          t_eval=[], method=method, rtol=rtol, atol=rtol)
-            error = abs(run().t_events[0] - exact).max()
-            print(f"{'the same, compiled'}: {method} {rtol:g}".ljust(48)
-                  + f"{least_time(run):10.0f}{error:>10.2}")
+        for rtol in (1e-6, 1e-9, 1e-10):
+            options = dict(method=method, rtol=rtol, atol=rtol)
+            errors, took = [], []
+            for solve in (by_scipy, by_ricochet):
+                times = solve(*problem, **options)
+                errors.append(abs(times - exact).max() if times.shape == exact.shape else math.inf)
+                took.append(least_time(lambda: solve(*problem, **options), 3))
+            rows.append((took[0] / took[1], f"{method} {rtol:g} {took[0] / took[1]:.0f} times, errors "
+                         f"{errors[0]:.0e} and {errors[1]:.0e}", errors[1] <= 2 * errors[0]))
+    line(all(factor >= 20 and as_near for factor, _, as_near in rows),
+         f"{name}, Python callbacks beside SciPy", ">= 20 times, at no larger error",
+         "; ".join(text for _, text, _ in rows))
 
-print()
-for system, start, t_end in ((ricochet.BouncingBall(), (10.0, 0.0), 20.5),
-                             (ricochet.StickSlip(), (1.0, 0.2), 120.0),
-                             (ricochet.ImpactOscillator(), (0.0, 0.0), 1795.0)):
-    took = least_time(lambda: ricochet.integrate(system, start, t_end))
-    print(f"{system!r}, {t_end:g} s".ljust(96) + f"{took:10.1f} us")
+
+def seconds_of_import(modules):
+    command = f"import time; s = time.process_time(); import {modules}; print(time.process_time() - s)"
+    return min(float(subprocess.run([sys.executable, "-c", command], check=True, text=True,
+                                    capture_output=True).stdout) for _ in range(7))
+
+
+def lines(measure):
+    beside_scipy(ball())
+    beside_scipy(pendulum())
+
+    def of_cpp():
+        text = subprocess.run([measure, "--only", "b1-time"], text=True, capture_output=True).stdout
+        return float(re.search(r"dopri5 +extremum +([0-9.]+) us raw", text)[1])
+
+    system, before = ricochet.BouncingBall(), of_cpp()
+    here = least_time(lambda: ricochet.integrate(system, (10.0, 0.0), 20.5, rtol=1e-10, atol=1e-10))
+    there = min(before, of_cpp())
+    line(here <= 1.2 * there, "the ready ball, 13 impacts, beside C++", "<= 1.2 times",
+         f"{here:.1f} us, {there:.1f} us in C++: {here / there:.2f} times")
+    oscillator = ricochet.ImpactOscillator()
+    short, long = (least_time(lambda: ricochet.integrate(oscillator, (0.0, 0.0), t_end))
+                   for t_end in (1795.0, 17950.0))
+    print(f"            the ready impact oscillator: {short:.0f} us for 200 periods, "
+          f"{long / short:.2f} times that for 2000")
+    beyond = seconds_of_import("numpy, ricochet") - seconds_of_import("numpy")
+    line(beyond <= 0.15, "import beyond NumPy", "<= 0.15 s", f"{beyond:.3f} s")
+
+
+if sys.argv[1:2] == ["--lines"]:
+    lines(sys.argv[2])
+else:
+    table()

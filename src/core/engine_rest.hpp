@@ -103,10 +103,10 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
             .error = error});
     const std::size_t modes = system_.modes();
     if (modes > 0 && mode_after >= modes) return end(Outcome::unknown_mode, i);
-    if (!fits_dimension(before, after, mode_after == mode)) {
+    if (after.size() == 0 || !fits_dimension(before, after, mode_after == mode)) {
         return end(Outcome::wrong_dimension, i);
     }
-    if (!all_finite(after) || after.size() == 0) {
+    if (!all_finite(after)) {
         return end(Outcome::non_finite, i);
     }
     step_.restart(ahead, 0, after, mode_after);

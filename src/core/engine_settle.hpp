@@ -285,6 +285,9 @@ inline void EventEngine<X, single>::refuse_bad_guards()
         if (info.unilateral && info.crossing != Crossing::falling) {
             throw_unilateral_not_falling(i, info.name);
         }
+        if (!(info.touch >= 0 && std::isfinite(info.touch))) {
+            throw_bad_touch(i, info.name, info.touch);
+        }
     }
 }
 

@@ -365,6 +365,10 @@ private:
             record.next = record.side;
             return true;
         }
+        if (watch.departs && barely_departs(probe, watch, record)) {
+            record.next = record.side;
+            return true;
+        }
         if (is_plateau(probe, watch)) {
             // After a crossing it is none where the guard moves by no more than its rounding.
             const double moves = std::fabs(watch.start.rate) * (watch.end.s - watch.start.s);
@@ -378,6 +382,16 @@ private:
             return true;
         }
         return false;
+    }
+
+    /// Whether a step from an event of the guard is too short to tell on which side it is: it
+    /// lasts a few units in the last place of the time, and the guard stays in the event's band.
+    [[nodiscard]] static bool barely_departs(const Probe& probe, const Watch& watch,
+                                             const GuardRecord& record)
+    {
+        const double t = probe.step().time(watch.end.s);
+        constexpr double ulps = 8 * std::numeric_limits<double>::epsilon();
+        return probe.step().h() <= ulps * std::fabs(t) && std::fabs(watch.end.value) <= record.band;
     }
 
     /// Whether a guard that has left its side by `node` has no other event in the rest of

@@ -46,6 +46,13 @@ void throw_unilateral_not_falling(std::size_t which, std::string_view name)
         guard_called(which, name)));
 }
 
+void throw_bad_touch(std::size_t which, std::string_view name, double touch)
+{
+    throw std::invalid_argument(
+        fmt::format("integrate: {} needs a touch that is finite and not negative, got {}",
+                    guard_called(which, name), touch));
+}
+
 void throw_unknown_mode(std::size_t mode, std::size_t modes)
 {
     throw std::invalid_argument(fmt::format(

@@ -28,7 +28,6 @@ TEST_F(App, FurtherProgramsRunByThemselves)
     EXPECT_EQ(status_of("ricochet-train", "pendulums --out x.safetensors"), 2);
     EXPECT_EQ(status_of("ricochet-certify", "--help"), 0);
     EXPECT_EQ(status_of("ricochet-certify", "no-such-model"), 2);
-    EXPECT_EQ(status_of("ricochet-studies", "compare bouncing-ball"), 2);
 }
 
 TEST_F(App, AProgramThatIsNotThereIsNamed)

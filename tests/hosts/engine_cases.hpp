@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "ricochet/hosts/run.hpp"
+#include "ricochet/hosts/detail/run.hpp"
 
 namespace ricochet::hosts_test {
 

@@ -11,7 +11,7 @@
 #include <numbers>
 #include <vector>
 
-#include "ricochet/hosts/run.hpp"
+#include "ricochet/hosts/detail/run.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::hosts_test {

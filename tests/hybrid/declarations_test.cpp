@@ -509,6 +509,13 @@ TEST(Declarations, ExceptionsCallAGuardByItsName)
     EXPECT_NE(thrown_by(Trapdoor{{}, {.unilateral = true}}, {-1, 0}, {.t_end = 1})
                   .find("behind guard 0, which bounds"),
               std::string::npos);
+    for (const double touch : {-1e-9, std::numeric_limits<double>::quiet_NaN(),
+                               std::numeric_limits<double>::infinity()}) {
+        EXPECT_NE(
+            thrown_by(Trapdoor{{}, {.name = "trapdoor", .touch = touch}}, {1, 0}, {.t_end = 1})
+                .find("guard 0 (trapdoor) needs a touch that is finite and not negative, got"),
+            std::string::npos);
+    }
 }
 
 }  // namespace

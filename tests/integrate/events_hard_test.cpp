@@ -764,13 +764,39 @@ struct Flag {
 TEST(HardEvents, AGuardThatStandsStillBetweenFlipsDoesNotAccumulate)
 {
     // The first guard has 20 events; the other falls at ten of them and rises at ten.
-    for (const auto [crossing, events] :
+    for (const auto& [crossing, events] :
          {std::pair{Crossing::either, 40U}, std::pair{Crossing::falling, 30U},
           std::pair{Crossing::rising, 30U}}) {
         const auto run = integrate(Flag{crossing}, X{0, 1}, {.t_end = 20.5});
         EXPECT_EQ(run.outcome, Outcome::reached_end);
         EXPECT_EQ(run.events.size(), events);
     }
+}
+
+/// As `RootAtAnEnd`, with a reset that changes nothing.
+struct ResetAtRoots : RootAtAnEnd {
+    void reset(double, X1&) const {}
+};
+
+TEST(HardEvents, ARootNextToTheEndOfAStepIsResetOnce)
+{
+    // From the event to the end of the step is one unit in the last place of the time; there the
+    // guard lies on the other side by less than at the event.
+    int runs = 0;
+    for (const double off : {0.0, 1.0, 10.0, 100.0, 1e4}) {
+        for (int i = 1; i <= 8; ++i) {
+            for (const double gap : {0.02, 0.0525, 0.11, 0.2, 0.3, 0.6}) {
+                ResetAtRoots system;
+                system.first = off + i * 0.25;
+                system.second = system.first + gap;
+                const auto run = integrate(system, X1{off}, {.t_end = 3, .step = 0.01},
+                                           FixedStep<Rk4>{}, Ends{}, Newton{});
+                EXPECT_EQ(run.events.size(), 2U) << off << ' ' << i << ' ' << gap;
+                ++runs;
+            }
+        }
+    }
+    EXPECT_EQ(runs, 240);
 }
 
 }  // namespace

@@ -65,6 +65,16 @@ TEST(WrongDimension, AStateGetsShorterWhereThatIsDeclared)
     EXPECT_EQ(run.x.size(), 2u);
 }
 
+/// A reset that leaves no component, where states may get shorter.
+struct Emptying : MergingAsDeclared {
+    void reset(double, V& x) const { x.clear(); }
+};
+
+TEST(WrongDimension, AResetToNoComponentEndsTheRun)
+{
+    EXPECT_EQ(integrate(Emptying{}, V{0, 0, 0}, {.t_end = 2}).outcome, Outcome::wrong_dimension);
+}
+
 TEST(Stalled, ARunWhoseTimeStandsStillEnds)
 {
     // 1000 steps of 1e-16 s against 1e-9 of 1 s.

@@ -6,12 +6,12 @@ set -uo pipefail
 source=$(realpath "$1") flags=$2
 shift 2
 failed=0
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
 
+compile() { "$@" -std=c++20 -Wall -Wextra -I"$source/include" $flags; }
 # first_error COMPILER FLAGS...: nothing where it compiles.
-first_error() {
-    "$@" -std=c++20 -Wall -Wextra -fsyntax-only -I"$source/include" $flags "$file" 2>&1 |
-        grep -m 1 -E 'error:|warning:'
-}
+first_error() { compile "$@" -fsyntax-only "$file" 2>&1 | grep -m 1 -E 'error:|warning:'; }
 expect() { # WHAT FOUND EXPECTED
     local fits=no
     if [ -n "$3" ]; then
@@ -28,10 +28,14 @@ expect() { # WHAT FOUND EXPECTED
 for compiler in "$@"; do
     for file in "$source"/tests/messages/refused*.cpp; do
         name=$(basename "$file")
-        expect "$compiler, $name, case 0" "$(first_error "$compiler" -DCASE=0)" ''
+        # The headers that all cases of the file share are read once.
+        grep '^#include' "$file" >"$work/$name.hpp"
+        compile "$compiler" -x c++-header "$work/$name.hpp" -o "$work/$name.hpp.gch"
+        headers=(-include "$work/$name.hpp")
+        expect "$compiler, $name, case 0" "$(first_error "$compiler" -DCASE=0 "${headers[@]}")" ''
         while IFS= read -r line; do
             number=${line%%:*} text=${line#*: }
-            extra=()
+            extra=("${headers[@]}")
             [[ $text == *fast-math* ]] && extra=(-ffast-math)
             expect "$compiler, $name, case $number" \
                 "$(first_error "$compiler" "-DCASE=$number" "${extra[@]}")" "$text"

@@ -49,7 +49,7 @@ for room in learn faults hosts nonsmooth scene sensitivity systems/sliding_mode.
     [ -e "$work/whole/include/ricochet/$room" ]
     [ ! -e "$work/core/include/ricochet/$room" ]
 done
-[ -e "$work/whole/include/ricochet/hosts/run.hpp" ]
+[ -e "$work/whole/include/ricochet/hosts/detail/run.hpp" ]
 echo "the core alone: no other component is installed or found"
 "$work/whole/bin/ricochet" simulate bouncing-ball --step 0.01 --detector network --json >/dev/null
 "$work/whole/bin/ricochet" simulate fault --json >/dev/null

@@ -181,6 +181,71 @@ TEST(DualSensitivity, OfStatesThatAreSizedAtRunTime)
     }
 }
 
+/// A pendulum beside a wall, for parameters of any scalar.
+template <class P>
+struct Swing {
+    using State = X;
+    P pull = 1;     ///< [1/s^2]
+    P wall = -0.5;  ///< [rad]
+    P restitution = 0.9;
+    template <class S>
+    void flow(const S&, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        using std::sin;
+        dxdt[0] = x[1];
+        dxdt[1] = -pull * sin(x[0]);
+    }
+    template <class S>
+    [[nodiscard]] S guard(const S&, const std::array<S, 2>& x) const
+    {
+        return x[0] - wall;
+    }
+    template <class S>
+    void reset(const S&, std::array<S, 2>& x) const
+    {
+        x[0] = wall;
+        x[1] = -restitution * x[1];
+    }
+};
+
+[[nodiscard]] Directions<Swing<double>> exact_parameters()
+{
+    Directions<Swing<double>> directions;
+    directions.parameters = {
+        parameter<Swing<double>>([](auto p) { return Swing<decltype(p)>{.pull = p}; }, 1),
+        parameter<Swing<double>>([](auto p) { return Swing<decltype(p)>{.wall = p}; }, -0.5),
+        parameter<Swing<double>>([](auto p) { return Swing<decltype(p)>{.restitution = p}; }, 0.9)};
+    return directions;
+}
+
+TEST(DualSensitivity, ByAParameterOfAnyScalarIsThatOfDifferences)
+{
+    const Options options{.t_end = 20, .rtol = 1e-10, .atol = 1e-12};
+    const auto exact = sensitivities(Swing<double>{}, {1.0, 0.0}, exact_parameters(), options);
+    ASSERT_GE(exact.events.size(), 5U);
+    auto differences = exact_parameters();
+    for (auto& parameter : differences.parameters) parameter.exact = {};
+    // As above: differences may change a step.
+    expect_near(exact, sensitivities(Swing<double>{}, {1.0, 0.0}, differences, options), 1e-8);
+}
+
+TEST(DualSensitivity, ByAParameterOfAnyScalarTakesNoDifferences)
+{
+    const Options options{.t_end = 20, .rtol = 1e-10, .atol = 1e-12};
+    auto deaf = exact_parameters();
+    for (auto& parameter : deaf.parameters) {
+        parameter.with = [](double) { return Swing<double>{}; };
+    }
+    const auto one = sensitivities(Swing<double>{}, {1.0, 0.0}, exact_parameters(), options);
+    const auto other = sensitivities(Swing<double>{}, {1.0, 0.0}, deaf, options);
+    EXPECT_EQ(one.state, other.state);
+    ASSERT_EQ(one.events.size(), other.events.size());
+    for (std::size_t k = 0; k < one.events.size(); ++k) {
+        EXPECT_EQ(one.events[k].dt, other.events[k].dt);
+        EXPECT_EQ(one.events[k].after, other.events[k].after);
+    }
+}
+
 }  // namespace
 
 }  // namespace ricochet::dual_sensitivity_test

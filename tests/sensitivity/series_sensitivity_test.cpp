@@ -78,6 +78,54 @@ TEST(SeriesSensitivity, OfABallIsThatOfTheGeometricSeriesToRounding)
     }
 }
 
+/// A ball for parameters of any scalar.
+template <class P>
+struct BallOf {
+    using State = X;
+    P gravity = 9.81;  ///< [m/s^2]
+    P restitution = 0.9;
+    template <class S>
+    void flow(const S&, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -gravity;
+    }
+    template <class S>
+    [[nodiscard]] S guard(const S&, const std::array<S, 2>& x) const
+    {
+        return x[0];
+    }
+    template <class S>
+    void reset(const S&, std::array<S, 2>& x) const
+    {
+        x[0] = 0.0;
+        x[1] = -restitution * x[1];
+    }
+};
+
+TEST(SeriesSensitivity, ByParametersOfAnyScalarIsThatOfTheGeometricSeriesToRounding)
+{
+    // As above; by the gravity -t_n / (2 g).
+    const double h = 10, g = 9.81, r = 0.9, t0 = std::sqrt(2 * h / g);
+    Directions<BallOf<double>> directions;
+    directions.initial_state = false;
+    directions.parameters = {
+        parameter<BallOf<double>>([](auto p) { return BallOf<decltype(p)>{.gravity = p}; }, g),
+        parameter<BallOf<double>>([](auto p) { return BallOf<decltype(p)>{.restitution = p}; }, r)};
+    const auto found = sensitivities(BallOf<double>{}, X{h, 0}, directions,
+                                     {.t_end = 15, .rtol = 1e-13, .atol = 1e-13}, ByTaylor{});
+    ASSERT_GE(found.events.size(), 8U);
+    double sum = 0, slope = 0, power = 1;
+    for (std::size_t n = 0; n < found.events.size(); ++n) {
+        const double t = t0 * (1 + 2 * sum);
+        // Each of ten impacts rounds numbers below 2 t0 slope < 200 by a few units, 3e-14.
+        EXPECT_NEAR(found.events[n].dt[0], -t / (2 * g), 1e-12);
+        EXPECT_NEAR(found.events[n].dt[1], 2 * t0 * slope, 1e-12);
+        slope += static_cast<double>(n + 1) * power;
+        sum += power *= r;
+    }
+}
+
 TEST(SeriesSensitivity, FollowsModes)
 {
     const Options options{.t_end = 20, .rtol = 1e-13, .atol = 1e-13};

@@ -64,6 +64,7 @@ TEST_F(Exhibits, RefusesWhatThereIsNot)
     expect_refused({"figure", "event-detection", "1"}, {"--out"});
     expect_refused({"figure", "event-detection", "1", "--out", "a.txt"}, {".svg or .png", "a.txt"});
     expect_refused({"figure", "event-detection", "1", "--out", "none/a.svg"}, {"none"});
+    expect_refused({"compare", "bouncing-ball"}, {"bouncing-ball"});
 }
 
 }  // namespace

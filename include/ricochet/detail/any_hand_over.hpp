@@ -10,10 +10,10 @@
 
 #include "ricochet/detail/branch_modes.hpp"
 #include "ricochet/detail/event_loop.hpp"
+#include "ricochet/detail/hand_over_run.hpp"
 #include "ricochet/detail/hand_over_watches.hpp"
 #include "ricochet/detail/held_reactions.hpp"
 #include "ricochet/detail/law.hpp"
-#include "ricochet/nonsmooth/hand_over_run.hpp"
 
 namespace ricochet::detail {
 

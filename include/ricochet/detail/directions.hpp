@@ -7,12 +7,35 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
 #include "ricochet/detail/differences.hpp"
+#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
+
+namespace detail {
+
+class Recorded;  // the scalar of Taylor's method (detail/taylor_recording.hpp)
+
+/// Derivatives of a system's functions by one parameter; where there is none, differences are
+/// taken.
+struct ParameterDerivatives {
+    std::function<void(Mode, double t, std::span<const double> x, std::span<double> df)> flow{};
+    /// The same for power series of n components.
+    std::function<void(Mode, const Recorded& t, const Recorded* x, std::size_t n, Recorded* df)>
+        flow_series{};
+    std::function<double(std::size_t which, Mode, double t, std::span<const double> x)> guard{};
+    /// False: this reset has no derivative.
+    std::function<bool(const FiredGuards&, Mode, double t, std::span<const double> x,
+                       std::span<double> by)>
+        reset{};
+};
+
+}  // namespace detail
 
 /// A parameter of a system, given as the way to a system with another value of it:
 ///
@@ -22,7 +45,8 @@ struct Parameter {
     std::function<System(double)> with{};                       ///< the system with that value
     double nominal = std::numeric_limits<double>::quiet_NaN();  ///< its value in the system at hand
     double scale = 0;  ///< over which the system bends with it; 0: |nominal|, or 1 where that is 0
-    std::vector<double> start{};  ///< derivative of the initial state by it; empty: zero
+    std::vector<double> start{};           ///< derivative of the initial state by it; empty: zero
+    detail::ParameterDerivatives exact{};  ///< set by `parameter(make, nominal)`
 };
 
 /// The columns of derivatives, in this order: one for each component of the initial

@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "ricochet/detail/branch_modes.hpp"
+#include "ricochet/detail/hand_over_run.hpp"
 #include "ricochet/integrate/simulation.hpp"
-#include "ricochet/nonsmooth/hand_over_run.hpp"
 
 namespace ricochet::detail {
 

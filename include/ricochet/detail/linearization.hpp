@@ -13,6 +13,7 @@
 // reset takes one, the mode where the system has modes.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
@@ -29,6 +30,13 @@
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet::detail {
+
+/// The components of a state, which lie one after another.
+template <class X>
+[[nodiscard]] auto numbers_of(X& x)
+{
+    return std::span(x.data(), static_cast<std::size_t>(x.size()));
+}
 
 /// A state of n components, uninitialised or zero.
 template <class X>
@@ -100,6 +108,8 @@ template <class System, class X, class... Which>
 struct ResetOf {
     std::size_t which;
 
+    [[nodiscard]] FiredGuards all() const noexcept { return FiredGuards(std::span(&which, 1)); }
+
     template <class System, class X>
     [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x) const
     {
@@ -135,6 +145,8 @@ struct Conflict {
 /// reset for sets, or else each reads the state before and writes what it changes.
 struct ResetSet {
     FiredGuards fired;
+
+    [[nodiscard]] FiredGuards all() const noexcept { return fired; }
 
     template <class System, class X>
     [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x) const
@@ -268,8 +280,8 @@ struct TimeReset {
 };
 
 /// Flow, guards and resets of a system, and their derivatives along directions (f_x s)
-/// and by its parameters (f_p), the latter by differences. The fields on both sides of a surface
-/// are taken to be smooth across it, since differences look beyond it.
+/// and by its parameters (f_p), the latter by differences unless the parameter has them. The fields
+/// on both sides of a surface are taken to be smooth across it, since differences look beyond it.
 template <class System, class X>
 class Linearization {
 public:
@@ -286,6 +298,7 @@ public:
             validate_parameter(j, static_cast<bool>(p.with), p.nominal, p.scale, p.start,
                                components);
             parameters_.push_back(neighbours_of(p, differences.step));
+            exact_.push_back(p.exact);
         }
     }
 
@@ -321,6 +334,7 @@ public:
     /// df = df/dp of parameter j.
     void flow_by(std::size_t j, Mode mode, double t, const X& x, X& df) const
     {
+        if (exact_[j].flow) return exact_[j].flow(mode, t, numbers_of(x), numbers_of(df));
         Scratch<X, 2> room(x);
         const Neighbours<System>& around = parameters_[j];
         const auto flow_at = [&](std::size_t k, X& f) {
@@ -345,6 +359,9 @@ public:
     template <class S, class Xs>
     void flow_by_of(std::size_t j, Mode mode, const S& t, const Xs& x, Xs& df) const
     {
+        if (exact_[j].flow_series) {
+            return exact_[j].flow_series(mode, t, x.data(), x.size(), df.data());
+        }
         const Neighbours<System>& around = parameters_[j];
         Xs first = x, value = x;
         flow_of_scalar(around.systems[0], mode, t, x, first);
@@ -385,6 +402,7 @@ public:
     [[nodiscard]] double guard_by(std::size_t j, std::size_t which, Mode mode, double t,
                                   const X& x) const
     {
+        if (exact_[j].guard) return exact_[j].guard(which, mode, t, numbers_of(x));
         return by_parameter(
             j, [&](const System& system) { return guard_of(system, which, mode, t, x); });
     }
@@ -430,6 +448,13 @@ public:
     [[nodiscard]] X reset_by(std::size_t j, const Reset& reset, Mode mode, double t,
                              const X& x) const
     {
+        if constexpr (requires { reset.all(); }) {
+            X by = x;
+            if (exact_[j].reset && resets(reset.all()) &&
+                exact_[j].reset(reset.all(), mode, t, numbers_of(x), numbers_of(by))) {
+                return by;
+            }
+        }
         return by_parameter(
             j, [&](const System& system) { return reset_of(system, reset, mode, t, x); });
     }
@@ -479,6 +504,13 @@ private:
         }
     }
 
+    /// Whether all that fired have resets.
+    [[nodiscard]] bool resets(const FiredGuards& fired) const
+    {
+        return std::ranges::all_of(
+            fired, [this](std::size_t which) { return guard_info_of<X>(system_, which).resets; });
+    }
+
     template <class Reset>
     [[nodiscard]] static X reset_of(const System& system, const Reset& reset, Mode mode, double t,
                                     X x)
@@ -497,6 +529,7 @@ private:
     System system_;
     Differences differences_;
     std::vector<Neighbours<System>> parameters_;
+    std::vector<ParameterDerivatives> exact_;
 };
 
 }  // namespace ricochet::detail

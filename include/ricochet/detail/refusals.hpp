@@ -21,6 +21,8 @@ namespace ricochet::detail {
 [[noreturn]] void throw_no_reset(std::size_t which, std::string_view name);
 /// @throws std::invalid_argument: a unilateral guard that does not fall.
 [[noreturn]] void throw_unilateral_not_falling(std::size_t which, std::string_view name);
+/// @throws std::invalid_argument: a tolerance of touches that is none.
+[[noreturn]] void throw_bad_touch(std::size_t which, std::string_view name, double touch);
 /// @throws std::invalid_argument: a guard is not finite at the start.
 [[noreturn]] void throw_start_guard_not_finite(std::size_t which, std::string_view name, double t,
                                                double guard);

@@ -34,16 +34,16 @@ class TaylorKernel {
     using Array = typename Room::Array;
     using Y = typename Room::Guarded;
 
-    /// Scratch of the size of the state: in registers where the compiler knows it.
-    [[nodiscard, gnu::always_inline]] static decltype(auto) room_of([[maybe_unused]] D& of)
-    {
-        if constexpr (n > 0) {
-            Room room;
-            return room;
-        } else {
-            return (of.room);
-        }
-    }
+    /// Scratch of the size of the state, in registers where the compiler knows that size.
+    struct OwnRoom {
+        Room room;
+        explicit OwnRoom(D& /*of*/) noexcept {}
+    };
+    struct BorrowedRoom {
+        Room& room;
+        explicit BorrowedRoom(D& of) noexcept : room(of.room) {}
+    };
+    using RoomFor = std::conditional_t<(n > 0), OwnRoom, BorrowedRoom>;
 
     [[nodiscard]] static D& at(void* door) noexcept
     {
@@ -97,7 +97,8 @@ class TaylorKernel {
     {
         const TStep& step = of.step;
         if (step.is_motion) return std::numeric_limits<double>::infinity();
-        auto&& room = room_of(of);
+        RoomFor scratch(of);
+        Room& room = scratch.room;
         return find_reach(state.x0, state.component_atol, step.coefficients.data(), step.order,
                           rtol, atol, room.w);
     }
@@ -123,7 +124,8 @@ class TaylorKernel {
         state.h = h;
         state.has_middle = false;
         state.asked_alone = 0;
-        auto&& room = room_of(of);
+        RoomFor scratch(of);
+        Room& room = scratch.room;
         Array& w = room.w;
         Array& rate = room.rate;
         evaluate_departure<true>(c, step.order, h, w, rate);
@@ -164,7 +166,8 @@ class TaylorKernel {
     static void depart(void* door, State& state, double s, C& w, C& rate)
     {
         const TStep& step = expand(door, state, at(door).step.asked);
-        auto&& room = room_of(at(door));
+        RoomFor scratch(at(door));
+        Room& room = scratch.room;
         evaluate_departure<true>(step.coefficients.data(), step.order, s, room.w, room.rate);
         const std::size_t size = step.size();
         for (std::size_t i = 0; i < size; ++i) {
@@ -176,7 +179,8 @@ class TaylorKernel {
     static void departure(void* door, const State& state, double s, C& w)
     {
         const TStep& step = expand(door, state, at(door).step.asked);
-        auto&& room = room_of(at(door));
+        RoomFor scratch(at(door));
+        Room& room = scratch.room;
         evaluate_departure<false>(step.coefficients.data(), step.order, s, room.w, room.rate);
         const std::size_t size = step.size();
         for (std::size_t i = 0; i < size; ++i) w[i] = room.w[i];
@@ -212,7 +216,8 @@ class TaylorKernel {
                           Crossing::falling, state.backward);
         const double* const c = step.coefficients.data();
         const std::size_t size = step.size();
-        auto&& room = room_of(at(door));
+        RoomFor scratch(at(door));
+        Room& room = scratch.room;
         Array& w = room.w;
         Array& rate = room.rate;
         Y& x = room.x;

@@ -33,8 +33,6 @@ namespace ricochet {
 
 namespace detail {
 
-class Recorded;  // the scalar of Taylor's method (detail/taylor_recording.hpp)
-
 /// `guard_count` as the system declares it: not at all, a constant, or a number.
 template <std::size_t fixed>
 struct GuardCount {

@@ -15,8 +15,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "ricochet/hosts/detail/run.hpp"
 #include "ricochet/hosts/detail/step_ends.hpp"
-#include "ricochet/hosts/run.hpp"
 
 namespace ricochet::hosts {
 

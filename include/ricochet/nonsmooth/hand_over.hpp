@@ -14,9 +14,9 @@
 #include <type_traits>
 
 #include "ricochet/detail/any_hand_over.hpp"
+#include "ricochet/detail/hand_over_run.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/refused_calls.hpp"
-#include "ricochet/nonsmooth/hand_over_run.hpp"
 
 namespace ricochet {
 

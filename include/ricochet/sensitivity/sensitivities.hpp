@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "ricochet/detail/directions.hpp"
+#include "ricochet/detail/dual_parameter.hpp"
 #include "ricochet/detail/undefined.hpp"
 #include "ricochet/detail/variational.hpp"
 #include "ricochet/integrate/integrate.hpp"

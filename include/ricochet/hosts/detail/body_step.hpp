@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "ricochet/hosts/detail/run.hpp"
 #include "ricochet/hosts/detail/step_ends.hpp"
-#include "ricochet/hosts/run.hpp"
 
 namespace ricochet::hosts::detail {
 

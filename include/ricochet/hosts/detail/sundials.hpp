@@ -13,8 +13,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "ricochet/hosts/detail/run.hpp"
 #include "ricochet/hosts/detail/step_ends.hpp"
-#include "ricochet/hosts/run.hpp"
 
 namespace ricochet::hosts::detail {
 

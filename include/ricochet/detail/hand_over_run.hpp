@@ -1,3 +1,5 @@
+// Internal: what it declares may change without notice.
+//
 // Options and results of a hand-over: phases of events and of set-valued steps.
 #pragma once
 

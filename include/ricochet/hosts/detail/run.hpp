@@ -1,3 +1,5 @@
+// Internal: what it declares may change without notice.
+//
 // The loop of a host and a monitor, for the adapters in this directory.
 //
 // A host holds the step that it took last, and is a `HostStep` itself. Besides:
