@@ -275,7 +275,7 @@ TEST_F(App, ParametersReachEverySystem)
     ASSERT_EQ(coulomb["events"].size(), 3U);
     EXPECT_EQ(coulomb["events"][0]["mode_before"], "slip-right");
     EXPECT_NEAR(coulomb["events"][0]["state_after"][0].get<double>(), 1.4, 1e-7);
-    // A mass that sticks also starts in its mode.
+    // A mass that sticks at the start remains so.
     const nlohmann::json stuck =
         json({"simulate", "coulomb-oscillator", "--json", "--set", "position=0.1"});
     EXPECT_EQ(stuck["events"].size(), 0U);
