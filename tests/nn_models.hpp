@@ -19,7 +19,7 @@ inline Model random_model(const std::vector<std::size_t>& widths, Activation act
                           std::uint64_t seed)
 {
     std::mt19937_64 bits(seed);
-    // Standard distributions differ between libraries; a mean of twelve uniform numbers does not.
+    // Standard distributions differ between libraries; a sum of twelve uniform numbers does not.
     const auto normal = [&] {
         double sum = -6;
         for (int i = 0; i < 12; ++i) sum += static_cast<double>(bits() >> 11) * 0x1p-53;
