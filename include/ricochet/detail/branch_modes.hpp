@@ -334,7 +334,7 @@ private:
     }
 
     /// y', or zero where rounding decides its sign: the curvature of a motion that is tangent
-    /// to y = 0 then tells where it goes.
+    /// to y = 0 then determines its direction.
     [[nodiscard]] double observed_rate(Eigen::Index i, Mode mode, double t, const Vector& w,
                                        const Vector& dwdt) const
     {
