@@ -24,7 +24,7 @@ public:
     /// A model or a kernel.
     void reads(std::string_view option, const std::filesystem::path& file);
 
-    /// A file that could be written anew now, or a device or a pipe.
+    /// A file that could be written now, or a device or a pipe.
     void writes(std::string_view option, const std::filesystem::path& file);
 
     /// The same for models, which are renamed into place: only a file may exist there.

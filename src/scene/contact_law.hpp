@@ -55,15 +55,16 @@ struct LawReport {
 };
 
 /// Newton's method on the law with multipliers: in each contact p = P(p - rho u), with P the
-/// projection onto the cone of friction and a large rho. Active contacts enter the matrix A + G' D
-/// G, which is regular however redundant the contacts are, and is factored once for a set of active
-/// contacts; then p is improved with the same factor. Without friction the matrix is symmetric, and
-/// the active set ends the iteration: its solution is exact to rounding. Where active sets cycle,
-/// paths lead to a solution: p = P(p - rho u + s c) with a shift c for which the start solves the
-/// law at s = 1, and s going to 0. The path is a polygon, at whose corners one contact changes; it
-/// is that of Lemke's method, in which s may grow for a while (R. W. Cottle, J.-S. Pang, R. E.
-/// Stone, The Linear Complementarity Problem, 1992, section 4.4), from a start nearby. After them
-/// come sweeps over the contacts, and the dense `ContactSolver`, for no more than 100 contacts.
+/// projection onto the cone of friction and a large rho. Active contacts enter the matrix
+/// A + G' D G, which is regular however redundant the contacts are, and is factored once for a set
+/// of active contacts; then p is improved with the same factor. Without friction the matrix is
+/// symmetric, and the active set ends the iteration: its solution is exact to rounding. Where
+/// active sets cycle, paths lead to a solution: p = P(p - rho u + s c) with a shift c for which the
+/// start solves the law at s = 1, and s going to 0. The path is a polygon, at whose corners one
+/// contact changes; it is that of Lemke's method, in which s may grow for a while (R. W. Cottle,
+/// J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section 4.4), from a start
+/// nearby. After them come sweeps over the contacts, and the dense `ContactSolver`, for no more
+/// than 100 contacts.
 class ContactLaw {
 public:
     explicit ContactLaw(double tolerance = 1e-10) : tolerance_(tolerance) {}

@@ -178,7 +178,7 @@ private:
     std::vector<std::uint32_t>& order_;
 };
 
-/// Boxes of bodies outside which they meet no other one: from closed forms where all walls are
+/// Boxes that bodies do not leave if they meet no other one: from closed forms where all walls are
 /// parallel, else from the largest speed.
 std::vector<Reach> reaches(const World& world)
 {

@@ -33,7 +33,7 @@ struct Closing {
 ///
 ///     look(s)       the gap at s
 ///     safe(gap)     [s] time after the last look for which an open gap provably cannot close
-///     linger(gap)   [s] the same for a closed gap, until it can have closed by as much again
+///     linger(gap)   [s] the same for a closed gap, until it can be exceeded by as much again
 ///     next_jump(s)  next time at which the rate may jump; the bounds hold up to there
 ///
 /// With a bound on second derivatives the steps converge to a root as Newton's method does, and

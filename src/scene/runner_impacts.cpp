@@ -129,8 +129,7 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     const Body& body = world_.bodies[i];
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = cluster_.before[slot];
-    if (body.mapped) return cluster_.sides.emplace_back(), void();  // the system's own guards find
-                                                                    // them
+    if (body.mapped) return cluster_.sides.emplace_back(), void();  // has its own guards
     const auto touch = [&](std::uint32_t f, const Vector2& normal) {
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = normal;
