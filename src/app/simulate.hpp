@@ -31,8 +31,8 @@ void claim_results(Claims& claims, const SimulateRequest& request);
 /// then are printed and written, marked as incomplete.
 ///
 /// @return 0 if the run reached its end; 129, 130 or 143 if a signal ended it; 1 if it ended
-/// otherwise
-///         (the result is printed and written all the same) or if the plot could not be drawn.
+///         otherwise (the result is printed and written all the same) or if the plot could not
+///         be drawn.
 /// @throws BadInput or ModelError before anything is printed or written.
 int simulate(const SimulateRequest& request);
 

@@ -290,7 +290,8 @@ bool explore(const Statement& statement, const Box& start, std::size_t max_unpro
 
 namespace {
 
-/// Counts the boxes below `box`, itself included, and those too narrow to be cut, in one sample.
+/// Adds one sample of the numbers of boxes below `box`, itself included, and of those among them
+/// that are too narrow to be cut.
 void descend(const Statement& statement, Box box, NetworkBounds::Scratch& scratch, Random& random,
              double& boxes, double& unproved, std::uint64_t& examined)
 {

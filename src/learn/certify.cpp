@@ -181,8 +181,7 @@ private:
 
     /// Descends from inexpensive thresholds to expensive ones.
     /// @returns nothing if even the least expensive is above the limit, or the logits do not
-    /// separate
-    ///          the states within the margin from the others
+    ///          separate the states within the margin from the others
     std::optional<Begun> search(double margin, const Attempt& attempt)
     {
         constexpr double first = 0.9;

@@ -45,8 +45,7 @@ struct Progressed {
 void save(const Progressed& all, const std::string& key, const std::filesystem::path& file);
 
 /// @throws std::runtime_error naming the file if it cannot be read, is cut short, has been altered,
-/// or has
-///         another key.
+///         or has another key.
 [[nodiscard]] Progressed load(const std::string& key, const std::filesystem::path& file);
 
 }  // namespace ricochet::learn
