@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Classes with Eigen's small matrices as members, which are laid out by the instruction set.
 //

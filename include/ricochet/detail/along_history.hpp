@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Friction of any law or learned pair along a history of slip rate.
 #pragma once

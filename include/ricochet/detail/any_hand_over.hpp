@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The loop of a hand-over for N components and M reactions, for systems of any type.
 #pragma once

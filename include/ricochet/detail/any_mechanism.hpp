@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A mechanical system with contacts of which only the number of coordinates is known.
 //

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The arithmetic that the library relies on: IEEE 754, with NaN and infinity.
 //

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The part of every gate that it delegates to the exact detector inside it.
 #pragma once

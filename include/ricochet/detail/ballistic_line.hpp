@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The exact rival of a network: where the guard is a parabola in time, whether a
 // step meets the event surface is one inequality.

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Proved bounds on the logit of a ReLU network over a box of features.
 //

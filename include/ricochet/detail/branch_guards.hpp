@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The guards of `AnyModes`, and its reset; a part of branch_modes.hpp.
 #pragma once

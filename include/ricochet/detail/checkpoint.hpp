@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The state of an interrupted training, as it is kept on disk.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A model that is ready to predict whether a step meets an event.
 #pragma once

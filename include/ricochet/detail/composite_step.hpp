@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Implicit steps of an inclusion: Bathe's composite step, backward Euler, theta.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The numbers of guards and modes that a system declares, and the guards watched in a mode.
 #pragma once

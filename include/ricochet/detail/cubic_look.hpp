@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Tests whether the cubic through the ends of an interval describes a guard inside it.
 //

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The degree of a guard as a polynomial in time and state together, found from its code.
 //

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A detector and a locator as the loop sees them: values with functions.
 #pragma once

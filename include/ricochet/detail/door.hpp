@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Converts a user's system, whatever its spellings and its type of state, to the table that the
 // loop uses (detail/system_table.hpp).

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Derivatives of flow and resets along a direction of state and time by dual numbers, for functions
 // that take any scalar (hybrid/scalar.hpp).

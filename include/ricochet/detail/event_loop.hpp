@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The event-driven phases of a hand-over: a simulation of the branches, whatever its stepper.
 #pragma once

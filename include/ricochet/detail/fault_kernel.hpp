@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Stress on one rectangle of a vertical fault caused by the slip of another.
 #pragma once

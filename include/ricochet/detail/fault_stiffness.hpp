@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The stiffness K of a fault of n x n elements: products, bounds of its spectrum, solutions.
 //

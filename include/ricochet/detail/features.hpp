@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The inputs of a network for a state: features computed from (t, x, h) by a recipe
 // that a model names.

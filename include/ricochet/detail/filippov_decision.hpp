@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Decides where a motion goes that has met switching surfaces, or may leave the surfaces on which
 // it slides. The rules are stated at `Filippov::reset`.

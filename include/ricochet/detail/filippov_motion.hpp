@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Motion across and along switching surfaces: the fields that meet at a point, and the
 // combinations of them that slide. The base of `Filippov`; it makes no decisions.

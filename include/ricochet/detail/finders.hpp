@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Converts a detector and a locator of any type to the tables that the loop uses.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A mechanical system with contacts, between its impacts, as a hybrid system.
 //

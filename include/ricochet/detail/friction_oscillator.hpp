@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A mass on a spring that rubs on a belt, with slipping and sticking as modes.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // One implicit stage of rate-and-state friction: the state is eliminated, then the slip rate
 // is found.

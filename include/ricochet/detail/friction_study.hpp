@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The published study of learned friction, repeated: its tables 1 to 4.
 //

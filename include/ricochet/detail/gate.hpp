@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A trained gate: the predictions of a network about the guards of a system, for several steps.
 //

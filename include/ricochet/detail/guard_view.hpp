@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // One guard of a system as detectors and locators use it: evaluations are counted,
 // and the rate is available whether or not the system has one in closed form.

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The incremental potential of one implicit step of a slider on a spring, and the condition
 // for its convexity.

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Four doubles side by side, one for each of four motions, with the operations of one double.
 //

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The operations of a flow that were recorded at run time, and their power series, computed
 // operation by operation, for flows whose operations the compiler cannot know.

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A loop whose quiet steps are taken elsewhere, together with those of other runs.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A system and its derivatives: the derivatives that it declares, else dual numbers where its
 // functions take any scalar (hybrid/scalar.hpp), else differences.

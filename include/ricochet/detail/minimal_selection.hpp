@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The reaction that the motion selects among those allowed at a state.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The events in the steps of a host program, as they are compiled in the library.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Set-ups that `integrate` rejects, each with a sentence.
 #pragma once

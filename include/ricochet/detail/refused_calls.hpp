@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Mistaken calls of `integrate`, each refused with a sentence where the compiler would list the
 // candidates that it has tried.

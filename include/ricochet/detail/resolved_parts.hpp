@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A step divided until a cubic through the ends of each part describes the guard.
 #pragma once

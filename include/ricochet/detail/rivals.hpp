@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Comparison of a trained network with other methods of finding events, on the same runs.
 #pragma once

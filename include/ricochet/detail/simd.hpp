@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Registers of several floats or doubles, and sums whose bits do not depend on their width.
 //

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Stages whose reactions lie in a box: the smooth part is solved by Newton's method, the
 // inequality of every iterate exactly, by cases.

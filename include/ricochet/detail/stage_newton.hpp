@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Stages by the semismooth Newton method, for sets of any shape.
 #pragma once

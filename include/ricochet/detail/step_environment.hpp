@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Steps chosen by reinforcement learning: a run as an environment, an action as a step.
 //

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The data of a run with a user-defined stepper, beside the system.
 #pragma once

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The data of a run by Taylor's method beside the system: the constants of its flow, and the
 // current step.

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Quiet steps of several runs by Taylor's method together, each with a length of its own.
 //

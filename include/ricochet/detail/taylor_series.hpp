@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Taylor coefficients of a motion, from the tape of its flow.
 //
-// With x(t0 + s) = sum_k x_k s^k and the same for every operation, the flow gives (k + 1) x_{k+1} =
-// f_k, and each operation has a recurrence for its own coefficient k from the coefficients of its
-// operands (Moore, Interval Analysis, 1966, chapter 11; Griewank and Walther, Evaluating
-// Derivatives, section 13.2). Coefficients are normalized: f_k is the k-th derivative / k!.
+// With x(t0 + s) = sum_k x_k s^k and the same for every operation, the flow gives
+// (k + 1) x_{k+1} = f_k, and each operation has a recurrence for its own coefficient k from those
+// of its operands (Moore, Interval Analysis, 1966, chapter 11; Griewank and Walther, Evaluating
+// Derivatives, section 13.2). Coefficients are normalized: f_k is the k-th derivative over k!.
 //
 // Sums begin with their middle terms and end with the newest coefficients, so that only two
 // additions depend on the previous operation. Short tapes are unrolled over operations and orders;

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A recording of a flow prepared for its series: without repetitions, in an order in which it can
 // be computed, with the degrees in time of all its operations.

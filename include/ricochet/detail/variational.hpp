@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A hybrid system together with its derivatives, as a hybrid system.
 //

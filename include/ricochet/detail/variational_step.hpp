@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Implicit steps of a block with rate-and-state friction, each stage the stationary point
 // of an incremental potential.
