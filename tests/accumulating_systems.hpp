@@ -1,5 +1,5 @@
-// Balls on floors at any height, fixed, moving or vibrating, whose impacts accumulate: of the
-// tests, and of the measurements.
+// Balls on floors at any height, fixed, moving or vibrating, whose impacts accumulate: for the
+// tests and the measurements.
 #pragma once
 
 #include <array>
@@ -60,7 +60,7 @@ struct BallOnFloor {
     void reset(double t, State& x) const { floor.bounce(t, x); }
 };
 
-/// With one, which holds on a floor that does not move.
+/// With a rest rule, which holds on a floor that does not move.
 struct RestingBall : BallOnFloor {
     void rest(double t, State& x) const { x = {floor.at(t), floor.velocity_at(t)}; }
 };
@@ -106,7 +106,7 @@ struct LiftedBall {
     }
 };
 
-/// A random case and what exact arithmetic makes of it.
+/// A random case, with its results in exact arithmetic.
 struct RandomBall {
     Floor floor{};
     double drop = 1;       ///< [m] above the floor
@@ -151,7 +151,7 @@ struct RandomBall {
     {
         return (speed - floor.velocity + first_speed()) / Floor::gravity;
     }
-    /// Where the impacts accumulate [s].
+    /// Time at which the impacts accumulate [s].
     [[nodiscard]] double limit() const
     {
         const double e = floor.restitution;
@@ -159,8 +159,9 @@ struct RandomBall {
     }
     [[nodiscard]] double end() const { return vibrates ? 20 : 1.3 * limit() + 1; }  ///< [s]
 
-    /// Impacts of exact arithmetic until an excursion v² / 2g is less than a unit in the last
-    /// place of the height, or what is left is less than one of the time or the tolerance.
+    /// Number of impacts in exact arithmetic until an excursion v² / 2g is less than a unit in the
+    /// last place of the height, or the remaining time is less than one of the time or the
+    /// tolerance.
     [[nodiscard]] int impacts() const
     {
         constexpr double ulp = 2.2e-16;
@@ -175,9 +176,9 @@ struct RandomBall {
         }
     }
 
-    /// How well the limit can be known [s]. Excursions may linger within 32 times the rounding
-    /// of 8 units in the last place, from where the impacts left take 2v / g(1 - e); an event
-    /// that is off by the tolerance shifts all that follow as much, again and again.
+    /// Accuracy with which the limit can be known [s]. Excursions may linger within 32 times the
+    /// rounding of 8 units in the last place, from where the remaining impacts take 2v / g(1 - e);
+    /// an event that is off by the tolerance shifts all later ones as much, again and again.
     [[nodiscard]] double accuracy() const
     {
         const double e = floor.restitution;
@@ -187,7 +188,7 @@ struct RandomBall {
     }
 };
 
-/// What went wrong, empty if nothing.
+/// Description of an error; empty if there is none.
 template <class Ball>
 [[nodiscard]] std::string fault_of(const RandomBall& ball, const Ball& system)
 {
@@ -211,7 +212,7 @@ template <class Ball>
         if (accumulations++ == 0) limit = event.t;
         moved = event.error;
     }
-    // Where a run ends at an accumulation, samples on the way there are those at the limit.
+    // Where a run ends at an accumulation, samples before it are those at the limit.
     const double deepest = 1e-7 + 20 * ball.tolerance + moved * std::fabs(ball.floor.velocity);
     for (std::size_t i = 0; i < run.trajectory.t.size(); ++i) {
         const double above = run.trajectory.x[i][0] - ball.floor.at(run.trajectory.t[i]);

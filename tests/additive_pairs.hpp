@@ -1,4 +1,4 @@
-// Additive pairs to try things on.
+// Additive pairs for tests.
 #pragma once
 
 #include "ricochet/faults/laws.hpp"
@@ -18,7 +18,7 @@ namespace ricochet::test {
             .rate = {.slope = p.b / beta * p.v_star / p.d_rs}};
 }
 
-/// The same with units that bend the nets.
+/// The same with nonlinear units in the nets.
 [[nodiscard]] inline AdditivePair::Parameters crooked_nets()
 {
     AdditivePair::Parameters p = linear_nets();

@@ -1,5 +1,5 @@
-// Counts heap allocations: a program that links allocations.cpp has its operator
-// new replaced by one that counts, on every thread by itself.
+// Counts heap allocations: in a program that links allocations.cpp operator
+// new is replaced by one that counts, separately on every thread.
 #pragma once
 
 #include <cstdint>

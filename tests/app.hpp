@@ -1,4 +1,4 @@
-// The command line, run as a child process as a user runs it.
+// The command line, run as a child process like a user's command.
 #pragma once
 
 #include <fcntl.h>
@@ -59,7 +59,7 @@ protected:
 
     [[nodiscard]] fs::path work() const { return root_ / "work"; }
 
-    /// Starts the program in `work()`, its output going to files outside of it.
+    /// Starts the program in `work()`, with its output going to files outside of it.
     pid_t start(const Words& words, const Words& environment = {}) const
     {
         Words all{RICOCHET_APP};
@@ -123,7 +123,7 @@ protected:
         EXPECT_EQ(result.out, "");
         EXPECT_EQ(files(), before);
         EXPECT_TRUE(result.err.starts_with("ricochet: ")) << result.err;
-        // A slow machine may be told that the program is still at work.
+        // On a slow machine a message may say that the program is still running.
         const auto lines = std::count(result.err.begin(), result.err.end(), '\n');
         const bool patient = result.err.starts_with("ricochet: still running");
         EXPECT_EQ(lines, patient ? 2 : 1) << result.err;

@@ -45,7 +45,7 @@ struct Clustered {
 ///     guard   (s - 0.1) (s - 0.4) (s - 0.8), either direction, s = x - shift or its square
 ///
 /// With `slip` > 0 every crossing moves x back by that much: less than an event's window,
-/// so that nothing is crossed twice.
+/// so that no root is crossed twice.
 struct ThreeRoots {
     using State = std::array<double, 1>;
 
@@ -106,7 +106,7 @@ struct Synchronous {
     static constexpr std::size_t guard_count = 2;
     static constexpr State start{1, 1, 0};
 
-    /// The component that a guard is.
+    /// The component whose value the guard is.
     [[nodiscard]] constexpr std::size_t component(std::size_t which) const noexcept
     {
         return swapped ? 1 - which : which;

@@ -1,10 +1,10 @@
-// Expected run of a random system, by its closed form and the meanings of the library
+// Expected run of a random system, from its closed form and the semantics of the library
 // alone: polynomials in long double, their roots between their extrema by bisection,
 // and the rules for sets, resets and cascades.
 //
-// A problem whose answer hangs by a thread says nothing about an integrator: it is run
+// A problem whose answer depends on tiny differences is no test of an integrator: it is run
 // again with its states moved by a billionth at every event, and must have the same
-// events. How far these move shows how well each of them can be known.
+// events. Their displacement shows how accurately each of them can be known.
 #pragma once
 
 #include <algorithm>
@@ -93,7 +93,7 @@ struct ExactEvent {
 };
 
 struct ExactRun {
-    bool regular = true;  ///< the rules say what happens, and nothing is nearly otherwise
+    bool regular = true;  ///< the rules determine the result, and no near coincidence exists
     std::vector<ExactEvent> events;
     std::array<Real, 3> x{};
     Mode mode = 0;
@@ -132,10 +132,10 @@ private:
 
     static constexpr std::size_t most_sets = 60;
     static constexpr int most_levels = 50;
-    static constexpr Real apart = 1e-6L;    ///< [s] sets that are nearer prove nothing
+    static constexpr Real apart = 1e-6L;    ///< [s] sets that are nearer are no test
     static constexpr Real clearly = 1e-5L;  ///< |g| or |rate| that is not zero
 
-    /// |g| that is the residue of a root, or of a disturbance.
+    /// |g| that remains of a root, or of a disturbance.
     [[nodiscard]] Real residue() const noexcept { return disturbance_ ? 1e-7L : 1e-15L; }
 
     /// The components as polynomials of the offset from here, positive in the
@@ -171,7 +171,7 @@ private:
         return out;
     }
 
-    /// From here to the next set, time event or the end.
+    /// Goes from here to the next set, the next time event or the end.
     void fly()
     {
         const std::array<Cubic, 3> x = motion();
@@ -191,7 +191,7 @@ private:
                 break;
             }
         }
-        // Twins have the same roots to the last bit.
+        // Equal guards have the same roots to the last bit.
         const Real end = std::min(horizon, *std::min_element(first.begin(), first.end()));
         Guards members;
         for (std::size_t i = 0; i < first.size(); ++i) {
@@ -212,7 +212,7 @@ private:
         }
     }
 
-    /// The changes up to the offset `end`: sides follow, notifications are recorded.
+    /// Records the changes up to the offset `end`, and updates the sides.
     void note(const std::vector<std::vector<Change>>& all, Real end)
     {
         std::vector<ExactEvent> notes;
@@ -229,7 +229,7 @@ private:
         run_.events.insert(run_.events.end(), notes.begin(), notes.end());
     }
 
-    /// A set fires, and the one that is flipped by it.
+    /// Fires a set, and the sets that are flipped by it.
     void happen(Guards members, bool on_time)
     {
         if (++run_.sets > most_sets) return give_up();
@@ -288,7 +288,7 @@ private:
             const bool fired = std::find(fired_.begin(), fired_.end(), i) != fired_.end();
             const bool on_surface = size <= (fired ? residue() : Real(0));
             if ((on_surface ? std::fabs(g.c[1]) : size) < clearly) give_up();
-            // Looked at from now on, and just now on its surface: who can tell?
+            // The guard is newly enabled and on its surface: the case is undecidable.
             if (on_surface && before == Side::plateau) give_up();
             sides_[i] = side_of(static_cast<double>(on_surface ? g.c[1] : g.c[0]));
             const bool now = std::find(members.begin(), members.end(), i) != members.end();
@@ -308,7 +308,7 @@ private:
         run_.events.push_back({.t = t_, .kind = kind, .guard = guard, .mode_after = run_.mode});
     }
 
-    /// Moves what has not just been put somewhere.
+    /// Moves components that have not just been written.
     void disturb(const std::array<std::optional<Write>, 3>& writes)
     {
         if (!disturbance_) return;

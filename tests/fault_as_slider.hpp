@@ -1,4 +1,4 @@
-// A fault of one element and the slider that it is: K = 1, hence mass rho L, stiffness G / L,
+// A fault of one element and the equivalent slider: K = 1, hence mass rho L, stiffness G / L,
 // normal force sigma.
 #pragma once
 

@@ -1,6 +1,6 @@
-// The energy of a fault's run, from what the run returns.
+// The energy of a fault's run, from the results of the run.
 //
-// Without units, with the slip d, the velocity v and the initial stress tau, the motion
+// In nondimensional form, with the slip d, the velocity v and the initial stress tau, the motion
 //
 //     v' = tau - K u - H u' - friction,      u = d - v_pl t,
 //
@@ -11,7 +11,7 @@
 //     tau.d - v_pl 1.(int K u + H u' dt) = v.v / 2 + u.K u / 2 + int friction.v dt + int u'.H u' dt
 //
 // K and its root are matrices here, and friction is integrated from the motion alone, so that
-// nothing of the integrator's own sums is used.
+// the integrator's own sums are not used.
 #pragma once
 
 #include <Eigen/Eigenvalues>
@@ -33,7 +33,7 @@ struct FaultEnergy {
     double friction = 0;   ///< dissipated
     double radiation = 0;  ///< dissipated
 
-    /// What is missing, over the largest of the terms.
+    /// The missing energy relative to the largest of the terms.
     [[nodiscard]] double defect() const
     {
         return std::abs(work - kinetic - strain - friction - radiation) /
@@ -56,8 +56,8 @@ struct FaultMatrices {
     Eigen::MatrixXd k, h;
 };
 
-/// Of friction that weakens with slip, whose work is a function of the path; radiated energy is
-/// given.
+/// Energy with friction that weakens with slip, whose work is a function of the path; radiated
+/// energy is given.
 inline FaultEnergy weakening_energy(const StrikeSlipFault& fault, const FaultMatrices& m,
                                     const Eigen::VectorXd& slip, const Eigen::VectorXd& velocity,
                                     double radiation)
@@ -76,7 +76,7 @@ inline FaultEnergy weakening_energy(const StrikeSlipFault& fault, const FaultMat
     return out;
 }
 
-/// Of the explicit run, its radiation by Simpson's rule over 2 `pairs` even intervals.
+/// Energy of the explicit run, with its radiation by Simpson's rule over 2 `pairs` even intervals.
 inline FaultEnergy explicit_energy(const StrikeSlipFault& fault, RuptureOptions options,
                                    std::size_t pairs)
 {
@@ -96,7 +96,7 @@ inline FaultEnergy explicit_energy(const StrikeSlipFault& fault, RuptureOptions 
     return weakening_energy(fault, m, run.slip, run.velocity, radiation);
 }
 
-/// Of Bathe's steps, its radiation by Simpson's rule over each of them.
+/// Energy of Bathe's steps, with its radiation by Simpson's rule over each of them.
 inline FaultEnergy bathe_energy(const StrikeSlipFault& fault, const RuptureOptions& options,
                                 BatheOptions bathe)
 {
@@ -110,8 +110,8 @@ inline FaultEnergy bathe_energy(const StrikeSlipFault& fault, const RuptureOptio
     return weakening_energy(fault, m, run.slip, run.velocity, radiation);
 }
 
-/// Of rate-and-state friction with the ageing law: theta from the velocities by its own equation,
-/// integrals by the trapezoidal rule over the steps.
+/// Energy with rate-and-state friction and the ageing law: theta from the velocities by its own
+/// equation, integrals by the trapezoidal rule over the steps.
 inline FaultEnergy rate_state_energy(const StrikeSlipFault& fault, RuptureOptions options,
                                      const FaultFriction& friction, const RateStateOptions& how)
 {

@@ -1,6 +1,6 @@
-// Files of every format: sound ones, broken ones, and what is done with one that loads.
+// Files of every format: valid ones, broken ones, and the use of those that load.
 //
-// A file is either refused with the exception that its format promises, or what was loaded is
+// A file is either refused with the exception that its format promises, or its content is
 // used. For file_fuzz.cpp, which breaks them at random, and for libFuzzer (stress/fuzz_files.cpp).
 #pragma once
 
@@ -42,12 +42,12 @@ namespace ricochet::file_fuzz {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-/// What a format says of a file that it does not take.
+/// The refusal of a file by its format.
 struct Refused {
     std::string why;
 };
 
-/// What `use` throws of the kind that the format promises becomes `Refused`.
+/// Converts exceptions of `use` of the promised kind to `Refused`.
 template <class Promised, class Use>
 auto refusing(const Use& use)
 {
@@ -65,7 +65,7 @@ public:
     [[nodiscard]] virtual std::size_t sound_count() const = 0;
     /// A broken file.
     [[nodiscard]] virtual std::string broken(Mutator& mutator) const = 0;
-    /// Loads it and uses what was loaded.
+    /// Loads it and uses its content.
     /// @throws Refused
     virtual void load_and_use(const std::string& bytes, Mutator& mutator) const = 0;
 };
@@ -194,7 +194,7 @@ public:
         const AdditivePair pair =
             refusing<PotentialFileError>([&] { return parse_pair(bytes, "f"); });
         const PairDomain& d = pair.parameters().domain;
-        if (d.v_max == 0) return;  // it states none
+        if (d.v_max == 0) return;  // it states no domain
         for (const double v : {d.v_min, std::sqrt(d.v_min) * std::sqrt(d.v_max), d.v_max}) {
             for (const double xi : {d.xi_min, (d.xi_min + d.xi_max) / 2, d.xi_max}) {
                 const FrictionAndRate at = pair.evaluate(v, xi);
@@ -209,7 +209,7 @@ public:
     }
 
 private:
-    /// The stored values made those of the changed weights, as far as they can be computed.
+    /// Replaces the stored values by those of the changed weights, as far as they can be computed.
     static void repeat_test(json& document)
     {
         try {
@@ -236,7 +236,7 @@ private:
             test["friction"] = now.friction;
             test["rate"] = now.rate;
         } catch (const std::exception&) {
-            // What was changed is no number: it stays as it is.
+            // The changed value is no number, and stays as it is.
         }
     }
 
@@ -352,7 +352,7 @@ private:
 
 // --- checkpoints ---
 
-/// Of trainings: a line, numbers and their checksum.
+/// Checkpoints of trainings: a line, numbers and their checksum.
 class Checkpoints : public InFile {
 public:
     Checkpoints()
@@ -383,7 +383,8 @@ public:
     {
         std::string bytes = mutator.any_of(sound_);
         const std::size_t first = bytes.find('\n') + 1;
-        // Whole lists are seldom cut where one begins: numbers are changed, or left out in eights.
+        // Lists are seldom cut exactly where one begins, so numbers are changed, or omitted in
+        // eights.
         for (std::uint64_t i = mutator.below(3); i < 3; ++i) {
             const std::size_t words = (bytes.size() - first) / 8;
             if (words < 4) break;
@@ -455,7 +456,7 @@ private:
     std::vector<std::string> sound_;
 };
 
-/// Of proofs, in JSON.
+/// Checkpoints of proofs, in JSON.
 class Proofs : public InFile {
 public:
     Proofs()

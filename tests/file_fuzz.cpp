@@ -1,10 +1,10 @@
-// Broken files of every format, made from sound ones, by the hundred thousand.
+// Broken files of every format, made from valid ones, by the hundred thousand.
 //
 //     file_fuzz [format] [count] [seed]
 //
-// A file is either refused with the exception that its format promises, or what was loaded is
-// used. Anything else ends the program; run it under the address and undefined-behaviour
-// sanitizers. Each file depends on the seed and its own number only, so that a failure can be
+// A file is either refused with the exception that its format promises, or its content is
+// used. Any other behaviour ends the program; run it under the address and undefined-behaviour
+// sanitizers. Each file depends only on the seed and its own number, so that a failure can be
 // repeated.
 #include <cstdint>
 #include <cstdio>
@@ -21,7 +21,7 @@ namespace {
 using namespace ricochet;
 using namespace ricochet::file_fuzz;
 
-/// The kind of complaint: its words up to what was found, without names and numbers.
+/// The kind of a refusal: its words up to the value found, without names and numbers.
 std::string kind_of(std::string_view message)
 {
     std::string kind;
@@ -53,7 +53,7 @@ void attempt(const Format& format, const std::string& bytes, Mutator& mutator, C
     }
 }
 
-/// @return whether all is well
+/// @return whether all files pass
 bool run(const std::string& name, const Format& format, std::uint64_t count, std::uint64_t seed)
 {
     Counts sound;

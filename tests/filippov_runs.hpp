@@ -9,13 +9,13 @@
 
 namespace ricochet::test {
 
-/// Tight enough that what is measured is the switching, not the steps.
+/// Tolerances tight enough for measuring the switching, not the steps.
 inline Options tight(double t_end, Mode mode)
 {
     return {.t_end = t_end, .mode = mode, .rtol = 1e-12, .atol = 1e-14};
 }
 
-/// Fields of any type behind one, so that the loop is compiled once for all of them.
+/// Fields of any type behind one type, so that the loop is compiled once for all of them.
 template <std::size_t surfaces, class X>
 struct AnyFields {
     static constexpr std::size_t surface_count = surfaces;

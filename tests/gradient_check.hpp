@@ -10,9 +10,9 @@
 
 namespace ricochet {
 
-/// Central differences of a function of order one, with h = 1e-5, are off by h^2 f''' / 6 and by
-/// the function's rounding over h: about 1e-10 and 1e-11. Where a gradient is not near zero that is
-/// below 1e-6 of it; a thousandth of its largest component counts as near.
+/// Central differences of a function of order one, with h = 1e-5, have errors of h^2 f''' / 6 and
+/// of the function's rounding over h: about 1e-10 and 1e-11. Where a gradient is not near zero that
+/// is below 1e-6 of it; a thousandth of its largest component counts as near zero.
 template <class Parameters, class Function>
 void expect_gradient(const std::vector<double>& gradient, Parameters& parameters,
                      const Function& function)

@@ -1,4 +1,4 @@
-// What solves the random inclusions, which have sizes of their own, is compiled once.
+// The solvers of the random inclusions, which have sizes of their own, are compiled once.
 #pragma once
 
 #include "ricochet/nonsmooth/hand_over.hpp"

@@ -1,4 +1,4 @@
-// The ready systems beside their known solutions, as a list that tests go through.
+// The ready systems with their known solutions, as a list for tests.
 #pragma once
 
 #include <cmath>
@@ -40,7 +40,7 @@ struct Happening {
     EventKind kind = EventKind::crossing;
 };
 
-/// A run, whatever the system's state type.
+/// A run, for any type of state.
 struct PlainRun {
     Outcome outcome = Outcome::reached_end;
     std::vector<Happening> events;
@@ -48,7 +48,7 @@ struct PlainRun {
     Mode mode = 0;
 };
 
-/// A system, a problem and what is known of its solution.
+/// A system, a problem and its known solution.
 struct KnownSolution {
     std::string name;
     std::vector<double> start;
@@ -58,7 +58,7 @@ struct KnownSolution {
     Mode mode = 0;              ///< at the end
     double time_error = 1e-12;  ///< largest error of an event at t, over max(1, |t|)
     double end_error = 1e-12;   ///< largest error of a component, over max(1, its size)
-    /// How it can be run at tight tolerances.
+    /// Methods that can run it at tight tolerances.
     std::vector<How> hows{How::dopri5_extremum, How::dopri5_ends, How::fehlberg78_extremum};
     double turn_at = std::numeric_limits<double>::quiet_NaN();  ///< [s]; see `SystemsBackward`
     std::function<PlainRun(const std::vector<double>& x0, const Options&, How)> run{};
@@ -77,7 +77,7 @@ template <class X>
     return out;
 }
 
-/// How to run a system from a start given as a vector.
+/// Runs a system from a start given as a vector.
 template <class System>
 [[nodiscard]] auto runs(const System& system)
 {
@@ -158,11 +158,11 @@ template <class Function>
 /// Every ready system with its default problem.
 [[nodiscard]] inline std::vector<KnownSolution> known_solutions()
 {
-    // A step adds an error of up to 1e-13 to every component of the state, or 1e-13 of it
-    // where it is larger than one. Most steps add a tenth of that or less, and the flows
+    // A step adds an error of up to 1e-13 to every component of the state, relative to its size
+    // if that is larger than one. Most steps add a tenth of that or less, and the flows
     // are stable or nearly so: over the few hundred to few thousand steps of a run 1e-12
-    // of the time has been enough for events that are met at rates of order one. What
-    // differs from that says why.
+    // of the time has been enough for events at rates of order one. Exceptions state
+    // their reasons.
     const auto tight = [](double t_end) {
         return Options{.t_end = t_end, .rtol = 1e-13, .atol = 1e-13};
     };
@@ -196,7 +196,7 @@ template <class Function>
                                .atol = 1e-13},
                    .events = crossings(as_vector(HiddenPair::zeros)),
                    .end = {120},
-                   // Long steps: the ends alone do not show the pair.
+                   // Long steps: the ends alone do not reveal the pair.
                    .hows = {How::dopri5_extremum, How::fehlberg78_extremum},
                    .turn_at = 3.75,
                    .run = runs(HiddenPair())});
@@ -278,8 +278,8 @@ template <class Function>
                    .hows = timed,
                    .turn_at = 19.75,
                    .run = runs(DetestF3())});
-    // The end of F4 is 1e-10 in size, and a relative error is wanted of it. Fehlberg's
-    // pair is not suited to F4 and F5, as their headers say.
+    // The end of F4 is 1e-10 in size, and its relative error matters. Fehlberg's
+    // pair is not suited to F4 and F5, as their headers explain.
     all.push_back({.name = "detest_f4",
                    .start = as_vector(DetestF4::start),
                    .options = {.t_end = DetestF4::t_end, .rtol = 1e-13, .atol = 1e-22},

@@ -123,7 +123,7 @@ TYPED_TEST_P(LocatorSuite, APoleIsNoCrossing)
 
 TYPED_TEST_P(LocatorSuite, ASteepCrossingIsNoJumpAtAnyTolerance)
 {
-    // 1000 steep where it crosses, and 1 at both ends of the step.
+    // The slope is 1000 at the crossing, and 1 at both ends of the step.
     const HostStep step(
         1.0, [](double s) { return std::tanh(1000 * (0.3 - s)); },
         [](double s) { return -1000 / std::pow(std::cosh(1000 * (0.3 - s)), 2); });
@@ -134,7 +134,7 @@ TYPED_TEST_P(LocatorSuite, ASteepCrossingIsNoJumpAtAnyTolerance)
 
 TYPED_TEST_P(LocatorSuite, AFlightThatEndsWithTheStepIsNoJump)
 {
-    // On the surface at the start and the end: the guard's ends say nothing of its size.
+    // On the surface at the start and the end: the guard's ends do not show its size.
     const HostStep step(
         1.0, [](double s) { return s * (1 - s) - 1e-17; }, [](double s) { return 1 - 2 * s; });
     EXPECT_FALSE(locate<TypeParam>(step, Side::above).jump);
@@ -142,7 +142,7 @@ TYPED_TEST_P(LocatorSuite, AFlightThatEndsWithTheStepIsNoJump)
 
 TYPED_TEST_P(LocatorSuite, ASaturatedGuardIsLocatedAllTheSame)
 {
-    // Flat at both ends, where its slope says nothing: erf is 1 to the last bit there.
+    // Flat at both ends, where its slope carries no information: erf is 1 to the last bit there.
     const HostStep step(
         10.0, [](double s) { return std::erf(10 * (5.03 - s)); },
         [](double s) { return -11.283791670955126 * std::exp(-std::pow(10 * (5.03 - s), 2)); });

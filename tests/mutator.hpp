@@ -1,8 +1,8 @@
 // Damage to files, drawn at random from a seed.
 //
-// Bytes changed at random hardly ever get past a parser, so most changes are made to what a format
-// consists of: to the nodes of a JSON document, the words of a text, the numbers of a binary file.
-// Lengths and checksums are then made to agree, for the most part, by the format that asks.
+// Random changes of bytes hardly ever get past a parser, so most changes are made to the elements
+// of a format: to the nodes of a JSON document, the words of a text, the numbers of a binary file.
+// The format then mostly makes lengths and checksums agree.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ public:
         return values[below(values.size())];
     }
 
-    /// Small, near a power of two up to 2^64, or anything.
+    /// A number that is small, near a power of two up to 2^64, or arbitrary.
     std::uint64_t size()
     {
         switch (below(4)) {
@@ -44,7 +44,7 @@ public:
         }
     }
 
-    /// The bits of a number that arithmetic stumbles over, or of any.
+    /// The bits of a special or an arbitrary number.
     std::uint64_t number()
     {
         static const std::array<double, 10> values{0.0,       -0.0,  1.0,    -1.0,  HUGE_VAL,
@@ -140,7 +140,7 @@ public:
         return changed + words.substr(one_in(4) ? begin : end);
     }
 
-    /// A text that may be JSON no more, or that is nested as no file is.
+    /// Makes a text that may not be valid JSON, or is nested deeper than any file.
     void break_text(std::string& text)
     {
         if (text.size() < 2) return;
@@ -159,7 +159,7 @@ public:
         }
     }
 
-    /// A few numbers of `width` bytes each replaced, from `first` on, or single bytes.
+    /// Replaces a few numbers of `width` bytes each, from `first` on, or single bytes.
     void change_numbers(std::string& bytes, std::size_t first, std::size_t width)
     {
         if (bytes.size() < first + width) return;
@@ -177,7 +177,7 @@ public:
         }
     }
 
-    /// Bytes that are fewer, more or others.
+    /// Removes, adds or changes bytes.
     void break_bytes(std::string& bytes)
     {
         if (bytes.empty()) return;

@@ -1,4 +1,4 @@
-// Networks for the tests, and a slow evaluation to judge them by.
+// Networks for the tests, and a slow evaluation for comparison.
 #pragma once
 
 #include "ricochet/nn/model.hpp"
@@ -19,7 +19,7 @@ inline Model random_model(const std::vector<std::size_t>& widths, Activation act
                           std::uint64_t seed)
 {
     std::mt19937_64 bits(seed);
-    // Standard distributions differ between libraries; the middle of twelve do not.
+    // Standard distributions differ between libraries; a sum of twelve uniform numbers does not.
     const auto normal = [&] {
         double sum = -6;
         for (int i = 0; i < 12; ++i) sum += static_cast<double>(bits() >> 11) * 0x1p-53;
@@ -49,10 +49,10 @@ struct Reference {
     std::vector<long double> bound;  ///< of the error of an evaluation with unit roundoff u
 };
 
-/// The network by the formula, in long double, and how far an evaluation in another
-/// order and with unit roundoff u may be off: n products and a bias give at most
-/// (n + 2) u (|W| |x| + |b|), errors of x arrive as |W| e, activations have slope at
-/// most one, and our tanh is good to 8 u.
+/// The network by the formula, in long double, and a bound of the error of an evaluation in another
+/// order and with unit roundoff u: n products and a bias give at most
+/// (n + 2) u (|W| |x| + |b|), errors of x contribute |W| e, activations have a slope of at
+/// most one, and our tanh has an error of 8 u.
 inline Reference evaluate_by_formula(const Model& model, const std::vector<double>& input,
                                      long double u)
 {

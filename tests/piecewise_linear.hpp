@@ -22,7 +22,7 @@ public:
         int sign;  ///< of V1 afterwards; 0: stuck
     };
 
-    /// Runs from `w` at 0 to t_end and keeps the changes of mode.
+    /// Runs from `w` at 0 to t_end and stores the changes of mode.
     void run(Eigen::Vector3d w, double t_end)
     {
         changes.clear();
@@ -75,7 +75,7 @@ private:
         return (map * w.homogeneous()).head<3>();
     }
 
-    /// After V1 has come to 0 from `before`, or has been stuck where that is 0.
+    /// The mode after V1 has reached 0 from `before`, or has been stuck if that is 0.
     [[nodiscard]] int mode_at_zero(const Eigen::Vector3d& w, int before = 0) const
     {
         const double drive = w[1] / p_.resistance;
@@ -84,7 +84,7 @@ private:
         return drive > 0 ? 1 : -1;
     }
 
-    /// When the mode ends, or infinity: the first sign change on a grid of 1e-3, far below
+    /// Time at which the mode ends, or infinity: the first sign change on a grid of 1e-3, far below
     /// the periods of the circuit, bisected.
     [[nodiscard]] double first_change(int sign, const Eigen::Vector3d& w, double limit) const
     {

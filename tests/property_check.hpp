@@ -1,4 +1,4 @@
-// A random problem, run and compared with what it must do.
+// A random problem, run and compared with its exact run.
 #pragma once
 
 #include <algorithm>
@@ -20,10 +20,10 @@
 
 namespace ricochet::test {
 
-/// What many random problems had in them, and what went wrong.
+/// Contents and failures of many random problems.
 struct PropertyReport {
     std::uint64_t problems = 0;
-    std::uint64_t irregular = 0;  ///< thrown away: not one answer
+    std::uint64_t irregular = 0;  ///< discarded: the answer is not unique
     std::uint64_t events = 0;
     std::uint64_t sets = 0;
     std::uint64_t together = 0;
@@ -31,7 +31,7 @@ struct PropertyReport {
 
     std::uint64_t unfinished = 0;       ///< another outcome, or time that stands still
     std::uint64_t missed = 0;           ///< problems with an event that was not found
-    std::uint64_t spurious = 0;         ///< problems with an event that is none, or twice
+    std::uint64_t spurious = 0;         ///< problems with a wrong event, or one twice
     std::uint64_t misplaced = 0;        ///< problems with an event at another time
     std::uint64_t astray = 0;           ///< problems with another end
     std::uint64_t order_dependent = 0;  ///< problems that the order of guards changed
@@ -48,7 +48,7 @@ namespace property {
 
 using X = RandomSystem::State;
 
-/// An exact run, and how well its events are known.
+/// An exact run, and the accuracy with which its events are known.
 struct Expected {
     ExactRun run;
     std::vector<Real> doubt;  ///< [s] for each event
@@ -78,7 +78,7 @@ struct Expected {
             out.state_doubt = std::max(out.state_doubt, std::fabs(other.x[c] - out.run.x[c]));
         }
     }
-    // Not worth following: a billionth has become a hundred-thousandth.
+    // Not worth following: a billionth has grown to a hundred-thousandth.
     if (!out.doubt.empty() && out.doubt.back() > 1e-5L) return std::nullopt;
     return out;
 }
@@ -94,7 +94,7 @@ template <class Events>
     return out;
 }
 
-/// Whether the run never turned in time.
+/// Whether time advances throughout the run.
 [[nodiscard]] inline bool advances(const Run<X>& run, bool backward)
 {
     return std::is_sorted(
@@ -102,7 +102,7 @@ template <class Events>
         [backward](const auto& a, const auto& b) { return backward ? a.t > b.t : a.t < b.t; });
 }
 
-/// Whether every event of the exact run is there, once, in time; counts what is not.
+/// Whether the run has every event of the exact run, once, at its time; counts the differences.
 inline bool compare(const Run<X>& run, const Expected& expected, const RandomProblem& problem,
                     PropertyReport& report)
 {
@@ -111,7 +111,7 @@ inline bool compare(const Run<X>& run, const Expected& expected, const RandomPro
         ++report.unfinished;
         return false;
     }
-    // Rounding moves a run by less than a thousandth of what a disturbance of 1e-9 does:
+    // Rounding moves a run by less than a thousandth of a disturbance of 1e-9:
     // a step adds a few units in the last place, 1e-15 of the states' sizes, and there are
     // fewer than a thousand steps between two disturbances.
     constexpr Real share = 1e-3L;

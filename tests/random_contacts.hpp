@@ -11,7 +11,7 @@ namespace ricochet::testing_support {
 
 /// 1 to `most` contacts of 2 or 3 components between bodies of three degrees of freedom,
 /// whose masses differ by up to 1e8, or between one and the ground. Bodies are few, so that
-/// there are often more contacts than degrees of freedom, and some contacts are there
+/// there are often more contacts than degrees of freedom, and some contacts occur
 /// twice. Friction is in [0, 2]. q is that of free bodies at random velocities,
 /// so that impulses exist that stop them.
 class RandomContacts {

@@ -1,4 +1,4 @@
-// Guards that move faster than the state: of the tests, and of the measurements.
+// Guards that move faster than the state: for the tests and the measurements.
 #pragma once
 
 #include <algorithm>
@@ -86,7 +86,7 @@ struct RandomGuard {
     }
 };
 
-/// Roots, and those that a run missed, with the widest dip missed as a part of its step.
+/// Roots, and those that a run missed, with the widest dip missed as a fraction of its step.
 struct Misses {
     std::size_t roots = 0;
     std::size_t missed = 0;
@@ -120,7 +120,8 @@ struct Misses {
     return misses;
 }
 
-/// A spiral into the origin, on which guards keep no scale. The third component counts events.
+/// A spiral into the origin, on which guards have no fixed scale. The third component counts
+/// events.
 struct Spiral {
     using State = std::array<double, 3>;
     enum Kind { product, component, cube };
@@ -149,7 +150,7 @@ struct Spiral {
     }
 };
 
-/// Motion that ends at its surface, where the flow is not a number beyond.
+/// Motion that ends at its surface, beyond which the flow is not a number.
 struct Draining {
     using State = std::array<double, 1>;
     enum Kind { root, torricelli, logarithm };
@@ -163,7 +164,7 @@ struct Draining {
     }
     [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
 
-    /// When the level is 0 after 1 at the start [s]: the integral of 1 / |x'| from 0 to 1.
+    /// Time when the level is 0 after 1 at the start [s]: the integral of 1 / |x'| from 0 to 1.
     [[nodiscard]] double empty() const { return kind == root ? 2 * (1 - std::log(2.0)) : 2; }
 };
 

@@ -1,7 +1,7 @@
 // Random inclusions in thirteen families, and their motion by another method.
 //
-// All families share one type: six components of state, of which those not used rest, and M
-// reactions, of which those not used act with the bounds [0, 0] on a component that is always 1.
+// All families share one type: six components of state, of which the unused ones rest, and M
+// reactions, of which the unused ones act with the bounds [0, 0] on a component that is always 1.
 #pragma once
 
 #include <algorithm>
@@ -333,7 +333,7 @@ template <int M>
     return InclusionMaker<M>(family, seed).make(family);
 }
 
-/// Backward Euler with every choice of branches tried, on plain arrays and without anything of
+/// Backward Euler with every choice of branches tried, on plain arrays and independently of
 /// the library.
 class BackwardEuler {
     static constexpr std::size_t n = 6, most = 5;
@@ -450,8 +450,8 @@ private:
         return next;
     }
 
-    /// The reaction on the branches in hand, if it lies on them. One whose y is zero may be at
-    /// its bound, so that reactions that depend on one another need not be held together.
+    /// The reaction on the present branches, if it lies on them. A reaction whose y is zero may be
+    /// at its bound, so that reactions that depend on one another need not be held together.
     bool fits(const Reactions& q, double room, Reactions& r) const
     {
         std::array<std::size_t, most> held{};
@@ -505,7 +505,7 @@ private:
     Reactions lower_{}, upper_{};
 };
 
-/// Extrapolated from two step lengths, with what they differ by.
+/// Extrapolated from two step lengths, with their difference.
 class ReferenceMotion {
 public:
     double size = 0, speed = 0, uncertainty = 0;
@@ -532,7 +532,7 @@ public:
         solved = coarse.unsolved + fine.unsolved == 0;
     }
 
-    /// How far w is from the motion at sample i.
+    /// Distance of w from the motion at sample i.
     template <class Vector>
     [[nodiscard]] double error(std::size_t i, const Vector& w) const
     {
@@ -543,8 +543,8 @@ public:
         return worst;
     }
 
-    /// What a run of set-valued steps h may be off by: a thousandth of the motion, or what the
-    /// motion does in two steps, since a change that is stepped over costs a step of one rate.
+    /// Allowed error of a run of set-valued steps h: a thousandth of the motion, or the change of
+    /// the motion in two steps, since a change within a step costs a step at one rate.
     [[nodiscard]] double allowed(double h) const
     {
         return 3 * uncertainty + std::max(1e-3 * size, 2 * h * speed);

@@ -1,4 +1,4 @@
-// Random mechanisms with contacts and friction, and what their motion has to obey.
+// Random mechanisms with contacts and friction, and the laws of their motion.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,11 +18,11 @@
 
 namespace ricochet::test {
 
-/// What was wrong with runs; and runs that ended by saying that they cannot continue.
+/// Errors of runs, and the number of runs that ended because they could not continue.
 struct MechanismTally {
     std::uint64_t runs = 0, steps = 0, impacts = 0, reported = 0;
     std::string fault;   ///< the first
-    double largest = 0;  ///< imbalance of the energy of a step, as a part of its terms
+    double largest = 0;  ///< imbalance of the energy of a step, relative to its terms
 };
 
 /// Follows a mechanism by time stepping, and checks each step: the laws of Newton and Coulomb on
@@ -30,8 +30,8 @@ struct MechanismTally {
 ///
 ///     T+ - T- = h F (v- + v+) / 2 + p (u- + u+) / 2,
 ///
-/// which holds to rounding whatever the impulses are; what contacts without restitution do is
-/// not positive.
+/// which holds to rounding for any impulses; the work of contacts without restitution
+/// is not positive.
 template <class System>
 void follow_mechanism(const System& system, const typename TimeStepping<System>::Vector& q,
                       const typename TimeStepping<System>::Vector& v, double t_end, double step,
@@ -88,7 +88,7 @@ void follow_mechanism(const System& system, const typename TimeStepping<System>:
         const double kinetic = 0.5 * (now.v - before.v).dot(mass * (now.v + before.v));
         const double load = 0.5 * h * force.dot(before.v + now.v);
         const double contacts = 0.5 * now.impulse.dot(u0 + u1);
-        // What they do beyond giving back what the load does against them within the step.
+        // Their work beyond returning the work that the load does against them in the step.
         const double dissipated = contacts + 0.5 * now.impulse.dot(directions * free);
         const double terms =
             0.5 * (now.v.cwiseAbs() + before.v.cwiseAbs())
@@ -184,7 +184,7 @@ struct RandomRollingBall {
     }
 };
 
-/// Follows the ball by hand-over with set-valued steps of three lengths; empty: no fault.
+/// Runs the ball by hand-over with set-valued steps of three lengths; empty: no fault.
 [[nodiscard]] inline std::string follow_ball(std::uint64_t seed, int reference_steps,
                                              std::uint64_t& reported)
 {
@@ -214,7 +214,7 @@ struct RandomRollingBall {
                                    run.trajectory.t[i], divisions, seed);
             }
         }
-        // While it rolls by events y drifts by the tolerance of those, whatever the other steps.
+        // While it rolls by events y drifts by the tolerance of events, for any other steps.
         const double broken = law_violation(InclusionMatrices<RollingBall>(system), run.state.t,
                                             run.state.w, run.state.reaction, ball.t_end / 200);
         if (!(broken <= 1e-6)) {

@@ -17,7 +17,7 @@
 
 namespace ricochet::test {
 
-/// What a reset does to one component.
+/// The effect of a reset on one component.
 struct Write {
     enum Kind { keep, put, scale } kind = keep;
     double value = 0;
@@ -148,7 +148,7 @@ private:
     return other;
 }
 
-/// A system, and where to run it.
+/// A system, and the interval of its run.
 struct RandomProblem {
     RandomSystem system;
     RandomSystem::State x0{};
@@ -197,7 +197,7 @@ private:
         return flow;
     }
 
-    /// A place that is shared by guards and resets now and then, so that a reset may put
+    /// A place that guards and resets sometimes share, so that a reset may put
     /// a component on the surface of a guard.
     [[nodiscard]] double place()
     {
@@ -239,7 +239,7 @@ private:
     }
 
     /// A guard that crosses at the same instants as another, by a factor that is exact
-    /// in binary; what both write they write alike.
+    /// in binary; both write the same values to common components.
     [[nodiscard]] RandomSystem::Guard twin(const RandomSystem& system)
     {
         const RandomSystem::Guard& other = system.guards_of[random_.below(system.guard_count())];

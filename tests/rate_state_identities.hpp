@@ -1,5 +1,5 @@
-// Accuracy with which the potentials of rate-and-state friction satisfy what they must, against
-// formulas of their own in arithmetic of 113 bits.
+// Accuracy with which the potentials of rate-and-state friction satisfy their identities, against
+// independent formulas in arithmetic of 113 bits.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace ricochet::test {
 
 using Quad = boost::multiprecision::cpp_bin_float_quad;
 
-/// The laws as they are defined, in other words than the library's.
+/// The laws by their definitions, in a different form from the library's.
 struct QuadLaw {
     RateStateParameters p;
     StateEvolution evolution;
@@ -28,7 +28,7 @@ struct QuadLaw {
         if (effect == DirectEffect::log) {
             return Quad(p.f_star) + Quad(p.a) * log(v / Quad(p.v_star)) + Quad(p.b) * xi;
         }
-        // The logarithm loses the digits of a small z, of which the series leaves out z^10.
+        // The logarithm loses the digits of a small z; the series omits z^10.
         const Quad z = abs(v) / w(xi);
         const Quad y = z * z;
         const Quad asinh =
@@ -45,7 +45,7 @@ struct QuadLaw {
         const Quad u = w(xi);
         return v * v / (sqrt(v * v + u * u) + u);
     }
-    /// The two sides of xi' D_RS, whose difference it is.
+    /// The two sides of which xi' D_RS is the difference.
     [[nodiscard]] Quad healing(const Quad& v, const Quad& xi) const
     {
         return evolution == StateEvolution::slip
@@ -108,7 +108,7 @@ void compare_jet(const RateStateJet& jet, const Function& value, double v, doubl
     const Quad centre = at(0, 0), right = at(1, 0), left = at(-1, 0), up = at(0, 1),
                down = at(0, -1);
     const Quad s = abs(Quad(v));
-    // A derivative that cancels is assessed by the part of it that the value has.
+    // A derivative that cancels is assessed relative to a fraction of the value.
     const Quad unit = abs(centre) * Quad("1e-3");
     const auto scale = [&](const Quad& derivative, const Quad& per) {
         return std::max<Quad>(abs(derivative), unit / per);

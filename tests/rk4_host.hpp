@@ -1,4 +1,4 @@
-// A host: the classical Runge-Kutta method with fixed steps, and nothing that knows of events.
+// A host: the classical Runge-Kutta method with fixed steps, without any notion of events.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ class Rk4Host {
 public:
     using X = std::array<double, n>;
 
-    /// A step that the host has taken; it can be taken again with another length.
+    /// A step taken by the host; it can be repeated with another length.
     class Step {
     public:
         Step(const Rk4Host& host, double h) : host_(host), h_(h), rate0_(host.rate(host.x_))
@@ -104,7 +104,7 @@ private:
     Mode mode_;
 };
 
-/// How a host's run went.
+/// Result of a host's run.
 template <class State>
 struct HostRun {
     Verdict verdict = Verdict::stands;
@@ -117,7 +117,7 @@ struct HostRun {
     Statistics statistics;
 };
 
-/// What a host shows of its steps, and of the rate after an event: all as it is.
+/// Shows the steps of a host, and the rate after an event, unchanged.
 struct AsItIs {
     [[nodiscard]] const auto& step(const auto& taken) const { return taken; }
     [[nodiscard]] auto rate(const auto& dxdt) const { return dxdt; }

@@ -1,4 +1,4 @@
-// Systems whose runs are saved, or cannot continue: of the tests, and of the measurements.
+// Systems whose runs are saved, or cannot continue: for the tests and the measurements.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ struct Droplet : Ball {};
     return simulation.save();
 }
 
-/// What a run with these choices answers to a snapshot; "accepted".
+/// The reaction of a run with these choices to a snapshot; "accepted" if there is no refusal.
 template <class System, class Stepping = ErrorControlled<Dopri5>, class... Choices>
 [[nodiscard]] std::string refused_by(const Snapshot& snapshot, const System& system,
                                      const Options& asked, const Stepping& stepping = {},

@@ -43,14 +43,14 @@ template <class System>
     }
 }
 
-/// How often each bound was looked at, and how often it did not hold.
+/// Number of evaluations of each bound, and of its violations.
 struct BoundsSampled {
     std::size_t samples = 0;
-    std::size_t broken_way = 0;    ///< the guard changed by more than the way allows
+    std::size_t broken_way = 0;    ///< the guard changed by more than the path length allows
     std::size_t broken_speed = 0;  ///< the speed changed by more than its rate allows
     std::size_t broken_lower = 0;  ///< the guard is below its lower bound
     std::size_t broken_upper = 0;  ///< the guard is above its upper bound
-    double closest_way = 0;        ///< the largest share of an allowed change that was used
+    double closest_way = 0;        ///< the largest fraction of an allowed change that was used
 };
 
 /// A run in steps of `step`, with `count` samples.
@@ -65,9 +65,9 @@ template <class System, class X>
     return integrate(system, x0, options, FixedStep<Rk4>{}, Ends{});
 }
 
-/// Looks at pairs of samples with no event between them, from both of their ends.
+/// Compares pairs of samples with no event between them, from both of their ends.
 ///
-/// A guard is followed along the numerical motion, which is off the true one by the error of
+/// A guard is evaluated along the numerical motion, which differs from the true one by the error of
 /// the steps; the allowance 1e-9 of the scale is far above that and far below any bound.
 template <class System, class X>
 [[nodiscard]] BoundsSampled sample_bounds(const System& system, const Run<X>& run,
@@ -117,8 +117,8 @@ template <class System, class X>
     return out;
 }
 
-/// No bound is broken in at least `count` samples, and they are not so wide that nothing
-/// could break them: somewhere `used` of the allowed change was used.
+/// Expects that no bound is broken in at least `count` samples, and that the bounds are not too
+/// wide to be broken: somewhere `used` of the allowed change was used.
 inline void expect_bounds_hold(const BoundsSampled& sampled, std::size_t count, double used)
 {
     EXPECT_GE(sampled.samples, count);

@@ -1,4 +1,4 @@
-// What the tests of derivatives share: a ball with closed forms, an oscillator.
+// Systems for tests of derivatives: a ball with closed forms, an oscillator.
 #pragma once
 
 #include <gtest/gtest.h>

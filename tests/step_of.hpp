@@ -1,4 +1,4 @@
-// A step of a method on a system, as the loop takes it.
+// A step of a method on a system, in the form that the loop uses.
 #pragma once
 
 #include "core/step.hpp"
@@ -12,7 +12,7 @@ struct DoorOf {
     detail::StepperDoor<System, X, Method> door;
 };
 
-/// Of states that the loop works with as they are.
+/// For states that the loop uses without conversion.
 template <class Method, class System, class X>
 class StepOf : DoorOf<Method, System, X>, public detail::Step<X> {
     static_assert(std::is_same_v<X, detail::CoreState<X>>);

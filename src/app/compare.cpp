@@ -32,7 +32,7 @@ struct Accuracy {
     std::size_t spurious = 0;
 };
 
-/// Matches the events in order. One further than half an interval from every exact
+/// Matches the events in order. An event farther than half an interval from every exact
 /// event that is left is spurious.
 Accuracy judge(const std::vector<double>& exact, std::span<const double> times)
 {
@@ -64,7 +64,7 @@ struct Method {
     Timing timing{};
 };
 
-/// Every detector in fixed steps and under error control, and Taylor series where there are any.
+/// Every detector in fixed steps and under error control, and Taylor series where they apply.
 class MethodList {
 public:
     MethodList(const SystemEntry& system, const std::vector<std::string>& set)
@@ -99,8 +99,8 @@ private:
     std::vector<Method> methods_;
 };
 
-/// The paper's columns are in the table of times, and beside them what is ours. The
-/// methods that are left out of it differ in the last digits at most.
+/// The table of times has the paper's columns, and ours beside them. The other
+/// methods differ in the last digits at most.
 std::vector<Method> methods(const SystemEntry& system, const std::vector<std::string>& set)
 {
     MethodList list(system, set);
@@ -122,7 +122,7 @@ std::vector<Method> methods(const SystemEntry& system, const std::vector<std::st
     return list.take();
 }
 
-/// Runs each method once, with its events. Those after an interrupt are left out.
+/// Runs each method once, with its events. An interrupt omits the remaining methods.
 void check_answers(const SystemEntry& system, const std::vector<double>& exact,
                    std::vector<Method>& methods)
 {
@@ -140,7 +140,7 @@ void check_answers(const SystemEntry& system, const std::vector<double>& exact,
     }
 }
 
-/// Times the methods in turn, so that whatever else the machine does meets all of
+/// Times the methods in turn, so that other loads on the machine affect all of
 /// them alike. Events are counted and not recorded.
 void measure(const SystemEntry& system, std::vector<Method>& methods)
 {
@@ -190,7 +190,7 @@ std::string extra(const Method& method, const Method& base)
     return fmt::format("{:+.1f} ns", (per_step(method) - per_step(base)) * 1e9);
 }
 
-/// Verdict of the measured times, under one stepping, on asking before a step.
+/// Verdict from the measured times, under one stepping, on whether a network before a step pays.
 void add_verdict(const std::vector<Method>& methods, bool fixed_step,
                  std::vector<std::string>& sentences)
 {
@@ -226,7 +226,7 @@ void add_verdict(const std::vector<Method>& methods, bool fixed_step,
     }
 }
 
-/// Nothing where methods are missing.
+/// Empty where methods are missing.
 std::vector<std::string> verdict(const std::vector<Method>& methods)
 {
     std::vector<std::string> sentences;
@@ -410,7 +410,7 @@ int compare(const CompareRequest& request)
                 "the event times of {} are known of its default parameters only, got --set {}",
                 system.name, joined(request.set, " ")));
         }
-        system.published.clear();  // of the defaults
+        system.published.clear();  // they are of the defaults
     }
     Claims claims;
     std::vector<Method> all = methods(system, request.set);

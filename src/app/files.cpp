@@ -37,10 +37,10 @@ fs::path directory_of(const fs::path& file)
     return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
-/// The file itself where the name is a link to it, so that the link stays; it need not be there.
+/// The file itself if the name is a link to it, so that the link stays; it need not exist.
 fs::path behind_links(const fs::path& file)
 {
-    constexpr int most = 40;  // as the system has it
+    constexpr int most = 40;  // as many as the system follows
     std::error_code error;
     fs::path target = fs::absolute(file, error);
     for (int i = 0; i < most && fs::is_symlink(fs::symlink_status(target, error)); ++i) {
@@ -71,7 +71,7 @@ bool write_all(int descriptor, std::string_view content)
 
 namespace {
 
-/// Longest name that a file may have beside which another is written first: that of a model gets
+/// Longest name of a file beside which another is written first: a model needs
 /// 15 characters more.
 std::size_t longest_name(const fs::path& directory)
 {
@@ -117,8 +117,8 @@ bool is_device(const fs::path& file)
     return fs::exists(file, error) && !fs::is_regular_file(file, error);
 }
 
-/// To be written to. A pipe without a reader is waited for, until an interrupt: the system would
-/// wait on. Below 0: errno says why not.
+/// Opens a device for writing. It waits for a reader of a pipe until an interrupt: the system would
+/// wait on. Below 0: errno gives the reason.
 int open_device(const fs::path& device)
 {
     constexpr std::chrono::milliseconds often(20);

@@ -11,26 +11,26 @@
 
 namespace ricochet::app {
 
-/// A file could not be written although it seemed so: status 1.
+/// A file could not be written although it seemed possible: status 1.
 class WriteError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
-/// The files of one command, claimed before any work is done: what it reads is not written, and
-/// nothing is written twice. Creates nothing. Everything throws BadInput naming the options.
+/// The files of one command, claimed before any work is done: a file that it reads is not written,
+/// and none is written twice. Creates nothing. All functions throw BadInput naming the options.
 class Claims {
 public:
     /// A model or a kernel.
     void reads(std::string_view option, const std::filesystem::path& file);
 
-    /// A file of which a new one could be written now, or a device or a pipe.
+    /// A file that could be written now, or a device or a pipe.
     void writes(std::string_view option, const std::filesystem::path& file);
 
-    /// The same for models, which are renamed into place: only a file may be there.
+    /// The same for models, which are renamed into place: only a file may exist there.
     void replaces(std::string_view option, const std::filesystem::path& file);
 
-    /// Where an interrupted training or proof is kept: not there yet, unless it is to `resume`.
+    /// File for an interrupted training or proof: it must not exist, unless it is to `resume`.
     void keeps(std::string_view option, const std::filesystem::path& file, bool resume);
 
 private:
@@ -45,11 +45,11 @@ private:
     std::vector<Claim> claims_;
 };
 
-/// Writes everything to an open file; false: errno says why not.
+/// Writes everything to an open file; false: errno gives the reason.
 [[nodiscard]] bool write_all(int descriptor, std::string_view content);
 
-/// A file that is written piece by piece beside the one whose place it takes in the end.
-/// Everything throws WriteError naming the file and what the system said.
+/// A file that is written piece by piece beside the one that it finally replaces.
+/// All functions throw WriteError naming the file and the system's message.
 class NewFile {
 public:
     explicit NewFile(const std::filesystem::path& file);
@@ -58,7 +58,7 @@ public:
     NewFile& operator=(const NewFile&) = delete;
 
     void write(std::string_view content);
-    /// Takes its place. Without, it is removed.
+    /// Replaces the file. Without this call the new one is removed.
     void keep();
 
 private:
@@ -69,15 +69,15 @@ private:
     int descriptor_ = -1;
 };
 
-/// Writes a neighbouring file and renames it. Devices and pipes are written to.
-/// @throws WriteError naming the file and what the system said.
+/// Writes a neighbouring file and renames it; writes directly to devices and pipes.
+/// @throws WriteError naming the file and the system's message.
 void write_file(const std::filesystem::path& file, std::string_view content);
 
-/// Does everything of a list, whatever fails of it, and throws the first failure then: what was
-/// computed is not lost with the first file that cannot be written.
+/// Calls all functions of a list, even if some fail, and then throws the first exception: results
+/// are not lost with the first file that cannot be written.
 void deliver(std::initializer_list<std::function<void()>> parts);
 
-/// A new directory under the system's temporary one, removed with what is in it.
+/// A new directory under the system's temporary one, removed with its contents.
 class TemporaryDirectory {
 public:
     TemporaryDirectory();

@@ -1,5 +1,5 @@
-// Strict reading of what the user typed: one sentence names what was given and what
-// was expected.
+// Strict reading of typed input: one sentence names the value given and the value
+// expected.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace ricochet::app {
 
-/// Input that cannot be right. Ends the command with status 2, nothing written.
+/// Input that cannot be right. Ends the command with status 2, and nothing is written.
 class BadInput : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
@@ -21,10 +21,10 @@ public:
 [[nodiscard]] BadInput unknown(std::string_view what, std::string_view given,
                                const std::vector<std::string_view>& known);
 
-/// Bytes that a terminal would act on, as a foreign file may hold, become '?'.
+/// Replaces bytes on which a terminal would act, as a foreign file may hold, by '?'.
 [[nodiscard]] std::string printable(std::string_view text);
 
-/// The text, or its start where it is too long for a sentence.
+/// The text, or its start if it is too long for a sentence.
 [[nodiscard]] std::string shortened(std::string_view text);
 
 /// The finite number that `text` spells.
@@ -36,7 +36,7 @@ public:
 [[nodiscard]] std::uint64_t whole_number(std::string_view option, std::string_view text,
                                          std::uint64_t lowest, std::uint64_t highest);
 
-/// "name=value" taken apart.
+/// The parts of "name=value".
 struct Assignment {
     std::string name;
     double value = 0;

@@ -35,7 +35,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A model and what was found out about it.
+/// A model and the results of its inspection.
 struct Inspection {
     fs::path file;
     std::uintmax_t bytes = 0;
@@ -52,20 +52,20 @@ const SystemEntry* system_of(const Model& model)
     return found == all.end() ? nullptr : &*found;
 }
 
-/// Whether it chooses steps.
+/// Whether the model chooses steps.
 bool is_policy(const Model& model)
 {
     return model.kind == StepPolicy::kind;
 }
 
-/// Whether it is the actor of a reinforcement learner.
+/// Whether the model is the actor of a reinforcement learner.
 bool is_actor(const Model& model)
 {
     return model.kind == step_actor_kind;
 }
 
-/// Names of the features, in the order of the inputs; "feature 0" where the
-/// recipe is not known here.
+/// Names of the features, in the order of the inputs; "feature 0" for an
+/// unknown recipe.
 std::vector<std::string> feature_names(const Model& model)
 {
     std::vector<std::string> names;
@@ -168,7 +168,7 @@ std::string numbers(const std::vector<double>& values)
     return fmt::format("({})", joined(values, ", "));
 }
 
-/// Why the certificate does not hold; empty if it does.
+/// The reason why the certificate does not hold; empty if it does.
 std::string objection(const Model& model)
 {
     try {
@@ -183,7 +183,7 @@ std::vector<std::string> certificate_lines(const Model& model)
 {
     if (model.certificate.empty()) return {"none"};
     if (const std::string why = objection(model); !why.empty()) {
-        constexpr std::size_t most = 200;  // it may be long, and it may be anything
+        constexpr std::size_t most = 200;  // it may be long, and have any content
         return {fmt::format("void: it {}", printable(why)),
                 printable(model.certificate.substr(0, most))};
     }

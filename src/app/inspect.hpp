@@ -1,4 +1,4 @@
-// `ricochet inspect`: what a model file is.
+// `ricochet inspect`: the contents of a model file.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@ struct InspectRequest {
     bool json = false;
 };
 
-/// Prints what the model was made for, its shape, its self-test and what an
-/// inference costs here and now.
+/// Prints the purpose of the model, its shape, its self-test and the cost of an
+/// inference on this machine.
 /// @return 0
 /// @throws BadInput or ModelError if there is no such file or it is not a model.
 int inspect(const InspectRequest& request);

@@ -1,5 +1,5 @@
-// Requests that end a command early and keep what it has computed: Ctrl-C, a request to terminate,
-// a terminal that goes away, memory that runs short.
+// Requests that end a command early and keep its results so far: Ctrl-C, a request to terminate,
+// a terminal that is closed, memory that runs short.
 #pragma once
 
 #include <unistd.h>
@@ -10,7 +10,7 @@
 
 namespace ricochet::app {
 
-/// Why a command is to end early.
+/// The reason for ending a command early.
 enum class Cause : int {
     none = 0,
     interrupt = SIGINT,
@@ -19,7 +19,7 @@ enum class Cause : int {
     memory = -1,
 };
 
-/// While it lives, the first interrupt sets a flag that runs examine after every step; a second one
+/// During its life the first interrupt sets a flag that runs examine after every step; a second one
 /// ends the program.
 class Interrupts {
 public:
@@ -39,7 +39,7 @@ public:
         sigaction(SIGINT, &action, &before_int_);
         sigaction(SIGTERM, &action, &before_term_);
         sigaction(SIGHUP, &action, &before_hup_);
-        // Of `nohup`: the command outlives its terminal.
+        // Set by `nohup`: the command outlives its terminal.
         if (before_hup_.sa_handler == SIG_IGN) sigaction(SIGHUP, &before_hup_, nullptr);
     }
     ~Interrupts()
@@ -51,7 +51,7 @@ public:
     Interrupts(const Interrupts&) = delete;
     Interrupts& operator=(const Interrupts&) = delete;
 
-    /// Safe in a signal handler and in any thread; the first cause stays.
+    /// Safe in a signal handler and in any thread; the first cause is kept.
     static void raise_for(Cause cause) noexcept
     {
         int none = 0;
@@ -63,7 +63,7 @@ public:
     /// For `Options::cancelled`.
     [[nodiscard]] static const std::atomic<bool>* flag() noexcept { return &flag_; }
 
-    /// "interrupted"; empty if there was nothing.
+    /// "interrupted"; empty without an interrupt.
     [[nodiscard]] static std::string_view cause() noexcept
     {
         switch (static_cast<Cause>(cause_.load())) {
@@ -76,7 +76,7 @@ public:
         return "";
     }
 
-    /// Exit status of a command that was ended early: 128 and the signal, as a shell has it.
+    /// Exit status of a command that was ended early: 128 plus the signal, as in a shell.
     [[nodiscard]] static int status() noexcept
     {
         const int cause = cause_.load();

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A name that is still free: "ball.kept.safetensors", "ball.kept-2.safetensors", ...
+/// A name that is not in use: "ball.kept.safetensors", "ball.kept-2.safetensors", ...
 std::optional<fs::path> free_name(const fs::path& directory, const fs::path& file)
 {
     constexpr int most = 100;

@@ -1,6 +1,6 @@
 // The command line `ricochet`: `systems`, `simulate`, `ensemble`, `inspect` and `compare`, which
-// need the core only. Everything else is done by further programs, `ricochet-<name>`, that stand
-// beside it.
+// need only the core. Further programs beside it, `ricochet-<name>`, execute all other
+// commands.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -24,10 +24,10 @@ namespace {
 constexpr std::string_view nonsmooth = "nonsmooth";
 constexpr std::string_view scene = "scene";
 
-char** all_arguments = nullptr;  ///< of main, for the programs that take its place
+char** all_arguments = nullptr;  ///< of main, for the programs that replace it
 
-/// A program takes the place of this one. Returns only by an exception.
-/// @param arguments  its own, from the first on
+/// Replaces this program by another one. Returns only by an exception.
+/// @param arguments  those of the other program, from the first on
 int run_instead(std::string_view name, char** arguments)
 {
     const std::string program = fmt::format("ricochet-{}", name);
@@ -66,7 +66,7 @@ int compare_here_or_there(const CompareRequest& request)
                : compare(request);
 }
 
-/// Commands that are programs, with what the list of commands says of them.
+/// Commands that are programs, with their texts in the list of commands.
 struct Program {
     std::string_view name;
     std::string_view meaning;
@@ -94,7 +94,7 @@ bool is_of_scene(int count, char** arguments)
     const std::string_view command = arguments[1];
     if (command == "explain") return true;
     if (command != "simulate") return false;
-    // The file may come after options, and what an option takes may be a file, too.
+    // The file may come after options, and the value of an option may be a file, too.
     for (int k = 2; k < count; ++k) {
         const std::string_view before = arguments[k - 1];
         const std::string_view argument = arguments[k];

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The first of the files that is there.
+/// The first of the files that exists.
 /// @throws BadInput
 fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates)
 {
@@ -33,7 +33,7 @@ fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates
         fmt::format("model '{}' not found; searched for {}", name, joined(looked, ", ")));
 }
 
-/// Why what `model` computes is not an event of `system`; empty if it may be.
+/// The reason why the output of `model` is not an event of `system`; empty if it may be.
 std::string objection_to_shape(const SystemEntry& system, const Model& model)
 {
     if (model.kind != "event-classifier") {
@@ -56,7 +56,7 @@ std::string objection_to_shape(const SystemEntry& system, const Model& model)
     return {};
 }
 
-/// Why `model` does not speak of the system with these parameters; empty if it does.
+/// The reason why `model` is not for the system with these parameters; empty if it is.
 std::string objection_to_parameters(const SystemEntry& system, const RunSettings& settings,
                                     const Model& model)
 {
@@ -84,7 +84,7 @@ std::string objection_to_system(const SystemEntry& system, const Model& model)
                : fmt::format("is for the system '{}', expected '{}'", model.system, system.name);
 }
 
-/// Why `model` cannot be used for this run; empty if it can.
+/// The reason why `model` cannot be used for this run; empty if it can.
 std::string objection(const SystemEntry& system, const RunSettings& settings, const Model& model)
 {
     if (std::string why = objection_to_system(system, model); !why.empty()) return why;
@@ -106,7 +106,7 @@ std::string objection(const SystemEntry& system, const RunSettings& settings, co
     return {};
 }
 
-/// Whether the start lies in the box of a model that sees the state as it is.
+/// Whether the start lies in the box of a model whose inputs are the state itself.
 bool holds_start(const SystemEntry& system, const RunSettings& settings, const Model& model)
 {
     if (model.recipe != "state") return true;

@@ -29,7 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 using PlainRun = Run<std::vector<double>>;
 
-/// A text in gnuplot's single quotes, where nothing but the quote is special.
+/// A text in gnuplot's single quotes, in which only the quote is special.
 std::string single_quoted(std::string_view text)
 {
     std::string out = "'";
@@ -82,8 +82,8 @@ bool jumps_in(const PlainRun& run, std::size_t i)
     return jump > 1e-6 * size;
 }
 
-/// Label of an axis: meaning, symbol and unit, the symbol only where the meaning does not say it
-/// already ("angle of the bird [rad]") and the unit only where there is one.
+/// Label of an axis: meaning, symbol and unit. The symbol is omitted if the meaning contains it
+/// ("angle of the bird [rad]"), and the unit if there is none.
 std::string axis_label(const Component& component)
 {
     std::string_view symbol = component.name;
@@ -95,7 +95,7 @@ std::string axis_label(const Component& component)
     return component.unit == "1" ? out : fmt::format("{} [{}]", out, component.unit);
 }
 
-/// A title for gnuplot in as many lines as its width of about 110 letters asks for.
+/// A title for gnuplot in as many lines as its width of about 110 letters requires.
 std::string wrapped_title(std::string_view text)
 {
     constexpr std::size_t width = 110;
@@ -162,12 +162,12 @@ std::string content(const fs::path& file)
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Runs gnuplot on `script` in `directory`; what it says goes to the file `messages`.
+/// Runs gnuplot on `script` in `directory`; its output goes to the file `messages`.
 void run_gnuplot(const fs::path& directory)
 {
     const std::string program = "gnuplot";
     const std::string messages = (directory / "messages").string();
-    // The script's own names are relative; the script changes to where they are.
+    // The script's own names are relative; the script changes to their directory.
     std::string no_settings = "--default-settings";
     std::string file = (directory / "script").string();
     std::array<char*, 4> arguments{const_cast<char*>(program.c_str()), no_settings.data(),
@@ -227,8 +227,9 @@ std::string plot_head(const fs::path& file, int width, int height)
                      width, height)
                : fmt::format("set terminal pngcairo noenhanced size {},{} font 'Sans,13'\n", width,
                              height);
-    // Colours of Okabe and Ito, which the colour-blind tell apart, each with a dash and a point of
-    // its own for print in grey; line style 12 marks events. The palette grows lighter throughout.
+    // The colours are those of Okabe and Ito, which are distinct for the colour-blind, each with
+    // its own dash and point for print in grey; line style 12 marks events. The palette grows
+    // lighter throughout.
     constexpr std::array colours{"#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#404040"};
     for (std::size_t i = 0; i < colours.size(); ++i) {
         out += fmt::format(

@@ -28,7 +28,7 @@ using PlotFiles = std::vector<std::pair<std::string, std::string>>;
 /// one style for lines, points, grid and palette. Curves use `linestyle` 1 to 6, events 12.
 [[nodiscard]] std::string plot_head(const std::filesystem::path& file, int width, int height);
 
-/// Runs gnuplot, as `plot` does, on a script of ours among `files`.
+/// Runs gnuplot, as `plot` does, on our own script among `files`.
 /// @throws WriteError as `plot` does.
 void draw(const PlotFiles& files, const std::string& script, const std::filesystem::path& file);
 

@@ -10,8 +10,8 @@ namespace ricochet::app {
 inline constexpr std::string_view step_actor_kind = "step-actor";
 inline constexpr std::string_view step_actor_recipe = "step-world-1";
 
-/// One sentence or two: what policies of a system were trained on, and when not to use the one that
-/// comes along. Empty for a system without.
+/// One sentence or two on the training of a system's policies, and on when not to use the policy of
+/// the library. Empty for a system without.
 [[nodiscard]] std::string_view policy_advice(std::string_view system);
 
 }  // namespace ricochet::app

@@ -10,13 +10,13 @@
 
 namespace ricochet::app {
 
-/// The file of the policy that `named_policy` takes.
-/// @throws BadInput if it is not there.
+/// The file of the policy that `named_policy` loads.
+/// @throws BadInput if it does not exist.
 [[nodiscard]] std::filesystem::path policy_file(const StepLayout& layout,
                                                 const std::optional<std::string>& given);
 
-/// The policy that the user named, or the one that comes along for the system.
-/// @throws BadInput or ModelError if it is not there, or not for that system and its inputs.
+/// The policy that the user named, or the policy of the library for the system.
+/// @throws BadInput or ModelError if it does not exist, or is not for that system and its inputs.
 [[nodiscard]] std::shared_ptr<const StepPolicy> named_policy(
     const StepLayout& layout, const std::optional<std::string>& given);
 

@@ -27,7 +27,7 @@ namespace ricochet::app {
 
 namespace {
 
-/// One thing that was typed where a value or a name belongs.
+/// Checks one argument that was typed as a value or a name.
 void check_value(std::string_view of, std::string_view value)
 {
     constexpr std::size_t longest = 4096;  // of a path
@@ -40,8 +40,8 @@ void check_value(std::string_view of, std::string_view value)
     }
 }
 
-/// All values of a command, before anything is made of them: every option that takes one has one,
-/// once (but --set and --vary, which may be repeated); none is empty, or the option that follows.
+/// Checks all values of a command before they are used: every option that takes a value has exactly
+/// one (except --set and --vary, which may be repeated), and none is empty or the next option.
 void check_values(const CLI::App& command, const std::vector<std::string>& arguments)
 {
     std::set<std::string> given;
@@ -78,7 +78,7 @@ void check_values(const CLI::App& command, const std::vector<std::string>& argum
     }
 }
 
-/// A first word that is no command gets a sentence of its own.
+/// A first word that is no command is refused with its own sentence.
 void check_command(const CLI::App& app, int count, char** arguments)
 {
     std::vector<std::string> names;
@@ -163,7 +163,7 @@ void add_program(CLI::App& app, std::string_view name, std::string_view meaning)
 
 namespace {
 
-/// What `simulate` and `ensemble` have in common.
+/// The options that `simulate` and `ensemble` share.
 void add_run_options(CLI::App& command, RunRequest& run)
 {
     command.add_option("--set", run.set, "a parameter of the system; may be repeated")
@@ -298,14 +298,14 @@ void add_compare(CLI::App& app, int& status, CompareHandler handler)
 
 namespace {
 
-/// Opens what of standard input, output and error is closed, so that no file of the command takes
-/// its number, and what is printed goes into no file. Printing to an output that was closed still
+/// Opens those of standard input, output and error that are closed, so that no file of the command
+/// takes their numbers and receives the printed output. Printing to an output that was closed still
 /// fails.
 void keep_standard_descriptors()
 {
     for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
         if (fcntl(descriptor, F_GETFD) != -1 || errno != EBADF) continue;
-        // The lowest number that is free is this one.
+        // The lowest free number is this one.
         const int flags = descriptor == STDOUT_FILENO ? O_RDONLY : O_RDWR;
         if (open("/dev/null", flags) != descriptor) return;
     }
@@ -315,8 +315,8 @@ void keep_standard_descriptors()
 
 int run_program(const AddCommands& add, int count, char** arguments)
 {
-    // A file or a pipe that takes no more is an error like any other: what else there is to write
-    // still is.
+    // A file or a pipe that accepts no more is an error like any other: the remaining output is
+    // still written.
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
     keep_standard_descriptors();

@@ -1,9 +1,9 @@
 // Parts that `ricochet` and its further programs, `ricochet-<name>`, share.
 //
-// Exit status: 0 fine; 1 a run or training that ended otherwise than hoped (its
-// result is printed all the same) or a file that could not be written in the end;
+// Exit status: 0 success; 1 a run or training with an outcome other than the desired one (its
+// result is printed nevertheless) or a file that could not be written at the end;
 // 2 bad input: one sentence on standard error, nothing printed, nothing written;
-// 129, 130 and 143 a run or comparison ended by a signal, its result printed as incomplete.
+// 129, 130 and 143 a run or comparison ended by a signal, with its result printed as incomplete.
 #pragma once
 
 #include <functional>
@@ -33,7 +33,7 @@ using EnsembleHandler = int (*)(const EnsembleRequest& request);
 void add_systems(CLI::App& app, int& status, SystemsHandler handler);
 void add_inspect(CLI::App& app, int& status, InspectHandler handler);
 
-/// `simulate`, `ensemble` and `compare` with all their options, which several programs take.
+/// `simulate`, `ensemble` and `compare` with all their options, for several programs.
 void add_simulate(CLI::App& app, int& status, SimulateHandler handler);
 void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler);
 void add_compare(CLI::App& app, int& status, CompareHandler handler);
@@ -44,7 +44,7 @@ void add_program(CLI::App& app, std::string_view name, std::string_view meaning)
 /// The main function of a program with these commands. @return the exit status
 int run_program(const AddCommands& add, int count, char** arguments);
 
-/// The same for a program of one command, which is not typed: `ricochet-train SYSTEM ...`.
+/// The same for a program of one command, whose name is not typed: `ricochet-train SYSTEM ...`.
 int run_command(std::string_view command, const AddCommands& add, int count, char** arguments);
 
 }  // namespace ricochet::app

@@ -1,7 +1,7 @@
 // The systems that the command line knows, as values.
 //
 // A system is added by one file in systems/ that defines its entry, and one line in
-// registry.cpp. The functions of a system that needs more than the core are in a file of the
+// registry.cpp. If a system needs more than the core, its functions are in a file of the
 // program that simulates it.
 #pragma once
 
@@ -46,7 +46,7 @@ struct Component {
     std::string_view meaning;
 };
 
-/// A guard, and what happens on its surface.
+/// A guard, and the event on its surface.
 struct GuardLabel {
     std::string_view name;   ///< "floor"
     std::string_view event;  ///< "impact"
@@ -64,15 +64,15 @@ struct HandOverPhase {
     std::string_view cause;
 };
 
-/// A run whatever the system's state type, and how long it took.
+/// A run for any type of state, with its duration.
 struct TimedRun {
     Run<std::vector<double>> run;
     double seconds = 0;                     ///< of wall time, per run
-    std::optional<SetValuedSteps> steps{};  ///< where there were any
+    std::optional<SetValuedSteps> steps{};  ///< if there were any
     std::vector<HandOverPhase> phases{};
 };
 
-/// Event times that somebody printed, for the default parameters.
+/// Published event times, for the default parameters.
 struct Published {
     std::string_view name;
     std::string_view source;
@@ -93,31 +93,31 @@ struct SystemEntry {
     std::vector<Parameter> parameters;
     std::vector<Component> state;
     std::vector<GuardLabel> guards{};
-    std::vector<std::string_view> modes{};  ///< their names; empty where there is but one
+    std::vector<std::string_view> modes{};  ///< their names; empty where there is only one
     double t_start = 0;                     ///< [s] default
     double t_end;                           ///< [s] default
 
-    /// The start that these parameters give.
+    /// The start for these parameters.
     std::vector<double> (*start)(const std::vector<double>& parameters);
 
-    /// Runs it `repeats` times over; the runs are alike and the last is returned.
+    /// Runs it `repeats` times; the runs are equal and the last is returned.
     TimedRun (*run)(const RunSettings& settings, int repeats);
 
-    /// Whether its flow can be a power series, as the stepper taylor needs it.
+    /// Whether its flow can be a power series, as required by the stepper taylor.
     bool series = false;
 
-    /// The mode that these parameters start in; mode 0: null.
+    /// The mode at the start for these parameters; null: mode 0.
     Mode (*start_mode)(const std::vector<double>& parameters) = nullptr;
 
-    /// The more special before the more general.
+    /// Specific models precede general ones.
     std::vector<OwnModel> models{};
 
-    /// Where the guard is a parabola in time: the boundary of a step that meets it, in
-    /// words. The detector `line` evaluates it. Empty elsewhere.
+    /// For a guard that is a parabola in time: the boundary of a step that meets it, in
+    /// words. The detector `line` evaluates it. Empty otherwise.
     std::string_view line{};
 
-    /// Known event times [s] up to a time, for comparison; none known: null.
-    /// @throws BadInput where none are known of these parameters.
+    /// Known event times [s] up to a time, for comparison; null if none are known.
+    /// @throws BadInput if none are known for these parameters.
     std::vector<double> (*exact_events)(const std::vector<double>& parameters,
                                         double t_end) = nullptr;
     bool numerical_reference = false;  ///< they were computed numerically; else in closed form,
@@ -125,33 +125,33 @@ struct SystemEntry {
     std::vector<Published> published{};
     double comparison_step = 0;  ///< [s] of the fixed steps in a comparison
 
-    /// Names for --integrator, the default first; empty where there is but "event".
+    /// Names for --integrator, the default first; empty where there is only "event".
     std::vector<std::string_view> integrators{};
     double set_valued_step = 0;  ///< [s] of its set-valued steps by default
-    /// State at a time, for comparisons of inclusions, empty where it is not known; null, too: a
-    /// run to 1e-13 serves instead.
+    /// State at a time, for comparisons of inclusions; empty where it is not known. If null or
+    /// empty, a run to 1e-13 serves instead.
     std::vector<double> (*exact_state)(const std::vector<double>& parameters, double t) = nullptr;
     std::vector<std::string_view> published_errors{};  ///< lines of a source
 
     /// Known solution in words, where the functions that compute it belong to `program`.
     std::string_view known_solution{};
 
-    /// Another program, `ricochet-<name>`, which simulates it; it has the functions, which are null
-    /// elsewhere.
+    /// Another program, `ricochet-<name>`, which simulates it; only that program has the functions,
+    /// which are null elsewhere.
     std::string_view program{};
 
-    /// Fills in how a differential inclusion is integrated; false: as any other system. Else null.
-    /// @throws BadInput for what does not fit the system or the integrator.
+    /// Sets the integrator of a differential inclusion; false: as any other system. Else null.
+    /// @throws BadInput for options that do not fit the system or the integrator.
     bool (*choose_integrator)(const SystemEntry& system, const RunRequest& request,
                               RunSettings& settings) = nullptr;
 };
 
 [[nodiscard]] const std::vector<SystemEntry>& systems();
 
-/// Fills in the functions of a system, in the program that has them.
+/// Fills in the functions of a system, in the program that contains them.
 void complete_system(std::string_view name, void (*complete)(SystemEntry& entry));
 
-/// @throws BadInput naming the systems there are.
+/// @throws BadInput naming the known systems.
 [[nodiscard]] const SystemEntry& find_system(std::string_view name);
 
 }  // namespace ricochet::app

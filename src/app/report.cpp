@@ -79,7 +79,7 @@ Json json(const Statistics& s)
               {"assumed", s.evidence.assumed}}}};
 }
 
-/// Zero has no sign for people.
+/// Removes the sign of zero from output for people.
 double unsigned_zero(double value)
 {
     return value == 0 ? 0 : value;
@@ -103,7 +103,7 @@ std::string_view cause(const SystemEntry& system, const PlainEvent& event)
     return event.guard == no_guard ? name(event.kind) : system.guards.at(event.guard).name;
 }
 
-/// Whose reset contradicts that of the guard that ended the run.
+/// The guard whose reset contradicts that of the guard that ended the run.
 std::string_view opponent(const SystemEntry& system, const PlainRun& run)
 {
     return run.other_guard == time_event_reset ? std::string_view("time event")
@@ -129,7 +129,7 @@ bool changed(const PlainEvent& event)
     return event.before != event.after;
 }
 
-/// The state after an event is left out where it is the one before.
+/// The state after an event is omitted if it equals the state before.
 std::string events_table(const SystemEntry& system, const PlainRun& run)
 {
     constexpr int wide = 24;

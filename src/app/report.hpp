@@ -16,7 +16,7 @@ struct Row {
     std::string event{};  ///< empty, "before floor" or "after floor"
 };
 
-/// The sampled trajectory with the left and right limit at each event, and the
+/// The sampled trajectory with the left and right limits at each event, and the
 /// end of the run.
 [[nodiscard]] std::vector<Row> rows(const SystemEntry& system, const Run<std::vector<double>>& run);
 
@@ -35,8 +35,8 @@ struct Row {
 /// Header "t [s],u [m],...,event", then `rows`.
 [[nodiscard]] std::string to_csv(const SystemEntry& system, const Run<std::vector<double>>& run);
 
-/// Says on standard error that a result is incomplete because the command was ended early,
-/// `where` it ended, and returns the exit status.
+/// Prints on standard error that a result is incomplete because the command was ended early, and
+/// `where` it ended; returns the exit status.
 [[nodiscard]] int ended_early(std::string_view where);
 
 /// The same in a table of numbers: its last line, a comment.

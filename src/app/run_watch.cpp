@@ -20,7 +20,7 @@ namespace ricochet::app {
 namespace {
 
 constexpr double unlimited = std::numeric_limits<double>::infinity();
-constexpr double reserve = 64 << 20;  ///< [bytes] that everything else takes
+constexpr double reserve = 64 << 20;  ///< [bytes] needed by the rest of the program
 
 /// The start of a small file, without an allocation; empty if there is none.
 std::array<char, 4096> start_of(const char* file)
@@ -57,7 +57,7 @@ Held held()
     return {.all = all * page, .resident = std::strtod(rest, nullptr) * page};
 }
 
-/// [bytes] that the program may still take: of the machine, of its group, of its own limits.
+/// [bytes] that the program may still allocate: limits of the machine, its group and its own.
 double available()
 {
     double most = unlimited;
@@ -87,7 +87,7 @@ RunWatch::RunWatch(double share)
     try {
         thread_ = std::thread([this] { watch(); });
     } catch (const std::system_error&) {
-        // Without a thread no progress is shown.
+        // Without the thread no progress is shown.
     }
 }
 

@@ -1,4 +1,4 @@
-// Looking after a run that takes long or much.
+// Supervision of a run that takes long or much memory.
 #pragma once
 
 #include <condition_variable>
@@ -8,13 +8,13 @@
 
 namespace ricochet::app {
 
-/// While it lives, a thread looks every few milliseconds at what the program holds, and raises
-/// `Cause::memory` when more would not leave enough to report what there is. After some seconds it
-/// says once on standard error that the run continues, and how it is ended.
+/// During its life a thread checks every few milliseconds how much memory the program holds, and
+/// raises `Cause::memory` when more would not leave enough for a report. After some seconds it
+/// prints once on standard error that the run continues, and how to end it.
 class RunWatch {
 public:
-    /// @param share  of the memory that is available now which a run may take: reports are made
-    ///               from copies, and a run that has taken all could not be printed any more
+    /// @param share  fraction of the memory available now that a run may take: reports are made
+    ///               from copies, and a run that has taken everything could not be printed any more
     explicit RunWatch(double share);
     ~RunWatch();
     RunWatch(const RunWatch&) = delete;

@@ -9,8 +9,8 @@
 
 namespace ricochet::app {
 
-/// Prints to standard error. Where that is closed, full or a terminal that has gone, what would
-/// have been said is lost, and nothing else: `fmt::print` throws there.
+/// Prints to standard error. If it is closed, full or a terminal that has gone, only the message is
+/// lost, whereas `fmt::print` would throw.
 template <class... Values>
 void say(fmt::format_string<Values...> format, Values&&... values)
 {

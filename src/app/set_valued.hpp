@@ -9,7 +9,7 @@
 
 namespace ricochet::app {
 
-/// "handover: dopri5, rtol 1e-10, atol 1e-12"; of other systems `describe_stepping`.
+/// "handover: dopri5, rtol 1e-10, atol 1e-12"; for other systems `describe_stepping`.
 [[nodiscard]] std::string describe_integration(const RunSettings& settings);
 [[nodiscard]] std::string set_valued_text(const TimedRun& timed);
 void add_set_valued(Json& out, const RunSettings& settings, const TimedRun& timed);

@@ -15,7 +15,7 @@ namespace ricochet::app {
 
 namespace {
 
-/// A minute or so: a run that asks for more says so.
+/// About a minute: a longer run must be requested.
 constexpr std::uint64_t default_max_steps = 10'000'000;
 
 template <class Kind, std::size_t n>
@@ -142,7 +142,7 @@ bool is_gate(DetectorKind kind)
            kind == DetectorKind::calibrated;
 }
 
-/// A model that clears more than one step, with what is to be believed of it.
+/// Chooses a model that clears more than one step, and the degree to which it is trusted.
 void choose_gate(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
 {
     if (!request.model) {
@@ -161,7 +161,7 @@ void choose_gate(const SystemEntry& system, const RunRequest& request, RunSettin
                         found.file.string(), found.model.kind));
     }
     settings.model = std::move(found.file);
-    // What an unverified gate may miss is known of such steps alone.
+    // The misses of an unverified gate are known only for such steps.
     if (settings.detector == DetectorKind::calibrated && !settings.fixed_step) {
         settings.options.h_min = found.model.step_min;
         settings.options.h_max = found.model.step_max;
@@ -191,7 +191,7 @@ void choose_detector(const SystemEntry& system, const RunRequest& request, RunSe
                         system.name));
     }
     if (is_gate(settings.detector)) {
-        // The models of a system that has its own are of single steps.
+        // The models of a system that has some are for single steps.
         if (system.models.empty()) return choose_gate(system, request, settings);
         if (settings.detector != DetectorKind::verified) {
             throw BadInput(

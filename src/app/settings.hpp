@@ -32,14 +32,14 @@ enum class DetectorKind {
     calibrated
 };
 enum class LocatorKind { newton, bisection, toms748 };
-/// Those of `MethodName`, and Taylor series.
+/// The methods of `MethodName`, and Taylor series.
 enum class StepperKind { euler, rk4, cash_karp54, dopri5, fehlberg78, taylor };
 
 [[nodiscard]] std::string_view name(DetectorKind kind) noexcept;
 [[nodiscard]] std::string_view name(LocatorKind kind) noexcept;
 [[nodiscard]] std::string_view name(StepperKind kind) noexcept;
 
-/// How a system that is a differential inclusion is integrated.
+/// Integration of a system that is a differential inclusion.
 struct SetValuedSettings {
     std::string integrator = "handover";  ///< or "event", "bathe", "time-stepping"
     /// Step controller of bathe: "error", "heuristic", "pi", "filter", "learned".
@@ -48,10 +48,11 @@ struct SetValuedSettings {
     std::shared_ptr<const StepPolicy> policy{};  ///< of "learned"
 };
 
-/// Everything a system needs to be run.
+/// Everything needed to run a system.
 struct RunSettings {
     std::vector<double> parameters;  ///< in the order of the system's
-    std::vector<double> start{};     ///< in place of what the parameters give; empty: not given
+    std::vector<double> start{};     ///< in place of the start that the parameters give; empty: not
+                                     ///< given
     Options options;
     StepperKind stepper = StepperKind::dopri5;
     bool fixed_step = false;  ///< else error control
@@ -63,7 +64,7 @@ struct RunSettings {
     std::optional<SetValuedSettings> set_valued{};
 };
 
-/// The start that the settings give, or else x0.
+/// The start in the settings, or else x0.
 template <class X>
 [[nodiscard]] X chosen_start(X x0, const RunSettings& settings)
 {
@@ -71,7 +72,7 @@ template <class X>
     return x0;
 }
 
-/// A run as it was asked for. What is absent has a default.
+/// A run as requested. Absent values have defaults.
 struct RunRequest {
     std::vector<std::string> set{};  ///< name=value
     std::optional<double> t_start{}, t_end{};
@@ -91,9 +92,9 @@ struct RunRequest {
 
 /// Fills in the defaults, and loads the model that the detector needs.
 ///
-/// With `step` the stepper takes fixed steps, rk4 unless it is named; without, it
-/// is error-controlled, dopri5 unless it is named. A model without a detector asks
-/// for the detector `network`.
+/// With `step` the stepper takes fixed steps, by default rk4; without, it
+/// is error-controlled, by default dopri5. A model without a detector implies
+/// the detector `network`.
 ///
 /// @throws BadInput or ModelError, in words of the command line.
 [[nodiscard]] RunSettings resolve(const SystemEntry& system, const RunRequest& request);

@@ -57,7 +57,7 @@ int simulate(const SimulateRequest& request)
 
     const Interrupts interrupts;
     const TimedRun timed = [&] {
-        // An event takes 15 times as much memory as JSON, and 5 times as text.
+        // As JSON an event takes 15 times as much memory, and as text 5 times.
         const RunWatch watch(request.json ? 1.0 / 20 : 1.0 / 12);
         return system.run(settings, 1);
     }();

@@ -16,23 +16,23 @@ struct SimulateRequest {
     std::optional<std::size_t> samples{};
     bool json = false;
     std::optional<std::filesystem::path> csv{}, plot{};
-    std::optional<std::filesystem::path> kernel{};  ///< of the system fault
+    std::optional<std::filesystem::path> kernel{};  ///< for the system fault
 };
 
 class Claims;
 
-/// The files that the request asks for, `csv` and `plot`.
+/// Claims the requested files, `csv` and `plot`.
 /// @throws BadInput if they cannot be written.
 void claim_results(Claims& claims, const SimulateRequest& request);
 
-/// Prints the run, and writes the files asked for.
+/// Prints the run, and writes the requested files.
 ///
-/// Ctrl-C, a request to terminate and memory that runs short end the run; what was computed until
-/// then is printed and written, marked as incomplete.
+/// Ctrl-C, a request to terminate and memory that runs short end the run; the results until
+/// then are printed and written, marked as incomplete.
 ///
 /// @return 0 if the run reached its end; 129, 130 or 143 if a signal ended it; 1 if it ended
-/// otherwise
-///         (the result is printed and written all the same) or if the plot could not be drawn.
+///         otherwise (the result is printed and written all the same) or if the plot could not
+///         be drawn.
 /// @throws BadInput or ModelError before anything is printed or written.
 int simulate(const SimulateRequest& request);
 

@@ -1,4 +1,4 @@
-// `ricochet systems`: what can be simulated.
+// `ricochet systems`: the list of systems.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Times measured often enough to be believed.
+// Times measured often enough to be reliable.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace ricochet::app {
 
-/// Seconds for one of whatever was timed, over many batches.
+/// Seconds per call of a timed function, over many batches.
 struct Timing {
     double median = 0;
     double lower = 0;  ///< quartile
@@ -19,7 +19,7 @@ struct Timing {
 /// Width of the middle half of the batches over their median: "2 %".
 [[nodiscard]] std::string spread(const Timing& timing);
 
-/// A time that people can read: "1.25 us", "3.4 ms".
+/// A time in readable form: "1.25 us", "3.4 ms".
 [[nodiscard]] std::string duration(double seconds);
 
 }  // namespace ricochet::app

@@ -109,7 +109,7 @@ protected:
 
     // --- time events ---
 
-    /// A time event that does not lie ahead would be lost, with all time events after it.
+    /// Finds the next time event. One that does not lie ahead would be lost, with all after it.
     void find_time_event(bool at_start = false);
 
     /// Applies a time event at the start of the step; `settle` deals with its consequences.

@@ -1,7 +1,7 @@
 // All guards of a system at the ends of a step.
 //
-// What every step needs of every guard lies in plain arrays, so that a hundred guards
-// are screened in one loop; what only events need lies beside them.
+// Data that every step needs for every guard lie in plain arrays, so that a hundred guards
+// are screened in one loop; data that only events need lie beside them.
 #pragma once
 
 #include <algorithm>
@@ -62,7 +62,7 @@ public:
         if (rules_.puts_off) {
             sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
             for (std::size_t i = 0; i < size(); ++i) {
-                rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until a rate is asked for
+                rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until a rate is needed
                 records_[i].deferred = false;
             }
         } else {
@@ -120,7 +120,7 @@ public:
         if (size() == 0) return true;
         return single && sign_[0] != 0 && !waiting_ && !bands_ && !selective_;
     }
-    /// @param t  [s] where the next step starts
+    /// @param t  [s] start of the next step
     void lend(QuietRun& run, double t) const noexcept
     {
         if (size() == 0) return;

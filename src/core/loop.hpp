@@ -98,7 +98,7 @@ public:
         return puts_off_ ? planner_->meter().reading() : meter_.reading();
     }
 
-    /// Takes one step, with whatever events it holds. False: the run has ended. A detector
+    /// Takes one step, with any events that it holds. False: the run has ended. A detector
     /// that defers checks does not look ahead here, since every step is final.
     bool step() override
     {
@@ -218,14 +218,14 @@ private:
 
     // --- steps ---
 
-    /// What a detector that defers checks is allowed to do.
+    /// The actions that a detector that defers checks may take.
     struct Advance {
         bool look_ahead = true;       ///< take steps that are closed only by a later check
         bool to_next_sample = false;  ///< but no step beyond one that holds a sample time
     };
 
-    /// One step, with whatever events it holds. If a function of the system throws and the run is
-    /// kept resumable, everything is as it was at the start of the step.
+    /// One step, with any events that it holds. If a function of the system throws and the run is
+    /// kept resumable, everything is restored to the start of the step.
     void advance_one(const Advance& how)
     {
         if (mark_) return advance_resumably(how);
@@ -288,12 +288,12 @@ private:
                bank_.is_steady();
     }
 
-    /// Takes steps until one needs a check, and deals with it. False: none did. After an exception
+    /// Takes steps until one needs a check, and handles it. False: no step did. After an exception
     /// the run returns to the start of the quiet run.
     bool run_quietly();
     [[gnu::noinline]] bool run_quietly_resumably();
     [[gnu::always_inline]] bool run_quietly_from_here();
-    /// What the quiet steps from here on are to heed.
+    /// Limits and settings for the quiet steps from here on.
     [[nodiscard, gnu::always_inline]] QuietRun quiet_orders() const;
     [[gnu::always_inline]] void run_quietly(QuietRun& quiet);
     [[gnu::always_inline]] void take_over(const QuietRun& quiet);
@@ -309,7 +309,7 @@ private:
         return std::fabs(step_.until(reviewed_)) < 1e-9 * span;
     }
 
-    /// Deals with a step that failed: an event before the failure, or the end of the run.
+    /// Handles a failed step: an event before the failure, or the end of the run.
     void end_step(Outcome outcome) noexcept
     {
         end(step_.flow_fits() ? outcome : Outcome::wrong_dimension);
@@ -425,14 +425,14 @@ private:
 
     // --- events ---
 
-    /// Looks for events in the step; true if they have cut it short, or the run has
+    /// Searches for events in the step; true if they have cut it short, or the run has
     /// ended.
     [[nodiscard]] bool handle_events();
 
-    /// Searches a step that may hold events, and deals with them.
+    /// Searches a step that may hold events, and handles them.
     [[gnu::noinline]] bool search(bool cleared);
 
-    /// Deals with a guard that is NaN at the end of the step: repeats the step, shorter, until all
+    /// Handles a guard that is NaN at the end of the step: repeats the step, shorter, until all
     /// guards are numbers. False: there is no such step, and the run has ended.
     [[nodiscard]] bool return_to_domain();
 

@@ -160,7 +160,7 @@ private:
         return any == 0;
     }
 
-    /// Asks guard by guard for the rates that are not finite, as nothing can be concluded from
+    /// Evaluates guard by guard the rates that are not finite, since no conclusion follows from
     /// them.
     [[gnu::cold, gnu::noinline]] void replace_lost(Mode mode, double t, const X& x, const X& dxdt,
                                                    double scale, std::uint64_t& calls,

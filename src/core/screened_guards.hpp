@@ -1,7 +1,7 @@
-// Screening: which guards of a system need a search in a step, by their values at its ends and
-// inside.
+// Screening: decides which guards of a system need a search in a step, from their values at its
+// ends and inside.
 //
-// What every step needs of every guard lies in plain arrays, so that a hundred guards
+// Data that every step needs for every guard lie in plain arrays, so that a hundred guards
 // are screened in one loop.
 #pragma once
 
@@ -141,7 +141,7 @@ public:
     }
 
     /// Whether a second evaluation inside the step can change the decision on a guard: it cannot
-    /// where the first agreed with the cubic to nine digits, which is no coincidence.
+    /// if the first agreed with the cubic to nine digits, which is no coincidence.
     [[nodiscard]] bool needs_second_look(double h) const noexcept
     {
         for (std::size_t i = 0; i < size(); ++i) {

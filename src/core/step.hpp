@@ -189,8 +189,8 @@ public:
         add_tangent(s, x);
     }
 
-    /// x(t0 + s) as precisely as is cheap: by dense output of the method's own order,
-    /// or by a step of its own.
+    /// x(t0 + s) as accurately as is possible at low cost: by dense output of the method's own
+    /// order, or by a step of its own.
     void sample(double s, X& x) const
     {
         if (kernel_->interpolates()) {

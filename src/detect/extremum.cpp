@@ -59,7 +59,7 @@ constexpr int most_samples = 80;
 /// Fraction of a step below which a rate that is a difference over 1e-5 of it smooths a kink.
 constexpr double coarse_part = 1e-3;
 
-/// Clear as far as can be seen: NaN is no evidence.
+/// Clear if this is known: NaN is no evidence.
 Finding clear_if(bool known) noexcept
 {
     return Finding::clear(known ? Evidence::checked : Evidence::assumed);
@@ -152,7 +152,7 @@ Finding clear_if(bool known) noexcept
     return clear_if(!std::isnan(lowest.value) && !std::isnan(highest.value));
 }
 
-/// Both ends are on the armed side: finds out whether the extremum between them is, too.
+/// Determines whether the extremum between two ends on the armed side is on that side too.
 [[gnu::noinline]] Finding look_for_pair(GuardPath& path, Watch watch, GuardCubic cubic)
 {
     GuardSample lo = watch.start;

@@ -73,8 +73,8 @@ public:
         for (int r = 1; r <= degree_; ++r) {
             for (int j = degree_; j >= r; --j) c[at(j)] += c[at(j - 1)];
         }
-        // Each coefficient is a sum of `degree` terms with sizes that add up to at most the size,
-        // with powers of as many roundings.
+        // Each coefficient is a sum of `degree` terms whose sizes add up to at most `size`, and
+        // whose powers have as many roundings.
         size_ = size;
         error_ = tail + 4 * last_terms(terms, i, h_) +
                  4 * degree_ * std::numeric_limits<double>::epsilon() * size;

@@ -182,7 +182,7 @@ ScalarJet AdditivePair::dual(double d, double /*xi*/) const
 
 ScalarJet AdditivePair::primal(double rate, double /*xi*/) const
 {
-    // The root of a rising function: Newton's method between ends of opposite signs.
+    // The root of a rising function, by Newton's method between ends of opposite signs.
     const double unit = p_.beta * p_.v_star;
     const auto gap = [&](double d) { return dual(d).first - rate; };
     double lower = -unit;

@@ -17,7 +17,7 @@ double integral_of_law(const Function& f, double from, double to)
 {
     if (from == to) return 0;
     if (std::isnan(to)) return to;
-    // Halved more often, no part comes nearer to what rounding leaves of so small an error.
+    // With more halvings, parts do not get below the rounding of such a small error.
     constexpr unsigned halvings = 5;
     return boost::math::quadrature::gauss_kronrod<double, 21>::integrate(f, from, to, halvings,
                                                                          1e-14);

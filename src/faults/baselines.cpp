@@ -38,7 +38,7 @@ struct Flow {
                 p.f_star + p.a * std::log(v / p.v_star) + p.b * std::log(p.v_star * y[2] / p.d_rs);
             rate = 1 - v * y[2] / p.d_rs;
         } else {
-            // dDdag/dV and dDdag/dxi of AgeingPotential, without its refusal of V <= 0.
+            // dDdag/dV and dDdag/dxi of AgeingPotential, without the check that refuses V <= 0.
             friction = p.f_star + p.a * std::log(v / p.v_star) + p.b * y[2];
             const double d = p.b * p.v_star * std::exp(-y[2]) - p.b * v;
             rate = d / (p.b * p.d_rs);
@@ -136,7 +136,7 @@ private:
     std::size_t known_ = 0;
 };
 
-/// Backward Euler, its two equations in (V, theta) solved by Newton's method as it is.
+/// Backward Euler, whose two equations in (V, theta) are solved by plain Newton's method.
 State newton_step(const Flow& flow, double t, const State& y, double h)
 {
     const RateStateParameters& p = flow.slider.friction;

@@ -27,7 +27,7 @@ using detail::StageSolver;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Where the fault is, with f + r there.
+/// State of the fault, with f + r there.
 struct Moment {
     FaultFields fields;
     VectorXd acceleration;
@@ -78,7 +78,7 @@ public:
     {
         return fault_.mean(now_.fields.path * fault_.slip_unit());
     }
-    /// Whether nothing moves, nor is any element driven beyond its strength.
+    /// Whether nothing moves, and no element is driven beyond its strength.
     bool at_rest() { return now_.fields.velocity.isZero(0) && rests(); }
 
     Rupture run()
@@ -104,7 +104,7 @@ public:
             } else {
                 factor = std::visit([](auto& rule) { return rule.failed(); }, controller);
             }
-            // A step cut short by the end says nothing of the next.
+            // A step cut short by the end says nothing about the next.
             h = std::min(longest, (accepted ? std::max(step, h) : step) * factor);
             if (!accepted) {
                 ++out_.statistics.rejected;
@@ -176,7 +176,7 @@ private:
         return true;
     }
 
-    /// `extrapolated`, but 0 where that has turned.
+    /// `extrapolated`, but 0 where its sign has changed.
     template <class Expression>
     static void guess(const VectorXd& v, const Expression& extrapolated, VectorXd& out)
     {
@@ -219,7 +219,7 @@ private:
         return std::max(of_v, of_s) / bathe_.rtol;
     }
 
-    /// Inputs of a policy about the attempt.
+    /// Inputs of a policy that describe the attempt.
     [[nodiscard]] StepView view(double h) const
     {
         const FaultFields& e = next_.fields;
@@ -238,7 +238,7 @@ private:
             switched += (v != 0) != (now_.fields.velocity[i] != 0) ? 1 : 0;
         }
         const double rate = speed > 0 ? growth / speed : 0;
-        const double longest = 6;  // logarithm of a time without end
+        const double longest = 6;  // logarithm of an unlimited time
         StepView out{.tolerance = bathe_.rtol, .step = h, .switched = switched / n};
         out.state = {
             0.5 * std::log(std::max(speed / n, 1e-24)),
@@ -295,7 +295,7 @@ private:
         record_.note_fastest(t_, now_.fields);
     }
 
-    /// Parabolas through the three states of a step.
+    /// Records parabolas through the three states of a step.
     void note(double t, double h, const FaultFields& a, const FaultFields& b, const FaultFields& c)
     {
         if (bathe_.observer) {
@@ -357,7 +357,7 @@ private:
     const BatheOptions& bathe_;
     Rupture out_;
     FaultForces& forces_;
-    std::uint64_t evaluations_;  // of the runs before
+    std::uint64_t evaluations_;  // of the previous runs
     std::uint64_t products_;
     StepController controller_ = bathe_.controller;
     RuptureRecord record_;

@@ -20,7 +20,7 @@ struct StageOfFault {
     VectorXd start;    ///< w
     VectorXd slip;     ///< d where v = 0
     VectorXd path;     ///< s where v = 0
-    VectorXd at_path;  ///< where the bound is taken, if extrapolated
+    VectorXd at_path;  ///< where the bound is evaluated, if extrapolated
 };
 
 struct Solved {
@@ -39,7 +39,7 @@ public:
         sign_.setZero(fault.size());
     }
 
-    /// `v`: a guess, then the solution.
+    /// `v` is a guess, replaced by the solution.
     Solved solve(const StageOfFault& stage, VectorXd& v)
     {
         prepare(stage);
@@ -87,7 +87,7 @@ private:
     }
 
     /// Direction in which each element slips, by the proximal map at v; elements that stick are
-    /// stopped. Returns whether any was.
+    /// stopped. Returns whether any element was stopped.
     bool classify(const StageOfFault& stage, VectorXd& v)
     {
         bool stopped = false;
@@ -107,7 +107,7 @@ private:
         return stopped;
     }
 
-    /// Residual of those that slip, and by how much friction softens them.
+    /// Residual of the elements that slip, and the amount by which friction softens them.
     void evaluate(const StageOfFault& stage, const VectorXd& v)
     {
         const bool implicit = options_.bound == FaultBound::implicit;
@@ -116,7 +116,7 @@ private:
             residual_[i] = softening_[i] = 0;
             if (sign_[i] == 0) continue;
             residual_[i] = rhs_[i] - sign_[i] * bound(stage, i, v[i]) - q_[i];
-            // A velocity against its own sign has no bound of its own: that of rest serves.
+            // A velocity against its own sign has no bound of its own: the bound at rest is used.
             if (implicit && sign_[i] * v[i] >= 0) {
                 softening_[i] = stage.friction * stage.g * fault_.weight()[i] * drop *
                                 std::exp(-(stage.path[i] + stage.g * std::abs(v[i])));
@@ -124,7 +124,7 @@ private:
         }
     }
 
-    /// Conjugate gradients on those that slip; q follows v, so that no product is lost.
+    /// Conjugate gradients on the elements that slip; q follows v, so that no product is wasted.
     bool improve(VectorXd& v, double enough)
     {
         p_ = residual_;

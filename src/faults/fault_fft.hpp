@@ -6,7 +6,7 @@
 
 namespace ricochet::detail {
 
-/// Two doubles in one register, a number to Eigen's FFT: two transforms for one.
+/// Two doubles in one register, one number to Eigen's FFT: two transforms for the cost of one.
 struct Pair {
     typedef double Vector __attribute__((vector_size(16)));
 
@@ -28,7 +28,7 @@ struct Pair {
 
 using ComplexPair = std::complex<Pair>;
 
-/// Transforms of one length, without factors: forward, then inverse, is `length` times.
+/// Transforms of one length, without factors: forward and inverse together multiply by `length`.
 class PairedTransform {
 public:
     explicit PairedTransform(int length) : length_(length)

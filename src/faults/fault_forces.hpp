@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// Products with K and H, in memory of their own.
+/// Products with K and H, with scratch memory of their own.
 class FaultForces {
 public:
     FaultForces(const StrikeSlipFault& fault, double bound)

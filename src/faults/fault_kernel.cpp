@@ -31,10 +31,10 @@ double full_space_stress(double dx, double dz, double width, double height, doub
     return -sum / (4 * std::numbers::pi);
 }
 
-// In Okada's letters, with q = 0 on the plane, d = eta and z = -depth: du_x/dy + du_y/dx of part
-// A is alpha/2 xi (eta/R^3 + xi^2 Y32) + eta/2 X11, or -alpha eta/(R xi) - xi/(2 R eta) but for
-// terms that cancel over the corners; the source itself is that. Its image has parts A and B, and
-// z times part C, -2 alpha xi (1/R^3 + z Y32). His slip is the other way round.
+// In Okada's notation, with q = 0 on the plane, d = eta and z = -depth: du_x/dy + du_y/dx of part
+// A is alpha/2 xi (eta/R^3 + xi^2 Y32) + eta/2 X11, or -alpha eta/(R xi) - xi/(2 R eta) except for
+// terms that cancel over the corners; this is the source itself. Its image has parts A and B, and
+// z times part C, -2 alpha xi (1/R^3 + z Y32). Okada's slip has the opposite sign.
 double half_space_stress(double dx, double depth, double source, double width, double height,
                          double poisson) noexcept
 {

@@ -20,7 +20,7 @@ using detail::RuptureRecord;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Nondimensional but for xi.
+/// Nondimensional except for xi.
 struct Motion {
     VectorXd u;             ///< d - v_pl t
     VectorXd v;             ///< velocity
@@ -97,7 +97,7 @@ public:
                 }
                 continue;
             }
-            // A step cut short by the end says nothing of the next.
+            // A step cut short by the end says nothing about the next.
             h = std::min(longest, std::max(step * std::clamp(growth(error), 0.2, 5.0),
                                            step < h && error < 1 ? h : 0));
             accept(step, step == left ? end : t_ + step);
@@ -140,9 +140,9 @@ private:
         return m.u.allFinite() && m.v.allFinite() && m.xi.allFinite();
     }
 
-    /// A step from `now_` to `next_`. Of order 1 under error control it is two halves, whose
-    /// difference from the whole is the estimate; one of order 4 that leaves elements creeping is
-    /// taken again with order 2.
+    /// A step from `now_` to `next_`. At order 1 under error control it is two halves, whose
+    /// difference from the whole is the estimate; a step of order 4 that leaves elements creeping
+    /// is repeated with order 2.
     bool attempt(double h)
     {
         residual_ = 0;
@@ -160,8 +160,8 @@ private:
     /// Whether an element that a stage found at rest is still being braked at the end of the step.
     /// The motion that S brakes to rest, v' = -S for v > 0, has a spurious stable equilibrium under
     /// order 4: with q = v / (S h / 4) between 1 and 2 the first stage leaves (q - 1), the next
-    /// three rest, and the last is 2.09 - 0.757 q, which q = 1.19 repeats for ever. Order 2 brings
-    /// every q below 3.4 to rest. What is too slow to count in the error is let pass.
+    /// three rest, and the last is 2.09 - 0.757 q, which q = 1.19 repeats forever. Order 2 brings
+    /// every q below 3.4 to rest. Elements too slow to count in the error are accepted.
     [[nodiscard]] bool leaves_creeping() const
     {
         const double counts = 0.01 * std::min(options_.rtol, 1e-3) * size_of_velocity() /
@@ -176,7 +176,8 @@ private:
         return false;
     }
 
-    /// Over the velocity at the end of the step: friction at rest falls by decades within a stage.
+    /// Relative to the velocity at the end of the step: friction at rest falls by decades within a
+    /// stage.
     static constexpr double at_rest = 1e-3;
 
     bool take(const Motion& from, double h, Motion& to)
@@ -228,7 +229,7 @@ private:
         }
     }
 
-    /// Norm of the whole field, to which its error is relative.
+    /// Norm of the whole field, the reference of its error.
     [[nodiscard]] double size_of_velocity() const
     {
         const double least = 1e-6 * law_.parameters().v_star / fault_.velocity_unit();
@@ -237,7 +238,7 @@ private:
                std::sqrt(static_cast<double>(next_.v.size())) * least;
     }
 
-    /// Over what is allowed.
+    /// The error relative to the allowed one.
     [[nodiscard]] double error_of() const
     {
         double of_u = 0;
@@ -267,8 +268,8 @@ private:
         return std::max(v, std::sqrt(std::max(of_u, of_xi)) / root_n) / options_.rtol;
     }
 
-    /// In time units. An element that is stopped by its neighbours is braked evenly, down to where
-    /// log V counts: from 0.1 to 1e-15 m/s within less than its velocity has digits for.
+    /// In time units. Its neighbours brake an element evenly to rest, down to where log V counts:
+    /// from 0.1 to 1e-15 m/s in a time below the resolution of its velocity.
     static constexpr double brief = 0.01;
 
     [[nodiscard]] double growth(double error) const
@@ -291,8 +292,8 @@ private:
         note_fastest(h);
     }
 
-    /// Cubics through both ends of a step; velocities of single elements, which may fall by
-    /// decades, on straight lines.
+    /// Records cubics through both ends of a step; velocities of single elements, which may fall by
+    /// decades, are straight lines.
     void note(double h)
     {
         const Motion& a = now_;
@@ -322,7 +323,7 @@ private:
             });
     }
 
-    /// The fastest element, and earthquakes that begin or end.
+    /// Records the fastest element, and earthquakes that begin or end.
     void note_fastest(double h)
     {
         const double fastest = now_.v.cwiseAbs().maxCoeff() * fault_.velocity_unit();
@@ -370,7 +371,7 @@ private:
     const RuptureOptions& options_;
     const RateStateOptions& how_;
     Law law_;
-    const detail::SdirkTable* table_;  ///< of the step that is taken
+    const detail::SdirkTable* table_;  ///< of the step in progress
     RateStateRupture out_;
     VectorXd normal_, stress_;
     StageStiffness stiffness_;

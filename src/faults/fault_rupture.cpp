@@ -24,7 +24,7 @@ constexpr double default_step = 0.28867513459481287;  // time units: 0.25 s at 3
 constexpr double default_bound = 1e-4;
 constexpr double stable_share = 0.95;
 
-/// How much finer than the defaults a small mesh is taken.
+/// Factor of the default steps and bounds on a small mesh, at most 1.
 double finer(const StrikeSlipFault& fault)
 {
     return std::clamp(fault.elements() / 100.0, 0.1, 1.0);
@@ -67,12 +67,12 @@ public:
         return (c_[1] + x * (2 * c_[2] + x * (3 * c_[3] + x * (4 * c_[4] + x * 5 * c_[5])))) / h_;
     }
 
-    /// Where a motion with the sign `sign` that is over at 1 stops.
+    /// Time at which a motion with the sign `sign` that has reversed at 1 stops.
     [[nodiscard]] double arrest(double sign) const
     {
         double from = 0;
         if (!(sign * velocity(0) > 0)) {
-            // It starts from rest: a little later it moves, or it never did.
+            // It starts from rest: either it moves a little later, or it never did.
             from = 0.5;
             while (from > 1e-6 && !(sign * velocity(from) > 0)) from *= 0.5;
             if (!(sign * velocity(from) > 0)) return 0;
@@ -160,7 +160,7 @@ private:
         release();
     }
 
-    /// Whether each element moves from here on, and how it is accelerated.
+    /// Decides which elements move from here on, and computes their accelerations.
     void release()
     {
         moving_ = 0;
@@ -188,7 +188,7 @@ private:
         }
     }
 
-    /// The step into d1_, v1_, a1_; its error over what is allowed.
+    /// Takes the step into d1_, v1_, a1_; returns its error relative to the allowed one.
     double attempt(double h)
     {
         v_stage_[0] = now_.velocity;
@@ -222,7 +222,7 @@ private:
             d_ += h * error_weights[j] * v_stage_[j];
             v_ += h * error_weights[j] * a_stage_[j];
         }
-        // Towards the end, when few elements creep, their velocities are no measure.
+        // Near the end, when few elements creep, their velocities are no measure.
         fastest_ = std::max(fastest_, now_.velocity.norm());
         const double of_v = std::max({now_.velocity.norm(), v1_.norm(), 1e-2 * fastest_});
         const double of_d = d1_.norm();
@@ -263,7 +263,7 @@ private:
         return {h, now_.slip[i], now_.velocity[i], acceleration_[i], d1_[i], v1_[i], a1_[i]};
     }
 
-    /// From the step's start: now_ and its end: d1_, v1_, a1_, with every arrest.
+    /// Fields between the step's start, now_, and its end, d1_, v1_, a1_, with every arrest.
     void fields_at(double theta, double h, FaultFields& out) const
     {
         out = now_;
@@ -320,7 +320,7 @@ private:
     VectorXd acceleration_, drive_;
     std::array<VectorXd, stages> v_stage_, a_stage_;
     VectorXd d_, v_, d1_, v1_, a1_;
-    VectorXd stop_;          // share of the step after which an element stopped; 2: it did not
+    VectorXd stop_;          // fraction of the step after which an element stopped; 2: it did not
     VectorXd sign_, sign1_;  // of the motion; 0: at rest
 };
 
@@ -335,7 +335,7 @@ double detail::polynomial_bound(const StrikeSlipFault& fault, const RuptureOptio
 void validate(const RuptureOptions& o)
 {
     constexpr detail::Require require{"RuptureOptions"};
-    // Shares of still shorter runs would not be numbers of full precision.
+    // Fractions of still shorter runs would not be numbers of full precision.
     require(o.t_end >= 1e-300 && std::isfinite(o.t_end),
             "t_end must be at least 1e-300 s and finite", o.t_end);
     require(o.step >= 0 && std::isfinite(o.step), "step must be zero or positive", o.step);

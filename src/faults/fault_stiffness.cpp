@@ -76,11 +76,11 @@ public:
     {
         const auto length = static_cast<std::size_t>(d_.length);
         rows_.resize(static_cast<std::size_t>(blocks_) * length);
-        // A block of rows may end beyond the circle's end.
+        // A block of rows may extend beyond the end of the circle.
         const auto longest = std::max(length, static_cast<std::size_t>(4 * blocks_));
         a_.resize(longest);
         b_.resize(longest);
-        // Plans are made at their first use: here, not in the first product.
+        // Plans are made at their first use: here, so that it is not in the first product.
         fft_.forward(b_.data(), a_.data());
         fft_.inverse(a_.data(), b_.data());
 #ifdef RICOCHET_WITH_FFTW
@@ -142,8 +142,8 @@ private:
         }
     }
 
-    /// The spectra of rows r, r + 1 at frequency k from those of x_r + i x_{r+1}, doubled.
-    /// Both frequencies k and k + 1 together, if the second exists, as a pair.
+    /// The spectra of rows r, r + 1 at frequency k, doubled, from those of x_r + i x_{r+1}.
+    /// Frequencies k and k + 1 are processed together as a pair, if the second exists.
     void gather(int k, int block, std::size_t lane, ComplexPair* out) const
     {
         const ComplexPair* row = row_of(block);
@@ -496,7 +496,7 @@ void StiffnessProduct::operator()(const double* x, double* y)
 
 namespace {
 
-/// Fields of a run and of the solver, of one double for each element.
+/// Number of fields of a run and of the solver, with one double for each element.
 constexpr double fields = 60;
 
 double of_run(double elements)
@@ -508,7 +508,7 @@ double of_run(double elements)
 
 double toeplitz_memory(double elements) noexcept
 {
-    // Symbol and its making, rows of transforms.
+    // The symbol and the memory to make it, and rows of transforms.
     return of_run(elements) + 8 * (2 + 4 + 2 + 2) * elements * elements;
 }
 

@@ -1,4 +1,4 @@
-// The product with a Toeplitz stiffness by FFTW, where that is asked for.
+// The product with a Toeplitz stiffness by FFTW, as an option.
 #pragma once
 
 #include <fftw3.h>
@@ -12,7 +12,7 @@
 
 namespace ricochet::detail {
 
-/// The same product by FFTW: rows, columns, and back, without the rows that are zero or not needed.
+/// The same product by FFTW: rows, columns, and back, omitting rows that are zero or not needed.
 class FftwProduct {
 public:
     explicit FftwProduct(const StiffnessData& data) : d_(data)
@@ -72,7 +72,7 @@ private:
         symbol_.resize(rows * columns);
         for (std::size_t i = 0; i < rows; ++i) {
             for (std::size_t k = 0; k < columns; ++k) {
-                // That of the paired transforms expects doubled spectra.
+                // The symbol of the paired transforms is for doubled spectra.
                 symbol_[i * columns + k] = 2 * d_.symbol[(k - k % 2) * rows + 2 * i + k % 2];
             }
         }

@@ -124,7 +124,7 @@ AgeingState advance_ageing(const AgeingState& from, double d_rs, double v0, doub
         return to;
     }
     // Panels in which the exponent changes by at most two; of the past beyond e^-45 nothing
-    // is left. Time runs backwards from the end: r = h - t.
+    // remains. Time runs backwards from the end: r = h - t.
     const double slope = (v1 - v0) / h;
     const auto panels = static_cast<int>(std::ceil(std::max(v0, v1) * h / d_rs / 2));
     const double width = h / panels;

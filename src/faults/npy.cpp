@@ -40,7 +40,7 @@ std::string_view value_of(const std::filesystem::path& file, std::string_view he
     return value.substr(0, value.find_last_not_of(' ') + 1);
 }
 
-/// "(100, 100" to 100; anything but two equal numbers is refused.
+/// "(100, 100" becomes 100; anything but two equal numbers is refused.
 std::uint64_t side_of(const std::filesystem::path& file, std::string_view shape)
 {
     const std::string text(shape.substr(std::min<std::size_t>(1, shape.size())));

@@ -95,7 +95,7 @@ private:
         }
     }
 
-    /// Where the pair was trained; all zero for one that was not.
+    /// Domain in which the pair was trained; all zero if it was not trained.
     [[nodiscard]] PairDomain domain() const
     {
         const json& in = object("domain");
@@ -180,8 +180,8 @@ private:
         return out;
     }
 
-    /// Friction and rate rise or fall with V and with xi: what is finite in the corners is finite
-    /// between them.
+    /// Friction and rate are monotone in V and in xi: if they are finite in the corners they are
+    /// finite between them.
     void check_over_domain(const AdditivePair& pair) const
     {
         const PairDomain& d = pair.parameters().domain;
@@ -203,7 +203,7 @@ private:
         const double v = number(test, "v");
         if (!(v > 0)) refuse(fmt::format("self test: \"v\" must be positive, found {}", v));
         const FrictionAndRate now = pair.evaluate(v, number(test, "xi"));
-        // Another compiler may order the sums otherwise.
+        // Another compiler may order the sums differently.
         const auto compare = [&](const char* what, double stored, double value) {
             if (!(std::abs(stored - value) <= 1e-12 * (std::abs(stored) + 1))) {
                 refuse(fmt::format("self test: {} is {}, stored {}", what, value, stored));

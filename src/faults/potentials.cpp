@@ -26,7 +26,7 @@ void require_drive(double d)
 /// log(Omega) >= -1 with Omega log(Omega) = q >= -1/e.
 double log_omega_of(double q)
 {
-    // m e^m = q. The start has an error below 0.3 (in m); Newton's method from above, in
+    // Solves m e^m = q. The start has an error below 0.3 (in m); Newton's method from above, in
     // m, of a function that is convex there descends to the solution.
     const double gap = 1 + q * std::exp(1.0);
     if (gap <= 0) return -1;
@@ -72,7 +72,8 @@ const
     double s = 0;
     if constexpr (evolution == StateEvolution::slip) {
         const double q = -rate * p.d_rs / heal;
-        // The largest rate has q = -1/e; what rounding of log(Omega) and xi adds is let by.
+        // The largest rate has q = -1/e; the excess by the rounding of log(Omega) and xi is
+        // allowed.
         if (!(q >= -std::exp(-1.0) * (1 + 1e-14 * (1 + std::abs(xi))))) refuse_rate(rate, xi);
         s = heal * std::exp(log_omega_of(q));
     } else {

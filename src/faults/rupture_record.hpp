@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// Bound that `RuptureOptions::polynomial_bound` stands for.
+/// The value of `RuptureOptions::polynomial_bound`, or its default.
 [[nodiscard]] double polynomial_bound(const StrikeSlipFault& fault, const RuptureOptions& options);
 
 /// Fields nondimensional.
@@ -36,8 +36,8 @@ public:
         out_.mean_velocities = {0.0};
     }
 
-    /// A step from t over h, both nondimensional. `mean_at(theta)` is the mean motion at t +
-    /// theta h, `fields_at(theta, fields)` the motion.
+    /// Records a step from t over h, both nondimensional. `mean_at(theta)` is the mean motion at t
+    /// + theta h, `fields_at(theta, fields)` is the motion.
     template <class MeanAt, class FieldsAt>
     void add(double t, double h, MeanAt&& mean_at, FieldsAt&& fields_at)
     {
@@ -66,7 +66,7 @@ public:
         }
     }
 
-    /// The fields at the end of a step.
+    /// Records the fields at the end of a step.
     void note_fastest(double t, const FaultFields& fields)
     {
         for (Eigen::Index i = 0; i < fields.velocity.size(); ++i) {
@@ -79,7 +79,7 @@ public:
     }
 
     /// @param rest_time  nondimensional; NaN: something moves
-    /// @param located    whether that is more exact than the ends of steps
+    /// @param located    whether it is more accurate than the ends of steps
     void finish(double t, double rest_time, bool located, const FaultFields& fields)
     {
         const bool rests = !std::isnan(rest_time);
@@ -112,7 +112,7 @@ private:
                                   .velocity = fields.velocity * fault_.velocity_unit()});
     }
 
-    /// Golden section; the mean velocity has one maximum in a quarter of a step or two.
+    /// Golden section search; the mean velocity has one maximum in a quarter of a step or two.
     template <class MeanAt>
     void refine_peak(double t, double h, double from, double to, MeanAt&& mean_at)
     {

@@ -105,7 +105,7 @@ public:
             }
             const double stop_at = std::min(t_end, slider_.load.next_corner(out_.state.t));
             const double room = stop_at - out_.state.t;
-            // A step that would leave less than a millionth of itself goes to the end.
+            // A step that would leave a remainder below a millionth of its length goes to the end.
             const bool to_stop = h > room * (1 - 1e-6);
             const double taken = to_stop ? room : h;
             SliderState to = out_.state;
@@ -137,7 +137,7 @@ public:
 private:
     [[nodiscard]] double estimate_order() const { return options_.order == 1 ? 2 : options_.order; }
 
-    /// A step; of order 1 under error control two halves of it, whose difference from the
+    /// A step; at order 1 under error control it is two halves, whose difference from the
     /// whole is the estimate.
     StepReport take(SliderState& to, double h) const
     {
@@ -200,7 +200,7 @@ private:
     void locate(const SliderState& from, const SliderState& to, double level, SliderEventKind up,
                 SliderEventKind down)
     {
-        // A step that starts on the level has left it as its end says.
+        // For a step that starts on the level its end tells on which side it left.
         const double start = from.v == level ? to.v : from.v;
         if ((start - level) * (to.v - level) < 0 || (to.v == level && start != level)) {
             add(from, level, 0, to.t - from.t, start < level ? up : down);
@@ -216,7 +216,7 @@ private:
         }
     }
 
-    /// Where the cubic through slip rates and accelerations turns, after `from`; else 0.
+    /// Place where the cubic through slip rates and accelerations turns, after `from`; else 0.
     [[nodiscard]] double turning_point(const SliderState& from, const SliderState& to) const
     {
         const double h = to.t - from.t;

@@ -16,7 +16,7 @@ struct StiffnessData {
     std::vector<double> symbol;
     /// layered: for each frequency along x a matrix of rows by rows, over length
     std::vector<Eigen::MatrixXd> layers;
-    /// dense; also of a small toeplitz mesh, for which it takes less time than transforms
+    /// dense; also for a small toeplitz mesh, where it takes less time than transforms
     Eigen::MatrixXd matrix;
     double upper = 0;  ///< bound of the eigenvalues
 

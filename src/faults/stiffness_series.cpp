@@ -24,7 +24,7 @@ Spectrum widened(Spectrum interval)
     return interval;
 }
 
-/// Coefficients of f's series, from its values at the zeros of a far higher polynomial.
+/// Coefficients of the series of f, from its values at the zeros of a far higher polynomial.
 std::vector<double> coefficients(const StiffnessSeries::Function& f, const Spectrum& interval,
                                  int count)
 {
@@ -126,7 +126,8 @@ StiffnessSeries StiffnessSeries::within(const Function& f, Spectrum interval, do
         some.c_ = of_least_error(f, all.interval_, degree);
         return (!some.c_.empty() && some.relative_error(f) <= bound) || meets(degree);
     };
-    // Errors fall with the degree: bisection between what is too few and what is enough.
+    // Errors fall with the degree: bisection between a degree that is too low and one that is
+    // enough.
     int enough = 1;
     while (enough < most_terms && !meets(enough)) enough = std::min(2 * enough, most_terms);
     if (!meets(enough)) {

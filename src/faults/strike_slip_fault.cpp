@@ -50,8 +50,8 @@ FaultStiffness full_space(const StrikeSlipFault::Parameters& p, double element)
     });
 }
 
-/// The stress at the centre of an element is not quite symmetric under a surface, as that of a mean
-/// over it would be: half the sum of both.
+/// Under a surface the stress at the centre of an element is not quite symmetric, as a mean over
+/// the element would be: half the sum of both is taken.
 FaultStiffness half_space(const StrikeSlipFault::Parameters& p, double element, double inset)
 {
     const auto depth = [=](int row) { return inset + (row + 0.5) * element; };

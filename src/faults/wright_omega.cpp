@@ -73,12 +73,12 @@ double by_exponential(double z) noexcept
 double wright_omega(double z) noexcept
 {
     if (z < -1.5) return by_exponential(z);
-    if (!(z < 1e300)) return z;  // and NaN
+    if (!(z < 1e300)) return z;  // also NaN
     const double u = start(z);
     // u (1 + t) is the solution where (1 + u) t - t^2/2 + t^3/3 - ... = r; t <= 2.5e-5, so
     // that three terms of the inverse series leave 1e-18.
     const double log_u = std::log(u);
-    const double r = z < 0.5 ? (z - log_u) - u : (z - u) - log_u;  // first what is alike
+    const double r = z < 0.5 ? (z - log_u) - u : (z - u) - log_u;  // the two of similar size first
     const double i = 1 / (1 + u);
     const double p = r * i;
     const double c = 0.5 * i;

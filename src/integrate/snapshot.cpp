@@ -18,7 +18,7 @@ constexpr std::string_view last_line = "checksum ";
 
 constexpr detail::Refuse refuse_snapshot{"snapshot"};
 
-/// The last line: 64 bits that differ where two texts do (Fowler, Noll and Vo's hash, 1a).
+/// The last line: 64 bits that change with the text (Fowler, Noll and Vo's hash, 1a).
 std::string checksum(std::string_view text)
 {
     std::uint64_t hash = 0xcbf29ce484222325u;

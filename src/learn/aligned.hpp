@@ -1,4 +1,4 @@
-// Memory that vector registers are filled from.
+// Memory with the alignment of vector registers.
 #pragma once
 
 #include <cstddef>

@@ -35,7 +35,7 @@ void BatchMlp<T>::initialise(T* parameters, Random& random) const
     for (const Shape& shape : shapes_) {
         const double bound = 1 / std::sqrt(static_cast<double>(shape.inputs));
         const std::size_t stride = padded<T>(shape.outputs);
-        for (std::size_t i = 0; i <= shape.inputs; ++i) {  // the bias lies behind the weight
+        for (std::size_t i = 0; i <= shape.inputs; ++i) {  // the bias follows the weight
             for (std::size_t j = 0; j < shape.outputs; ++j) {
                 parameters[shape.weight + i * stride + j] =
                     static_cast<T>(random.uniform(-bound, bound));
@@ -167,7 +167,7 @@ template <class T>
 void transpose(const T* a, std::size_t a_stride, std::size_t m, std::size_t n, T* out,
                std::size_t out_stride)
 {
-    constexpr std::size_t block = 16;  // whose rows and columns stay in the cache
+    constexpr std::size_t block = 16;  // its rows and columns stay in the cache
     for (std::size_t i0 = 0; i0 < m; i0 += block) {
         for (std::size_t j = 0; j < n; ++j) {
             for (std::size_t i = i0; i < std::min(m, i0 + block); ++i) {

@@ -2,8 +2,8 @@
 //
 //     x_0 = x,  x_k+1 = max(0, W_k x_k + b_k),  y = W_n x_n + b_n
 //
-// A shape and its arithmetic; parameters, gradients and what the layers say lie in memory of the
-// caller, so that a group of networks can share one vector, and threads one network.
+// The class holds a shape and its arithmetic; parameters, gradients and the layers' outputs lie in
+// memory of the caller, so that a group of networks can share one vector, and threads one network.
 #pragma once
 
 #include <cstddef>
@@ -21,13 +21,13 @@ namespace ricochet::learn {
 template <class T>
 struct Rows {
     T* data;
-    std::size_t stride;  ///< whole cache lines; beyond the columns there are zeros
+    std::size_t stride;  ///< whole cache lines; beyond the columns the rows are zero
 
     [[nodiscard]] T* row(std::size_t i) const noexcept { return data + i * stride; }
 };
 
-/// Parameters: layer by layer the weight, inputs x outputs row by row, then the bias, each row
-/// filled up with zeros to whole cache lines.
+/// Parameters: layer by layer the weight, inputs x outputs row by row, then the bias, with each row
+/// padded with zeros to whole cache lines.
 template <class T>
 class BatchMlp {
 public:
@@ -50,7 +50,7 @@ public:
     /// Initial values like PyTorch's: weights and biases uniform within +-1 / sqrt(inputs).
     void initialise(T* parameters, Random& random) const;
 
-    /// The weights, transposed; what `backward` goes back through.
+    /// Transposes the weights for `backward`.
     void transpose(const T* parameters, T* transposed) const;
 
     [[nodiscard]] Work work(std::size_t rows) const;
@@ -58,9 +58,9 @@ public:
     /// Writes `work.values`; returns those of the last layer.
     Rows<T> forward(const T* parameters, Rows<const T> x, std::size_t rows, Work& work) const;
 
-    /// From the derivatives by the output, which lie in `slopes_out(work)`, to those by the
-    /// parameters, written to `gradient` (null: left out), and by the inputs, written to `dx` with
-    /// a stride of padded(inputs) (null: left out). After `forward` with the same x and work.
+    /// From the derivatives by the output, in `slopes_out(work)`, computes the derivatives by the
+    /// parameters, written to `gradient` (null: omitted), and by the inputs, written to `dx` with
+    /// a stride of padded(inputs) (null: omitted). Call after `forward` with the same x and work.
     void backward(const T* transposed, Rows<const T> x, std::size_t rows, Work& work, T* gradient,
                   T* dx) const;
 

@@ -11,7 +11,7 @@ namespace ricochet::learn {
 
 namespace {
 
-/// A ball with its own gravity and step, so that one sample may hold many. Times
+/// A ball with its own gravity and step, so that one sample may hold many kinds. Times
 /// are counted in steps.
 struct Ball {
     double u;        ///< height [m]
@@ -35,7 +35,7 @@ struct Floor {
 
     [[nodiscard]] double guard(const Ball& ball) const { return ball.u; }
 
-    /// Back to the impact that began the flight.
+    /// Time back to the impact that began the flight.
     [[nodiscard]] double horizon(const Ball& ball) const
     {
         return -2 * ball.v / (ball.gravity * ball.step);
@@ -141,8 +141,8 @@ void check(const BallTraining& training)
     require_positive(training.height, "height");
 }
 
-/// Scale of order one where the boundary is crossed in a fixed step, and where it bends
-/// in the logarithms.
+/// A scale of order one where a fixed step crosses the boundary, and where the boundary
+/// bends in logarithmic features.
 std::vector<double> scale(BallModel kind, const BallTraining& training)
 {
     if (kind == BallModel::any_step) return {0.25, 0.25};

@@ -31,7 +31,7 @@ Point centre_of(const Box& box, std::size_t n) noexcept
     return c;
 }
 
-/// Half-widths about the centre, rounded up; of an edge without length 0.
+/// Half-widths about the centre, rounded up; 0 for an edge without length.
 Point half_of(const Box& box, const Point& centre, std::size_t n) noexcept
 {
     Point half{};
@@ -80,8 +80,8 @@ Box Statement::domain() const
 
 void Statement::check_slack(const Box& box, const double* centre, double guard) const
 {
-    // NaN where the parent was not asked. The allowance is for rounding, which a slack may
-    // forget without being wrong by much.
+    // NaN where the guard of the parent was not evaluated. The allowance covers rounding, which a
+    // slack may neglect without being far wrong.
     const double change = std::fabs(guard - box.parent_guard);
     const double rounding =
         1e-9 * std::max({std::fabs(guard), std::fabs(box.parent_guard), box.parent_slack});
@@ -93,7 +93,7 @@ void Statement::check_slack(const Box& box, const double* centre, double guard) 
         change, box.parent_slack));
 }
 
-/// Leaves its findings in `parent`, `parent_guard` and `parent_slack`, for the halves.
+/// Stores its results in `parent`, `parent_guard` and `parent_slack`, for the halves.
 bool Statement::proved_by_guard(Box& box) const
 {
     const Point centre = centre_of(box, n_);
@@ -110,7 +110,7 @@ bool Statement::proved_by_guard(Box& box) const
     return guard - slack - rounding > margin_;
 }
 
-/// Whether a box is one of those that are examined closely, whichever thread examines it.
+/// Whether a box is among those examined closely, independently of the thread.
 bool one_in_64(const Point& centre, std::size_t n) noexcept
 {
     std::uint64_t hash = 0;
@@ -121,8 +121,8 @@ bool one_in_64(const Point& centre, std::size_t n) noexcept
     return hash >> 58U == 0;
 }
 
-/// The guard itself is not asked for, which may be a thousand times as expensive; one box in 64
-/// compares it with the bound.
+/// Proves a box without the guard itself, which may be a thousand times as expensive; one box in 64
+/// compares the guard with the bound.
 bool Statement::proved_by_least(Box& box) const
 {
     const Point centre = centre_of(box, n_);
@@ -138,7 +138,7 @@ bool Statement::proved_by_least(Box& box) const
         }
     }
     if (least > margin_) return true;
-    // Where the bound is exact nothing within is above the margin.
+    // Where the bound is exact no guard in the box is above the margin.
     const Point half = half_of(box, centre, n_);
     box.guard_spent = least + 2 * problem_.slack(half.data()) <= margin_;
     return false;
@@ -148,14 +148,14 @@ bool Statement::proved_by_logit(Box& box, NetworkBounds::Scratch& scratch, doubl
 {
     const Interval range =
         bounds_.over(box.lower.data(), box.upper.data(), threshold_, scratch, influence);
-    // What holds of the whole holds of the part, so that bounds never get worse downwards.
+    // A bound of the whole box holds for its parts, so bounds never get worse downwards.
     if (range.lower > box.low) box.low = range.lower;
     box.logit_spent = range.upper < threshold_;
     return box.low >= threshold_;
 }
 
 /// The edge along which the guard and the logit can change most, each relative to its change over
-/// the whole box; edges that matter to neither, or are too narrow, are left alone.
+/// the whole box; edges that affect neither, or are too narrow, are not cut.
 std::size_t Statement::choose_axis(const Box& box, const double* half,
                                    const double* influence) const
 {
@@ -290,7 +290,8 @@ bool explore(const Statement& statement, const Box& start, std::size_t max_unpro
 
 namespace {
 
-/// Boxes below `box`, itself included, and of them those too narrow to be cut: one sample.
+/// Adds one sample of the numbers of boxes below `box`, itself included, and of those among them
+/// that are too narrow to be cut.
 void descend(const Statement& statement, Box box, NetworkBounds::Scratch& scratch, Random& random,
              double& boxes, double& unproved, std::uint64_t& examined)
 {

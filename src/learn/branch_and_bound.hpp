@@ -1,4 +1,4 @@
-// One statement of a certificate, and how a box is decided.
+// One statement of a certificate, and the decision about a box.
 #pragma once
 
 #include <array>
@@ -16,21 +16,21 @@ namespace ricochet::learn {
 
 constexpr std::size_t most_features = NetworkBounds::max_inputs;
 
-/// A part of the domain, and what is known of it.
+/// A part of the domain, and what is known about it.
 struct Box {
     std::array<double, most_features> lower{};
     std::array<double, most_features> upper{};
-    double low = -std::numeric_limits<double>::infinity();  ///< no logit within is below
-    bool guard_spent = false;  ///< every guard within is at most the margin
-    bool logit_spent = false;  ///< every logit within is below the threshold
+    double low = -std::numeric_limits<double>::infinity();  ///< no logit in the box is lower
+    bool guard_spent = false;  ///< every guard in the box is at most the margin
+    bool logit_spent = false;  ///< every logit in the box is below the threshold
 
-    /// The centre of the box that this is a half of; its guard and slack, if they were asked for.
+    /// The centre of the box of which this is a half; its guard and slack, if they were evaluated.
     std::array<double, most_features> parent{};
     double parent_guard = std::numeric_limits<double>::quiet_NaN();
     double parent_slack = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Result of a part of the tree.
+/// Result for a part of the tree.
 struct Tally {
     std::uint64_t boxes = 0;
     double lowest = std::numeric_limits<double>::infinity();  ///< logit in an unproved box
@@ -52,7 +52,7 @@ public:
     enum class Verdict {
         proved,
         cut,      ///< in two along `axis`
-        stuck,    ///< too narrow for that
+        stuck,    ///< too narrow to be cut
         refuted,  ///< the centre is a counterexample
     };
 
@@ -84,7 +84,7 @@ private:
     std::vector<bool> guard_depends_;  ///< on this feature
 };
 
-/// The upper part of the tree, in breadth: what is still to be examined, and what was.
+/// The upper part of the tree, in breadth: the boxes still to be examined, and those done.
 struct Frontier {
     std::vector<Box> open{};
     Tally tally{};
@@ -92,9 +92,9 @@ struct Frontier {
 
 [[nodiscard]] Frontier grow(const Statement& statement, std::size_t boxes);
 
-/// Examines all that is below `start`, depth first, until it is refuted, more than
-/// `max_unproved` boxes are stuck, or `stop` says so, which is asked now and then with the
-/// boxes examined since.
+/// Examines all boxes below `start`, depth first, until one is refuted, more than
+/// `max_unproved` boxes are stuck, or `stop`, called now and then with the number of
+/// boxes examined since, returns true.
 /// @returns false if stopped
 bool explore(const Statement& statement, const Box& start, std::size_t max_unproved, Tally& tally,
              const std::function<bool(std::uint64_t boxes)>& stop);

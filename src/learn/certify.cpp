@@ -50,7 +50,7 @@ void check(const CertifyOptions& o)
 
 constexpr std::string_view level_gate = "gate-level";
 
-/// The margins of a gate of levels, unless others are asked for.
+/// Fills in the margins of a gate of levels, unless others are given.
 CertifyOptions completed(const Model& model, CertifyOptions o)
 {
     if (model.kind == level_gate && o.margins.empty()) {
@@ -75,7 +75,7 @@ void check_recipe(const Model& model)
                     model.recipe));
 }
 
-/// A random state of the domain.
+/// Draws a random state of the domain.
 void draw(const Model& model, Random& random, std::vector<double>& x)
 {
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -179,9 +179,9 @@ private:
         return {.highest = highest, .spread = highest - low, .closest = o_.closest};
     }
 
-    /// Descends from cheap thresholds to expensive ones.
-    /// @returns nothing if even the cheapest is above the limit, or the logits do not tell the
-    ///          states within the margin from the others
+    /// Descends from inexpensive thresholds to expensive ones.
+    /// @returns nothing if even the least expensive is above the limit, or the logits do not
+    ///          separate the states within the margin from the others
     std::optional<Begun> search(double margin, const Attempt& attempt)
     {
         constexpr double first = 0.9;
@@ -221,7 +221,7 @@ private:
                      margin);
     }
 
-    /// Repeats a proof that failed, further away from counterexamples.
+    /// Repeats a proof that failed, farther away from counterexamples.
     CertifyOutcome search_and_prove(double margin)
     {
         constexpr int attempts = 6;
@@ -315,7 +315,7 @@ private:
         return CertifyOutcome::proved;
     }
 
-    /// Every box is proved or has no logit below `lowest`, so that with this threshold all are.
+    /// Every box is proved or has no logit below `lowest`: with this threshold all are proved.
     void finish(const Tally& total, double margin)
     {
         const Begun& begun = *all_.current;
@@ -460,7 +460,7 @@ LowestLogit lowest_logit(const Model& model, const GuardProblem& problem, double
     const Classifier classifier(model);
     Random random(seed);
     const std::size_t n = model.domain.size();
-    // Outside the margin a state is the better the nearer it is, within it the lower its logit.
+    // Outside the margin nearer states are better; within it, states with a lower logit.
     const auto better = [margin](const Found& a, const Found& b) {
         const bool in_a = a.guard <= margin;
         const bool in_b = b.guard <= margin;

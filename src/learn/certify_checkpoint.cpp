@@ -31,7 +31,7 @@ Json json(const std::vector<std::vector<Interval>>& boxes)
     return out;
 }
 
-/// @throws std::out_of_range for what is no count
+/// @throws std::out_of_range for a value that is no count
 std::uint64_t count_of(const nlohmann::json& from)
 {
     if (!from.is_number_unsigned()) throw std::out_of_range("no count");
@@ -78,7 +78,7 @@ Attempt attempt_of(const nlohmann::json& from)
             .closest = from.at(3).get<double>()};
 }
 
-/// Parts with a counterexample are left out, to be found again.
+/// Omits parts with a counterexample, which is found again.
 Json json(const Begun& begun)
 {
     Json done = Json::array();
@@ -115,7 +115,7 @@ Begun begun_of(const nlohmann::json& from)
         tally.boxes = count_of(part.at(1));
         tally.unproved = boxes_of(part.at(3));
         constexpr double inf = std::numeric_limits<double>::infinity();
-        if (!tally.unproved.empty()) {  // JSON has no infinity: without a bound it is null
+        if (!tally.unproved.empty()) {  // JSON has no infinity: a missing bound is null
             tally.lowest = part.at(2).is_null() ? -inf : part.at(2).get<double>();
         }
         out.done.at(count_of(part.at(0))) = std::move(tally);

@@ -1,4 +1,4 @@
-// A proof that was interrupted, as it is kept on disk.
+// The state of an interrupted proof, as it is kept on disk.
 #pragma once
 
 #include <filesystem>
@@ -11,23 +11,23 @@
 
 namespace ricochet::learn {
 
-/// Boxes that the top of the tree ends in.
+/// Number of boxes in which the top of the tree ends.
 constexpr std::size_t frontier_boxes = 2048;
 
-/// A level that was begun.
+/// A level whose proof has started.
 struct Begun {
     double threshold = 0;
-    double lowering = 0;  ///< of the threshold that is allowed, to take unproved boxes in
+    double lowering = 0;  ///< allowed lowering of the threshold, to include unproved boxes
     Estimate estimate{};
     double seconds = 0;
     std::vector<std::optional<Tally>> done{};  ///< per box of the frontier
 };
 
-/// Where the search for a threshold is: attempts that failed have moved these.
+/// State of the search for a threshold, as failed attempts have changed it.
 struct Attempt {
     int number = 0;
-    double highest = 0;  ///< threshold that could be proved at best
-    double spread = 0;   ///< of the logits, what a distance between thresholds is measured in
+    double highest = 0;  ///< highest threshold that could be proved
+    double spread = 0;   ///< of the logits, the unit of distances between thresholds
     double closest = 0;  ///< to `highest`
 };
 
@@ -38,15 +38,14 @@ struct Progressed {
     std::optional<Begun> current{};
 };
 
-/// Writes to a neighbouring file and renames it. Of a level that was begun the finished parts are
+/// Writes to a neighbouring file and renames it. Of a started level the finished parts are
 /// kept.
-/// @param key  what a proof that continues must agree in
+/// @param key  properties in which a proof that continues must agree
 /// @throws std::runtime_error naming the file
 void save(const Progressed& all, const std::string& key, const std::filesystem::path& file);
 
 /// @throws std::runtime_error naming the file if it cannot be read, is cut short, has been altered,
-/// or has
-///         another key.
+///         or has another key.
 [[nodiscard]] Progressed load(const std::string& key, const std::filesystem::path& file);
 
 }  // namespace ricochet::learn

@@ -83,7 +83,7 @@ void refuse_checkpoint(const std::filesystem::path& file, const std::string& wha
 
 namespace {
 
-/// Half of a checkpoint is of no use to anybody.
+/// Half of a checkpoint is useless, and is refused.
 [[noreturn]] void refuse_unwritten(const std::filesystem::path& file,
                                    const std::filesystem::path& fresh, const std::string& why)
 {

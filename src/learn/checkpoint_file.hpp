@@ -1,6 +1,6 @@
-// Numbers in a file that is either whole or not there.
+// Numbers in a file that is either whole or absent.
 //
-// A first line says what the file is; then come numbers as their bits,
+// The first line identifies the file; then come numbers as their bits,
 // little-endian, and a checksum of them.
 #pragma once
 
@@ -38,7 +38,7 @@ private:
     std::string bytes_;
 };
 
-/// Reads back what a `Writer` was given, in the same order.
+/// Reads the values given to a `Writer`, in the same order.
 /// Every `get` throws std::runtime_error naming the file if it is cut short.
 class Reader {
 public:
@@ -77,8 +77,8 @@ private:
 void write_checkpoint(std::string_view first_line, const Writer& writer,
                       const std::filesystem::path& file);
 
-/// Keeps a training in its checkpoint, time after time. A disk that is full later does not end the
-/// training: what could not be written is remembered, and tried again with the next checkpoint.
+/// Keeps a training in its checkpoint, again and again. A disk that fills up later does not end the
+/// training: the failure is remembered, and the next checkpoint is another attempt.
 class Keeper {
 public:
     /// @param file  empty: nothing is kept
@@ -98,7 +98,7 @@ public:
         }
     }
 
-    /// Why the last checkpoint could not be written; empty: it was.
+    /// The reason why the last checkpoint could not be written; empty if it was.
     [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
 
 private:

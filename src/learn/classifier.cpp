@@ -161,7 +161,7 @@ bool better(const Score& a, const Score& b)
     return std::tie(a.misses, a.false_alarms, a.loss) < std::tie(b.misses, b.false_alarms, b.loss);
 }
 
-/// A hash of all that decides the weights: a checkpoint of anything else is
+/// A hash of everything that determines the weights: a checkpoint with another one is
 /// refused.
 class Fingerprint {
 public:
@@ -314,7 +314,7 @@ private:
         ++iteration_;
     }
 
-    /// The training states of the largest loss. None before the network has
+    /// The training states of the largest loss. There are none before the network has
     /// learned anything, when the largest loss means little.
     void find_hard()
     {
@@ -337,7 +337,7 @@ private:
         std::sort(hard_.begin(), hard_.end());
     }
 
-    /// Judges the present weights, rounded to float, and keeps them if they are
+    /// Assesses the present weights, rounded to float, and keeps them if they are
     /// the best so far.
     Progress evaluate()
     {

@@ -1,7 +1,7 @@
-// The arithmetic of training: products of small matrices, and what goes over long vectors.
+// The arithmetic of training: products of small matrices, and operations on long vectors.
 //
-// Matrices lie row by row, and every row fills whole cache lines; what is there beyond the
-// last column is zero. Sums are taken in one fixed order, so that on one instruction set the
+// Matrices are stored row by row, and every row fills whole cache lines; the elements beyond the
+// last column are zero. Sums are taken in one fixed order, so that on one instruction set the
 // bits never change; between instruction sets they do.
 #pragma once
 
@@ -68,7 +68,8 @@ struct AdamStep {
     T polyak;
 };
 
-/// The quantile Huber loss of n quantiles against m targets, as W. Dabney et al., "Distributional
+/// The quantile Huber loss of n quantiles against m targets, as in W. Dabney et al.,
+/// "Distributional
 /// reinforcement learning with quantile regression", AAAI 2018, equation 10, with kappa = 1:
 ///
 ///     L = scale sum_ij w_ij huber(d_ij),  d_ij = target_j - quantile_i,
@@ -105,7 +106,7 @@ extern const DenseTable dense_baseline;
 extern const DenseTable dense_v3;
 extern const DenseTable dense_v4;
 
-/// The kernels of one instruction set, or of the best that the library and the processor have.
+/// The kernels of one instruction set, or of the best that the library and the processor support.
 template <class T>
 [[nodiscard]] const DenseKernels<T>& dense_kernels(
     InstructionSet set = best_instruction_set()) noexcept;

@@ -1,4 +1,4 @@
-// The kernels as the whole library is compiled.
+// The kernels for the instruction set of the whole library.
 #define RICOCHET_DENSE_NAMESPACE dense_library_baseline
 #define RICOCHET_DENSE_REGISTER 16
 #include "dense_kernels.hpp"

@@ -1,8 +1,9 @@
 // The kernels of dense.hpp for one instruction set.
 //
-// Included by one file per instruction set, which is compiled with its flags and has defined
-// RICOCHET_DENSE_NAMESPACE and RICOCHET_DENSE_REGISTER, the bytes of a register. Nothing of
-// the standard library is called here: the linker might take its other callers' instance.
+// One file per instruction set includes this header. It is compiled with the flags of that set and
+// defines RICOCHET_DENSE_NAMESPACE and RICOCHET_DENSE_REGISTER, the bytes of a register. No
+// function of the standard library is called here: the linker might take an instance from another
+// file.
 #pragma once
 
 #include <cstddef>
@@ -58,8 +59,8 @@ RICOCHET_ALWAYS Vector<T> all(T value) noexcept
 #define RICOCHET_DENSE_OPERAND "+m"
 #endif
 
-/// Zero, without the compiler's knowing: of a known zero g++ makes a comparison and a mask
-/// where one instruction does.
+/// A zero that is opaque to the compiler: for a known zero g++ makes a comparison and a mask
+/// where one instruction suffices.
 template <class T>
 RICOCHET_ALWAYS Vector<T> unknown_zero() noexcept
 {
@@ -68,7 +69,7 @@ RICOCHET_ALWAYS Vector<T> unknown_zero() noexcept
     return zero;
 }
 
-/// Of these, a NaN in b stays.
+/// The larger or smaller of two; a NaN in b stays.
 template <class V>
 RICOCHET_ALWAYS V larger(V a, V b) noexcept
 {
@@ -126,7 +127,7 @@ RICOCHET_ALWAYS void product_block(const Product<T>& p, After after, std::size_t
     }
 }
 
-// As many rows as fill the registers, and hide the latency of a sum.
+// As many rows as fill the registers and hide the latency of a sum.
 inline constexpr int block_rows = register_bytes == 64 ? 8 : register_bytes == 32 ? 4 : 2;
 
 template <class T>

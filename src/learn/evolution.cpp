@@ -20,7 +20,7 @@ namespace ricochet::learn {
 namespace {
 
 constexpr std::string_view first_line = "ricochet evolution checkpoint 1\n";
-constexpr double checkpoint_interval = 1;  // [s]: an interruption costs no more
+constexpr double checkpoint_interval = 1;  // [s]: an interruption loses no more
 
 constexpr ricochet::detail::Refuse refuse_search{"evolve"};
 
@@ -57,14 +57,14 @@ void check(std::span<const double> x0, const EvolutionOptions& o)
     if (o.resume && o.checkpoint.empty()) refuse_search("resume needs a checkpoint");
 }
 
-/// NaN is behind everything.
+/// NaN ranks last.
 bool better(double a, double b)
 {
     return std::isnan(b) ? !std::isnan(a) : a < b;
 }
 
 /// Learning rates and weights, from dimension and population alone: the tutorial's
-/// equations 49 to 58, and of the diagonal the factor (n + 2) / 3 of Ros and Hansen.
+/// equations 49 to 58, and the factor (n + 2) / 3 of Ros and Hansen for the diagonal.
 struct Rates {
     Rates(std::size_t dimension, std::size_t population) : weights(population / 2)
     {
@@ -90,14 +90,14 @@ struct Rates {
     }
 
     std::vector<double> weights;  ///< of the better half, best first; their sum is 1
-    double mu;                    ///< how many equal ones have as much variance
+    double mu;                    ///< number of equal weights with the same variance
     double step, damping;         ///< of the step's length
     double path;                  ///< of the path of the covariance
     double one, many;             ///< of the covariance: from the path, from the population
     double length;                ///< of a normal vector, on average
 };
 
-/// All that a checkpoint holds.
+/// Everything that a checkpoint holds.
 struct State {
     std::uint64_t generations = 0;
     std::uint64_t evaluations = 0;
@@ -195,7 +195,7 @@ public:
     }
 
 private:
-    /// False if a score was given up in a part of the search, which is then as if not begun.
+    /// False if a score was given up in a part of the search, which then counts as not started.
     template <class Part>
     [[nodiscard]] bool completes(const Part& part)
     {

@@ -100,7 +100,7 @@ private:
     std::array<double, most> weight_{}, scale_{}, shift_{};
 };
 
-/// How the internal variable is driven: d = e^C(xi) - w with w the wear, xi' = G(d), in one
+/// The drive of the internal variable: d = e^C(xi) - w with w the wear, xi' = G(d), in one
 /// block of parameters: offset of C, C, G.
 class StateDrive {
 public:
@@ -141,7 +141,7 @@ public:
         return {heal, -heal * c.slope, g.value - rest_, g.slope, d};
     }
 
-    /// dG/d(raw) of the drive at xi into g; the part through the wear is the caller's.
+    /// dG/d(raw) of the drive at xi into g; the caller adds the part through the wear.
     void gradient(const Drive& drive, double xi, double* g) const
     {
         const double by_c = drive.rate_slope * drive.heal;
@@ -175,7 +175,7 @@ public:
     [[nodiscard]] virtual std::unique_ptr<FrictionModel> clone() const = 0;
     [[nodiscard]] virtual std::size_t size() const = 0;
     [[nodiscard]] virtual std::size_t internals() const = 0;
-    /// The parameters that the rate of an internal variable depends on.
+    /// The parameters on which the rate of an internal variable depends.
     struct Block {
         std::size_t first, size;
     };

@@ -43,7 +43,7 @@ struct SliderPath {
 
 constexpr int samples_per_second = 1024;
 
-/// Steps of order 4 and 2^-13 s, which end at the corners of the load.
+/// Takes steps of order 4 and 2^-13 s, which end at the corners of the load.
 template <class Law>
 SliderPath follow(const Law& law, const SliderCase& c)
 {

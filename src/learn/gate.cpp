@@ -26,7 +26,7 @@ namespace {
 
 constexpr ricochet::detail::Refuse refuse_gate{"train_gate"};
 
-/// What the network is to say of a state: the higher, the nearer.
+/// The network's target for a state: the higher, the nearer the event.
 double target_of(double value, double unit)
 {
     return -std::asinh(value / unit);
@@ -34,7 +34,7 @@ double target_of(double value, double unit)
 
 }  // namespace
 
-/// States as the network sees them, and the weights on their way.
+/// States as the network sees them, and the weights in training.
 class GateTrainer::State {
 public:
     State(const GateTraining& options, GateSamples training, GateSamples validation)
@@ -63,7 +63,7 @@ public:
             return true;
         }
         Adam adam(network_.parameters().size(), {});
-        best_cost_ = infinity;  // more states may have made what was best too bold
+        best_cost_ = infinity;  // more states may have made the best choice too bold
         std::size_t since_best = 0;
         std::size_t i = 0;
         const bool goes_on = resumed_ && round == resumed_->round;
@@ -98,7 +98,7 @@ public:
             }
             if (last || since_best >= options_.patience) return true;
             if (options_.cancelled && *options_.cancelled) {
-                // Before the first evaluation there is nothing worth keeping: no state is cleared.
+                // Before the first evaluation nothing is worth keeping: no state is cleared.
                 if (!best_.empty()) keep_([&] { save(round, i, since_best, adam); });
                 outcome_ = TrainingOutcome::stopped;
                 return false;
@@ -310,7 +310,7 @@ private:
         }
     }
 
-    /// Into the classes of which batches are made.
+    /// Sorts states into the classes from which batches are made.
     void sort_out()
     {
         fatal_.clear();
@@ -378,14 +378,14 @@ private:
             }
             return sum;
         }
-        // Pinball loss: the logit is to be above the target for `quantile` of the states.
+        // Pinball loss: the logit should be above the target for `quantile` of the states.
         const double above = target_of(set.value[i], options_.levels.front()) - logits[0];
         const double q = options_.quantile;
         slopes[0] = above > 0 ? -q : 1 - q;
         return above > 0 ? q * above : (q - 1) * above;
     }
 
-    /// Judges the present weights, as they would be stored, and keeps them if they are the best.
+    /// Assesses the present weights, as they would be stored, and keeps them if they are the best.
     double evaluate(std::size_t& since_best)
     {
         const std::vector<double> exact(network_.parameters().begin(), network_.parameters().end());
@@ -412,7 +412,7 @@ private:
         return mean;
     }
 
-    /// The thresholds of the best weights, after more states have come.
+    /// Computes the thresholds of the best weights again, after more states were added.
     void judge_again()
     {
         const std::vector<double> exact(network_.parameters().begin(), network_.parameters().end());
@@ -430,8 +430,8 @@ private:
         double cost = infinity;
     };
 
-    /// Thresholds that clear no fatal state, and of those that are left the cheapest. The logits
-    /// of the validation set are in `logits_`.
+    /// The least expensive thresholds that clear no fatal state. The logits of the validation set
+    /// are in `logits_`.
     [[nodiscard]] Choice choose()
     {
         std::vector<double> lowest(options_.levels.size(), infinity);
@@ -468,7 +468,7 @@ private:
         }
     }
 
-    /// Looks per step (or per time in which the guard can change by half the first level).
+    /// Checks per step (or per time in which the guard can change by half the first level).
     [[nodiscard]] double cost(const std::vector<double>& thresholds) const
     {
         double sum = 0;

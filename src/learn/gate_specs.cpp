@@ -41,7 +41,7 @@ GateSets sets_of(const GateSpec& spec, const GateTraining& training,
                  const ProgressCallback& progress)
 {
     GateRuns<GateSystem, X, Stepping> runs(spec.system, spec.starts, {}, training, progress);
-    // Named, since the order of the two draws is that of `train_gate`.
+    // A named variable, since the order of the two draws is that of `train_gate`.
     GateSamples first = runs.sample(training.events, training.states, training.seed);
     GateSamples second =
         runs.sample(training.validation_events, training.states / 4, training.seed + 1'000'003);

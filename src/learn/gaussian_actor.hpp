@@ -56,9 +56,9 @@ public:
     [[nodiscard]] Noise noise() const;
     /// New values of `noise.normal`.
     void draw(Noise& noise, Random& random) const;
-    /// All but the transposed ones, from these and the parameters: enough for `forward`.
+    /// All except the transposed weights, from these and the parameters: enough for `forward`.
     void prepare_forward(const T* parameters, Noise& noise) const;
-    /// All, for `backward` too.
+    /// All values, as `backward` needs them.
     void prepare(const T* parameters, Noise& noise) const;
 
     [[nodiscard]] Work work(std::size_t rows) const;
@@ -67,8 +67,8 @@ public:
     void forward(const T* parameters, const Noise& noise, Rows<const T> states, std::size_t rows,
                  Work& work) const;
 
-    /// The gradient of a loss with these derivatives by the actions, and `by_density` by each of
-    /// the log densities.
+    /// The gradient of a loss with these derivatives by the actions, and the derivative
+    /// `by_density` by each of the log densities.
     void backward(const Noise& noise, Rows<const T> states, std::size_t rows,
                   Rows<const T> by_actions, T by_density, Work& work, T* gradient) const;
 
@@ -77,7 +77,7 @@ public:
 
     [[nodiscard]] const BatchMlp<T>& trunk() const noexcept { return trunk_; }
     [[nodiscard]] const BatchMlp<T>& mean() const noexcept { return mean_; }
-    /// Where l begins.
+    /// Offset of l.
     [[nodiscard]] std::size_t deviation_offset() const noexcept { return deviation_; }
 
     static constexpr T mean_bound = T(2);

@@ -24,7 +24,7 @@ StatePath path(const FrictionHistory& h, double v_star, double log_l, double xi_
     const double l = std::exp(log_l);
     StatePath out;
     const double theta = l / v_star * std::exp(xi_start);
-    // d theta / d log L at the start: theta itself, since xi is what is held.
+    // d theta / d log L at the start: theta itself, since xi is held fixed.
     AgeingState s{theta, theta};
     double by_start = theta;
     for (std::size_t n = 0; n < h.t.size(); ++n) {

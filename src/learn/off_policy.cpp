@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view first_line = "ricochet policy checkpoint 1\n";
 
-/// All of the loop that a checkpoint holds; the learner and the buffer add theirs.
+/// The part of the loop that a checkpoint holds; the learner and the buffer add theirs.
 struct State {
     std::uint64_t step = 0;
     std::uint64_t episodes = 0;
@@ -26,7 +26,7 @@ struct State {
     Random::State actions{};  ///< of the uniform ones
     Random::State episode_seeds{};
     std::uint64_t episode_seed = 0;
-    std::vector<double> episode_actions;  ///< of the episode that continues, one after the other
+    std::vector<double> episode_actions;  ///< of the current episode, one after the other
     std::vector<double> observation;
     double episode_return = 0;
     double returns = 0;  ///< summed since the last report
@@ -111,7 +111,7 @@ public:
     }
 
 private:
-    /// Acts, keeps what came of it, and learns. Something if it cannot continue.
+    /// Acts, stores the transition, and learns. Returns an outcome if it cannot continue.
     std::optional<PolicyOutcome> step()
     {
         choose_action();
@@ -170,7 +170,7 @@ private:
         }
     }
 
-    /// The range of what is observed.
+    /// Updates the range of the observations.
     void look()
     {
         for (std::size_t i = 0; i < s_.observation.size(); ++i) {
@@ -298,7 +298,7 @@ private:
         return_to_episode();
     }
 
-    /// Takes the networks of another training, and nothing else.
+    /// Takes only the networks of another training.
     void start_from_other()
     {
         const State fresh = s_;
@@ -348,7 +348,7 @@ private:
         }
     }
 
-    /// Acts again as in the episode that was interrupted.
+    /// Repeats the actions of the interrupted episode.
     void return_to_episode()
     {
         const std::size_t width = action_.size();

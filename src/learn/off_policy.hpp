@@ -1,4 +1,4 @@
-// Acting, keeping and learning in turns: the loop around a learner.
+// Acting, storing and learning in turns: the loop around a learner.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,8 @@ struct Learner {
     std::function<bool()> finite;
     std::function<std::vector<DenseLayer>()> layers;
     std::function<void(Writer&)> shape;    ///< of the networks
-    std::function<void(Writer&)> options;  ///< the others that a resumed training must agree in
+    std::function<void(Writer&)> options;  ///< the other options in which a resumed training must
+                                           ///< agree
     std::function<void(Writer&)> save;
     std::function<void(Reader&)> load;
     std::function<void(std::uint64_t seed)> reseed;

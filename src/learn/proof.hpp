@@ -21,9 +21,9 @@ namespace ricochet::learn {
 
 enum class Stop { none, interrupted, out_of_time, out_of_memory };
 
-/// Examines the parts below a frontier on several threads, in order. Stops as soon as the parts
-/// that are done without a gap contain a counterexample or too many unproved boxes, so that
-/// neither depends on the speed of the threads.
+/// Examines the parts below a frontier on several threads, in order. It stops as soon as the
+/// finished parts without a gap contain a counterexample or too many unproved boxes, so the result
+/// does not depend on the speed of the threads.
 class Proof {
 public:
     Proof(const Statement& statement, Frontier frontier, std::size_t max_unproved, Begun& begun)
@@ -41,7 +41,7 @@ public:
         advance();
     }
 
-    /// @param wait  called about twenty times a second, while the workers are held; not none: stop
+    /// @param wait  called about twenty times a second while the workers are held; not `none`: stop
     template <class Wait>
     void run(unsigned threads, const Wait& wait)
     {
@@ -49,7 +49,7 @@ public:
         try {
             for (unsigned i = 0; i < threads; ++i) workers.emplace_back([this] { work(); });
         } catch (const std::system_error&) {
-            if (workers.empty()) throw;  // fewer threads do as well
+            if (workers.empty()) throw;  // fewer threads suffice
         }
         {
             std::unique_lock lock(mutex_);
@@ -82,7 +82,7 @@ private:
                (finished() || stop_ != Stop::none || error_ || next_ >= frontier_.open.size());
     }
 
-    /// Adds up what is done without a gap.
+    /// Adds up the finished parts without a gap.
     void advance()
     {
         while (!finished() && begun_.done[settled_]) {
@@ -147,7 +147,7 @@ private:
     std::size_t settled_ = 0;
     std::size_t next_ = 0;  ///< next part that is not claimed
     unsigned running_ = 0;
-    std::uint64_t boxes_ = 0;  ///< for the progress; parts that are not finished included
+    std::uint64_t boxes_ = 0;  ///< for the progress; including parts that are not finished
     Stop stop_ = Stop::none;
     std::exception_ptr error_{};
     std::mutex mutex_;

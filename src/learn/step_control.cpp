@@ -14,7 +14,7 @@ namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr double final_margin = 0.05;  // of the logarithm of work
-constexpr double tiny = 1e-12;         // below it errors are all alike
+constexpr double tiny = 1e-12;         // below it all errors are equal
 
 /// Tolerances of the classical curves.
 std::vector<double> fine_tolerances()
@@ -24,7 +24,7 @@ std::vector<double> fine_tolerances()
     return out;
 }
 
-/// Steps as long as the free estimate's are on the average at about that tolerance.
+/// Constant steps as long as the free estimate's steps on average at about that tolerance.
 StepRule constant_rule(double tolerance)
 {
     return {.controller = ConstantStep{}, .step = 20 * std::cbrt(tolerance)};
@@ -121,7 +121,7 @@ StepScore::StepScore(const StepFamily& family, unsigned threads) : family_(famil
                 final_error.add(mean.work, mean.final_error);
             }
             error.finish();
-            // A root mean square of a few errors that change their signs: smoothed.
+            // A root mean square of a few errors with changing signs is smoothed.
             final_error.finish(0.2);
             group.of_error.push_back(std::move(error));
             group.of_final.push_back(std::move(final_error));
@@ -174,7 +174,7 @@ LearnedStep rule_of(const StepLayout& layout, const std::vector<double>& weights
     return {.policy = std::make_shared<const StepPolicy>(step_policy_model(layout, weights))};
 }
 
-/// Random weights but for the last layer, which is zero; and how far each may wander.
+/// Random weights with a zero last layer, and the range in which each may vary.
 struct Start {
     std::vector<double> x;
     std::vector<double> scales;
@@ -197,7 +197,7 @@ Start start_of(std::uint64_t seed)
     return out;
 }
 
-/// The system and all problems, so that no checkpoint of other ones is resumed.
+/// Name of the system and all problems, so that no checkpoint of other ones is resumed.
 std::string name_of(const StepFamily& family)
 {
     std::string out(family.layout.system);

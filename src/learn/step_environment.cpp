@@ -25,14 +25,14 @@ constexpr std::size_t observations = 3 + StepView::state_inputs;
 /// Result of an attempt.
 struct Attempt {
     bool solved = false;
-    double length = 0;  ///< [s] of the step taken, or asked for
+    double length = 0;  ///< [s] of the step taken, or requested
     double error = 0;   ///< scaled
     double work = 0;
     double work_per_solve = 1;
     bool ended = false;
 };
 
-/// A fault under steps from outside.
+/// A fault whose steps are chosen by the caller.
 class FaultRun {
 public:
     FaultRun(const StrikeSlipFault& fault, double t_end, const StepWorldOptions& options)
@@ -83,7 +83,7 @@ public:
 
     [[nodiscard]] double done() const { return motion_->t() / t_end_; }
     [[nodiscard]] const StepView& view() const { return motion_->view(); }
-    /// Share of the squared error so far, at the end with what is left.
+    /// The squared error so far as a fraction of the whole; at the end with the remaining part.
     double squares(bool ended)
     {
         if (!ended) return comparison_->squares();
@@ -118,7 +118,7 @@ private:
     bool ended_ = false;
 };
 
-/// A small inclusion under steps from outside. A step without a solution ends it.
+/// A small inclusion whose steps are chosen by the caller. A step without a solution ends it.
 template <class System>
 class SmallRun {
 public:
@@ -189,7 +189,7 @@ public:
     [[nodiscard]] const StepView& view() const { return view_; }
     double squares(bool ended)
     {
-        // What was not reached counts as if it were zero.
+        // The part that was not reached counts as if it were zero.
         if (ended) {
             while (done_ + 1 < reference_.size()) sum_ += reference_[++done_].squaredNorm();
         }
@@ -308,7 +308,8 @@ private:
     {
         const StepView& view = run_.view();
         const auto bounded = [](double x) { return std::clamp(x, -5.0, 5.0); };
-        // As the source: 1 / (1 + E) says little of errors far from 1, their logarithm does.
+        // As in the source: 1 / (1 + E) says little about errors far from 1, unlike their
+        // logarithm.
         out[0] = bounded(std::log(std::max(error, 1e-10)) / 5);
         out[1] = bounded((std::log(std::max(view.step, 1e-6)) + 2) / 3);
         out[2] = view.switched - 2 * failed;

@@ -22,7 +22,7 @@ constexpr double usual_fault_step = 0.125 / 0.8660254037844386;  // [time units]
 using detail::Comparison;
 using detail::FaultReference;
 
-/// A fault, its reference, and what runs have left behind for the next ones.
+/// A fault, its reference, and data that runs keep for the next ones.
 class FaultProblem {
 public:
     FaultProblem(const StrikeSlipFault& fault, double t_end, double polynomial_bound,
@@ -96,7 +96,7 @@ private:
     std::vector<std::unique_ptr<BatheRuns>> idle_;
 };
 
-/// A fault that ruptures, and a time that holds it all.
+/// For a fault that ruptures, a time that contains the whole rupture.
 std::optional<double> time_of_rupture(const StrikeSlipFault& fault, double after)
 {
     const Rupture run = simulate(fault, {.t_end = 80, .rtol = 1e-3, .polynomial_bound = 1e-3});

@@ -43,7 +43,7 @@ struct SmallProblem {
                         .floor = start.norm()}},
             .max_attempts = constant ? 50'000U : 5'000U};
         if (rule.estimate == ErrorEstimate::doubling) {
-            // As the published code: components by themselves, its error of order 1.
+            // As in the published code: components are separate, and its error is of order 1.
             out.fields.clear();
             out.rtol = std::min(rule.tolerance, 0.5);
             out.atol = 1e-3 * rule.tolerance;
@@ -99,7 +99,7 @@ StepProblem as_problem(SmallProblem<System> problem, int group)
             .run = [shared](const StepRule& rule) { return shared->run(rule); }};
 }
 
-/// Up and down by at most this factor.
+/// The value times a random factor between 1 / `factor` and `factor`.
 double about(double value, double factor, Random& random)
 {
     return random.log_uniform(value / factor, value * factor);

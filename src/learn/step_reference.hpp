@@ -1,4 +1,4 @@
-// References of problems that steps are chosen for, and runs compared with them.
+// References of the problems for which steps are chosen, and comparison of runs with them.
 #pragma once
 
 #include <fmt/format.h>
@@ -51,10 +51,10 @@ public:
         }
     }
 
-    /// The square of the relative error so far, as a share of the whole run.
+    /// The square of the relative error so far, as a fraction of the whole run.
     [[nodiscard]] double squares() const { return sum_ / reference_.of_all; }
 
-    /// Relative; what comes after the last step is at rest.
+    /// Relative error; after the last step the motion counts as at rest.
     [[nodiscard]] double error()
     {
         for (; next_ <= fault_samples; ++next_) sum_ += column().squaredNorm();
@@ -105,7 +105,7 @@ inline constexpr std::size_t samples = 2000;
 template <class System>
 using Reference = std::vector<StateOf<System>>;
 
-/// The parabola through the start, the middle stage and the end of a step. Of step doubling the
+/// The parabola through the start, the middle stage and the end of a step. For step doubling the
 /// middle stage is that of the second half.
 struct StepParabola {
     double middle = 0.5;
@@ -115,7 +115,7 @@ struct StepParabola {
     {
     }
 
-    /// At a share of the step.
+    /// Value at a fraction of the step.
     template <class System>
     [[nodiscard]] StateOf<System> state(const SetValuedMotion<System>& motion, double theta) const
     {
@@ -125,7 +125,7 @@ struct StepParabola {
         return wa * motion.before().w + wb * motion.middle().w + wc * motion.state().w;
     }
 
-    /// [1/s] At its end.
+    /// [1/s] Rate at its end.
     template <class System>
     [[nodiscard]] StateOf<System> rate(const SetValuedMotion<System>& motion) const
     {
@@ -137,7 +137,7 @@ struct StepParabola {
     }
 };
 
-/// Walks the even times that a step covers.
+/// Visits the even times that a step covers.
 template <class System>
 class Samples {
 public:
@@ -164,7 +164,7 @@ private:
     std::size_t next_ = 1;
 };
 
-/// The solution.
+/// The exact solution.
 inline Reference<SlidingMode> reference_of(const SlidingMode& system, double from, double t_end)
 {
     Reference<SlidingMode> out;
@@ -179,7 +179,7 @@ inline Reference<DiodeCircuit> reference_of(const DiodeCircuit& system,
                                             const Eigen::Vector3d& start, double t_end)
 {
     Reference<DiodeCircuit> out{start};
-    // Of order 2 with its switches located: off by about a millionth.
+    // Order 2 with located switches: the error is about one millionth.
     SetValuedMotion<DiodeCircuit> motion(
         system, start,
         {.t_end = t_end, .step = 5e-4 * system.step_unit(), .switches = Switches::located});
@@ -188,7 +188,7 @@ inline Reference<DiodeCircuit> reference_of(const DiodeCircuit& system,
         (void)motion.advance();
         at.step(motion, [&](std::size_t, const Eigen::Vector3d& w) { out.push_back(w); });
     }
-    // The last time may lie behind the end by rounding.
+    // By rounding the last time may lie beyond the end.
     if (out.size() == samples) out.push_back(motion.state().w);
     if (motion.outcome() != Outcome::reached_end || out.size() != samples + 1) {
         throw std::runtime_error(fmt::format("the reference of a diode circuit ended early: {}",

@@ -24,7 +24,7 @@ double first_step(const StepRule& rule, double usual_step)
 SearchedSteps search_steps(const StepProblem& problem, std::size_t count, std::size_t evaluations,
                            std::uint64_t seed, unsigned threads, const StepWatch& watch)
 {
-    // Even steps as far as the motion goes: some end at rest, long before their time.
+    // Takes even steps as far as the motion goes: some motions come to rest long before their time.
     const StepTrial even = problem.run({.controller = ConstantStep{}});
     const double span = static_cast<double>(even.steps) * problem.usual_step;
     const std::vector<double> start(count, std::log(span / static_cast<double>(count)));
@@ -36,7 +36,7 @@ SearchedSteps search_steps(const StepProblem& problem, std::size_t count, std::s
     const EvolutionResult found = evolve(
         [&](std::span<const double> x) {
             const StepTrial trial = problem.run(prescribed(lengths_of(x)));
-            // More steps than asked for, because the last was repeated, are no bargain.
+            // More steps than requested, because the last was repeated, are no gain.
             const double more =
                 std::max(0.0, static_cast<double>(trial.steps) / static_cast<double>(count) - 1);
             return std::log(std::max(trial.error, 1e-12)) + 10 * more + (trial.ended ? 0 : 10);

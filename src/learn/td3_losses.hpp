@@ -60,10 +60,10 @@ public:
         std::size_t batch;  ///< B, of which this is a part
     };
 
-    /// The part's share in the loss, and its gradient by the critics' parameters.
+    /// The part's contribution to the loss, and its gradient by the critics' parameters.
     double critic_part(const Parameters& p, Work& work, T* gradient) const;
 
-    /// The same of the actor.
+    /// The same for the actor.
     double actor_part(const Parameters& p, Work& work, T* gradient) const;
 
 private:

@@ -16,8 +16,8 @@ namespace ricochet::learn {
 
 namespace {
 
-// Rows of a batch that are worked on together: few enough that their layers stay in the cache, and
-// the same however many threads there are, so that sums have the same bits.
+// Number of rows of a batch processed together: few enough for their layers to stay in the cache,
+// and independent of the number of threads, so that sums have the same bits.
 constexpr std::size_t part_rows = 64;
 
 void check(const TqcOptions& o)
@@ -253,8 +253,8 @@ private:
         });
     }
 
-    /// Down the gradient of -log(temperature) times the mean of log density + target, the target
-    /// being an entropy of -1 per action.
+    /// Descends the gradient of -log(temperature) times the mean of log density + target, where the
+    /// target is an entropy of -1 per action.
     void move_temperature()
     {
         double mean = 0;

@@ -58,7 +58,7 @@ void TqcLosses<T>::make_targets(const Parameters& p, Work& work) const
     const auto kept = static_cast<std::ptrdiff_t>(all - shape_.dropped * shape_.critics);
     for (std::size_t i = 0; i < batch.rows; ++i) {
         T* z = work.pool.data() + i * all;
-        T check = 0;  // NaN if one of them is not finite: they could not be put in order
+        T check = 0;  // NaN if one of them is not finite: they could not be sorted
         for (std::size_t j = 0; j < all; ++j) check += T(0) * z[j];
         if (check == 0) std::nth_element(z, z + kept, z + all);
         const T entropy = p.temperature * work.actor.log_density[i];
@@ -68,7 +68,7 @@ void TqcLosses<T>::make_targets(const Parameters& p, Work& work) const
     }
 }
 
-/// Slopes of the critics' outputs, and the loss if asked for.
+/// Slopes of the critics' outputs, and the loss if requested.
 template <class T>
 double TqcLosses<T>::huber(Work& work, const Parameters& p, bool loss) const
 {

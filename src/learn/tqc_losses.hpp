@@ -30,7 +30,7 @@ struct TqcShape {
     std::size_t dropped;    ///< of each critic
 };
 
-/// Shares of a part in the sums over the batch.
+/// Contributions of a part to the sums over the batch.
 struct ActorSums {
     double loss = 0;         ///< divided by the size of the batch
     double log_density = 0;  ///< not divided
@@ -78,7 +78,7 @@ public:
         std::size_t batch;  ///< B, of which this is a part
     };
 
-    /// Gradient by the critics' parameters; the loss only if it is asked for.
+    /// Gradient by the critics' parameters; the loss only if requested.
     double critic_part(const Parameters& p, Work& work, bool loss, T* gradient) const;
 
     /// Gradient by the actor's parameters; the actor's loss and log densities.

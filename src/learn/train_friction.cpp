@@ -46,7 +46,7 @@ public:
     [[nodiscard]] double value() const { return xi_; }
     [[nodiscard]] const Eigen::VectorXd& sensitivity() const { return sensitivity_; }
 
-    /// Over an interval of length h in which V/V* goes linearly from u0 to u1.
+    /// Advances over an interval of length h in which V/V* goes linearly from u0 to u1.
     void advance(double u0, double u1, double h, int steps)
     {
         const double part = h / steps;
@@ -56,7 +56,7 @@ public:
         }
     }
 
-    /// Steps for an interval: with the slip in it, since the state forgets by slip.
+    /// Number of steps for an interval, by the slip in it, since the state forgets by slip.
     [[nodiscard]] static int steps_for(double u0, double u1, int refine)
     {
         const double u = std::max(u0, u1);
@@ -83,7 +83,7 @@ private:
         if (with_gradient_) sensitivity_ = stage_;
     }
 
-    /// xi - before - own rate(xi) = 0, between before and before + own rate(before).
+    /// Solves xi - before - own rate(xi) = 0, between before and before + own rate(before).
     [[nodiscard]] double solve(double y, double u, double before, double own, double guess) const
     {
         const double far = before + own * model_.rate(j_, y, u, before, nullptr).value;
@@ -95,7 +95,7 @@ private:
             const double gap = xi - before - own * r.value;
             const double step = -gap / (1 - own * r.slope);
             (gap > 0 ? upper : lower) = xi;
-            // What is left after a step this small is its square.
+            // After a step this small the error is its square.
             if (std::abs(step) <= 1e-8) return xi + step;
             const double next = xi + step;
             xi = next > lower && next < upper ? next : (lower + upper) / 2;

@@ -10,7 +10,7 @@ namespace ricochet::learn {
 
 namespace {
 
-// States are worked on in blocks: a block of one row stays in registers while
+// States are processed in blocks: a block of one row stays in registers while
 // the other index runs, and its lanes never mix except in `sum`.
 constexpr std::size_t block = 8;
 using Block = std::array<double, block>;
@@ -32,7 +32,7 @@ double sum(const Block& b)
     return ((b[0] + b[4]) + (b[2] + b[6])) + ((b[1] + b[5]) + (b[3] + b[7]));
 }
 
-// Evaluations of many states go through in pieces that stay in the cache.
+// Evaluations of many states are done in pieces that stay in the cache.
 constexpr std::size_t piece = 256;
 
 }  // namespace

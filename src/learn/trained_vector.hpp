@@ -1,4 +1,4 @@
-// Parameters on their way: with the moments of Adam and, maybe, a copy that follows.
+// Parameters in training: with the moments of Adam and optionally a target copy that follows them.
 #pragma once
 
 #include <algorithm>
@@ -26,12 +26,12 @@ public:
     [[nodiscard]] const float* target() const noexcept { return target_.data(); }
     void copy_to_target() { target_ = values_; }
 
-    /// Counts a step; then `step` is called for each part of the vector.
+    /// Counts a step; `step` is then called for each part of the vector.
     void begin_step() noexcept { ++steps_; }
 
-    /// Components `begin` to `begin` + n move against the gradient.
+    /// Moves components `begin` to `begin` + n against the gradient.
     /// @param gradient  of the whole vector, in `parts` summands
-    /// @param polyak    of the target; 0: it stays
+    /// @param polyak    rate of the target; 0: it does not move
     void step(std::size_t begin, std::size_t n, const Buffer<float>& gradient, std::size_t parts,
               double rate, double polyak) noexcept
     {

@@ -1,4 +1,4 @@
-// Transitions that a learner is taught from, kept and drawn.
+// Transitions from which a learner learns, stored and sampled.
 #pragma once
 
 #include <algorithm>
@@ -53,7 +53,7 @@ public:
         writer.put(numbers_);
     }
 
-    /// Whether what was read is a buffer of this width and capacity.
+    /// Whether the data read are a buffer of this width and capacity.
     [[nodiscard]] bool load(Reader& reader)
     {
         std::uint64_t next = 0;
@@ -71,11 +71,11 @@ private:
     std::size_t width_;
     std::size_t capacity_;
     std::size_t size_ = 0;
-    std::size_t next_ = 0;  ///< to be written
+    std::size_t next_ = 0;  ///< next place to be written
     std::vector<float> numbers_;
 };
 
-/// Transitions as matrices; what is handed to a thread.
+/// Transitions as matrices, as passed to a thread.
 template <class T>
 struct Transitions {
     Transitions(std::size_t observations, std::size_t actions, std::size_t most_rows)
@@ -117,7 +117,7 @@ struct Transitions {
     Buffer<T> going_on;  ///< 0 after a terminal step, else 1
 };
 
-/// Rows of (state, action) from both.
+/// Rows of (state, action) from the two.
 template <class T>
 void join(Rows<const T> states, std::size_t observations, Rows<const T> actions,
           std::size_t n_actions, std::size_t rows, Rows<T> out)

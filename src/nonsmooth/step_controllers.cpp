@@ -26,7 +26,7 @@ StepVerdict ErrorStep::judge(double error, double /*h*/) const noexcept
 StepVerdict HeuristicStep::judge(double error, double /*h*/) const noexcept
 {
     const double factor = std::pow(positive(error), -1.0 / (order + 1));
-    // Just above 1 the power rounds to 1, and the same step would be rejected for ever.
+    // Just above 1 the power rounds to 1, and the same step would be rejected forever.
     constexpr double below_one = 1 - std::numeric_limits<double>::epsilon() / 2;
     return error <= 1 ? StepVerdict{true, std::min(up, factor)}
                       : StepVerdict{false, std::min(factor, below_one)};

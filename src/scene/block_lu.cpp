@@ -8,7 +8,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// A pivot that shrinks by more has lost the digits that the iterations around it need.
+/// A pivot that shrinks below this fraction has lost the digits that the iterations need.
 constexpr double least_pivot = 1e-13;
 
 using Block = BlockLu::Block;
@@ -37,7 +37,7 @@ using Block = BlockLu::Block;
 
 }  // namespace
 
-/// Rows of the least degree first; what a row is coupled with becomes coupled.
+/// Orders rows by least degree; all rows that a row is coupled with become coupled.
 void BlockLu::order(int count, const std::vector<std::array<int, 2>>& pairs)
 {
     std::vector<std::set<int>> near(static_cast<std::size_t>(count));

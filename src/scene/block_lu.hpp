@@ -1,8 +1,8 @@
-// Elimination of sparse matrices of 2 x 2 blocks whose pattern is symmetric and known before.
+// Elimination of sparse matrices of 2 x 2 blocks whose symmetric pattern is known in advance.
 //
-// Factors A = L U in an order of least degree, pivots within the diagonal blocks alone. Matrices of
-// contacts are small and are factored again and again with other numbers in the same places:
-// what a general sparse elimination spends on finding those places is most of its time.
+// Factors A = L U in an order of least degree, with pivots within the diagonal blocks alone.
+// Matrices of contacts are small and are factored again and again with other numbers in the same
+// places; a general sparse elimination would spend most of its time on finding those places.
 #pragma once
 
 #include <Eigen/Dense>
@@ -18,7 +18,7 @@ public:
     /// Row-major: xx, xy, yx, yy.
     using Block = std::array<double, 4>;
 
-    /// For `count` diagonal blocks, and others at (i, j) and (j, i) of each pair.
+    /// Prepares for `count` diagonal blocks, and blocks at (i, j) and (j, i) of each pair.
     void analyze(int count, const std::vector<std::array<int, 2>>& pairs);
 
     void clear();
@@ -32,8 +32,8 @@ public:
         for (const std::size_t at : pairs_[pair]) add_to(at, -1, block);
     }
 
-    /// False where a diagonal block is singular, or so small beside what it was that digits are
-    /// lost.
+    /// False where a diagonal block is singular, or so small compared with its first value that
+    /// digits are lost.
     [[nodiscard]] bool factor();
     [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
 
@@ -45,9 +45,10 @@ private:
     void order(int count, const std::vector<std::array<int, 2>>& pairs);
 
     std::vector<int> place_;               ///< of a block's row in the elimination
-    std::vector<std::vector<int>> later_;  ///< rows that a row is coupled with, when its turn comes
-    std::vector<std::size_t> upper_;       ///< where a row's blocks to the right begin
-    std::vector<std::size_t> lower_;       ///< and those below the diagonal
+    std::vector<std::vector<int>> later_;  ///< rows with which a row is coupled when it is
+                                           ///< eliminated
+    std::vector<std::size_t> upper_;       ///< start of a row's blocks to the right
+    std::vector<std::size_t> lower_;       ///< start of its blocks below the diagonal
     std::vector<std::uint32_t> targets_;   ///< of the products, in the order of their use
     std::vector<std::array<std::size_t, 2>> pairs_;
     std::vector<Block> blocks_;  ///< diagonal ones first; inverted by `factor`

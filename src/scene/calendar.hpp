@@ -1,7 +1,7 @@
-// Next body to act, with one entry for each body that is awake: a heap of four children a node or,
-// where there are many, a ring of lists of which the present one alone is in the heap (G. Paul, A
-// complexity O(1) priority queue for event driven molecular dynamics simulations, Journal of
-// Computational Physics 221, 2007). Both have the same order.
+// Finds the next body to act, with one entry for each awake body: a heap of four children a node
+// or, where there are many, a ring of lists of which only the present one is in the heap (G. Paul,
+// A complexity O(1) priority queue for event driven molecular dynamics simulations, Journal of
+// Computational Physics 221, 2007). Both give the same order.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ class Calendar {
 public:
     explicit Calendar(std::size_t bodies) : place_(bodies, none) {}
 
-    /// No entries; with a ring if there are to be many.
+    /// Removes all entries; with a ring if there will be many.
     void clear(bool with_ring)
     {
         for (const Entry& entry : heap_) place_[entry.body] = none;
@@ -33,7 +33,7 @@ public:
         present_ = 0;
         origin_ = inverse_ = 0;
     }
-    /// Whether there is no entry. `first` is what precedes all others after a call that says no.
+    /// Whether there is no entry. After a call that returns false, `first` precedes all others.
     [[nodiscard]] bool empty()
     {
         while (ring_ && heap_.empty()) {
@@ -48,7 +48,7 @@ public:
     [[nodiscard]] std::uint32_t first() const noexcept { return heap_[0].body; }
     [[nodiscard]] const Instant& first_time() const noexcept { return heap_[0].t; }
 
-    /// The entry of a body; an infinite time takes it out.
+    /// Sets the entry of a body; an infinite time removes it.
     void set(std::uint32_t body, const Instant& t)
     {
         if (ring_) return set_in_ring(body, t);
@@ -57,11 +57,11 @@ public:
     }
 
 private:
-    /// Entries in a list when it becomes the present one: few lists are empty, and the heap stays
-    /// in the nearest cache.
+    /// Mean number of entries in a list when it becomes the present one: few lists are empty, and
+    /// the heap stays in the nearest cache.
     static constexpr double in_a_list = 16;
 
-    /// What a list says counts if `times_` agrees when it is poured: nothing is ever taken out.
+    /// A node of a list is valid if `times_` agrees when the list is poured; none is ever removed.
     struct Node {
         std::uint32_t body = none;
         std::uint32_t next = none;
@@ -100,7 +100,7 @@ private:
             late_.push_back(body);
         }
     }
-    /// The entries of a list into the heap.
+    /// Moves the entries of a list into the heap.
     void pour(std::size_t list)
     {
         std::uint32_t node = lists_[list];
@@ -115,9 +115,10 @@ private:
             node = next;
         }
     }
-    /// All entries are late: new lists, as long as a quarter of the entries fill in a quarter of
-    /// the lists of as many. So a turn of the ring has at least a quarter of them, and its cost is
-    /// shared by as many events. False if there are none.
+    /// Builds new lists when all entries are late. The first quarter of the entries determines
+    /// their width, such that it has `in_a_list` entries a list. So a turn of the ring has at least
+    /// a quarter of the entries, and its cost is divided among as many events. False if there are
+    /// none.
     bool turn()
     {
         std::erase_if(late_, [&](std::uint32_t body) {
@@ -139,7 +140,7 @@ private:
         if (!(until > 0)) until = std::ranges::max(some_) - origin_;
         const double count = static_cast<double>(late_.size()) / in_a_list;
         inverse_ = 0.25 * count / until;
-        if (!std::isfinite(inverse_)) inverse_ = 0;  // at one time: all in the heap
+        if (!std::isfinite(inverse_)) inverse_ = 0;  // all at one time: all go into the heap
         lists_.assign(static_cast<std::size_t>(2 * count) + 2, none);
         present_ = 0;
         waiting_.swap(late_);
@@ -173,7 +174,7 @@ private:
         Instant t;
         std::uint32_t body;
     };
-    /// Of two at one time the lower label, which decides nothing but the order of the work.
+    /// Orders entries at one time by label, which affects only the order of the work.
     [[nodiscard]] static bool precedes(const Entry& a, const Entry& b) noexcept
     {
         if (a.t.value != b.t.value) return a.t.value < b.t.value;
@@ -236,7 +237,7 @@ private:
     std::uint32_t free_ = none;
     std::size_t present_ = 0;
     double origin_ = 0, inverse_ = 0;
-    std::vector<std::uint32_t> late_, waiting_;  ///< entries behind the last list
+    std::vector<std::uint32_t> late_, waiting_;  ///< entries beyond the last list
     std::vector<char> is_late_;
     std::vector<double> some_;
 };

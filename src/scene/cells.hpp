@@ -1,5 +1,5 @@
-// A grid of cells over the whole plane, folded onto a torus: a body far away shares its bucket with
-// one that is near, which costs a question and decides nothing.
+// A grid of cells over the whole plane, folded onto a torus: a body far away may share its bucket
+// with one that is near, which costs a test but changes no result.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ class Cells {
 public:
     Cells() = default;
 
-    /// Empty cells of this side. Numbers of buckets are powers of two.
+    /// Makes empty cells with this side. The numbers of buckets are powers of two.
     void size(double side, std::uint32_t buckets_x, std::uint32_t buckets_y)
     {
         side_ = side;
@@ -63,7 +63,7 @@ public:
     [[nodiscard]] std::uint32_t head(std::uint32_t bucket) const noexcept { return heads_[bucket]; }
     [[nodiscard]] std::size_t buckets() const noexcept { return heads_.size(); }
 
-    /// The cell and its neighbours.
+    /// Visits the cell and its neighbours.
     template <class Visit>
     void around(const Cell& cell, const Visit& visit) const
     {
@@ -71,14 +71,14 @@ public:
             for (int y = -1; y <= 1; ++y) visit(bucket_of(cell.x + x, cell.y + y));
         }
     }
-    /// Bodies in a bucket.
+    /// Visits the bodies in a bucket.
     template <class Visit>
     void each_in(std::uint32_t bucket, const std::vector<Body>& bodies, const Visit& visit) const
     {
         for (std::uint32_t j = heads_[bucket]; j != none; j = bodies[j].next) visit(j);
     }
 
-    /// Faces that reach into a bucket; there are none to ask for unless `any_faces()`.
+    /// Adds a face that reaches into a bucket; without any, `any_faces()` is false.
     void add_face(std::uint32_t bucket, std::uint32_t face)
     {
         if (fixed_.empty()) fixed_.resize(heads_.size());

@@ -1,5 +1,5 @@
-// Chains of segments from surfaces that end where others begin: what touches a corner passes it by
-// the same rules, whether one surface has both of its sides or each is a surface of its own.
+// Chains of segments from surfaces that end where others begin: a body that touches a corner passes
+// it by the same rules, whether one surface has both of its sides or each is a surface of its own.
 #include <map>
 
 #include "scene/motion.hpp"
@@ -9,7 +9,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Open terrain as it lies among the faces: segments at every second place from `first`.
+/// Open terrain as it is stored among the faces: segments at every second place from `first`.
 struct Chain {
     const std::vector<Vector2>* points = nullptr;
     std::uint32_t first = 0;
@@ -20,12 +20,12 @@ struct Chain {
     {
         return static_cast<std::uint32_t>(points->size() - 1);
     }
-    /// The segment at its start (0) or end (1), as its points are given.
+    /// The segment at its start (0) or end (1), in the order of its points.
     [[nodiscard]] std::uint32_t at_end(int end) const
     {
         return first + (end == 0 ? 0 : 2 * (segments() - 1));
     }
-    /// From that end to the point beside it.
+    /// Direction from that end to the adjacent point.
     [[nodiscard]] Vector2 into(int end) const
     {
         const std::size_t last = points->size() - 1;
@@ -61,7 +61,7 @@ public:
         }
         partners_.assign(chains_.size(), {none_, none_});
         for (const auto& [point, ends] : places) {
-            // Where three meet, none of them goes on in one other.
+            // Where three meet, none of them continues in a single other one.
             if (ends.size() != 2 || folds_back(ends[0], ends[1])) continue;
             for (const int side : {0, 1}) {
                 const auto& [chain, end] = ends[static_cast<std::size_t>(side)];
@@ -77,7 +77,7 @@ public:
     }
 
 private:
-    /// Two that lie upon each other have no corner.
+    /// Two segments that lie upon each other have no corner.
     [[nodiscard]] bool folds_back(const End& a, const End& b) const
     {
         const Vector2 first = chains_[a.chain].into(a.end);
@@ -86,7 +86,7 @@ private:
         return dot(first, second) > 0 && std::fabs(dot(turned(first), second)) <= 1e-12 * sizes;
     }
 
-    /// Of all that are joined with it, the end of each is the start of the next.
+    /// Orients all chains joined with it so that the end of each is the start of the next.
     void orient_from(std::size_t start)
     {
         std::vector<std::size_t> reached;

@@ -17,8 +17,8 @@ constexpr double epsilon = 2.220446049250313e-16;
 
 // --- the law of one step ---
 
-/// Springs resist the velocity that they will have caused: h c + h^2 k along the spring, and its
-/// tension across, where it pulls.
+/// Springs resist the velocity at the end of the step: with h c + h^2 k along the spring, and with
+/// its tension across, where it pulls.
 void ContactIsland::couple_springs(double h)
 {
     problem_.couplings.clear();
@@ -40,7 +40,7 @@ void ContactIsland::couple_springs(double h)
     }
 }
 
-/// What does not depend on contacts.
+/// Assembles the terms that do not depend on contacts.
 void ContactIsland::assemble(double h, const Eigen::VectorXd& v)
 {
     const auto n = bodies_.size();
@@ -63,7 +63,7 @@ LawContact ContactIsland::law_contact(const Touch& touch, double h) const
                  .normal = touch.normal,
                  .offset = {},
                  .friction = touch.law.friction};
-    // Rounding goes back in one step; what is deeper is not pushed out at a speed.
+    // An overlap by rounding is removed in one step; a deeper one is not pushed out at a speed.
     c.offset[0] = std::max(touch.gap, -closed_gap * size_of(touch.body)) / h;
     if (!touch.wall) return c;
     const auto way = wall_displacement(touch.other, t_, t_ + h);
@@ -73,12 +73,12 @@ LawContact ContactIsland::law_contact(const Touch& touch, double h) const
     return c;
 }
 
-/// Of the last step, where the same contact pushed then.
+/// Impulses of the last step, for contacts that pushed then.
 Eigen::VectorXd ContactIsland::warm_impulses(double h) const
 {
     Eigen::VectorXd p = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(touches_.size()));
     if (!(warm_step_ > 0)) return p;
-    // Both are in the order of their members.
+    // Both lists are in the order of their members.
     std::size_t k = 0;
     const auto before = [](const Touch& a, const Touch& b) {
         return std::tuple(a.wall, a.body, a.other) < std::tuple(b.wall, b.body, b.other);
@@ -103,7 +103,7 @@ bool ContactIsland::solve_touches(double h)
     const bool overlaps = std::ranges::any_of(touches_, [](const Touch& c) { return c.gap < 0; });
     if (solve_law(h, !overlaps)) return true;
     if (!overlaps) return false;
-    // Discs that friction has wedged cannot part by what rounding lets them overlap: it stays.
+    // Discs that friction has wedged cannot part by an overlap of rounding: it is left in place.
     for (std::size_t k = 0; k < touches_.size(); ++k) {
         Touch closed = touches_[k];
         closed.gap = std::max(0.0, closed.gap);
@@ -113,8 +113,8 @@ bool ContactIsland::solve_touches(double h)
     return solve_law(h, true);
 }
 
-/// The contacts that there are, from the impulses of the last step. Without last resorts nothing
-/// but a solution will do.
+/// Solves the present contacts, from the impulses of the last step. Without last resorts only
+/// a converged solution is accepted.
 bool ContactIsland::solve_law(double h, bool last_resorts)
 {
     impulses_ = warm_impulses(h);
@@ -138,7 +138,7 @@ bool ContactIsland::stays_within(const std::vector<double>& reach, double h) con
     return true;
 }
 
-/// The velocities after a step of length h, in `v_next_`.
+/// Computes the velocities after a step of length h, in `v_next_`.
 bool ContactIsland::attempt(double h)
 {
     assemble(h, v_);
@@ -176,8 +176,9 @@ double ContactIsland::relative_normal(const Touch& touch, const Eigen::VectorXd&
     return nx * x + ny * y;
 }
 
-/// Leaves out what would rebound for a step or longer, so that the motion goes on up to it. A
-/// shorter rebound is spent: what a step does not resolve accumulates within it.
+/// Excludes contacts that would rebound for a step or longer, so that the motion goes on up to
+/// them. A shorter rebound is dissipated: impacts that a step does not resolve accumulate within
+/// it.
 bool ContactIsland::exclude_arrivals(double h)
 {
     Eigen::VectorXd kick = problem_.momentum;
@@ -200,7 +201,7 @@ bool ContactIsland::exclude_arrivals(double h)
                    warm_impulses_[2 * static_cast<Eigen::Index>(&w - warm_.data())] > 0;
         });
         if (lasts || !(approach > 0)) continue;
-        // Under gravity whatever is as slow as a step of free fall is pressed together soon.
+        // Under gravity any approach as slow as a step of free fall is soon pressed together.
         const double press =
             std::max(-relative_normal(c, kick) / h, std::hypot(gravity_[0], gravity_[1]));
         if (2 * c.law.restitution * approach < press * h) {
@@ -240,8 +241,9 @@ ContactIsland::Touch ContactIsland::on_chord(const Touch& touch, double s) const
     return then;
 }
 
-/// On the straight lines of the step; infinite where the gap stays open. Gaps are convex along
-/// them, so that Newton's method comes from the left and does not pass the first root.
+/// Time at which a contact closes on the straight lines of the step; infinite where the gap stays
+/// open. Gaps are convex along them, so Newton's method comes from the left and does not pass the
+/// first root.
 double ContactIsland::closing_time(const Touch& touch, double h) const
 {
     double s = 0;
@@ -261,7 +263,7 @@ double ContactIsland::closing_time(const Touch& touch, double h) const
     return std::numeric_limits<double>::infinity();
 }
 
-/// Of those left out, which close first, and when; those that do so together are `arrivals_`.
+/// Time of the first of the excluded contacts to close; those that close together are `arrivals_`.
 double ContactIsland::first_arrival(double h)
 {
     double first = std::numeric_limits<double>::infinity();
@@ -293,7 +295,7 @@ IslandContact ContactIsland::public_contact(const Touch& c, double normal, doubl
 
 // --- steps ---
 
-/// A step of length h or, where its contacts are not solved, of a part of it.
+/// Takes a step of length h or, where its contacts are not solved, of a fraction of it.
 bool ContactIsland::fit_step(double h)
 {
     for (int halving = 0; halving <= 10; ++halving) {
@@ -339,7 +341,7 @@ ContactIsland::Plan ContactIsland::plan(double until)
     return {IslandOutcome::reached, planned_};
 }
 
-/// Whether this step is the last of as many without contact as patience asks for. It is not
+/// Whether this step is the last of as many without contact as the patience requires. It is not
 /// taken: the scene goes on from where contact has ended, or from where patience has.
 bool ContactIsland::is_released() const
 {
@@ -381,7 +383,7 @@ void ContactIsland::commit(double s)
     statistics_.largest_residual = std::max(statistics_.largest_residual, failure_.residual);
     if (whole) try_to_sleep(free);
     planned_ = 0;
-    // A wall is not where the straight line of a step leads, when it is cut.
+    // A moving wall is not on the straight line of a step when the step is cut.
     const auto moving = [](const IslandWall& wall) { return wall.motion != nullptr; };
     if (!whole && std::ranges::any_of(walls_, moving)) project();
 }
@@ -417,8 +419,8 @@ IslandOutcome ContactIsland::advance_once(double until)
     return next.outcome;
 }
 
-/// The same step whole and in two halves, which count; their difference is the error of the whole
-/// one, and about that of the halves.
+/// Takes the same step whole and in two halves. The halves are kept; the difference is the error of
+/// the whole step, and approximately that of the halves.
 IslandOutcome ContactIsland::advance_by_halves(double until)
 {
     const Plan whole = plan(until);
@@ -443,7 +445,7 @@ IslandOutcome ContactIsland::advance_by_halves(double until)
 
 // --- rest ---
 
-/// Whether no velocity at all follows from a step of length h at rest.
+/// Whether a step of length h from rest leaves all velocities zero.
 bool ContactIsland::rests(double h)
 {
     excluded_.clear();
@@ -470,7 +472,8 @@ bool ContactIsland::rests(double h)
            v_next_.lpNorm<Eigen::Infinity>() <= options_.tolerance * largest;
 }
 
-/// Where velocities are zero, but for what the solver and the rounding of gaps leave, and stay so.
+/// Puts the island to sleep where velocities are zero, up to the errors of the solver and of the
+/// rounding of gaps, and remain zero.
 void ContactIsland::try_to_sleep(double free_speed)
 {
     if (!(wake_time() > t_)) return;

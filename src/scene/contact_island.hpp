@@ -1,10 +1,10 @@
 // A connected group of bodies and walls in lasting contact, in the plane.
 //
 // The scene's loop hands a group over where impacts accumulate or a contact is pressed together,
-// and takes it back where nothing is in contact any more. Bodies are discs without spin (points are
+// and takes it back where no contact remains. Bodies are discs without spin (points are
 // discs of radius 0): two coordinates each, so that friction acts on centres and a force at a rim
 // exerts no torque. A disc on an incline slides like a block and does not roll; angular momentum is
-// not kept in the friction of a pair.
+// not conserved in the friction of a pair.
 //
 // A step of length h is implicit in velocities, contacts, springs, dampers and drag, and explicit
 // in gravity (Moreau's rule over Signorini's and Coulomb's laws; with the gap in the law as in M.
@@ -14,7 +14,7 @@
 //     M (v+ - v) = h F + G' p,    q+ = q + h v+
 //     0 <= p_n,  n.(v+ - w) + g(q)/h >= 0, complementary;  friction on t.(v+ - w)
 //
-// with w the velocity of a wall. Restitution is 0 in it. Three things follow:
+// with w the velocity of a wall. The law has restitution 0. Three properties follow:
 //
 //  - distances of discs from discs, lines and segments are convex, and their linear model is below
 //    them: no gap of a step's end is negative beyond rounding, whatever the step;
@@ -39,12 +39,12 @@ namespace ricochet::detail {
 
 struct IslandStatistics {
     std::uint64_t steps = 0;
-    std::uint64_t problems = 0;    ///< contact laws solved, those of repeated steps included
+    std::uint64_t problems = 0;    ///< contact laws solved, including those of repeated steps
     std::uint64_t iterations = 0;  ///< of Newton's method in them
     std::uint64_t factors = 0;
     std::uint64_t sweeps = 0;
     std::uint64_t dense = 0;     ///< problems that only the dense solver could solve
-    std::uint64_t wedged = 0;    ///< problems solved with overlaps by rounding left as they are
+    std::uint64_t wedged = 0;    ///< problems solved with overlaps by rounding left in place
     std::uint64_t halvings = 0;  ///< steps tried again at half the length
     std::uint64_t spent = 0;     ///< arrivals whose rebound would have been shorter than a step
     std::uint64_t slept = 0;
@@ -55,7 +55,7 @@ struct IslandStatistics {
     double projected = 0;      ///< [m] the farthest that a body was moved onto its surface
 };
 
-/// What `ContactIsland::strike` did.
+/// Result of `ContactIsland::strike`.
 struct StrikeReport {
     bool refused = false;  ///< nothing was changed
     std::string message;
@@ -65,57 +65,57 @@ struct StrikeReport {
 
 class ContactIsland {
 public:
-    /// Bodies and walls are put into an order that depends on where they are, not on ids. What lies
-    /// behind a surface by no more than `largest_overlap` is put onto it, moving least by mass.
+    /// Bodies and walls are ordered by position, not by id. A body that lies behind a surface by no
+    /// more than `largest_overlap` is put onto it by the least displacement, weighted by mass.
     ///
     /// @throws std::invalid_argument for an overlap beyond that (which, and by how much), a mass or
-    /// step that is not positive, an unknown body of a spring, what is not finite.
+    /// step that is not positive, an unknown body of a spring, or a number that is not finite.
     ContactIsland(IslandSetup setup, const IslandOptions& options, double t);
 
-    /// Steps until `until`, or until something else ends it, exactly then.
+    /// Steps until `until`, or until another outcome ends it at an earlier time.
     IslandOutcome advance(double until);
 
-    /// The same under the scene's eyes: a step no farther than `until`, which nothing has changed
-    /// yet. `length` is 0 where it was not `reached`, and where the island sleeps the time until it
-    /// wakes or `until`; with `impact` the time until the arrival.
+    /// Plans the same for the scene: a step no farther than `until`, which has not changed anything
+    /// yet. `length` is 0 where it was not `reached`; where the island sleeps it is the time until
+    /// it wakes or `until`; with `impact` it is the time until the arrival.
     struct Plan {
         IslandOutcome outcome = IslandOutcome::reached;
         double length = 0;  ///< [s]
     };
     Plan plan(double until);
-    /// [s] Length of the current step, of which an arrival may cut a part off.
+    /// [s] Length of the current step, which an arrival may shorten.
     [[nodiscard]] double planned_step() const noexcept { return planned_; }
     /// The planned motion: at + s chord.
     [[nodiscard]] std::array<double, 2> chord(std::uint32_t id) const;
-    /// Goes to s, no farther than the length of the plan.
+    /// Advances to s, at most the length of the plan.
     void commit(double s);
 
     [[nodiscard]] double t() const noexcept { return t_; }
     [[nodiscard]] bool asleep() const noexcept { return asleep_; }
-    /// When a wall begins to move; infinite where none does.
+    /// Time at which a wall begins to move; infinite if none does.
     [[nodiscard]] double wake_time() const;
     void wake();
 
     [[nodiscard]] std::size_t size() const noexcept { return bodies_.size(); }
     [[nodiscard]] IslandBody body(std::uint32_t id) const;
-    /// After an impact. Wakes the island.
+    /// Sets a velocity after an impact, and wakes the island.
     void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity);
 
-    /// Newton's law of impact and Coulomb's of friction at all contacts that touch and approach,
-    /// together. Refused where the two together would raise the energy, or are not solved.
+    /// Applies Newton's law of impact and Coulomb's law of friction at all contacts that touch and
+    /// approach, together. Refused where the two would raise the energy, or are not solved.
     StrikeReport strike();
 
-    /// Those that ended `advance` as `impact`.
+    /// Contacts that ended `advance` with the outcome `impact`.
     [[nodiscard]] const std::vector<IslandContact>& arrivals() const noexcept { return arrivals_; }
-    /// Of the last step, those that pushed; kept asleep.
+    /// Contacts that pushed in the last step; kept during sleep.
     [[nodiscard]] std::vector<IslandContact> contacts() const;
     /// [s] length of the step whose impulses these are.
     [[nodiscard]] double contact_step() const noexcept { return warm_step_; }
-    /// Ids of bodies that contacts that push, or springs, connect: where there are several groups,
-    /// they are islands of their own.
+    /// Ids of bodies grouped by springs and by contacts that push: several groups are islands of
+    /// their own.
     [[nodiscard]] std::vector<std::vector<std::uint32_t>> groups() const;
 
-    /// Kinetic, of gravity and of springs [J].
+    /// Kinetic energy and potential energy of gravity and of springs [J].
     [[nodiscard]] double energy() const;
     [[nodiscard]] const IslandStatistics& statistics() const noexcept { return statistics_; }
     [[nodiscard]] const LawReport& failure() const noexcept { return failure_; }
@@ -125,7 +125,7 @@ private:
     struct Touch {
         int body = 0, other = 0;  ///< places; of a body or of a wall
         bool wall = false;
-        bool at_end = false;  ///< of a segment: which one
+        bool at_end = false;  ///< of a segment: at one of its ends
         Point normal{}, end{};
         double gap = 0;
         ContactCoefficients law{};

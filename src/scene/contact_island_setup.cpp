@@ -1,4 +1,4 @@
-// What an island is made of, and where its members touch.
+// The members of an island, and the places where they touch.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -70,7 +70,7 @@ void ContactIsland::check(const IslandSetup& setup) const
     }
 }
 
-/// Places by where members are: sums and pivots then do not depend on ids.
+/// Sorts members by place: sums and pivots then do not depend on ids.
 void ContactIsland::sort_members(IslandSetup setup)
 {
     bodies_ = std::move(setup.bodies);
@@ -118,7 +118,7 @@ int ContactIsland::place_of(std::uint32_t id) const
     return found->second;
 }
 
-/// Of the coordinates, by which rounding is measured [m].
+/// Size of the coordinates, in proportion to which rounding grows [m].
 double ContactIsland::size_of(int body) const
 {
     return bodies_[static_cast<std::size_t>(body)].radius + std::abs(q_[2 * body]) +
@@ -133,8 +133,8 @@ std::string ContactIsland::name_of(const Touch& touch) const
                       : fmt::format("bodies {} and {}", first, bodies_[other].id);
 }
 
-/// Onto their surfaces by the least way, weighed by mass. It is as if gravity had acted a hair
-/// longer or shorter: velocities are left as they are.
+/// Moves bodies onto their surfaces by the shortest way, weighted by mass. This amounts to a
+/// minimal change of the time for which gravity acts: velocities are unchanged.
 void ContactIsland::project()
 {
     const std::vector<double> close(bodies_.size(), 0.0);
@@ -261,7 +261,7 @@ void ContactIsland::wall_touches(int body, double reach)
         Touch touch{.body = body, .other = w, .wall = true};
         if (!wall_touch({q_[2 * body], q_[2 * body + 1]}, moved, touch)) continue;
         if (!(touch.gap <= reach + way)) continue;
-        // Where two segments end at one point, both have it.
+        // Where two segments end at one point, both have that contact.
         const bool again = wall.is_segment && !wall.motion &&
                            std::any_of(touches_.begin() + static_cast<std::ptrdiff_t>(own),
                                        touches_.end(), [&](const Touch& c) {
@@ -271,7 +271,7 @@ void ContactIsland::wall_touches(int body, double reach)
     }
 }
 
-/// All that could close where each body goes no farther than its reach [m].
+/// Finds all contacts that could close if no body moves farther than its reach [m].
 void ContactIsland::find_touches(const std::vector<double>& reach)
 {
     touches_.clear();

@@ -1,4 +1,4 @@
-// What the scene asks of an island, and tells it.
+// Queries and commands of the scene for an island.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -12,23 +12,23 @@ namespace ricochet::detail {
 namespace {
 
 /// rho in units of a contact's own inertia. A defect of velocity shrinks by about this factor at
-/// each use of a matrix, and the rounding of velocities grows by it in the impulses. Sets that run
-/// in circles under the first may settle under the second.
+/// each use of a matrix, and the rounding of velocities grows by it in the impulses. Active sets
+/// that cycle with the first value may settle with the second.
 constexpr double stiff = 1e5;
 constexpr double less_stiff = 1e3;
 
 /// [contacts] The dense solver's time grows with the cube.
 constexpr std::size_t most_dense = 100;
 
-/// A larger defect is worth the last resorts.
+/// A larger defect justifies the last resorts.
 constexpr double loose = 1e-7;
 
 /// Where a defect no longer halves, rounding has been reached.
 constexpr double rounding = 1e-14;
 
-/// Sweeps cost a hundredth of a factor. These numbers are from piles of 5 to 160 discs: with 40
-/// iterations in a row problems with friction take three to ten times as long, as active sets run
-/// in circles that sweeps leave.
+/// A sweep costs a hundredth of a factorisation. These numbers are from piles of 5 to 160 discs:
+/// with 40 consecutive iterations problems with friction take three to ten times as long, as active
+/// sets cycle, which sweeps end.
 constexpr int sweeps_before = 4;
 constexpr int first_batch = 30;
 constexpr int iterations_with_friction = 6;
@@ -51,7 +51,7 @@ ContactLaw::Pair ContactLaw::relative(const LawContact& c, const Eigen::VectorXd
     return {nx * x + ny * y + c.offset[0], nx * y - ny * x + c.offset[1]};
 }
 
-/// b += G' p of one contact.
+/// Adds G' p of one contact to b.
 void ContactLaw::push(const LawContact& c, double normal, double tangential, Eigen::VectorXd& b)
 {
     const auto [nx, ny] = c.normal;
@@ -73,7 +73,7 @@ double ContactLaw::unit(const LawContact& c) const
     return first * second / (first + second);
 }
 
-/// Adds what couples `a` with `b`, or belongs to `a` alone, to a list of entries.
+/// Adds to a list of entries the coupling of `a` with `b`, or a term of `a` alone.
 void ContactLaw::add_entries(int a, int b, const BlockLu::Block& block)
 {
     const auto add = [&](int row, int column, double sign) {
@@ -89,8 +89,8 @@ void ContactLaw::add_entries(int a, int b, const BlockLu::Block& block)
     add(b, a, -1);
 }
 
-/// A, in blocks: add(a, b, pair, block) for what couples a and b, the place of their pair in the
-/// pattern; b is -1 for what belongs to a alone.
+/// Assembles A by blocks: add(a, b, pair, block) for a coupling of a and b, with the place of their
+/// pair in the pattern; b is -1 for a term of a alone.
 template <class Add>
 std::size_t ContactLaw::assemble_inertia(const Add& add) const
 {
@@ -105,7 +105,7 @@ std::size_t ContactLaw::assemble_inertia(const Add& add) const
     return pair;
 }
 
-/// A + G' D G, with D = -dp/du of what is active.
+/// Assembles A + G' D G, with D = -dp/du of the active contacts.
 template <class Add>
 void ContactLaw::assemble(const Add& add) const
 {
@@ -174,9 +174,9 @@ void ContactLaw::follow(const Eigen::VectorXd& p, Eigen::VectorXd& v)
     }
 }
 
-/// The largest relative velocity without impulses, in units of equal mass: gaps that are open
-/// count where they would close alone. Two bodies that move together have none, but for the
-/// rounding of their velocities, which no solution can be told from.
+/// The largest relative velocity without impulses, in units of equal mass: open gaps count at the
+/// velocity at which they would close exactly. Two bodies that move together have none, except for
+/// the rounding of their velocities, from which no solution can be distinguished.
 void ContactLaw::set_scale(const Eigen::VectorXd& free)
 {
     scale_ = 0;
@@ -210,7 +210,7 @@ double ContactLaw::residual(const Eigen::VectorXd& p, const Eigen::VectorXd& v) 
     return scale_ > 0 ? worst / scale_ : worst;
 }
 
-/// What is active at p and the relative velocities u; false where nothing has changed.
+/// Chooses the active contacts at p and the relative velocities u; false if none has changed.
 bool ContactLaw::choose(const Eigen::VectorXd& p, const Eigen::VectorXd& u)
 {
     const auto& contacts = problem_->contacts;
@@ -237,7 +237,7 @@ bool ContactLaw::choose(const Eigen::VectorXd& p, const Eigen::VectorXd& u)
     return changed;
 }
 
-/// A + G' D G by blocks or, where pivots between blocks are needed, with those.
+/// Factors A + G' D G by blocks or, where pivots between blocks are needed, with such pivots.
 bool ContactLaw::factor()
 {
     block_lu_.clear();
@@ -260,9 +260,9 @@ bool ContactLaw::factor()
     return sparse_lu_.info() == Eigen::Success;
 }
 
-/// The impulses of the active contacts, and the relative velocities u that go with them. Only the
-/// change of velocities is solved for: what rounding makes of velocities themselves would be
-/// magnified by rho, and that is more than the forces of a short step leave of bodies in motion.
+/// The impulses of the active contacts, and the relative velocities u that belong to them. Only the
+/// change of velocities is solved for: the rounding of the velocities themselves would be
+/// magnified by rho, beyond the forces of a short step on moving bodies.
 void ContactLaw::improve(Eigen::VectorXd& p, Eigen::VectorXd& u)
 {
     const auto& contacts = problem_->contacts;
@@ -323,7 +323,7 @@ void ContactLaw::confine(Eigen::VectorXd& p) const
     }
 }
 
-/// From (p, v); true and there the solution, or false and there the best that was found.
+/// Starts from (p, v). True: they are the solution; false: they are the best point found.
 bool ContactLaw::newton(Eigen::VectorXd& p, Eigen::VectorXd& v, int most, LawReport& report,
                         bool active_given)
 {
@@ -359,8 +359,8 @@ bool ContactLaw::newton(Eigen::VectorXd& p, Eigen::VectorXd& v, int most, LawRep
     return report.residual <= tolerance_;
 }
 
-/// Where A is diagonal one contact after the other, with the others' impulses as they are; else all
-/// together, with a length at which the defects do not grow.
+/// Relaxes one contact after the other where A is diagonal, with the others' impulses fixed; else
+/// all together, with a step length at which the defects do not grow.
 void ContactLaw::relax(Eigen::VectorXd& p, Eigen::VectorXd& v, int times)
 {
     if (problem_->couplings.empty()) {
@@ -436,7 +436,7 @@ void ContactLaw::solve_densely(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport
             w(2 * static_cast<Eigen::Index>(k) + 1, j) = u.tangential;
         }
     }
-    // `follow` is affine: without what it is for no impulse, the columns are those of W.
+    // `follow` is affine: minus its value for zero impulses, the columns are those of W.
     w.colwise() -= q;
     w = (0.5 * (w + w.transpose())).eval();
     Eigen::VectorXd trial = p;
@@ -486,7 +486,7 @@ LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen
     return report;
 }
 
-/// Newton's method; where it runs in circles, paths with friction; then ever more sweeps between
+/// Newton's method; where it cycles, paths with friction; then more and more sweeps between
 /// attempts.
 bool ContactLaw::iterate(Eigen::VectorXd& p, Eigen::VectorXd& v, bool last_resorts,
                          LawReport& report)
@@ -506,7 +506,7 @@ bool ContactLaw::iterate(Eigen::VectorXd& p, Eigen::VectorXd& v, bool last_resor
          ++round, batch *= 2) {
         relax(p, v, batch);
         report.sweeps += batch;
-        // What Newton's method finds replaces the sweeps' only where nothing better has been seen.
+        // The result of Newton's method replaces that of the sweeps only if it is the best so far.
         if (round >= rounds_of_one) {
             stiffness_ = less_stiff;
             converged = newton(p, v, iterations_less_stiff, report);

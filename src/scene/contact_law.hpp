@@ -3,10 +3,10 @@
 //     A v = b + G' p,    u = G v + offset,    for every contact:
 //     0 <= p_n,  u_n >= 0,  p_n u_n = 0,      |p_t| <= friction p_n, and against u_t at the bound
 //
-// with two coordinates a body. A is diagonal, but for what springs and dampers couple; it is never
-// inverted as a matrix, and W = G A^-1 G' is not formed: the equations are solved for velocities,
-// of which there are fewer than impulses where contacts are redundant. A contact with one row more
-// for a spin would change `LawContact` and the products with G alone.
+// with two coordinates per body. A is diagonal, except for couplings by springs and dampers; it is
+// never inverted as a matrix, and W = G A^-1 G' is not formed: the equations are solved for
+// velocities, which are fewer than impulses where contacts are redundant. A contact with one more
+// row for a spin would change only `LawContact` and the products with G.
 #pragma once
 
 #include <Eigen/Dense>
@@ -54,22 +54,23 @@ struct LawReport {
     bool dense = false;  ///< whether `ContactSolver` had to help
 };
 
-/// Newton's method on the law with multipliers: in each contact p = P(p - rho u), P onto the cone
-/// of friction, with a large rho. What is active enters the matrix A + G' D G, which is regular
-/// however redundant the contacts are, and is factored once for a set of active contacts; then p is
-/// improved with the same factor. Without friction the matrix is symmetric, and the active set ends
-/// the iteration: its solution is exact to rounding. Where sets run in circles, paths lead to a
-/// solution: p = P(p - rho u + s c) with a shift c for which the start solves the law at s = 1, and
-/// s going to 0. The path is a polygon, at whose corners one contact changes; it is that of Lemke's
-/// method, in which s may grow for a while (R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear
-/// Complementarity Problem, 1992, section 4.4), from a start that is near. After them come sweeps
-/// over the contacts, and the dense `ContactSolver`, for no more than 100 contacts.
+/// Newton's method on the law with multipliers: in each contact p = P(p - rho u), with P the
+/// projection onto the cone of friction and a large rho. Active contacts enter the matrix
+/// A + G' D G, which is regular however redundant the contacts are, and is factored once for a set
+/// of active contacts; then p is improved with the same factor. Without friction the matrix is
+/// symmetric, and the active set ends the iteration: its solution is exact to rounding. Where
+/// active sets cycle, paths lead to a solution: p = P(p - rho u + s c) with a shift c for which the
+/// start solves the law at s = 1, and s going to 0. The path is a polygon, at whose corners one
+/// contact changes; it is that of Lemke's method, in which s may grow for a while (R. W. Cottle,
+/// J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section 4.4), from a start
+/// nearby. After them come sweeps over the contacts, and the dense `ContactSolver`, for no more
+/// than 100 contacts.
 class ContactLaw {
 public:
     explicit ContactLaw(double tolerance = 1e-10) : tolerance_(tolerance) {}
 
     /// `p`, two for each contact, normal first, is the start and the result, as is `v`, which
-    /// satisfies the first equation to rounding whatever the outcome. `last_resorts`: whether
+    /// satisfies the first equation to rounding for any outcome. `last_resorts`: whether
     /// sweeps and the dense solver are tried where paths do not lead to a solution.
     LawReport solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
                     bool last_resorts = true);
@@ -136,7 +137,7 @@ private:
     Eigen::SparseLU<Sparse> sparse_lu_;
     Eigen::VectorXd right_, linear_, trial_p_, trial_v_;
     struct Path {
-        Eigen::VectorXd w, w_rate;  ///< p - rho u + left shift, of which p is the projection
+        Eigen::VectorXd w, w_rate;  ///< p - rho u + left shift, whose projection is p
         Eigen::VectorXd shift;
         double left = 1, left_rate = -1;
     } path_;

@@ -14,7 +14,7 @@ constexpr int iterations_after_path = 8;
 
 }  // namespace
 
-/// The start at (p, v): p is the projection of w, and w natural where it can be.
+/// Starts a path at (p, v): p is the projection of w, and w is p - rho u where possible.
 void ContactLaw::begin_path(const Eigen::VectorXd& p, const Eigen::VectorXd& v)
 {
     const auto& contacts = problem_->contacts;
@@ -29,7 +29,7 @@ void ContactLaw::begin_path(const Eigen::VectorXd& p, const Eigen::VectorXd& v)
         const double rho = stiffness_ * unit(c);
         const double normal = p[i] - rho * u.normal;
         const double tangential = p[i + 1] - rho * u.tangential;
-        // Off the borders of states, at a distance that no two contacts share.
+        // Keeps off the boundaries between states, at a distance that no two contacts share.
         const double part = std::fmod(0.618033988749895 * static_cast<double>(k + 1), 1.0);
         const double margin = 1e-3 * (1 + part) * scale_ * std::sqrt(unit(c));
         const double bound = c.friction * p[i];
@@ -53,8 +53,8 @@ void ContactLaw::begin_path(const Eigen::VectorXd& p, const Eigen::VectorXd& v)
     path_.left_rate = -1;
 }
 
-/// The direction in which the path goes on with the contacts as they are, the sense of `left`
-/// kept.
+/// Finds the direction in which the path continues with the present states of contacts, keeping the
+/// sense of `left`.
 void ContactLaw::turn_path()
 {
     const auto& contacts = problem_->contacts;
@@ -80,7 +80,7 @@ void ContactLaw::turn_path()
     }
 }
 
-/// The first contact to change on the way.
+/// The first contact to change along the path.
 ContactLaw::Switch ContactLaw::next_switch() const
 {
     Switch first{.after = std::numeric_limits<double>::infinity()};
@@ -121,8 +121,8 @@ ContactLaw::Switch ContactLaw::next_switch() const
     return first;
 }
 
-/// To that change and beyond it: where the path would turn back into the state that it has left,
-/// it goes on in the other sense.
+/// Moves to that change and beyond it. Where the path would turn back into the state that it has
+/// left, it continues in the opposite sense.
 void ContactLaw::pass(const Switch& next)
 {
     path_.w += next.after * path_.w_rate;
@@ -147,7 +147,7 @@ void ContactLaw::pass(const Switch& next)
     path_.w_rate = -path_.w_rate;
 }
 
-/// From its start to where nothing of the shift is left; false where it does not come there.
+/// Follows the path until nothing of the shift is left; false where it does not get there.
 bool ContactLaw::follow_path(LawReport& report)
 {
     if (!factor()) return false;
@@ -183,8 +183,8 @@ void ContactLaw::impulses_of_path(Eigen::VectorXd& p) const
     }
 }
 
-/// The start from no impulses: a shift that opens all contacts, from which Lemke's method comes to
-/// the end wherever there is a solution.
+/// Starts from zero impulses, with a shift that opens all contacts, from which Lemke's method
+/// reaches the end wherever there is a solution.
 void ContactLaw::begin_path_afar()
 {
     const auto& contacts = problem_->contacts;
@@ -234,7 +234,7 @@ bool ContactLaw::along_paths(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& 
         const double now = residual(at_p, at_v);
         report.residual = std::min(before, now);
         const bool converged = newton(at_p, at_v, iterations_after_path, report, true);
-        // Even where it is no better in the norm of the residual, the path's end is nearer.
+        // The path's end is nearer to the solution, even if its residual has no smaller norm.
         p = at_p, v = at_v;
         if (converged) return true;
     }

@@ -1,4 +1,4 @@
-// What a group of bodies in lasting contact is made of, and what comes of its steps.
+// The definition of a group of bodies in lasting contact, and the results of its steps.
 #pragma once
 
 #include <array>
@@ -20,16 +20,16 @@ struct IslandBody {
     std::uint32_t patience = 1;  ///< steps without contact after which it is handed back
 };
 
-/// How a wall moves: without turning.
+/// Motion of a wall, without rotation.
 struct WallMotion {
     std::function<std::array<double, 2>(double t)> displacement;  ///< [m]
-    /// Until when the wall stands still that does so at t; t where it moves.
+    /// Time until which the wall stands still if it does at t; t where it moves.
     std::function<double(double t)> still_until;
-    /// When its velocity jumps next after t, infinite where it does not. May be empty.
+    /// Time of the next jump of its velocity after t, infinite if there is none. May be empty.
     std::function<double(double t)> next_break{};
 };
 
-/// A line that bodies are on one side of, or a segment that is met from both, its ends included.
+/// A line that bounds bodies on one side, or a segment that acts on both, including its ends.
 struct IslandWall {
     std::uint32_t id = 0;
     bool is_segment = false;
@@ -45,7 +45,7 @@ struct IslandSpring {
     double rest = 0, stiffness = 0, damping = 0;
 };
 
-/// Where two materials meet.
+/// Coefficients for a pair of materials.
 struct ContactCoefficients {
     double restitution = 0;
     double friction = 0;
@@ -73,9 +73,9 @@ struct IslandOptions {
 inline constexpr double closed_gap = 1e-12;
 
 enum class IslandOutcome {
-    reached,        ///< the time that was asked for
-    asleep,         ///< at rest until struck or woken: its time is the one asked for
-    released,       ///< nothing has been in contact for `patience` steps: to be handed back
+    reached,        ///< the requested time
+    asleep,         ///< at rest until struck or woken: its time is the requested one
+    released,       ///< no contact for `patience` steps: it must be handed back
     impact,         ///< two of `arrivals` meet at a speed from which they would rebound
     not_converged,  ///< the contact law was not solved, see `failure`
     non_finite,
@@ -91,8 +91,8 @@ struct IslandContact {
     std::array<double, 2> impulse{};  ///< [N s] normal and tangential
 };
 
-/// Patience of a body that is handed over at `t` and was handed back at `released_at`: twice as
-/// long where that was within ten steps, so that nothing goes back and forth for long.
+/// Patience of a body that is handed over at `t` and was handed back at `released_at`: it doubles
+/// where that was within ten steps, so that a body does not alternate for long.
 [[nodiscard]] constexpr std::uint32_t next_patience(std::uint32_t patience, double released_at,
                                                     double t, double step) noexcept
 {

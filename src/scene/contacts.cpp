@@ -15,7 +15,7 @@ std::vector<std::uint32_t> Contacts::closure(const std::vector<std::uint32_t>& b
     };
     for (const std::uint32_t i : bodies) {
         const Body& body = world_.bodies[i];
-        // Those that springs join are in one group.
+        // Bodies joined by springs are in one group.
         if (body.contact != none) {
             add(groups_[body.contact]->members);
         } else if (body.island != none) {
@@ -30,7 +30,7 @@ std::vector<std::uint32_t> Contacts::closure(const std::vector<std::uint32_t>& b
     return all;
 }
 
-/// Bodies where their records are now.
+/// The set-up of bodies at the present places of their records.
 IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
                                const std::vector<std::uint32_t>& faces) const
 {
@@ -58,7 +58,7 @@ IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
     }
     for (const std::uint32_t f : faces) {
         const Face& face = world_.faces[f];
-        if (face.kind == Face::Kind::vertex) continue;  // segments have their ends
+        if (face.kind == Face::Kind::vertex) continue;  // segments include their ends
         IslandWall wall{.id = f, .point = face.at, .normal = face.normal};
         wall.material = face.material;
         if (face.kind == Face::Kind::segment) {
@@ -73,7 +73,7 @@ IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
     return setup;
 }
 
-/// Motions of walls by the clock of a group, which begins now.
+/// Sets the motions of walls by the clock of a group, which starts now.
 void Contacts::set_motions(IslandSetup& setup, Group& group, const Instant& now) const
 {
     for (IslandWall& wall : setup.walls) {
@@ -92,8 +92,8 @@ void Contacts::set_motions(IslandSetup& setup, Group& group, const Instant& now)
     }
 }
 
-/// Of the coordinates: rounding and, where walls move, how far they leave the straight lines of a
-/// step.
+/// Largest overlap relative to the coordinates: rounding and, where walls move, their deviation
+/// from the straight lines of a step.
 double Contacts::largest_overlap(const Group& group) const
 {
     double most = IslandOptions{}.largest_overlap;
@@ -170,7 +170,7 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
     group.planned = true;
     group.start = now;
     group.end = now.after(length);
-    // No step is as short as what rounding leaves of the run.
+    // The rounding left at the end of the run is no step.
     const bool over = seconds(group.end, t_end) <= resolution(t_end);
     if (length == left || (over && outcome != IslandOutcome::impact)) group.end = t_end;
     if (asleep && !(wakes < never)) group.end = t_end;

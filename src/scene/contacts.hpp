@@ -13,39 +13,40 @@
 
 namespace ricochet::detail {
 
-/// Groups in lasting contact. In a step of its group a body moves on a straight line, which its
-/// record says; its velocity changes along it (`World::drifts`).
+/// Groups in lasting contact. In a step of its group a body moves on the straight line of its
+/// record; its velocity changes along it (`World::drifts`).
 class Contacts {
 public:
     explicit Contacts(World& world) : world_(world) {}
 
     [[nodiscard]] bool available() const noexcept { return world_.options.contacts != nullptr; }
 
-    /// These bodies and whatever is joined with them, by a group or by springs, in ascending order.
+    /// These bodies and all that are joined with them, by a group or by springs, in ascending
+    /// order.
     [[nodiscard]] std::vector<std::uint32_t> closure(
         const std::vector<std::uint32_t>& bodies) const;
 
-    /// A group of `members`, a closure, which meets `faces`; the groups that they were in are gone.
-    /// Returns its number. @throws std::invalid_argument where bodies overlap
+    /// Makes a group of `members`, a closure, which meets `faces`; their previous groups are
+    /// removed. Returns its number. @throws std::invalid_argument where bodies overlap
     std::uint32_t join(std::vector<std::uint32_t> members, std::vector<std::uint32_t> faces,
                        const std::vector<std::uint32_t>& patience, const Instant& now);
 
-    /// The next step; its members get new records.
+    /// Plans the next step; its members get new records.
     IslandOutcome plan(std::uint32_t group, const Instant& now, const Instant& t_end);
-    /// Goes to `now` in the step that was planned; the group waits for another plan.
+    /// Advances to `now` in the planned step; the group then needs another plan.
     void commit(std::uint32_t group, const Instant& now);
     void set_velocity(std::uint32_t group, std::uint32_t body, const Vector2& v)
     {
         groups_[group]->motion->set_velocity(body, v);
     }
-    /// A group is no more: its members fly on from their records.
+    /// Removes a group: its members fly on from their records.
     void dissolve(std::uint32_t group, const Instant& now);
 
     struct Group {
         std::unique_ptr<LastingContact> motion;
         std::vector<std::uint32_t> members;
-        std::vector<std::uint32_t> faces;                    ///< those it meets itself
-        std::vector<std::unique_ptr<WallMotion>> motions{};  ///< of those that move
+        std::vector<std::uint32_t> faces;                    ///< those that the group itself meets
+        std::vector<std::unique_ptr<WallMotion>> motions{};  ///< of the faces that move
         Instant start{}, end{};
         double length = 0;  ///< [s] from start to end
         IslandOutcome outcome = IslandOutcome::reached;

@@ -1,4 +1,4 @@
-// What a run would do, and what it would not.
+// Explains what a run would do, and what it would not.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ std::string motion_of(const World& world, std::span<const std::uint32_t> group)
     return "parabola, closed form";
 }
 
-/// The first meeting of two of a group as they move now, if they had no surfaces before.
+/// The first meeting of two bodies of a group as they move now, as if there were no surfaces.
 std::string first_meeting(const World& world, std::span<const std::uint32_t> group)
 {
     if (group.size() * group.size() > most_pairs) return "";

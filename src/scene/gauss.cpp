@@ -27,8 +27,8 @@ public:
     void drop_last() { active_.pop_back(); }
     [[nodiscard]] const std::vector<Index>& indices() const { return active_; }
 
-    /// The impulses under which the active contacts do not move; false where they depend on each
-    /// other.
+    /// The impulses under which the active contacts do not move; false where the contacts depend on
+    /// each other.
     [[nodiscard]] bool solve(Eigen::VectorXd& z) const
     {
         const auto n = static_cast<Index>(active_.size());
@@ -59,8 +59,8 @@ private:
     std::vector<Index> active_;
 };
 
-/// Goes from p towards z until an impulse vanishes, and on without it; false where the set left
-/// cannot be solved.
+/// Goes from p towards z until an impulse vanishes, and on without it; false where the remaining
+/// set cannot be solved.
 bool approach(ActiveSet& set, Eigen::VectorXd& p, Eigen::VectorXd& z)
 {
     for (;;) {

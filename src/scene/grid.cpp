@@ -9,21 +9,22 @@ namespace ricochet::detail {
 
 namespace {
 
-/// With no more than these there are no cells: so few are all asked, and none pays for the cells
-/// that it crosses.
+/// With no more than these there are no cells: all of so few are tested, and none pays for crossing
+/// cells.
 constexpr double few_bodies = 16;
 constexpr std::size_t few_faces = 64;
 constexpr double boundless = 0x1p200;
 
-/// [cells] A ring is laid again when its body has moved so far along an axis. A big body of radius
-/// R is struck 2 R n v times a second by bodies of density n and speed v, and asks each time those
-/// on its ring, 2 pi R n a metre of width, which are more the farther it may move; its ring, some
-/// 2 pi R / side cells a layer, is laid v / play times a second. With cells of 0.4 bodies the sum
-/// is least at play^2 = 4 side^3 / R: two thirds of a cell for R of ten cells, a third for fifty.
+/// [cells] A ring is laid again when its body has moved this far along an axis. A big body of
+/// radius R is struck 2 R n v times a second by bodies of density n and speed v, and each time
+/// tests those on its ring, 2 pi R n per metre of width, which are more the farther it may move;
+/// its ring, some 2 pi R / side cells a layer, is laid v / play times a second. With cells of 0.4
+/// bodies the sum is least at play^2 = 4 side^3 / R: two thirds of a cell for R of ten cells, a
+/// third for fifty.
 constexpr double play = 0.35;
 
-/// Cost of visiting a cell and of laying a ring on it and lifting it, over that of a first contact
-/// that is asked for: one and several numbers are read, beside a record of two cache lines.
+/// Cost of visiting a cell, and of laying a ring on it and lifting it, relative to a test for a
+/// first contact: they read one and several numbers, the test a record of two cache lines.
 constexpr double visiting = 0.2;
 constexpr double laying = 1;
 
@@ -86,8 +87,8 @@ struct SizeClass {
 };
 using SizeClasses = std::array<SizeClass, 64>;
 
-/// First contacts asked for in a second, over 2 n v, if the first `big` classes are big. A body of
-/// radius r is struck as often as r plus the mean radius.
+/// Tests for first contacts per second, divided by 2 n v, if the first `big` classes are big. A
+/// body of radius r is struck in proportion to r plus the mean radius.
 double work(const SizeClasses& classes, std::size_t big, const Box& box, double slack)
 {
     SizeClass small;
@@ -107,7 +108,7 @@ double work(const SizeClasses& classes, std::size_t big, const Box& box, double 
     const double density = small.count / room;
     const double side = side_of(room, small.count, small.largest, slack);
     const double asked = std::min(small.count, 9 * density * side * side) + 9 * visiting;
-    // Two plays, a radius and a half and more of a cell on both sides of the edge.
+    // Twice the play, a radius, and a cell and a half or more on both sides of the edge.
     const double width = small.largest + (2 * 1.5 * play + 1.3) * side;
     const double covered = 2 * pi * large.radii * width / room;
     const double crossings = 2 / (pi * density * side);
@@ -143,7 +144,7 @@ double largest_ordinary(const World& world, std::span<const std::uint32_t> membe
         of.squares += r * r;
         of.largest = std::max(of.largest, r);
     }
-    // The sums are rounded and the model is rough: a little is not worth a second grid.
+    // The sums are rounded and the model is rough: a small gain does not justify a second grid.
     double least = 0.8 * work(classes, 0, box, slack);
     double ordinary = box.largest;
     for (std::size_t k = 1; k < classes.size(); ++k) {
@@ -159,7 +160,7 @@ double largest_ordinary(const World& world, std::span<const std::uint32_t> membe
 void Grid::size(World& world, std::span<const std::uint32_t> members, bool steps)
 {
     const Box box = box_of(world, members);
-    // Steps are asked where they are only now and then, and may lie a tenth outside their cell.
+    // Steps are tested only now and then, and may lie a tenth outside their cell.
     const double slack = steps ? 1.3 : 1.0001;
     const double wanted = world.tuning.big_above;
     const double ordinary =
@@ -192,7 +193,7 @@ void Grid::size(World& world, std::span<const std::uint32_t> members, bool steps
     if (some_big) size_big(world, members, box);
 }
 
-/// The second grid: a body may lie farther from its cell by what its ring plays.
+/// Sizes the second grid: a body may lie farther from its cell by the play of its ring.
 void Grid::size_big(const World& world, std::span<const std::uint32_t> members, const Box& box)
 {
     ring_of_.assign(world.bodies.size(), none);

@@ -1,8 +1,8 @@
-// Which bodies and surfaces a body can touch before it leaves its cell.
+// Determines which bodies and surfaces a body can touch before it leaves its cell.
 //
 // Bodies of ordinary size lie in cells of one grid. Big ones, where there are any, meet each other
-// in a second one, and ordinary bodies where their rings lie on the first. What is asked costs
-// time, and decides no bit.
+// in a second one, and ordinary bodies where their rings lie on the first. The choice of tests
+// costs time, and changes no bit.
 #pragma once
 
 #include <cstdint>
@@ -21,29 +21,29 @@ struct Box {
     double largest = 0;  ///< radius
     double count = 0;
 };
-/// [m] Side of cells for `count` bodies of at most this radius in an area: that of two bodies, or
-/// what leaves some 0.4 bodies in each. By trial that is 1.2 times as fast at a fraction of 0.3 as
-/// one body in each.
+/// [m] Side of cells for `count` bodies of at most this radius in an area: either that of two
+/// bodies, or the side with some 0.4 bodies in each cell. Measured at an area fraction of 0.3, that
+/// is 1.2 times as fast as one body in each.
 [[nodiscard]] inline double side_of(double area, double count, double radius, double slack)
 {
     return std::max(2 * radius * slack, 0.65 * std::sqrt(area / count));
 }
-/// The radius above which bodies are big: the largest one of all where a second grid does not pay.
+/// The radius above which bodies are big: the largest of all where a second grid does not pay.
 /// `slack`: the least side of a cell, in diameters.
 [[nodiscard]] double largest_ordinary(const World& world, std::span<const std::uint32_t> members,
                                       const Box& box, double slack);
 
 class Grid {
 public:
-    /// Empty grids for these bodies, whose sizes it decides, and all faces. `steps`: some advance
-    /// by steps, and lie a tenth of a cell outside of theirs.
+    /// Makes empty grids for these bodies, marking the big ones, and for all faces. `steps`: some
+    /// bodies advance by steps, and may lie a tenth of a cell outside theirs.
     void size(World& world, std::span<const std::uint32_t> members, bool steps);
 
     /// Returns the cell.
     Cells::Cell insert(std::vector<Body>& bodies, std::uint32_t i, const Vector2& p);
-    /// From its cell to where it is now.
+    /// Moves a body from its cell to its present place.
     void move(std::vector<Body>& bodies, std::uint32_t i, Cells::Cell& cell, const Vector2& p);
-    /// From its cell into a neighbour.
+    /// Moves a body from its cell into a neighbour.
     void step(std::vector<Body>& bodies, std::uint32_t i, Cells::Cell& cell, int x, int y)
     {
         cells_.remove(bodies, i);
@@ -51,10 +51,10 @@ public:
         cell.y += y;
         cells_.insert(bodies, i, cell);
     }
-    /// A big body where it is now.
+    /// Lays the ring of a big body at its present place.
     void lay_again(std::vector<Body>& bodies, std::uint32_t i, Cells::Cell& cell, const Vector2& p);
 
-    /// A square that a body has to leave before it can touch others than `each_near`.
+    /// A square that a body must leave before it can touch bodies outside `each_near`.
     struct Square {
         Vector2 low{};
         double side = 0;
@@ -69,10 +69,10 @@ public:
         const double side = cells_.side();
         return {{static_cast<double>(cell.x) * side, static_cast<double>(cell.y) * side}, side};
     }
-    /// [m] So far outside of it bodies that advance by steps may lie.
+    /// [m] Distance by which bodies that advance by steps may lie outside it.
     [[nodiscard]] double outside() const noexcept { return 0.1 * cells_.side(); }
 
-    /// Bodies that one can touch, and itself.
+    /// Visits the bodies that a body can touch, and itself.
     template <class Visit>
     void each_near(const std::vector<Body>& bodies, std::uint32_t i, const Cells::Cell& cell,
                    const Visit& visit) const
@@ -84,7 +84,7 @@ public:
         rings_.each_bucket(cells_, ring_of_[i],
                            [&](std::uint32_t bucket) { cells_.each_in(bucket, bodies, visit); });
     }
-    /// Those that one of ordinary size can touch now that it has come from the side.
+    /// Visits the bodies that one of ordinary size can touch after entering a cell from a side.
     template <class Visit>
     void each_ahead(const std::vector<Body>& bodies, std::uint32_t i, const Cells::Cell& cell,
                     int x, int y, const Visit& visit) const
@@ -98,12 +98,12 @@ public:
     }
 
     [[nodiscard]] bool any_faces() const noexcept { return cells_.any_faces(); }
-    /// Faces that a body can touch.
+    /// The faces that a body can touch.
     [[nodiscard]] const std::vector<std::uint32_t>& faces(const Body& body) const noexcept
     {
         return (body.big ? big_cells_ : cells_).faces(body.bucket);
     }
-    /// And those that it can from the cells around its own.
+    /// Visits the faces that it can touch from the cells around its own, too.
     template <class Visit>
     void each_face_near(const Body& body, const Cells::Cell& cell, const Visit& visit) const
     {

@@ -15,7 +15,7 @@ struct Interval {
     double low = 0, high = 0;
 };
 
-/// Of x + v s + a s^2/2 for s in [0, until].
+/// Range of x + v s + a s^2/2 for s in [0, until].
 Interval swept(double x, double v, double a, double until)
 {
     if (a == 0 && v == 0) return {x, x};
@@ -32,8 +32,8 @@ Interval swept(double x, double v, double a, double until)
 
 constexpr double infinite = never;
 
-/// Where gravity is across the walls that a body can meet, what happens on them leaves its motion
-/// along them alone: both are known.
+/// Where gravity is perpendicular to the walls that a body can meet, their impacts do not change
+/// its motion along them, so both motions are known.
 bool along_walls(const World& world, const Body& body, double until, Reach& reach)
 {
     const Vector2 normal = world.wall_count > 0 ? world.faces[0].normal : Vector2{0, 1};
@@ -47,14 +47,14 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
         }
     }
     const double pull = dot(world.gravity, normal);
-    // Drag may turn a body back sooner, to where without it there was no time to come.
+    // Drag may turn a body back earlier, so that it comes to places out of reach without drag.
     const bool slowed = body.island != none;
     if (slowed && dot(world.gravity, along) != 0) return false;
     const double height = dot(body.p, normal);
     const double rise = dot(body.v, normal);
     Interval across = swept(height, rise, pull, until);
     if (pull != 0) {
-        // No higher than its energy takes it, against gravity; as far as it falls along it.
+        // The body rises against gravity no higher than its energy allows, and may fall along it.
         const double top = height - rise * rise / (2 * pull);
         (pull < 0 ? across.high : across.low) =
             pull < 0 ? std::max(across.high, top) : std::min(across.low, top);
@@ -70,7 +70,8 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
             across.low = std::max(across.low, at);
         } else {
             across.high = std::min(across.high, at);
-            // Struck from below, what moves against gravity may come back faster than it left.
+            // A body struck from below may come back faster than it left, if it moves against
+            // gravity.
             if (pull > 0) across.low = -infinite;
         }
     }
@@ -87,7 +88,7 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
     return true;
 }
 
-/// Around the start with the largest speed, behind no wall.
+/// The box around the start that the largest speed reaches, behind no wall.
 void by_speed(const World& world, const Body& body, double fastest, Reach& reach)
 {
     const double far = fastest * (world.options.t_end - world.options.t_start) * (1 + 1e-9);
@@ -104,8 +105,8 @@ void by_speed(const World& world, const Body& body, double fastest, Reach& reach
     }
 }
 
-/// Bodies that meet exchange speeds. With V^2 the sum of m v^2, impacts let V not grow, and gravity
-/// by |g| sqrt(mass of all) a second at most; no speed is above V / sqrt(m).
+/// Bodies that meet exchange speeds. With V^2 the sum of m v^2, impacts do not increase V, and
+/// gravity increases it by |g| sqrt(total mass) a second at most; no speed exceeds V / sqrt(m).
 void by_energy(const World& world, std::span<const std::uint32_t> group, std::vector<Reach>& boxes)
 {
     const double until = world.options.t_end - world.options.t_start;
@@ -116,7 +117,7 @@ void by_energy(const World& world, std::span<const std::uint32_t> group, std::ve
         square += dot(body.v, body.v) / body.inverse_mass;
         mass += 1 / body.inverse_mass;
     }
-    // What sleeps alone is not pulled by anything.
+    // Gravity does not move a group that sleeps.
     const bool asleep =
         std::ranges::all_of(group, [&](std::uint32_t i) { return world.bodies[i].asleep; });
     if (asleep) return;
@@ -128,7 +129,7 @@ void by_energy(const World& world, std::span<const std::uint32_t> group, std::ve
     }
 }
 
-/// Joins all that overlap along one axis; true if a part fell apart.
+/// Joins all boxes that overlap along one axis; true if the set was divided.
 class Divider {
 public:
     Divider(const std::vector<Reach>& reaches, std::vector<std::uint32_t>& order)
@@ -136,7 +137,7 @@ public:
     {
     }
 
-    /// Parts of [begin, end) that are apart along an axis, divided again along the other one.
+    /// Separates [begin, end) into parts along an axis, and divides these along the other one.
     void divide(std::size_t begin, std::size_t end, std::size_t axis, bool tried)
     {
         if (end - begin <= 1) return close(begin, end);
@@ -177,8 +178,8 @@ private:
     std::vector<std::uint32_t>& order_;
 };
 
-/// Boxes of bodies that meet no other one: from closed forms where all walls are parallel, else
-/// from the largest speed.
+/// Boxes that bodies do not leave if they meet no other one: from closed forms where all walls are
+/// parallel, else from the largest speed.
 std::vector<Reach> reaches(const World& world)
 {
     const double until = world.options.t_end - world.options.t_start;
@@ -188,7 +189,7 @@ std::vector<Reach> reaches(const World& world)
     const bool terrain = world.fixed_count > world.wall_count;
     for (std::size_t i = 0; i < out.size(); ++i) {
         const Body& body = world.bodies[i];
-        // Springs may drive their bodies anywhere; drag alone only slows.
+        // Springs may move their bodies anywhere; drag alone only slows them.
         if (body.island != none && world.islands->members(body.island).size() > 1) {
             out[i] = {{-infinite, -infinite}, {infinite, infinite}};
         } else if (body.asleep) {
@@ -209,8 +210,8 @@ Groups groups_of(const World& world)
     groups.order_.resize(world.bodies.size());
     std::iota(groups.order_.begin(), groups.order_.end(), 0U);
     if (world.faces.size() > world.wall_count || !world.scene.systems().empty()) {
-        // Terrain lies in the cells of a group, and what moves by itself may drive bodies anywhere:
-        // one group for all.
+        // Terrain lies in the cells of a group, and moving surfaces and systems may drive bodies
+        // anywhere: all bodies are one group.
         groups.ends_ = {world.bodies.size()};
         return groups;
     }

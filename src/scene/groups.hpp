@@ -1,4 +1,4 @@
-// Which bodies can meet at all before the end.
+// Determines which bodies can meet before the end.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,13 @@
 
 namespace ricochet::detail {
 
-/// All that a body can touch until the end of the run, in any event, lies in this box.
+/// A box that contains everything that a body can touch until the end of the run.
 struct Reach {
     Vector2 low{}, high{};
 };
 
-/// Bodies whose boxes overlap, directly or by others, and members of one island, ascending. Bodies
-/// of different groups never meet: each group runs by itself.
+/// Bodies whose boxes overlap, directly or through others, and members of one island, ascending.
+/// Bodies of different groups never meet: each group runs by itself.
 class Groups {
 public:
     [[nodiscard]] std::size_t size() const noexcept { return ends_.size(); }

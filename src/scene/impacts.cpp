@@ -11,16 +11,17 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Approaches that differ by less are equally fast.
+/// Approach velocities that differ by less are treated as equal.
 constexpr double tie = 1e-12;
 
-/// Waves for each contact after which a cluster is taken for one that collapses.
+/// Waves per contact after which a cluster is treated as collapsing.
 constexpr std::size_t patience = 100;
 
-/// The same where there is lasting contact, whose next step takes what is left without restitution.
+/// The same in lasting contact, whose next step takes the remaining impacts without restitution.
 constexpr std::size_t lasting_patience = 4;
 
-/// Sweeps alone, for few contacts; before the exact solution of more; where that is too large.
+/// Limits: sweeps alone for few contacts; sweeps before an exact solution; sweeps for many
+/// contacts.
 constexpr std::size_t few = 4;
 constexpr std::size_t most_exact = 600;
 constexpr int few_sweeps = 30;
@@ -51,7 +52,7 @@ void Impacts::push(Cluster& cluster, const Contact& contact, const Vector2& impu
     b = b - world_.bodies[contact.b].inverse_mass * impulse;
 }
 
-/// The same where a body may be one of a system, whose other ones it moves, too.
+/// The same where a body may belong to a system, whose other bodies it moves too.
 void Impacts::push_coupled(Cluster& cluster, const Contact& contact, const Vector2& impulse) const
 {
     const auto apply = [&](std::uint32_t body, std::uint32_t slot, const Vector2& p) {
@@ -93,7 +94,7 @@ void Impacts::set_masses(Cluster& cluster) const
     }
 }
 
-/// One contact alone, in closed form.
+/// Resolves one contact alone, in closed form.
 void Impacts::strike(Cluster& cluster, Contact& contact) const
 {
     const double u = approach(cluster, contact);
@@ -110,7 +111,7 @@ void Impacts::strike(Cluster& cluster, Contact& contact) const
     }
 }
 
-/// How an impulse at one contact moves another one along its normal.
+/// Effect of an impulse at one contact on another one along its normal.
 static double coupling(const World& world, const Contact& a, const Contact& b)
 {
     double sum = 0;
@@ -125,7 +126,7 @@ static double coupling(const World& world, const Contact& a, const Contact& b)
     return sum;
 }
 
-/// Without friction, by an active set; false where that does not come to an end.
+/// Solves without friction, by an active set; false where that does not terminate.
 bool Impacts::solve_exactly(Cluster& cluster) const
 {
     const auto n = static_cast<Eigen::Index>(struck_.size());
@@ -149,7 +150,7 @@ bool Impacts::solve_exactly(Cluster& cluster) const
     return true;
 }
 
-/// All of `struck_` together: separation >= target, impulse >= 0, one of them equal.
+/// Solves all of `struck_` together: separation >= target, impulse >= 0, with equality in one.
 void Impacts::solve(Cluster& cluster) const
 {
     double fastest = 0;
@@ -179,7 +180,7 @@ double Impacts::kinetic_energy(const Cluster& cluster) const
     double twice = 0;
     for (std::size_t i = 0; i < cluster.bodies.size(); ++i) {
         if (world_.bodies[cluster.bodies[i]].mapped) {
-            // Of a system: what its impulses in this wave have given it.
+            // For a body of a system: the work of its impulses in this wave.
             twice +=
                 dot(cluster.impulses[i] - impulses_before_[i], before_wave_[i] + cluster.after[i]);
             continue;
@@ -190,7 +191,7 @@ double Impacts::kinetic_energy(const Cluster& cluster) const
     return 0.5 * twice;
 }
 
-/// [J] By surfaces that move, in the current solve.
+/// [J] Work of moving surfaces in the current solve.
 double Impacts::work_of_surfaces(const Cluster& cluster) const
 {
     double work = 0;
@@ -203,8 +204,8 @@ double Impacts::work_of_surfaces(const Cluster& cluster) const
     return work;
 }
 
-/// Newton's restitution and Coulomb's friction at several contacts may gain energy together. Then
-/// restitution is spent, and where the sweeps still gain, friction is left out.
+/// Newton's restitution and Coulomb's friction at several contacts may gain energy together. In
+/// that case restitution is set to 0, and where the sweeps still gain energy, friction is left out.
 void Impacts::solve_without_gain(Cluster& cluster)
 {
     const std::vector<Vector2> start = cluster.after;
@@ -230,7 +231,7 @@ void Impacts::solve_without_gain(Cluster& cluster)
     }
 }
 
-/// One contact after another, until no velocity changes by more than `smallest`.
+/// Solves one contact after another, until no velocity changes by more than `smallest`.
 void Impacts::sweep(Cluster& cluster, double smallest, int most) const
 {
     for (int k = 0; k < most; ++k) {
@@ -258,7 +259,7 @@ void Impacts::sweep(Cluster& cluster, double smallest, int most) const
     }
 }
 
-/// The contacts that approach fastest; false where none approaches.
+/// Strikes the contacts that approach fastest; false where none approaches.
 bool Impacts::wave(Cluster& cluster)
 {
     struck_.clear();

@@ -1,4 +1,4 @@
-// Impacts of one cluster: contacts that are struck at one instant, or touch one that is.
+// Impacts of one cluster: contacts that are struck at one instant, or touch a body that is.
 #pragma once
 
 #include <array>
@@ -15,19 +15,20 @@ struct Contact {
     bool surface = false;
     std::uint32_t slot_a = 0, slot_b = 0;  ///< in the cluster
     Vector2 normal{};
-    Vector2 at{};  ///< by which contacts are ordered, whatever the labels
+    Vector2 at{};  ///< place by which contacts are ordered, independent of the labels
     double restitution = 1;
     double friction = 0;
     double impulse = 0;  ///< of the current solve, normal and tangential
     double tangential = 0;
-    double target = 0;  ///< [m/s] separation that is asked for
+    double target = 0;  ///< [m/s] required separation
     double mass = 0;    ///< effective, along the normal and across
     double tangential_mass = 0;
     bool moving = false;         ///< whether its surface moves
     Vector2 surface_velocity{};  ///< [m/s]
 };
 
-/// Of body a relative to what it touches, where `v` are the velocities of the cluster.
+/// Velocity of body a relative to the body or face that it touches; `v` are the cluster's
+/// velocities.
 [[nodiscard]] inline Vector2 relative_velocity(const std::vector<Vector2>& v,
                                                const Contact& contact)
 {
@@ -35,7 +36,7 @@ struct Contact {
     return contact.moving ? v[contact.slot_a] - contact.surface_velocity : v[contact.slot_a];
 }
 
-/// How a push of one body of a system moves another one, or itself.
+/// Effect of a push of one body of a system on another one, or on itself.
 struct Coupling {
     std::uint32_t of = 0, by = 0;      ///< slots
     std::array<Vector2, 2> changes{};  ///< [1/kg] of the velocity, by impulses along x and y
@@ -68,15 +69,15 @@ struct Cluster {
     }
 };
 
-/// Resolves the impacts of a cluster: `after` from `before`. What was struck is appended to
+/// Resolves the impacts of a cluster: `after` from `before`. The contacts struck are appended to
 /// `events`, in the order of the waves, if it is not null.
 class Impacts {
 public:
     explicit Impacts(World& world) : world_(world) {}
 
-    /// Newton's law by waves, or for all at once. A cluster that does not come to an end has its
-    /// restitution spent, as `spend` has from the start; one with lasting contact is left sooner,
-    /// with what still approaches. Returns whether it has been left.
+    /// Applies Newton's law by waves, or for all together. Restitution is set to 0 in a cluster
+    /// that does not terminate, and with `spend` from the start; a cluster with lasting contact is
+    /// left sooner, with contacts that still approach. Returns whether it was left.
     bool resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events);
 
 private:

@@ -1,4 +1,4 @@
-// Systems as islands: their events, which the core finds, their discs, and how these are pushed.
+// Systems as islands: their events, which the core finds, their discs, and pushes of these.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// The current step as a monitor sees it.
+/// The current step as seen by a monitor.
 class Islands::Step final : public SceneStep {
 public:
     Step(const Islands& islands, const Island& island) : islands_(islands), island_(island) {}

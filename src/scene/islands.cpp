@@ -11,8 +11,8 @@ namespace ricochet::detail {
 
 namespace {
 
-/// So many steps in a row, each so small a part of the run, are taken for the rule: a run of 10^8
-/// steps takes half a minute and more.
+/// This many consecutive steps, each this small a fraction of the run, are taken as its typical
+/// steps: a run of 10^8 steps takes half a minute or more.
 constexpr std::uint32_t most_short_steps = 1000;
 constexpr double short_part = 1e-8;
 
@@ -118,10 +118,10 @@ void Islands::flow(const Island& island, const AnyState& x, AnyState& rate, doub
     }
 }
 
-// Of systems as well (island_systems.cpp).
+// Systems need it as well (island_systems.cpp).
 template void Islands::flow(const Island&, const State&, State&, double) const;
 
-/// A state of few numbers, in registers; the bits are those of `depart`.
+/// Departs from a state of few numbers, in registers; the bits are those of `depart`.
 template <std::size_t n, class Flow>
 void Islands::depart_few(const Island& island, double h, bool with_error, const Flow& flow) const
 {
@@ -169,7 +169,7 @@ void Islands::depart(const Island& island, double h, bool with_error) const
         for (State& stage : stages_) stage.resize(n);
     }
     if (n == 4 && !island.system) {
-        // One body has no springs.
+        // A single body has no springs.
         const double damping = island.drag[0] * island.inverse_mass[0];
         const Vector2 pull = world_.gravity;
         return depart_few<4>(island, h, with_error, [&](const auto& x, auto& rate) {
@@ -248,7 +248,7 @@ bool Islands::attempt(std::uint32_t which)
         const double error = error_of(island, island.h);
         const double factor = std::isfinite(error) ? ErrorRule{}.factor(error, 5) : 0.2;
         if (ErrorRule::accepts(error)) {
-            // A step that the end of the run has cut short says little about the next one.
+            // A step shortened by the end of the run says little about the next one.
             if (island.h < left || factor < 1) island.next = island.h * factor;
             island.end = island.h == left ? t_end : island.start.after(island.h);
             ++world_.statistics.steps;
@@ -262,8 +262,8 @@ bool Islands::attempt(std::uint32_t which)
     }
 }
 
-/// Quartics through the middle and the end of the current step. False where a system does not go
-/// on.
+/// Records quartics through the middle and the end of the current step. False where a system cannot
+/// continue.
 bool Islands::record(Island& island)
 {
     const double h = island.h;

@@ -21,7 +21,7 @@ class Islands {
 public:
     explicit Islands(World& world);
 
-    /// Whether there are any, and of how many members.
+    /// Number of islands, and members of each.
     [[nodiscard]] std::size_t count() const noexcept { return islands_.size(); }
     [[nodiscard]] const std::vector<std::uint32_t>& members(std::uint32_t island) const
     {
@@ -29,25 +29,25 @@ public:
     }
     [[nodiscard]] const Instant& end(std::uint32_t island) const { return islands_[island].end; }
 
-    /// On the method's own map: the current step, taken again with another length.
+    /// By the method's own map: the current step is repeated with another length.
     [[nodiscard]] Vector2 position(std::uint32_t body, const Instant& t) const;
     [[nodiscard]] Vector2 velocity(std::uint32_t body, const Instant& t) const;
 
-    /// The next step of an island; its members get new records. False where no step is short
-    /// enough, or nothing finite comes out.
+    /// Takes the next step of an island; its members get new records. False where no step is short
+    /// enough, or the result is not finite.
     bool advance(std::uint32_t island);
-    /// Whether its steps have become so short that it would hardly ever come to the end.
+    /// Whether its steps have become so short that it would hardly ever reach the end.
     [[nodiscard]] bool stalls(std::uint32_t island) const;
 
-    /// An island goes on from t with changed velocities of some members: the current step is cut
+    /// Continues an island from t with changed velocities of some members: the current step is cut
     /// there, and its length is kept for the next one.
     bool restart(std::uint32_t island, const Instant& t,
                  const std::vector<std::pair<std::uint32_t, Vector2>>& velocities);
 
-    /// Its members advance otherwise from now on, as part of a group in lasting contact.
+    /// From now on its members advance as part of a group in lasting contact.
     void suspend(std::uint32_t island);
-    /// An island that was suspended goes on from t with these positions and velocities, in the
-    /// order of its members.
+    /// Continues a suspended island from t with these positions and velocities, in the order of its
+    /// members.
     bool resume(std::uint32_t island, const Instant& t,
                 const std::vector<std::array<Vector2, 2>>& states);
 
@@ -58,7 +58,7 @@ public:
     /// Springs of an island.
     [[nodiscard]] std::vector<Join> springs(std::uint32_t island) const;
 
-    /// The island of one body that neither a body nor a surface can meet.
+    /// Marks the island of one body that can meet neither a body nor a surface.
     void set_unseen(std::uint32_t island) { islands_[island].unseen = !islands_[island].system; }
 
     // --- systems: islands whose members are the discs of one ---
@@ -67,15 +67,15 @@ public:
     {
         return islands_[island].system != nullptr;
     }
-    /// On the method's own map.
+    /// By the method's own map.
     [[nodiscard]] const std::vector<double>& state(std::uint32_t island, const Instant& t) const;
-    /// A system goes on from t with its discs pushed by these impulses, as by `restart`.
+    /// Continues a system from t with its discs pushed by these impulses, as `restart` does.
     bool push(std::uint32_t island, const Instant& t,
               const std::vector<std::pair<std::uint32_t, Vector2>>& impulses);
-    /// Velocities of disc `of` where disc `by` is pushed by (1, 0) and (0, 1), as changes.
+    /// Changes of the velocity of disc `of` when disc `by` is pushed by (1, 0) and by (0, 1).
     [[nodiscard]] std::array<Vector2, 2> mobility(std::uint32_t of, std::uint32_t by,
                                                   const Instant& t) const;
-    /// Why an island did not go on, if there is more to say than that its steps have become short.
+    /// The reason why an island did not continue, if it is more than that its steps became short.
     struct Trouble {
         Outcome outcome = Outcome::step_underflow;
         std::string what;  ///< of its first member
@@ -96,7 +96,7 @@ private:
         double h = 0;     ///< of the current step
         double next = 0;  ///< length that the error allows
         bool begun = false;
-        bool unseen = false;  ///< one body that nothing can meet: its record has no polynomial
+        bool unseen = false;  ///< one body that can meet nothing: its record has no polynomial
         std::uint32_t short_steps = 0;         ///< in a row
         State x, remainder, rate;              ///< at the start of the current step
         State x_end, remainder_end, rate_end;  ///< at its end
@@ -104,7 +104,7 @@ private:
         std::unique_ptr<SystemEvents> events;
         Mode mode = 0;
         Mode mode_after = 0;
-        bool cut = false;  ///< whether its step ends at events, which have led to x_end
+        bool cut = false;  ///< whether its step ends at events, which have produced x_end
     };
     class Step;
 
@@ -131,7 +131,7 @@ private:
     std::vector<std::uint32_t> place_;  ///< of a body in its island
     mutable std::vector<State> stages_;
     mutable State w_, end_rate_, error_, middle_, at_, point_;
-    mutable const Island* seen_ = nullptr;  ///< whose state at `seen_at_` lies in `at_`
+    mutable const Island* seen_ = nullptr;  ///< the island whose state at `seen_at_` is in `at_`
     mutable Instant seen_at_{};
     mutable Instant seen_from_{};
     mutable std::vector<State> spare_stages_;

@@ -25,7 +25,7 @@ using nlohmann::json;
 constexpr int deepest = 8;
 constexpr std::uintmax_t longest_file = 1ULL << 32;
 
-/// What is wrong with the value at a path.
+/// An error in the value at a path.
 struct Trouble {
     JsonPath path;
     std::string what;
@@ -37,7 +37,7 @@ std::string shown(const json& value)
     return text.size() > 40 ? text.substr(0, 37) + "..." : text;
 }
 
-/// An object of the file: every key of it has to be asked for.
+/// An object of the file, all of whose keys must be read.
 class Part {
 public:
     Part(const json& value, JsonPath path, std::string_view what)
@@ -127,7 +127,7 @@ public:
         if (!at(key).is_boolean()) expected("true or false", key, at(key));
         to = at(key).get<bool>();
     }
-    /// Calls `function(value, path)` for each entry of a list, if there is one.
+    /// Calls `function(value, path)` for each entry of a list, if there is a list.
     void each(std::string_view key,
               const std::function<void(const json&, const JsonPath&)>& function) const
     {
@@ -146,7 +146,7 @@ public:
         fail_at(key, fmt::format("expected {} for \"{}\", found {}", what, key, shown(found)));
     }
 
-    /// Calls what the scene may refuse; a refusal is about this part.
+    /// Makes a call that the scene may refuse; a refusal is reported for this part.
     template <class Call>
     auto ask(const Call& call) const
     {
@@ -402,7 +402,7 @@ private:
     std::unordered_map<std::string, MaterialId> materials_;
 };
 
-/// The line that a parser means, which counts bytes or names a key.
+/// The line to which a parser's message refers, by a count of bytes or the name of a key.
 std::size_t line_of_trouble(std::string_view text, std::string_view message)
 {
     try {

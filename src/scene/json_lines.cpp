@@ -7,12 +7,13 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Walks through a text that is JSON, or was up to where it is cut: nothing is checked again.
+/// Walks through a text that is valid JSON, at least up to where it is cut, without checking it
+/// again.
 class Walk {
 public:
     explicit Walk(std::string_view text) : text_(text) {}
 
-    /// Byte at which the value at `path` begins, or the last part of it that there is.
+    /// Byte at which the value at `path` begins, or else that of the last part of it that exists.
     std::size_t to(const JsonPath& path)
     {
         path_ = &path;
@@ -46,7 +47,7 @@ private:
         return inside;
     }
 
-    /// `depth` parts of the path lead here, or `none` where this is off the path.
+    /// The first `depth` parts of the path lead here, or `none` where this is off the path.
     void value(std::size_t depth)
     {
         space();

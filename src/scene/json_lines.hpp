@@ -1,4 +1,4 @@
-// Where in a text of JSON a value stands.
+// Finds the line of a value in a JSON text.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,8 @@ using JsonPath = std::vector<std::variant<std::string, std::size_t>>;
 /// The line, counted from 1, of the byte.
 [[nodiscard]] std::size_t line_of_byte(std::string_view text, std::size_t byte);
 
-/// The line on which the value at `path` begins, or the last part of the path that there is, in a
-/// text that is JSON.
+/// The line on which the value at `path` begins, or else the last part of the path that exists, in
+/// a text that is valid JSON.
 [[nodiscard]] std::size_t line_of(std::string_view text, const JsonPath& path);
 
 /// The line of the second of two equal keys of one object; 0 where there is none.

@@ -1,4 +1,4 @@
-// Memory of many bodies and events in large pages, where the system has them to give: a million of
+// Memory of many bodies and events in large pages, where the system provides them: a million of
 // them touch 100 000 small pages, each of which costs the system more than the arithmetic.
 #pragma once
 
@@ -11,7 +11,8 @@
 
 namespace ricochet::detail {
 
-/// Room for `count` more elements at least, in large pages where it is large. It changes no result.
+/// Reserves memory for `count` elements at least, in large pages if it is large. Results are the
+/// same.
 template <class T>
 void reserve_large(std::vector<T>& list, std::size_t count)
 {
@@ -22,7 +23,7 @@ void reserve_large(std::vector<T>& list, std::size_t count)
     const auto begin = (reinterpret_cast<std::uintptr_t>(list.data()) + page - 1) & ~(page - 1);
     const auto end = reinterpret_cast<std::uintptr_t>(list.data() + list.capacity()) & ~(page - 1);
     if (begin < end) {
-        // Where it is refused the memory is as good, and slower.
+        // Where this is refused the memory is usable, but slower.
         static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
     }
 #endif

@@ -1,5 +1,5 @@
-// Lasting contact as the loop sees it: what makes and advances such groups is a library of its own,
-// of which the loop knows these two interfaces alone.
+// Lasting contact as the loop sees it: a library of its own makes and advances such groups, and the
+// loop knows only these two interfaces.
 #pragma once
 
 #include <array>
@@ -20,26 +20,26 @@ public:
     LastingContact(const LastingContact&) = delete;
     LastingContact& operator=(const LastingContact&) = delete;
 
-    /// The next step, no longer than `longest`. Nothing has moved yet.
+    /// The next step, no longer than `longest`. The plan moves nothing.
     struct Plan {
         IslandOutcome outcome = IslandOutcome::reached;
         double length = 0;  ///< [s] until it ends, or an arrival ends it
-        double step = 0;    ///< [s] in which velocities go over into those of the chords
+        double step = 0;    ///< [s] in which velocities change to those of the chords
         double defect = 0;  ///< of the contact law, as a fraction
-        double wakes = 0;   ///< [s] until a wall begins to move, infinite where none does
+        double wakes = 0;   ///< [s] until a wall begins to move, infinite if none does
     };
     virtual Plan plan(double longest) = 0;
-    /// Goes s seconds on into the step that was planned.
+    /// Advances by s seconds in the planned step.
     virtual void commit(double s) = 0;
-    /// Velocity [m/s] of the straight line on which a body goes in the step that was planned.
+    /// Velocity [m/s] of the straight line of a body in the planned step.
     [[nodiscard]] virtual std::array<double, 2> chord(std::uint32_t id) const = 0;
     [[nodiscard]] virtual IslandBody body(std::uint32_t id) const = 0;
     virtual void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity) = 0;
-    /// Bodies that contacts that push, or springs, connect.
+    /// Bodies grouped by springs and by contacts that push.
     [[nodiscard]] virtual std::vector<std::vector<std::uint32_t>> groups() const = 0;
     /// Contacts that pushed in the last step.
     [[nodiscard]] virtual std::vector<IslandContact> contacts() const = 0;
-    /// What meets at the end of a step whose outcome is `impact`.
+    /// Contacts that meet at the end of a step whose outcome is `impact`.
     [[nodiscard]] virtual std::vector<IslandContact> arrivals() const = 0;
     /// Why a step was not solved, in a clause.
     [[nodiscard]] virtual std::string failure() const = 0;

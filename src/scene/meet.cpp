@@ -23,7 +23,7 @@ namespace {
     return c;
 }
 
-/// How far the path can lead away from its start within `until`.
+/// Distance that the path can lead away from its start within `until`.
 [[nodiscard]] double reach_of(const Path& path) noexcept
 {
     double sum = 0;
@@ -33,7 +33,7 @@ namespace {
     return sum;
 }
 
-/// Whether one coordinate alone keeps the path farther than `reach` from the origin.
+/// Whether one coordinate is enough to keep the path farther than `reach` from the origin.
 [[nodiscard]] bool stays_beyond(const Path& path, double reach) noexcept
 {
     for (std::size_t c = 0; c < 2; ++c) {
@@ -172,7 +172,7 @@ bool lies_on(const Face& face, const Vector2& p, double slack)
     return along >= -slack && along <= face.length + slack;
 }
 
-/// Whether a body that comes to the line of a segment at p meets it between its ends.
+/// Whether a body that reaches the line of a segment at p meets it between its ends.
 static bool lands_on(const World& world, const Body& body, std::uint32_t which, bool above,
                      const Vector2& p, const Vector2& v)
 {
@@ -181,7 +181,7 @@ static bool lands_on(const World& world, const Body& body, std::uint32_t which, 
     return world.holds(face, p) && !world.passes_end(body, which, above, p, v);
 }
 
-/// A wall, or the inside of a segment.
+/// First contact with a wall, or with the inside of a segment.
 static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t which)
 {
     const Face& face = world.faces[which];
@@ -192,7 +192,7 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     const Vector2 normal = above ? face.normal : -1.0 * face.normal;
     const double gap = dot(path.c[0] - face.at, normal) - b.radius;
     const double rounding = World::rounding(path.c[0], b.radius) + World::rounding(face.at, 0);
-    // What is on the line beside a segment comes to its end a little later.
+    // A body on the line beside a segment reaches its end a little later.
     const bool on =
         !segment || lies_on(face, path.c[0], b.radius > 0 ? 0 : World::end_slack(face, path.c[0]));
     const double closed = on ? rounding : 0;
@@ -208,7 +208,7 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     };
     Meeting meeting{.from = b.t};
     const Polynomial c{gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};
-    // Beside the end of a segment a disc may reach across its line: it meets the segment when it
+    // Beside the end of a segment a disc may reach across its line: it meets the segment after it
     // has left the line and comes back.
     const bool beside = gap < -rounding && !on;
     if (on && gap <= rounding && std::fabs(rate) <= noise(path.c[1], {})) {
@@ -224,7 +224,7 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
                                : falls_after(gap, rate, 2 * bend, closed);
         if (!(beside && meeting.after == never) && lands(meeting.after, above)) return meeting;
         if (bend <= 0 || rate >= 0) return {};
-        // Past its end, and back from behind.
+        // The body passes its end, and comes back from behind.
         const double behind = -(gap + 2 * b.radius);
         const double square = rate * rate + 4 * bend * behind;
         if (!(square > 0)) return {};
@@ -251,7 +251,7 @@ Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
     if (face.kind != Face::Kind::vertex) return meet_line(world, i, which);
     if (b.radius == 0) return {};
     if (b.held != none && world.faces[b.held].kind == Face::Kind::segment) {
-        // What slides along a segment passes the ends of those that go on in its line.
+        // A body that slides along a segment passes the ends of segments that continue in its line.
         const Face& under = world.faces[b.held];
         const double height = dot(face.at - under.at, under.normal);
         const double rounding = World::rounding(face.at, 0) + World::rounding(under.at, 0);

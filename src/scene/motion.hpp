@@ -1,4 +1,4 @@
-// Bounds on how surfaces move.
+// Bounds on the motion of surfaces.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// At most, at any time or until the next break. Infinite where nothing is known.
+/// Largest values, at any time or until the next break. Infinite where nothing is known.
 struct MotionBounds {
     double acceleration = 0;  ///< [m/s^2]
     double speed = 0;         ///< [m/s]
@@ -21,16 +21,16 @@ struct MotionBounds {
     return !std::holds_alternative<Fixed>(motion);
 }
 
-/// The first time after t at which the velocity jumps; infinite where there is none.
+/// The first time after t at which the velocity jumps; infinite if there is none.
 [[nodiscard]] double next_break(const SurfaceMotion& motion, double t);
 
-/// Until when a surface stands still that does so at t; t where it moves.
+/// Time until which a surface stands still if it does at t; t where it moves.
 [[nodiscard]] double still_until(const SurfaceMotion& motion, double t);
 
 /// @throws std::invalid_argument in a sentence about the motion of `whose`.
 void check_motion(const SurfaceMotion& motion, const std::string& whose);
 
-/// The same for what a function returns at the start.
+/// The same for the value of a function at the start.
 void check_motion_at(const SurfaceMotion& motion, double t, const std::string& whose);
 
 }  // namespace ricochet::detail

@@ -8,13 +8,13 @@ namespace ricochet::detail {
 
 namespace {
 
-/// What a function must keep between two times at which it was evaluated.
+/// Values of a function whose bounds must hold between two evaluations.
 struct Evaluated {
     double t = 0;
     Vector2 moved{}, v{};
 };
 
-/// Notes a bound that `now` has broken since `then`. Rounding may break it by a little.
+/// Records a bound that `now` has broken since `then`. Rounding may exceed it by a little.
 void check_bounds(const World& world, const MovingFace& of, std::uint32_t surface,
                   const Evaluated& then, const Evaluated& now)
 {
@@ -66,7 +66,7 @@ void check_bounds(const World& world, const MovingFace& of, std::uint32_t surfac
     return sum;
 }
 
-/// Of the second derivative within a path [m/s^2].
+/// Bound of the second derivative along a path [m/s^2].
 [[nodiscard]] double acceleration_of(const Path& path) noexcept
 {
     double sum = 2 * norm(path.c[2]);
@@ -101,8 +101,8 @@ public:
           body_(world.bodies[i]),
           path_(world.path(i, body_.t))
     {
-        // At least this is the second derivative of the gap to a surface at rest: distances from
-        // what is convex are convex along straight lines.
+        // Lower bound of the second derivative of the gap to a surface at rest: the distance from a
+        // convex set is convex along straight lines.
         const bool exact = face_.kind == Face::Kind::wall && path_.degree <= 2;
         bend_ = exact ? 2 * dot(path_.c[2], face_.normal) : -acceleration_of(path_);
     }
@@ -170,7 +170,7 @@ private:
 
 namespace {
 
-/// Two bodies on the maps of their motions, of which bounds on accelerations are known.
+/// Two bodies on the maps of their motions, with known bounds on their accelerations.
 class BodyPair {
 public:
     BodyPair(const World& world, std::uint32_t i, std::uint32_t j)
@@ -274,7 +274,7 @@ Meeting meet_moving(const World& world, std::uint32_t i, std::uint32_t which, co
     const Closing closing = first_closing(until, pair);
     Meeting meeting{.from = body.t, .after = closing.after};
     if (!(closing.after > 0) || !(closing.after < never)) return meeting;
-    // It has hopped no higher than its place is rounded.
+    // It has not risen above the rounding of its place.
     if (!closing.opened) return {.from = body.t, .after = 0, .presses = true};
     meeting.after = on_map(closing.after, until, [&](double s) {
         const Instant t = body.t.after(s);

@@ -1,5 +1,5 @@
-// First contacts with what moves by a motion that only its bounds tell of: the gap is followed by
-// steps within which these bounds prove it open.
+// First contacts with motions that are known only by bounds: the gap is followed in steps over
+// which these bounds prove it open.
 #pragma once
 
 #include <algorithm>
@@ -15,15 +15,15 @@ struct GapAndRate {
     double rate = 0;
 };
 
-/// A gap now, and what is known of it.
+/// A gap at one time, and what is known of it.
 struct OpenGap {
     double gap = 0;
     double rate = 0;
-    double noise = 0;   ///< rates as small are the rounding of others
-    double closed = 0;  ///< gaps as small are closed
+    double noise = 0;   ///< rates up to this are rounding
+    double closed = 0;  ///< gaps up to this are closed
 };
 
-/// When a gap closes.
+/// The time at which a gap closes.
 struct Closing {
     double after = never;
     bool opened = false;  ///< whether it has been more than closed before, or its rate has jumped
@@ -32,9 +32,9 @@ struct Closing {
 /// The first s in [0, until] at which a gap is closed and closes further. `pair` has
 ///
 ///     look(s)       the gap at s
-///     safe(gap)     [s] for how long after the last look a gap that is open cannot close, proved
-///     linger(gap)   [s] the same where it is closed, until it can be over by as much again
-///     next_jump(s)  when next the rate may jump; the bounds hold up to there
+///     safe(gap)     [s] time after the last look for which an open gap provably cannot close
+///     linger(gap)   [s] the same for a closed gap, until it can be exceeded by as much again
+///     next_jump(s)  next time at which the rate may jump; the bounds hold up to there
 ///
 /// With a bound on second derivatives the steps converge to a root as Newton's method does, and
 /// never pass one.
@@ -58,8 +58,7 @@ template <class Pair>
     }
 }
 
-/// The root of a gap moved to where the gap closes on the exact motion. `gap` returns the gap there
-/// and its rate.
+/// The root of a gap, corrected to the exact motion. `gap` returns the gap at a time and its rate.
 template <class Gap>
 [[nodiscard]] double on_map(double after, double until, const Gap& gap)
 {
@@ -80,7 +79,7 @@ template <class Gap>
 [[nodiscard]] FaceGap displaced_gap(const Face& face, const Vector2& moved, double radius,
                                     const Vector2& p);
 
-/// First contact of two bodies of which one at least is mapped, in their current steps.
+/// First contact of two bodies, at least one of them mapped, in their current steps.
 [[nodiscard]] Meeting meet_mapped(const World& world, std::uint32_t i, std::uint32_t j);
 
 /// First contact of a body with a face that moves, before `t_end`.

@@ -1,4 +1,4 @@
-// The name that was probably meant.
+// Guess of the intended name.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,7 +11,7 @@
 
 namespace ricochet::detail {
 
-/// Insertions, deletions and replacements that turn `a` into `b`.
+/// Number of insertions, deletions and replacements that turn `a` into `b`.
 [[nodiscard]] inline std::size_t edits(std::string_view a, std::string_view b)
 {
     std::vector<std::size_t> row(b.size() + 1);
@@ -27,7 +27,7 @@ namespace ricochet::detail {
     return row[b.size()];
 }
 
-/// ", the nearest known name is 'x'", or nothing where none is known.
+/// ", the nearest known name is 'x'", or nothing where no name is known.
 template <class Names>
 [[nodiscard]] std::string nearest_name(std::string_view given, const Names& known)
 {

@@ -10,19 +10,19 @@ namespace ricochet::detail {
 /// @throws std::invalid_argument naming the option, what was given and what was expected.
 void validate(const SceneOptions& options);
 
-/// What costs time and changes no result. By rules, unless a test wants otherwise.
+/// Parameters that affect time but no result. They follow rules, unless a test sets them.
 struct SceneTuning {
     /// Bodies of a larger radius [m] are in the second grid.
     double big_above = std::numeric_limits<double>::quiet_NaN();
-    /// The calendar of a group of as many bodies is a ring of lists. In a gas of discs that cover
-    /// 0.3 it takes 3 % more time at 100 bodies and nothing less at 300; it takes 5 % less at 1000
-    /// and 3000, 14 % less at 10 000 and 2 % less at 100 000.
+    /// The calendar of a group of at least this many bodies is a ring of lists. In a gas of discs
+    /// that cover 0.3 of the area a ring takes 3 % more time at 100 bodies and the same at 300; it
+    /// takes 5 % less at 1000 and 3000, 14 % less at 10 000 and 2 % less at 100 000.
     std::size_t ring_from = 1000;
 };
 [[nodiscard]] SceneRun simulate(const Scene& scene, const SceneOptions& options,
                                 const SceneTuning& tuning);
 
-/// What `Scene::check` throws for a body that lies where it must not.
+/// The exception of `Scene::check` for a body at a place where it must not be.
 struct Misplaced : std::invalid_argument {
     Misplaced(const std::string& what, std::uint32_t which)
         : std::invalid_argument(what), body(which)

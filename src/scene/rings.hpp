@@ -1,5 +1,5 @@
-// The cells from which ordinary bodies can touch a big one: a ring around its edge, since nothing
-// is inside of it.
+// The cells from which ordinary bodies can touch a big one: a ring around its edge, since no body
+// is inside it.
 #pragma once
 
 #include <algorithm>
@@ -13,9 +13,9 @@ namespace ricochet::detail {
 
 class Rings {
 public:
-    /// No rings, in cells of that grid. A ring holds while its body is within `play` [m] of where
-    /// the ring was laid along each axis; ordinary bodies are no larger than `radius`, and no
-    /// farther than `outside` [m] from their cell along each axis.
+    /// Starts without rings, in the cells of that grid. A ring holds while its body is within
+    /// `play` [m] along each axis of the place where the ring was laid; ordinary bodies are no
+    /// larger than `radius`, and no farther than `outside` [m] from their cell along each axis.
     void size(const Cells& cells, double radius, double play, double outside)
     {
         rings_.clear();
@@ -24,19 +24,19 @@ public:
         heads_.clear();
         radius_ = radius;
         play_ = play;
-        // The diagonals, and what rounding makes of both.
+        // Includes the diagonals, and the rounding of both.
         reach_ = 1.5 * (play + outside) + 1e-3 * cells.side();
     }
 
     [[nodiscard]] bool empty() const noexcept { return rings_.empty(); }
     [[nodiscard]] double play() const noexcept { return play_; }
 
-    /// Cells across the ring of a body.
+    /// Number of cells across the ring of a body.
     [[nodiscard]] double across(const Cells& cells, double radius) const noexcept
     {
         return 2 * outer(radius) / cells.side() + 2;
     }
-    /// A ring that is not laid yet. Returns its number.
+    /// Adds a ring that is not laid yet. Returns its number.
     std::uint32_t add(double radius)
     {
         rings_.push_back({{}, outer(radius), 0.999 * radius - reach_});
@@ -80,15 +80,15 @@ public:
         });
     }
 
-    /// Big bodies whose rings lie on a bucket.
+    /// Visits the big bodies whose rings lie on a bucket.
     template <class Visit>
     void each_on(std::uint32_t bucket, const Visit& visit) const
     {
         for (std::uint32_t n = heads_[bucket]; n != none; n = nodes_[n].next) visit(nodes_[n].body);
     }
 
-    /// Buckets of the cells of a ring, which depend on nothing but where it was laid. None comes
-    /// twice on a torus of at least `across` cells a side.
+    /// Visits the buckets of the cells of a ring, which depend only on the place where it was laid.
+    /// No bucket comes twice on a torus of at least `across` cells a side.
     template <class Visit>
     void each_bucket(const Cells& cells, std::uint32_t ring, const Visit& visit) const
     {
@@ -104,7 +104,7 @@ public:
             const double wide = std::sqrt(std::max(outer * outer - near * near, 0.0));
             const std::int64_t from = cells.cell_of({at[0] - wide, at[1]}).x;
             const std::int64_t to = cells.cell_of({at[0] + wide, at[1]}).x;
-            // Cells whose corners are all inside.
+            // Cells with all corners inside are left out.
             std::int64_t hole = to + 1;
             std::int64_t resume = to + 1;
             if (inner > far) {

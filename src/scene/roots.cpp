@@ -6,7 +6,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Where a polynomial changes its sign, ascending.
+/// Places at which a polynomial changes its sign, ascending.
 struct Roots {
     std::array<double, largest_degree> at{};
     int count = 0;
@@ -35,7 +35,7 @@ double root_between(const Polynomial& c, int degree, double a, double b)
     return s;
 }
 
-/// All in (0, until], from those of the derivative, between which it is monotone.
+/// All roots in (0, until], from those of the derivative, between which the polynomial is monotone.
 Roots roots_in(const Polynomial& c, int degree, double until)
 {
     Roots roots;
@@ -63,7 +63,7 @@ Roots roots_in(const Polynomial& c, int degree, double until)
     return roots;
 }
 
-/// All roots lie below it (Lagrange; Fujiwara).
+/// A bound below which all roots lie (Lagrange; Fujiwara).
 double bound_of_roots(const Polynomial& c, int degree)
 {
     double bound = 0;
@@ -81,7 +81,7 @@ double falls_within(Polynomial c, int degree, double until, double tolerance) no
 {
     while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;
     if (c[0] <= tolerance) {
-        // Closed now: what follows decides, and the root at zero is divided out.
+        // The gap is closed now: the next coefficient decides, and the root at zero is divided out.
         int first = 1;
         while (first <= degree && c[static_cast<std::size_t>(first)] == 0) ++first;
         if (first > degree) return never;

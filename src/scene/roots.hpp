@@ -1,4 +1,4 @@
-// When a polynomial gap closes.
+// Time at which a polynomial gap closes.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@ namespace ricochet::detail {
 inline constexpr double never = std::numeric_limits<double>::infinity();
 
 /// Time from now until g + b s + a s^2/2, positive now, falls to zero. A gap no larger than
-/// `tolerance` is closed: where it opens, the time until it closes again; where it closes further,
-/// now.
+/// `tolerance` is closed: if it opens, this is the time until it closes again; if it closes
+/// further, it is zero.
 [[nodiscard]] inline double falls_after(double g, double b, double a, double tolerance) noexcept
 {
     if (g <= tolerance) {

@@ -1,4 +1,4 @@
-// The loop of a scene: the next body to act, what it meets, what it crosses.
+// The loop of a scene: the next body to act, and its meetings and crossings.
 #include "scene/runner.hpp"
 
 #include <fmt/format.h>
@@ -12,7 +12,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Acts in a row at one time, and 64 for each body: by trial, far more than any collapse takes.
+/// Consecutive acts at one time, and 64 per body: by trial, far more than any collapse takes.
 constexpr std::uint64_t most_idle = 100'000;
 
 }  // namespace
@@ -109,7 +109,8 @@ void Runner::fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::strin
     result_.failure = Failure{outcome, now_, std::move(bodies), std::move(message)};
 }
 
-/// Samples before t, and at t if `inclusive`: one at the time of an event shows the state after it.
+/// Writes samples before t, and at t if `inclusive`: a sample at an event's time shows the state
+/// after.
 void Runner::sample_until(const Instant& t, bool inclusive, Samples& samples)
 {
     const auto& times = world_.options.sample_times;
@@ -159,7 +160,7 @@ void Runner::consider(std::uint32_t i, const Meeting& meeting, bool surface, std
     Pending& pending = pending_[i];
     using Kind = Pending::Kind;
     const bool pressing = pending.kind == Kind::presses || pending.kind == Kind::presses_face;
-    // Where a body presses on one and approaches another, it is the impact that comes first.
+    // Where a body presses on one body and approaches another, the impact comes first.
     if (before(pending.t, t)) return;
     if (!before(t, pending.t) && (!pressing || meeting.presses)) return;
     pending.t = t;
@@ -191,7 +192,7 @@ void Runner::consider_walls(std::uint32_t i)
     }
 }
 
-/// Surfaces that move, which wake sleepers, too.
+/// Considers moving surfaces, which wake sleepers too.
 void Runner::consider_moving(std::uint32_t i)
 {
     const auto count = static_cast<std::uint32_t>(world_.faces.size());
@@ -250,7 +251,7 @@ void Runner::predict(std::uint32_t i)
     put_in_calendar(i);
 }
 
-/// A sleeper has no entry in the calendar: those that are awake around it may meet it now.
+/// A sleeper has no entry in the calendar: the awake bodies around it may meet it now.
 void Runner::offer(std::uint32_t i)
 {
     grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
@@ -316,7 +317,7 @@ void Runner::predict_crossing(std::uint32_t i)
     if (first < never) pending.crossing = now_.after(first);
 }
 
-/// A tenth of a cell outside of it, as the bound proves.
+/// Predicts a crossing to a tenth of a cell outside, as proved by the bound.
 void Runner::predict_crossing_mapped(std::uint32_t i)
 {
     Pending& pending = pending_[i];
@@ -335,7 +336,7 @@ void Runner::predict_crossing_mapped(std::uint32_t i)
     if (first < path.until) pending.crossing = now_.after(first);
 }
 
-/// Into the cell where a step has led it.
+/// Moves a body into the cell to which a step has led it.
 void Runner::move_to_cell(std::uint32_t i)
 {
     const Instant& t = world_.bodies[i].t;

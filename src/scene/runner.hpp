@@ -17,7 +17,7 @@
 
 namespace ricochet::detail {
 
-/// Why a group could not go on.
+/// The reason why a group could not go on.
 struct Failure {
     Outcome outcome = Outcome::reached_end;
     Instant t{};
@@ -25,7 +25,7 @@ struct Failure {
     std::string message{};
 };
 
-/// What becomes of a group by `t_end`; the world's records are where its bodies are then.
+/// Result of a group at `t_end`; the world's records then hold its bodies.
 struct GroupResult {
     std::optional<Failure> failure;
     std::vector<SceneEvent> events;
@@ -35,8 +35,8 @@ struct GroupResult {
 /// State of all bodies of a group at a sample time.
 using Samples = std::vector<std::vector<BodyState>>;
 
-/// A value for each body of a group, in room for the labels between its first and its last: those
-/// of a body that is alone are always in the same place.
+/// A value for each body of a group, in memory for the labels between its first and its last: the
+/// values of a body that is alone are always in the same place.
 template <class Value>
 class OfGroup {
 public:
@@ -65,7 +65,7 @@ public:
 
     /// @param events   to which those of this group are appended
     /// @param samples  a row for each of the options' sample times, whose bodies of this group are
-    ///                 filled in as far as the group comes
+    ///                 filled in as far as the group runs
     GroupResult run(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events,
                     Samples& samples);
 
@@ -182,8 +182,8 @@ private:
     };
     OfGroup<Series> series_;  ///< of impacts of a body
     Instant now_{};
-    std::uint32_t fruitless_ = 0;  ///< predicted impacts in a row that moved nothing
-    std::uint64_t idle_ = 0;       ///< acts in a row at one time
+    std::uint32_t fruitless_ = 0;  ///< consecutive predicted impacts that moved nothing
+    std::uint64_t idle_ = 0;       ///< consecutive acts at one time
     std::size_t next_sample_ = 0;
     GroupResult result_;
 };

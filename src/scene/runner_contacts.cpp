@@ -1,4 +1,4 @@
-// Bodies that stay in contact with each other: joined to groups, and set free again.
+// Bodies that stay in contact with each other: joined to groups, and released again.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Steps in which a group has been several before it is divided.
+/// Steps during which a group has been in several parts before it is divided.
 constexpr std::uint32_t patience_to_divide = 3;
 
 }  // namespace
@@ -28,7 +28,7 @@ bool Runner::known_to_group(std::uint32_t i, bool surface, std::uint32_t other) 
     return contacts_.knows(group, other);
 }
 
-/// Whether a contact is that of a group with what is not of it.
+/// Whether a contact is between a group and something outside it.
 bool Runner::across(const Contact& contact) const
 {
     const bool first = world_.bodies[contact.a].contact != none;
@@ -36,8 +36,8 @@ bool Runner::across(const Contact& contact) const
     return (first || second) && !known_to_group(contact.a, contact.surface, contact.b);
 }
 
-/// Bodies that meet a group, those of it included, and approach it at more than `least` and less
-/// than `most` [m/s].
+/// Bodies in contact across a group's boundary, on both sides, that approach at more than `least`
+/// and less than `most` [m/s].
 std::vector<std::uint32_t> Runner::joining(double least, double most) const
 {
     std::vector<std::uint32_t> bodies;
@@ -57,7 +57,7 @@ std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& 
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) faces.push_back(f);
     const auto count = static_cast<std::uint32_t>(world_.faces.size());
     for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
-        // Those that are not touched stay the scene's, and keep no group awake.
+        // Faces that are not touched remain with the scene, and keep no group awake.
         const bool touched = std::ranges::any_of(members, [&](std::uint32_t i) {
             const double radius = world_.bodies[i].radius;
             const Vector2 p = world_.position(i, now_);
@@ -77,7 +77,7 @@ std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& 
     return faces;
 }
 
-/// A body is pressed onto another one, or onto a surface; whatever touches it joins it.
+/// Handles a body pressed onto another one, or onto a surface; every body that touches it joins it.
 void Runner::press(std::uint32_t i, const std::string& sentence)
 {
     gather(i, pending_[i]);
@@ -156,7 +156,7 @@ void Runner::note_group(SceneEvent::Kind kind, std::uint32_t i)
     result_.events.push_back(event);
 }
 
-/// The next step of a group, and what its members meet in it.
+/// Plans the next step of a group, and the meetings of its members in it.
 void Runner::plan_group(std::uint32_t number)
 {
     const bool slept = world_.bodies[contacts_[number].members[0]].asleep;
@@ -201,7 +201,7 @@ void Runner::step_group(std::uint32_t number)
     if (!divide(number)) plan_group(number);
 }
 
-/// Members meet at a speed from which they rebound: an impact like any other.
+/// Resolves members that meet at a speed from which they rebound: an impact like any other.
 void Runner::arrive(std::uint32_t number)
 {
     const std::uint32_t first = contacts_[number].motion->arrivals().at(0).first;
@@ -211,7 +211,7 @@ void Runner::arrive(std::uint32_t number)
     plan_group(number);
 }
 
-/// After an impact.
+/// Continues a group after an impact.
 void Runner::restart_group(std::uint32_t number)
 {
     contacts_.commit(number, now_);
@@ -232,7 +232,7 @@ bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
     const Body& body = world_.bodies[i];
     if (body.island != none) return false;
     for (const std::uint32_t f : faces_near({i})) {
-        if (world_.moves(f)) return false;  // which carries it
+        if (world_.moves(f)) return false;  // the face carries it
         const Face& face = world_.faces[f];
         if (face.kind != Face::Kind::vertex) continue;
         const double gap = norm(body.p - face.at) - body.radius;
@@ -242,7 +242,7 @@ bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
     return contacts_.exists(number);
 }
 
-/// A group that has fallen apart, and stayed so for some steps, is several from now on.
+/// Divides a group that has fallen apart, and stayed so for some steps, into several.
 bool Runner::divide(std::uint32_t number)
 {
     Contacts::Group& group = contacts_[number];
@@ -279,7 +279,7 @@ bool Runner::divide(std::uint32_t number)
     return true;
 }
 
-/// Nothing of the group has been in contact for as long as its patience asks for.
+/// Releases a group without contact for as long as its patience requires.
 void Runner::release(std::uint32_t number)
 {
     const std::vector<std::uint32_t> members = contacts_[number].members;

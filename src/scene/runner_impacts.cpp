@@ -1,4 +1,4 @@
-// Impacts: the cluster that is struck at one instant, and what becomes of its bodies.
+// Impacts: the cluster that is struck at one instant, and the motion of its bodies afterwards.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,19 +12,21 @@ namespace ricochet::detail {
 
 namespace {
 
-/// So many impacts of a body within the resolution of the time each, and its cluster collapses.
+/// Number of a body's impacts within the resolution of the time each after which a cluster
+/// collapses.
 constexpr std::uint32_t crowded = 64;
 
-/// Hops lower than so many roundings of the place, and how many of them in a row are the last ones.
+/// Hops are low below this many roundings of the place; this many consecutive low hops are the
+/// last.
 constexpr double low = 1024;
 constexpr std::uint32_t most_low = 1024;
 
-/// Predicted impacts in a row that change nothing.
+/// Consecutive predicted impacts that change nothing.
 constexpr std::uint32_t most_fruitless = 1000;
 /// The same, before the cluster is joined to a group in lasting contact.
 constexpr std::uint32_t fruitless_to_join = 8;
 
-/// Of the coordinates: gaps that the steps of groups in contact leave.
+/// Gaps, relative to the coordinates, that the steps of groups in contact leave.
 constexpr double loose = 1e-10;
 
 }  // namespace
@@ -59,7 +61,8 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
     for (const std::uint32_t body : cluster_.bodies) slots_[body] = none;
 }
 
-/// How pushes move the discs of systems. All discs of one are in a cluster, or none.
+/// Computes how pushes move the discs of systems. A cluster contains all discs of a system, or
+/// none.
 void Runner::add_couplings()
 {
     for (std::uint32_t by = 0; by < cluster_.bodies.size(); ++by) {
@@ -88,8 +91,8 @@ void Runner::add_couplings()
     if (!cluster_.couplings.empty()) cluster_.impulses.assign(cluster_.bodies.size(), {});
 }
 
-/// Segments that a point touches now, and on which side, from a record that has led there; `sure`
-/// is one of them whatever its distance, and the first.
+/// Segments that a point touches now, and its side of each, from the record that has led there;
+/// `sure` is one of them at any distance, and the first.
 std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
 {
     std::vector<Side> sides;
@@ -97,7 +100,7 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     if (body.radius > 0 || !celled_ || !grid_.any_faces()) return sides;
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = world_.velocity(i, now_);
-    // A long flight and its height round more than its end.
+    // A long flight and its height have larger roundings than its end.
     const double s = seconds(body.t, now_);
     const double flown = 4 * epsilon * s * (norm(body.v) + s * norm(body.a));
     for (const std::uint32_t f : grid_.faces(body)) {
@@ -108,7 +111,8 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
             const double gap = face_gap(face, body, p, above).gap;
             const double tolerance = World::rounding(p, 0) + World::rounding(face.at, 0) + flown +
                                      2 * resolution(now_) * std::fabs(dot(v, face.normal));
-            // Four times, since it is moved onto the line of another one before it goes on.
+            // Four times, since the point is moved onto the line of another segment before it goes
+            // on.
             if (std::fabs(gap) > 4 * tolerance) continue;
         }
         sides.push_back({f, above});
@@ -118,14 +122,14 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     return sides;
 }
 
-/// Contacts of a body of the cluster with faces; the face `sure` touches whatever its gap.
+/// Gathers contacts of a body of the cluster with faces; the face `sure` touches at any gap.
 void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
 {
     const std::uint32_t i = cluster_.bodies[slot];
     const Body& body = world_.bodies[i];
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = cluster_.before[slot];
-    if (body.mapped) return cluster_.sides.emplace_back(), void();  // its guards are its own
+    if (body.mapped) return cluster_.sides.emplace_back(), void();  // has its own guards
     const auto touch = [&](std::uint32_t f, const Vector2& normal) {
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = normal;
@@ -179,8 +183,8 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     }
 }
 
-/// [m] What a group in lasting contact leaves of a gap: in a step of its own, surfaces move on
-/// straight lines.
+/// [m] Gap left by a group in lasting contact: in one of its steps, surfaces move on straight
+/// lines.
 double Runner::loose_motion(std::uint32_t face, double size) const
 {
     const double h = world_.options.contact_step;
@@ -207,14 +211,14 @@ void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
 
 void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
 {
-    if (slots_[j] != none && slots_[j] < slot) return;  // seen from there
+    if (slots_[j] != none && slots_[j] < slot) return;  // gathered from there
     const std::uint32_t i = cluster_.bodies[slot];
     const Body& a = world_.bodies[i];
     const Body& b = world_.bodies[j];
     const double reach = a.radius + b.radius;
     if (reach == 0 || (a.mapped && b.mapped && a.island == b.island)) return;
     if (!sure && (a.quartic || b.quartic)) {
-        // On the polynomials first: the maps are expensive.
+        // The polynomials are tested first: the maps are expensive.
         const Vector2 near = world_.path(i, now_).c[0] - world_.path(j, now_).c[0];
         if (norm(near) > 1.001 * reach) return;
     }
@@ -238,8 +242,8 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     cluster_.contacts.push_back(contact);
 }
 
-/// Whether impacts of a body follow each other more closely than the time tells or, where groups in
-/// lasting contact can take it, than its place tells.
+/// Whether impacts of a body follow each other more closely than the time resolves or, where groups
+/// in lasting contact can take over, than its place resolves.
 bool Runner::collapses(std::uint32_t slot)
 {
     const std::uint32_t i = cluster_.bodies[slot];
@@ -262,10 +266,10 @@ bool Runner::collapses(std::uint32_t slot)
            s * fastest <= World::rounding(world_.position(i, now_), world_.bodies[i].radius);
 }
 
-/// Whether an elastic body with friction hops on surfaces, again and again, without the energy to
-/// rise by more than rounding makes of its place. Friction leads into such hops, for instance
-/// between the two sides of a corner, both of which it strikes at a right angle; there it takes
-/// nothing away any more.
+/// Whether an elastic body with friction hops on surfaces, again and again, without enough energy
+/// to rise above the rounding of its place. Friction leads into such hops, for instance between the
+/// two sides of a corner, both of which the body strikes at a right angle; there it dissipates no
+/// more energy.
 bool Runner::hops_below_rounding(std::uint32_t slot)
 {
     const std::uint32_t i = cluster_.bodies[slot];
@@ -291,7 +295,7 @@ void Runner::impact(std::uint32_t i)
     resolve_cluster(i);
 }
 
-/// The impacts of the cluster that was gathered around i.
+/// Resolves the impacts of the cluster that was gathered around i.
 void Runner::resolve_cluster(std::uint32_t i)
 {
     const double within = world_.options.elastic_within;
@@ -326,8 +330,8 @@ void Runner::resolve_cluster(std::uint32_t i)
         result_.events[k].number = result_.event_count;
     }
     apply();
-    // Bodies whose restitution is spent stay together: what else keeps them apart is the rounding
-    // of their velocities, by which they would meet again and again.
+    // Bodies whose restitution was set to 0 stay together: otherwise only the rounding of their
+    // velocities separates them, and they would meet again and again.
     const bool together =
         spend && contacts_.available() &&
         std::ranges::any_of(cluster_.contacts, [](const Contact& c) { return !c.surface; });
@@ -359,13 +363,13 @@ void Runner::resolve_cluster(std::uint32_t i)
     }
 }
 
-/// A flight from now on, of a body in closed form. Returns the face that held it before.
+/// Starts a flight of a body in closed form. Returns the face that held it before.
 std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
                                    const std::vector<Side>& sides)
 {
     Body& body = world_.bodies[i];
     body.p = place(body, seconds(body.t, now_));
-    // A velocity whose square vanishes is none: in a corner it would be halved for ever.
+    // A velocity whose square underflows is set to 0: in a corner it would be halved forever.
     body.v = norm(velocity) < 1e-150 ? Vector2{} : velocity;
     body.a = world_.gravity;
     body.t = now_;
@@ -375,7 +379,7 @@ std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
     return std::exchange(body.held, none);
 }
 
-/// New records of those whose velocity has changed, and what they meet now.
+/// Writes new records of bodies whose velocity has changed, and predicts their meetings.
 void Runner::apply()
 {
     changed_.clear();
@@ -425,8 +429,9 @@ void Runner::apply()
     }
 }
 
-/// A body alone that has just left the only wall there is: flight after flight, each twice the way
-/// to its top. Times are sums of multiples of a unit, which are exact, and of what is left.
+/// Bounces a body alone that has just left the only wall: flight after flight, each lasting twice
+/// the time to its top. Times are sums of multiples of a unit, which are exact, and of the
+/// remainder.
 void Runner::bounce(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
@@ -483,7 +488,7 @@ void Runner::bounce(std::uint32_t i)
     if (leaves == 0) settle(i, none);
 }
 
-/// A system goes on from where its discs have been pushed.
+/// Continues a system from the state to which its discs have been pushed.
 bool Runner::push_system(std::uint32_t island)
 {
     velocities_.clear();

@@ -29,14 +29,14 @@ std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
     return faces;
 }
 
-/// A body whose bounces on surfaces are shorter than the time resolves stays on them: at rest, or
+/// Keeps a body whose bounces are shorter than the time resolves on its surfaces: at rest, or
 /// sliding on one of them. `was` is the face on which it slid before.
 void Runner::settle(std::uint32_t i, std::uint32_t was)
 {
     Body& body = world_.bodies[i];
     const Vector2 velocity = body.v;
     const std::vector<std::uint32_t> faces = touching_faces(i);
-    // In a corner, what rises by less than the rounding of its place does not move.
+    // In a corner, a body that would rise by less than the rounding of its place does not move.
     const double pull_of_all = norm(world_.gravity);
     const double rise = faces.size() > 1 ? 4 * World::rounding(body.p, body.radius) : 0;
     const double gained =
@@ -45,7 +45,8 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
     const double still = std::max(8 * epsilon * norm(body.v), 0.5 * gained);
     const double rounding = 8 * epsilon * pull_of_all;
     std::vector<std::uint32_t> holding;
-    std::vector<Vector2> blocking;  // by what it cannot be pulled into, overhanging faces included
+    std::vector<Vector2> blocking;  // normals into which it cannot be pulled, overhanging faces
+                                    // included
     for (const std::uint32_t f : faces) {
         const Vector2 n = world_.push_of(body, f);
         const double pull = dot(world_.gravity, n);
@@ -89,7 +90,7 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
         return;
     }
     if (chosen == none) {
-        // No single one carries it, so it lies in the corner of two.
+        // No single face carries it, so it lies in the corner of two.
         body.v = body.a = {};
         body.asleep = true;
         body.held = chosen = holding[0];
@@ -97,7 +98,7 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
     if (chosen != was) note(SceneEvent::Kind::held, i, chosen, velocity);
 }
 
-/// Whether surfaces alone hold from now on what presses on one of them.
+/// Whether surfaces alone hold, from now on, a body that presses on one of them.
 bool Runner::rests_on_face(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
@@ -107,7 +108,7 @@ bool Runner::rests_on_face(std::uint32_t i)
     return body.held != none;
 }
 
-/// When friction stops it, or its face ends.
+/// Considers the times when friction stops it, or its face ends.
 void Runner::consider_own(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
@@ -161,7 +162,7 @@ void Runner::leave_edge(std::uint32_t i)
     for (const std::uint32_t f : touching_faces(i)) {
         const Face& face = world_.faces[f];
         if (face.kind != Face::Kind::segment) continue;
-        // The face that goes on from here, in the direction of the motion.
+        // The face that continues from here, in the direction of the motion.
         const Vector2 n = world_.push_of(body, f);
         if (!world_.leads_off(face, body.p, velocity) &&
             std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) && dot(world_.gravity, n) < 0) {

@@ -28,7 +28,7 @@ void require_vector(const Vector2& given, std::string_view what)
     for (const double component : given) require_finite(who, what, component);
 }
 
-/// What touches may overlap by the rounding of its coordinates.
+/// Overlap of touching bodies that the rounding of their coordinates allows.
 double rounding_of(const Vector2& at, double radius)
 {
     return 8 * std::numeric_limits<double>::epsilon() *
@@ -298,7 +298,7 @@ void Scene::check(double t_start) const
             }
         }
     }
-    // By the left edge: who begins before another one ends may overlap it.
+    // Ordered by the left edge: a body that begins before another one ends may overlap it.
     std::vector<std::uint32_t> order(bodies_.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
     const auto left = [&](std::uint32_t i) { return bodies_[i].at[0] - bodies_[i].radius; };

@@ -1,5 +1,5 @@
-// On which side of a segment a point is. Its coordinates do not tell where it is on the line by
-// rounding, so that its record keeps the sides of the segments that it touches.
+// Determines the side of a segment on which a point is. Its rounded coordinates do not determine
+// it for a point on the line, so its record keeps the sides of the segments that it touches.
 #include <algorithm>
 
 #include "scene/world.hpp"
@@ -38,8 +38,8 @@ bool World::begins_above(const Body& body, std::uint32_t f) const
             if (side != none && side / 2 == which) return side % 2 == 1;
         }
     }
-    // Nothing is known before the first contact: it is where the motion leads, or what does not
-    // move lies upon the segment.
+    // Nothing is known before the first contact: the motion then determines the side, and a point
+    // that does not move lies upon the segment.
     const double rate = dot(body.v, face.normal);
     if (std::fabs(rate) > noise(body.v, {})) return rate > 0;
     return dot(gravity, face.normal) <= 0;
@@ -54,7 +54,7 @@ bool World::arrives_above(const Body& body, std::uint32_t f, const Vector2& p,
     const double start = height(face, body.p);
     const double rounding = rounding_at(face, body.p);
     if (std::fabs(start) <= rounding) return above;
-    // Back from behind, where it has passed the end of the segment and turned round.
+    // The point has passed the end of the segment, turned round, and come back from behind.
     const double rate = dot(v, face.normal) * (above ? 1 : -1);
     const double before = dot(body.v, face.normal) * (above ? 1 : -1);
     const double bend = std::fabs(dot(body.a, face.normal));
@@ -75,7 +75,7 @@ void World::make_one(std::vector<Side>& sides) const
 
 void World::remember(Body& body, const std::vector<Side>& sides) const
 {
-    // Twenty times for what rounding leaves at a corner.
+    // Twenty times, because of the rounding at a corner.
     for (int k = 0; k < 20; ++k) {
         bool moved = false;
         for (const Side& side : sides) {
@@ -122,7 +122,7 @@ bool World::passes_end(const Body& body, std::uint32_t f, bool above, const Vect
         const bool side = arrives_above(body, other, p, v) == above ? above : !up;
         if (side != above) return true;
         if (side == up || inside > end_slack(face, p)) continue;
-        // Around an outer corner: it is struck by what leads behind both segments.
+        // At an outer corner only a motion behind both segments strikes.
         const double rate = dot(v, beside.normal) * (side ? 1 : -1);
         if (rate >= -noise(v, {})) return true;
     }

@@ -44,7 +44,7 @@ void validate(const SceneOptions& o)
 
 namespace {
 
-/// All groups until `t_end`; the first failure of any.
+/// Runs all groups until `t_end`; returns the earliest failure.
 std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
 {
     std::optional<Failure> failure;
@@ -55,7 +55,7 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
     for (std::size_t number = 0; number < groups.size(); ++number) {
         const auto group = groups[number];
         const std::size_t known = run.events.size();
-        // What one group adds is seldom more than half of what there is.
+        // One group seldom adds more than half of the present number.
         if (2 * known > run.events.capacity()) {
             const std::size_t alike = known / number * groups.size();
             reserve_large(run.events, std::clamp(alike + alike / 8, 4 * known, 64 * known));
@@ -79,8 +79,8 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
 
 namespace {
 
-/// One pass over all groups; what failed in one group ends the others at that time, in a pass of
-/// their own.
+/// One pass over all groups; a failure of one group ends the others at that time, in another
+/// pass.
 SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneTuning& tuning,
                    double t_end, Failure* first)
 {
@@ -115,8 +115,8 @@ struct Key {
     friend auto operator<=>(const Key&, const Key&) = default;
 };
 
-/// Events by time and, at one time, as they stand: first into some 8 to each interval of the run,
-/// as their times are spread, and then within each.
+/// Sorts events by time and, at one time, in their present order: first into intervals of the run
+/// with some 8 events each, as if their times were evenly spread, and then within each.
 std::vector<Key> keys_in_order(const std::vector<SceneEvent>& events)
 {
     const auto [first, last] = std::ranges::minmax(events | std::views::transform(&SceneEvent::t));
@@ -143,7 +143,7 @@ std::vector<Key> keys_in_order(const std::vector<SceneEvent>& events)
     return keys;
 }
 
-/// Events of all groups in the order of time; those of one group at one time keep theirs.
+/// Sorts the events of all groups by time; events of one group at one time keep their order.
 void sort_events(SceneRun& run)
 {
     std::uint64_t last = ~0ULL;
@@ -177,14 +177,14 @@ SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const 
 {
     validate(wanted);
     SceneOptions options = wanted;
-    // Their times tell which is the last.
+    // The times of events determine the last one.
     options.record_events |= wanted.max_events != SceneOptions{}.max_events;
     scene.check(options.t_start);
     scene.require_room(0);
     Failure failure;
     SceneRun run = run_until(scene, options, tuning, options.t_end, &failure);
     if (run.statistics.events > options.max_events) {
-        // Each group has counted for itself: the time of the last event that is wanted ends all.
+        // Each group has counted by itself: the time of the last event wanted ends all.
         std::vector<double> times;
         std::uint64_t last = ~0ULL;
         for (const SceneEvent& event : run.events) {

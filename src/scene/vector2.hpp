@@ -1,7 +1,7 @@
 // Arithmetic in the plane.
 //
-// Every sum is written so that exchanging two bodies changes signs alone: the bits do not depend on
-// which of them is asked first.
+// Every sum is written so that exchanging two bodies only changes signs: the bits do not depend on
+// the order of the two.
 #pragma once
 
 #include <cmath>
@@ -38,7 +38,7 @@ namespace ricochet::detail {
 {
     return std::isfinite(a[0]) && std::isfinite(a[1]);
 }
-/// Turned by a right angle, counterclockwise.
+/// The vector turned by a right angle, counterclockwise.
 [[nodiscard]] inline Vector2 turned(const Vector2& a) noexcept
 {
     return {-a[1], a[0]};

@@ -85,7 +85,7 @@ World::World(const Scene& from, const SceneOptions& with)
 
 World::~World() = default;
 
-/// Segments with their ends, which need no faces of their own where no point meets them.
+/// Adds segments with their ends, which need no faces of their own where no point meets them.
 void World::add_moving_faces()
 {
     std::uint32_t index = 0;
@@ -131,12 +131,12 @@ bool World::leads_off(const Face& face, const Vector2& p, const Vector2& heading
     if (face.kind != Face::Kind::segment) return false;
     const Vector2 along = -1.0 * turned(face.normal);
     const double place_on = dot(p - face.at, along);
-    const double slack = 0.5 * rounding(p, 0);  // so near, it touches what joins it there, too
+    const double slack = 0.5 * rounding(p, 0);  // so near, it touches the adjacent segment too
     const double ahead = dot(heading, along);
     return ahead > 0 ? place_on >= face.length - slack : ahead < 0 && place_on <= slack;
 }
 
-/// A body on a face moves along it: pulled by gravity, slowed by friction.
+/// Makes a body on a face move along it: pulled by gravity, slowed by friction.
 void World::slide(std::uint32_t i, std::uint32_t face)
 {
     Body& body = bodies[i];
@@ -160,7 +160,7 @@ void World::slide(std::uint32_t i, std::uint32_t face)
     body.a = rate * along;
 }
 
-/// What does not move and is not pulled, or lies on a wall that holds it.
+/// Puts bodies to sleep that do not move and are not pulled, or lie on a wall that holds them.
 void World::put_to_sleep()
 {
     for (std::uint32_t i = 0; i < bodies.size(); ++i) {

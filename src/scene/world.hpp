@@ -1,8 +1,8 @@
 // The bodies of a scene in motion.
 //
-// A body's record says where it was when its velocity last changed, and how it has moved since.
-// Nothing else advances it: when a pair meets is a function of two records alone, whatever was
-// asked before, so that calendars, cells, samples and labels do not change a bit.
+// A body's record holds its state when its velocity last changed, and its motion since then.
+// Nothing else advances it: the time at which a pair meets is a function of two records alone,
+// independent of earlier queries, so calendars, cells, samples and labels do not change a bit.
 #pragma once
 
 #include <algorithm>
@@ -36,15 +36,15 @@ inline constexpr double epsilon = 2.220446049250313e-16;
 }
 inline constexpr Instant no_instant{never, 0};
 
-/// Neither two events nor the ends of a flight closer than this are told apart.
+/// Times closer than this are not distinguished, for events and for the ends of a flight.
 [[nodiscard]] inline double resolution(const Instant& t) noexcept
 {
     return 4 * epsilon * std::fabs(t.value);
 }
 
-/// 128 bytes: the first half is what the neighbours ask for.
+/// 128 bytes: the first half holds the data that neighbours read.
 struct alignas(64) Body {
-    Vector2 p{}, v{}, a{};  ///< at t: position, velocity, and half the second derivative's double
+    Vector2 p{}, v{}, a{};  ///< at t: position, velocity and second derivative
     Instant t{};
     double radius = 0;
     double inverse_mass = 0;
@@ -52,19 +52,19 @@ struct alignas(64) Body {
     std::uint32_t next = none, previous = none;  ///< in the cell
     std::uint32_t bucket = none;
     std::uint32_t material = 0;
-    std::uint32_t island = none;   ///< of those that advance by steps
+    std::uint32_t island = none;   ///< index, if it advances by steps
     std::uint32_t held = none;     ///< face on which it slides
     std::uint32_t contact = none;  ///< group in lasting contact: a is 0, v the step's chord
-    /// Of a point: segments that it touches at t, 2 face + (whether it is above).
+    /// For a point: segments that it touches at t, 2 face + (whether it is above).
     std::array<std::uint32_t, 3> sides{none, none, none};
     bool asleep = false;
     bool quartic = false;  ///< its step has terms of degree 3 and 4
-    bool mapped = false;   ///< of a system: its step has no polynomial, but a bound
+    bool mapped = false;   ///< in a system: its step has no polynomial, but a bound
     bool big = false;      ///< in the second grid (grid.hpp)
 };
 static_assert(sizeof(Body) == 128);
 
-/// What bodies meet that is no body: a wall, a segment or an end of segments.
+/// An obstacle that is no body: a wall, a segment or an end of segments.
 struct Face {
     enum class Kind : std::uint8_t { wall, segment, vertex };
     Kind kind = Kind::wall;
@@ -82,27 +82,27 @@ struct FaceGap {
     Vector2 normal{};
 };
 
-/// How a face moves.
+/// Motion of a face.
 struct MovingFace {
     const SurfaceMotion* motion = nullptr;
     MotionBounds bounds{};
-    bool given = false;  ///< by functions
+    bool given = false;  ///< whether it is given by functions
 };
 
-/// A bound of a motion that is found broken, or a motion that is not finite.
+/// A violated bound of a motion, or a motion that is not finite.
 struct BrokenBound {
     bool non_finite = false;
     std::string sentence;
 };
 
-/// Links the segments of open terrain whose ends are the same point, of two and no more, and turns
+/// Links the segments of open terrain where exactly two of them end at the same point, and orients
 /// them so that the end of one is the start of the next.
 void join_chains(const Scene& scene, std::uint32_t wall_count, std::vector<Face>& faces);
 
-/// On which side of a segment a point is that touches it.
+/// The side of a segment on which a point that touches it lies.
 struct Side {
     std::uint32_t face = none;
-    bool above = true;  ///< to where the normal points
+    bool above = true;  ///< side to which the normal points
 };
 
 /// Position from an instant on: c[0] + c[1] s + ... within `until`.
@@ -127,23 +127,23 @@ struct World {
     std::vector<Body> bodies;
     std::vector<std::array<Vector2, 2>>
         bends;                          ///< terms of degree 3 and 4, where there are islands
-    std::vector<Face> faces;            ///< walls first, then terrain, then what moves
+    std::vector<Face> faces;            ///< walls first, then terrain, then moving faces
     std::uint32_t wall_count = 0;       ///< walls that do not move
-    std::uint32_t fixed_count = 0;      ///< with the terrain that does not
+    std::uint32_t fixed_count = 0;      ///< of these and of terrain that does not move
     std::vector<MovingFace> motions;    ///< of the faces from there on
-    std::vector<double> accelerations;  ///< [m/s^2] of mapped bodies in their steps, at most
+    std::vector<double> accelerations;  ///< [m/s^2] bounds for mapped bodies in their steps
     mutable std::optional<BrokenBound> broken;
     std::unique_ptr<Islands> islands;
     struct Drift {
-        Vector2 v{}, rate{};  ///< where the step of its group began
+        Vector2 v{}, rate{};  ///< at the start of the step of its group
     };
     std::vector<Drift> drifts;  ///< of bodies in lasting contact, where there have been any
     SceneStatistics statistics;
 
-    /// By its record; by the method's own map where it advances by steps.
+    /// From its record; by the method's own map where it advances by steps.
     [[nodiscard]] Vector2 position(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Vector2 velocity(std::uint32_t i, const Instant& t) const;
-    /// Derivative of the position: in lasting contact that is the chord of the step.
+    /// Derivative of the position: in lasting contact it is the chord of the step.
     [[nodiscard]] Vector2 heading(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Path path(std::uint32_t i, const Instant& t) const;
 
@@ -161,7 +161,7 @@ struct World {
     {
         return motions[face - fixed_count];
     }
-    /// Of a face that moves, at t.
+    /// Gap of a moving face at t.
     [[nodiscard]] FaceGap moving_gap(std::uint32_t face, double radius, const Vector2& p,
                                      const Instant& t) const;
     /// Zero where it does not move.
@@ -171,38 +171,38 @@ struct World {
     [[nodiscard]] Vector2 push_of(const Body& body, std::uint32_t face) const;
 
     /// Whether a body is on the side to which a segment's normal points: at the start of its
-    /// record, and where that has led it to p with velocity v. A point on the line is where it was
-    /// when it came there, which its record remembers.
+    /// record, and at p with velocity v, to which the record has led. A point on the line is on the
+    /// side from which it came, which its record stores.
     [[nodiscard]] bool begins_above(const Body& body, std::uint32_t face) const;
     [[nodiscard]] bool arrives_above(const Body& body, std::uint32_t face, const Vector2& p,
                                      const Vector2& v) const;
-    /// Makes the sides of adjacent segments one: where they differ the point is on the side on
-    /// which their angle is larger.
+    /// Unifies the sides of adjacent segments: where they differ the point is on the side with the
+    /// larger angle.
     void make_one(std::vector<Side>& sides) const;
-    /// A point lies on these sides from now on, from which rounding has moved it.
+    /// Stores the sides on which a point lies from now on, and undoes its displacement by rounding.
     void remember(Body& body, const std::vector<Side>& sides) const;
     /// Whether a point that reaches the end of a segment at p with velocity v passes there.
     [[nodiscard]] bool passes_end(const Body& body, std::uint32_t face, bool above,
                                   const Vector2& p, const Vector2& v) const;
     /// Whether a body at the foot of p on a segment leaves it over one of its ends.
     [[nodiscard]] bool leads_off(const Face& face, const Vector2& p, const Vector2& heading) const;
-    /// A body on a face moves along it from now on: pulled by gravity, slowed by friction.
+    /// Makes a body on a face move along it from now on: pulled by gravity, slowed by friction.
     void slide(std::uint32_t i, std::uint32_t face);
 
-    /// [m] So far beyond its ends a segment holds a point, which the rounding of two sides of a
-    /// sharp corner moves by a multiple of it.
+    /// [m] Distance beyond its ends up to which a segment holds a point; at a sharp corner the
+    /// rounding of two sides moves a point by a multiple of itself.
     [[nodiscard]] static double end_slack(const Face& face, const Vector2& p) noexcept
     {
         return 32 * (rounding(p, 0) + rounding(face.at, 0));
     }
-    /// [m] The same at the corner with an adjacent segment. What is on both lines by rounding is
-    /// as much farther from a flat corner as the sine of its angle is small.
+    /// [m] The same at the corner with an adjacent segment. A point on both lines by rounding may
+    /// be farther from a flat corner, in proportion to 1 / sine of its angle.
     [[nodiscard]] double corner_slack(const Face& face, std::uint32_t other,
                                       const Vector2& p) const;
-    /// Whether a point on the line of a segment is between its ends, by these.
+    /// Whether a point on the line of a segment is between its ends, within these distances.
     [[nodiscard]] bool holds(const Face& face, const Vector2& p) const;
 
-    /// What rounding makes of a gap at these coordinates [m].
+    /// Rounding of a gap at these coordinates [m].
     [[nodiscard]] static double rounding(const Vector2& p, double radius) noexcept
     {
         return 8 * epsilon * (std::fabs(p[0]) + std::fabs(p[1]) + radius);
@@ -213,7 +213,7 @@ private:
     void put_to_sleep();
 };
 
-/// By the record, for bodies in closed form.
+/// Place by the record, for bodies in closed form.
 [[nodiscard]] inline Vector2 place(const Body& b, double s) noexcept
 {
     return {b.p[0] + s * (b.v[0] + 0.5 * s * b.a[0]), b.p[1] + s * (b.v[1] + 0.5 * s * b.a[1])};
@@ -223,7 +223,7 @@ private:
     return {b.v[0] + s * b.a[0], b.v[1] + s * b.a[1]};
 }
 
-/// A first contact, `after` seconds after `from`; infinite where there is none. `presses`: the two
+/// A first contact, `after` seconds after `from`; infinite if there is none. `presses`: the two
 /// touch without approaching, and are pushed together.
 struct Meeting {
     Instant from{};
@@ -235,7 +235,7 @@ struct Meeting {
     return before(a, b) ? b : a;
 }
 
-/// Velocities below it are the rounding of others.
+/// Velocities below it are rounding.
 [[nodiscard]] inline double noise(const Vector2& a, const Vector2& b) noexcept
 {
     return 8 * epsilon * (norm(a) + norm(b));
@@ -255,8 +255,9 @@ struct Squares {
     return {(distance - reach) * (distance + reach), dot(dp, dv), 2 * reach * rounding};
 }
 
-/// Two straight flights, or two of the same acceleration. The discriminant is that of the reach and
-/// of how far the paths pass each other, so that a small reach is not lost in a long way.
+/// Meeting of two straight flights, or of two with the same acceleration. The discriminant is
+/// formed from the reach and the distance at which the paths pass, so a small reach keeps its
+/// digits.
 [[nodiscard]] inline double straight(const Squares& now, const Vector2& dp, const Vector2& dv,
                                      double reach) noexcept
 {
@@ -268,7 +269,7 @@ struct Squares {
     return now.at_once / (std::sqrt(square) - now.rate);
 }
 
-/// Bodies of which one at least moves by steps, or whose accelerations differ.
+/// Meeting of bodies of which at least one moves by steps, or whose accelerations differ.
 [[nodiscard]] Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j);
 
 [[nodiscard]] inline Meeting meet(const World& world, std::uint32_t i, std::uint32_t j)
@@ -301,7 +302,7 @@ struct Squares {
 }
 [[nodiscard]] Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t face);
 
-/// Between a face and a body that its flight has led to p.
+/// Gap between a face and a body that its flight has led to p.
 [[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above);
 /// Whether the foot of p on the line lies on the segment.
 [[nodiscard]] bool lies_on(const Face& face, const Vector2& p, double slack);

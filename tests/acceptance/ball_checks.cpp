@@ -1,4 +1,4 @@
-// What the bouncing ball must show.
+// Acceptance checks of the bouncing ball.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -91,7 +91,7 @@ Measured time_of_impacts()
             ErrorControlled<Dopri5>{}, Extremum{});
     };
 
-    // The answers are checked before the clock counts.
+    // The answers are checked before times are measured.
     std::vector<Work> works{yardstick(), repeated(unrecorded)};
     std::vector<Row> rows;
     for (const Case& c : cases) {
@@ -163,7 +163,7 @@ Measured no_allocation()
     count_allocations("fehlberg78 extremum", ErrorControlled<Fehlberg78>{}, Extremum{}, total,
                       text);
 
-    // The counter counts: an allocation between two readings shows.
+    // The counter works: an allocation between two readings is visible.
     const std::uint64_t before = testing_support::allocations();
     std::vector<double> something(100);
     keep(something);
@@ -176,8 +176,8 @@ Measured no_allocation()
 
 Measured detection_overhead()
 {
-    // One flight of 305 steps, launched at 15 m/s: it stays in the box the network
-    // was trained for and meets the floor only after the run.
+    // One flight of 305 steps, launched at 15 m/s: it stays in the box for which the network
+    // was trained and meets the floor only after the run.
     const BouncingBall ball;
     const Unguarded<BouncingBall> unguarded{ball};
     const std::array<double, 2> launch{0, 15};
@@ -234,7 +234,7 @@ Measured detection_overhead()
     details.push_back(fmt::format(
         "It can pay only where one guard call costs more than about {:.0f} ns (scaled).", asking));
     if (asking <= looking) {
-        // Should a network ever be cheaper here, say so.
+        // If a network is ever cheaper here, the report says so.
         details[details.size() - 2] = fmt::format(
             "On this guard asking the network ({:.1f} ns) is no dearer than looking ({:.1f} ns).",
             asking, looking);

@@ -1,4 +1,4 @@
-// What the semantics of events must show.
+// Acceptance checks of the semantics of events.
 #include <fmt/format.h>
 
 #include <algorithm>

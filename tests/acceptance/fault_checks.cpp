@@ -1,5 +1,5 @@
-// What the fault and the rules for its steps must show: order 4 through arrests, onsets, energy,
-// runs that can be watched, policies where they were not trained.
+// Acceptance checks of the fault and the rules for its steps: order 4 through arrests, onsets,
+// energy, runs that can be watched, policies where they were not trained.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace {
 
 constexpr double constant_steps = std::numeric_limits<double>::infinity();
 
-/// In which every element is braked to rest.
+/// Friction with which every element is braked to rest.
 FaultFriction weakening(double overload)
 {
     FaultFriction out{.overload = overload};
@@ -139,7 +139,7 @@ Measured balance_energy()
                                 before[1], after[1], second[1], first[1])}};
 }
 
-/// The longest time between two calls of what watches the comparison's runs.
+/// The longest time between two calls of the watcher of the comparison's runs.
 Measured watch_long_runs()
 {
     using Clock = std::chrono::steady_clock;
@@ -167,7 +167,7 @@ Measured watch_long_runs()
         .text = fmt::format("{:.2f} s of {:.1f} s are the longest without a sign", longest, all)};
 }
 
-/// Iterations of the coarsest setting from which on the error stays below 1e-2.
+/// Iterations of the coarsest setting from which the error stays below 1e-2.
 std::uint64_t iterations(const learn::StepProblem& problem,
                          const std::function<learn::StepRule(double finer)>& rule)
 {

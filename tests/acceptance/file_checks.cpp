@@ -1,4 +1,4 @@
-// Saved runs, potential files and runs that cannot continue: nothing is taken for what it is not.
+// Saved runs, potential files and runs that cannot continue: no file is mistaken for a valid one.
 #include <fmt/format.h>
 
 #include <array>
@@ -85,7 +85,7 @@ Measured refuse_changed_texts()
     return {.pass = taken == 0, .text = fmt::format("{} of {} taken", taken, tried)};
 }
 
-/// Snapshots with one number or count replaced by a hostile one; those that are taken are run.
+/// Snapshots with one number or count replaced by a hostile one; accepted ones are run.
 Measured run_hostile_snapshots()
 {
     const Snapshot good = saved_ball();
@@ -189,7 +189,7 @@ Measured refuse_potential_files()
     std::size_t taken = !refused(good) ? 0 : 1;
     for (const std::string& text : bad) taken += !refused(text);
 
-    // Others end in the exception of a potential file, or are read.
+    // The other files are refused by the exception of a potential file, or are read.
     std::mt19937_64 random(10);
     constexpr int trials = 100'000;
     for (int i = 0; i < trials; ++i) {

@@ -1,4 +1,4 @@
-// What rate-and-state friction must show.
+// Acceptance checks of rate-and-state friction.
 #include <vector>
 
 #include "measure.hpp"

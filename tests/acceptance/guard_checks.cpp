@@ -1,4 +1,4 @@
-// What skipping the checks of expensive guards must show.
+// Acceptance checks of skipping the checks of expensive guards.
 #include <vector>
 
 #include "certificates.hpp"

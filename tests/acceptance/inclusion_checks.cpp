@@ -1,5 +1,5 @@
-// What the hand-over must show where several relays, contacts and diodes meet: random inclusions
-// against backward Euler, at three step lengths.
+// Acceptance checks of the hand-over where several relays, contacts and diodes meet: random
+// inclusions against backward Euler, at three step lengths.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -88,7 +88,7 @@ template <int M>
     Tally tally;
     for (std::uint64_t seed = 0; seed < seeds; ++seed) {
         const auto system = random_inclusion<M>(family, seed);
-        // Small or accumulating motions take backward Euler more steps.
+        // For small or accumulating motions backward Euler needs more steps.
         const ReferenceMotion reference(system, system.reactions > 2 ? 10'000 : 50'000, samples);
         ++tally.systems;
         // The motion is not known where backward Euler has not converged.

@@ -9,7 +9,7 @@
 
 namespace ricochet::bench {
 
-/// What a check found.
+/// Result of a check.
 struct Measured {
     bool pass = false;
     std::string text;                    ///< the figure, in one line
@@ -23,19 +23,19 @@ inline constexpr std::array<std::string_view, 14> topics = {
 struct Check {
     std::string_view topic;  ///< one of `topics`
     std::string id;          ///< e.g. "b1-rk4"
-    std::string sentence;    ///< what is claimed
+    std::string sentence;    ///< the claim
     std::string target;
     std::function<Measured()> run;
-    bool required = true;  ///< false: a wish, which does not fail the run
+    bool required = true;  ///< false: a desired property, which does not fail the run
 };
 
 /// The bouncing ball, end to end.
 [[nodiscard]] std::vector<Check> ball_checks();
 
-/// The compiled core: what a step, a pointer and an impact in a large state cost.
+/// The compiled core: the costs of a step, a pointer and an impact in a large state.
 [[nodiscard]] std::vector<Check> core_checks();
 
-/// The interface for C; none where it is not built.
+/// The interface for C; none if it is not built.
 [[nodiscard]] std::vector<Check> c_checks();
 
 /// The monitor in other people's integrators; none without SUNDIALS.
@@ -51,7 +51,7 @@ struct Check {
 /// The semantics of events.
 [[nodiscard]] std::vector<Check> event_checks();
 
-/// Dear guards: the planner, networks, certificates.
+/// Expensive guards: the planner, networks, certificates.
 [[nodiscard]] std::vector<Check> guard_checks();
 
 /// Set-valued motion.
@@ -94,7 +94,7 @@ struct Check {
 [[nodiscard]] Measured hand_over_sliding_mode();
 [[nodiscard]] Measured hand_over_circuit();
 
-/// Their run times at the errors asked for, and those of Bathe's steps.
+/// Their run times at the requested errors, and those of Bathe's steps.
 [[nodiscard]] Measured time_circuit_to_1e8();
 [[nodiscard]] Measured time_sliding_mode();
 [[nodiscard]] Measured time_bathe_on_circuit();
@@ -123,19 +123,19 @@ struct Check {
 /// The cost of one step with each detector.
 [[nodiscard]] Measured compare_detectors();
 
-/// Every problem with a known solution, in every way it can be run.
+/// Every problem with a known solution, run in every possible way.
 [[nodiscard]] Measured compare_systems();
 
-/// Pairs of crossings a hair apart, and near misses.
+/// Pairs of crossings very close together, and near misses.
 [[nodiscard]] Measured find_near_tangent_pairs();
 
-/// Balls that are alike to the bit.
+/// Balls that are equal to the bit.
 [[nodiscard]] Measured drop_identical_balls();
 
 /// Balls of every restitution for 1e7 s.
 [[nodiscard]] Measured bounce_for_ever();
 
-/// The energy of a ball that loses none.
+/// The energy of an elastic ball.
 [[nodiscard]] Measured keep_elastic_energy();
 
 /// An ensemble of 1e5 balls on one, two and four threads.
@@ -144,7 +144,7 @@ struct Check {
 /// Saving and restoring at random points.
 [[nodiscard]] Measured restore_anywhere();
 
-/// The guards of a system in another order.
+/// The guards of a system in a different order.
 [[nodiscard]] Measured reorder_guards();
 
 /// Random hybrid systems against their closed forms.
@@ -157,7 +157,7 @@ struct Check {
 [[nodiscard]] Measured compare_impacts();
 [[nodiscard]] Measured time_long_impacts();
 
-/// What watching costs: crossings that are only recorded, guards that never fire.
+/// The cost of watching: crossings that are only recorded, guards that never fire.
 [[nodiscard]] Measured time_recorded_crossings();
 [[nodiscard]] Measured time_idle_guard();
 [[nodiscard]] Measured time_hundred_idle_guards();
@@ -191,7 +191,7 @@ struct Check {
 [[nodiscard]] Measured time_friction();
 [[nodiscard]] Measured learn_slip_law();
 
-/// Networks of any weights in front of these guards: time with the meter on, and events.
+/// Networks with any weights before these guards: time with the meter on, and events.
 [[nodiscard]] Measured time_metered_networks();
 [[nodiscard]] Measured same_events_whatever_the_weights();
 

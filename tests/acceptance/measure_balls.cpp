@@ -1,5 +1,5 @@
-// Balls: many alike, balls of every restitution for a very long time, and the energy of
-// one that loses none.
+// Balls: many equal ones, balls of every restitution for a very long time, and the energy of
+// an elastic one.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace {
 
 using State = BouncingBall::State;
 
-/// Balls that are alike to the bit: everyone bounces with everyone else, when one alone
+/// Balls that are equal to the bit: all of them bounce together, when a single one
 /// would.
 template <class Stepping>
 bool bounce_together(std::string_view method, std::size_t n, const Options& options,
@@ -97,7 +97,7 @@ struct Drift {
     bool reached = false;
 };
 
-/// The energy just after every bounce of a ball that loses none.
+/// The energy just after every bounce of an elastic ball.
 Drift elastic(double h_max)
 {
     constexpr std::uint64_t wanted = 1'000'000;

@@ -1,4 +1,4 @@
-// What the interface for C costs: runs by callbacks beside the same runs of C++ systems.
+// Cost of the interface for C: runs by callbacks beside the same runs of C++ systems.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -85,7 +85,7 @@ rc_options c_options(double t_end)
     return options;
 }
 
-/// A whole run; the state at its end, and what it has counted.
+/// A whole run: the state at its end, and its counts.
 struct Ended {
     std::vector<double> x;
     std::size_t events = 0;

@@ -1,4 +1,4 @@
-// What the compiled core costs: a step without guards beside Odeint's own, the flow behind a
+// Costs of the compiled core: a step without guards beside Odeint's own, the flow behind a
 // pointer beside the flow inlined, and impacts in a large state beside the same by hand.
 #include <fmt/format.h>
 
@@ -70,7 +70,7 @@ ByOdeint<X> rotate_by_odeint(const X& x0, double t_end)
     return run;
 }
 
-/// Time of a step over that of a step of Odeint's, in one run.
+/// Time of a step relative to a step of Odeint's, in one run.
 template <class X>
 double step_ratio(std::size_t n, std::vector<std::string>& details)
 {
@@ -140,8 +140,8 @@ double balls_end(std::size_t n)
 }
 
 /// The same by hand: dense output, the heights at the end of each step, the earliest impact by
-/// bisection of the time at which any ball has passed the floor, and a new start. The number of
-/// impacts.
+/// bisection of the time at which any ball has passed the floor, and a new start. Returns the
+/// number of impacts.
 std::size_t drop_by_hand(std::size_t n)
 {
     using State = std::vector<double>;

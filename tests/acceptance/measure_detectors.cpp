@@ -1,4 +1,4 @@
-// What each detector adds to a step, with the networks of both shapes and the
+// Cost that each detector adds to a step, with the networks of both shapes and the
 // closed-form rival beside them.
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-// An expensive guard without geometry: what bounds of its value save beside those of its rate.
+// An expensive guard without geometry: savings by bounds of its value beside bounds of its rate.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -48,7 +48,7 @@ Planning plan(const LeastEigenvalue& system, const Options& options)
             .seconds = time_alone(repeated(go), {.budget = 0.2, .fewest = 3}).median};
 }
 
-/// What oracles need, with location.
+/// Evaluations that oracles need, including location.
 std::string ceilings(const LeastEigenvalue& system, const Options& options, const Statistics& every)
 {
     const OracleCalls oracle = count_oracle<Fixed>(system, system.start(), options);
@@ -90,7 +90,7 @@ void measure_level(double level, Measured& out)
     }
 }
 
-/// Time where a call takes a millisecond longer.
+/// Measures the time if a call takes a millisecond longer.
 void measure_slow(Measured& out)
 {
     const Options options{.t_end = 20, .step = step};

@@ -1,4 +1,4 @@
-// An ensemble of 1e5 balls: the same results for any number of threads, and what two cores gain.
+// An ensemble of 1e5 balls: the same results for any number of threads, and the gain of two cores.
 #include <fmt/format.h>
 
 #include <algorithm>

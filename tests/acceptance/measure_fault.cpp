@@ -63,7 +63,7 @@ StrikeSlipFault published(bool large)
 
 struct TimedRupture {
     Rupture run;
-    double seconds = 0;  ///< with everything that is made before
+    double seconds = 0;  ///< including everything that is made before
     double mib = 0;
 };
 
@@ -192,7 +192,7 @@ Measured bathe_100()
 
 Measured table_of_meshes()
 {
-    // The limit of finer meshes, which plain and tip-corrected ones approach from two sides.
+    // The limit of finer meshes, which plain and tip-corrected ones approach from opposite sides.
     constexpr double limit = 250.32;
     Measured out{.pass = true, .text = "below"};
     out.details.push_back(fmt::format("{:>5}{:>12}{:>9}{:>10}{:>10}{:>9}{:>9}{:>14}{:>9}", "n",

@@ -20,8 +20,8 @@ namespace {
 
 constexpr double constant_steps = std::numeric_limits<double>::infinity();
 
-/// The start is six percent faster than the plates, which is unstable: what is below the tolerance
-/// would have its own time to grow.
+/// The start is six percent faster than the plates, which is unstable: without it, disturbances
+/// below the tolerance would grow in their own time.
 const FaultFriction disturbed{.overload = 1e-3};
 
 struct TimedCycle {

@@ -98,7 +98,7 @@ std::string errors_text(const learn::FrictionErrors& e)
                        e.deviation, e.most, e.mean_beyond);
 }
 
-/// Velocities at a fixed step, every `keep`-th of them, and what the stages did.
+/// Velocities at a fixed step, every `keep`-th of them, and statistics of the stages.
 struct FixedRun {
     std::vector<double> velocity{};
     bool stable = true;
@@ -351,7 +351,7 @@ Measured count_unstable()
     const auto row = [&](const char* name, const BaselineOptions& options) {
         std::string line = fmt::format("{:<44}", name);
         // The steps of `ricochet compare rate-and-state`: near the limit of a method a step that
-        // differs by half a percent may turn a verdict.
+        // differs by half a percent may change a verdict.
         for (const int steps : learn::study_steps) {
             int bad = 0;
             for (const SliderCase& c : cases) {

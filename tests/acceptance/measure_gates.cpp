@@ -1,6 +1,6 @@
-// What trained gates save, and what they miss. Guards are counted, not waited for: a guard of
-// 50 us costs its calls times 50 us, beside which the steps (0.1 us) and the networks (0.2 us a
-// call) are nothing; the time of the gates is printed.
+// Savings and misses of trained gates. Guards are counted instead of waited for: a guard of 50 us
+// costs its calls times 50 us, compared with which the steps (0.1 us) and the networks (0.2 us a
+// call) are negligible; the time of the gates is printed.
 #include "measure_gates.hpp"
 
 #include <fmt/format.h>
@@ -65,13 +65,13 @@ GateTraining arm_training(std::size_t events)
     training.validation_events = 10'000;
     training.iterations = 6000;
     training.fresh_events = events;
-    // Contacts of four to seven steps, two of 30 000, are as good as invisible from afar: margins
-    // of 0.25 and of 3 clear steps before them.
+    // Contacts of four to seven steps, two of 30 000, are practically invisible from a distance:
+    // margins of 0.25 and of 3 clear steps before them.
     training.logit_margin = 10;
     return training;
 }
 
-/// The least looks of `EveryK` that miss no more than `misses` of the same number of events.
+/// The fewest checks of `EveryK` that miss no more than `misses` of the same number of events.
 struct Rival {
     GateTrial trial;
     std::size_t steps = 0;

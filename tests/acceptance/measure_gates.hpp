@@ -19,8 +19,8 @@ namespace ricochet::bench {
 /// calls of the guard over `seconds` of the motion.
 [[nodiscard]] Measured gate_eigenvalue(double level, double seconds = 300);
 
-/// A valued guard of which no bound is known, on the arm of 4 joints: `SlopeSkip`, `EveryK` and a
-/// horizon gate, with what each misses.
+/// A valued guard without a known bound, on the arm of 4 joints: `SlopeSkip`, `EveryK` and a
+/// horizon gate, with the misses of each.
 [[nodiscard]] Measured gate_without_bounds(std::size_t events = 30'000);
 
 }  // namespace ricochet::bench

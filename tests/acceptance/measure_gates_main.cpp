@@ -1,4 +1,4 @@
-// Measures what trained gates save: ricochet_measure_gates [d4] [d6] [f] [g], all by default.
+// Measures the savings of trained gates: ricochet_measure_gates [d4] [d6] [f] [g], all by default.
 #include <fmt/format.h>
 
 #include <cstdio>

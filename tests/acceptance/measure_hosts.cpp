@@ -1,4 +1,4 @@
-// What the monitor costs in a host, and what it finds there: CVODE beside its own root finding.
+// Cost of the monitor in a host, and its events there: CVODE beside its own root finding.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -121,7 +121,7 @@ Measured count_crests()
 
 // --- the cost of a step without an event ---
 
-/// A rotation, as a host that costs nothing: exact, by a constant matrix.
+/// A rotation, as a host program at no cost: exact, by a constant matrix.
 template <class X>
 class RotatingHost {
 public:
@@ -317,8 +317,8 @@ Measured run_stiff_systems()
     return out;
 }
 
-/// Events of the implicit method and of CVODE's BDF with the monitor, at the same tolerances, and
-/// their times in turns.
+/// Events of the implicit method and of CVODE's BDF with the monitor, at the same tolerances,
+/// timed in turns.
 template <class System>
 void compare_implicit(const char* name, const System& system, const std::array<double, 3>& x0,
                       Mode mode, double t_end, double atol, Measured& out)

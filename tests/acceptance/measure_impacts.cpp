@@ -47,7 +47,7 @@ void add(CaseList& cases, const ImpactProblem& problem, const std::string& metho
               {.rtol = tolerance, .atol = tolerance}, ErrorControlled<Method>{}, Extremum{});
 }
 
-/// The error of the whole state held at `tolerance`, large or small.
+/// Adds cases with an absolute error `tolerance` of the whole state, large or small.
 void add_absolute(CaseList& cases, const ImpactProblem& problem, double tolerance)
 {
     cases.add(problem, {"fehlberg78", "extremum", "atol", tolerance},

@@ -1,5 +1,5 @@
-// What an evaluation of a small network costs, and that every kernel returns the
-// same bits.
+// Cost of an evaluation of a small network, and the equality of the bits that
+// all kernels return.
 #include <fmt/format.h>
 
 #include <array>
@@ -23,7 +23,7 @@ namespace ricochet::bench {
 
 namespace {
 
-/// Whether code for x86-64-v3 is in this build and runs here.
+/// Whether code for x86-64-v3 is in this build and can run here.
 bool has_v3()
 {
     return static_networks_are_v3() && supported(InstructionSet::x86_64_v3);

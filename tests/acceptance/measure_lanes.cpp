@@ -25,8 +25,8 @@ struct Section : HenonHeiles {
     }
 };
 
-/// Times 63 runs from starts of their own, around `start`; returns how many times as many lanes do
-/// in a second.
+/// Times 63 runs from different starts around `start`; returns the ratio of the numbers of runs
+/// that lanes and single runs complete in a second.
 template <class System>
 double compare_lanes(const char* name, const typename System::State& around, Measured& out)
 {

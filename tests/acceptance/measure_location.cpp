@@ -1,4 +1,4 @@
-// Cavern over tens of thousands of events, and what it takes to locate one.
+// Cavern over tens of thousands of events, and the evaluations needed to locate one.
 #include <fmt/format.h>
 
 #include <cstddef>
@@ -85,7 +85,7 @@ struct LocatorCalls {
 };
 LocatorCalls located;
 
-/// Newton, watched.
+/// Newton's locator, with its calls recorded.
 struct WatchedNewton {
     [[nodiscard]] Location locate(GuardPath& probe, const GuardSample& lo, const GuardSample& hi,
                                   double tolerance) const

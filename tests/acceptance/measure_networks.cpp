@@ -1,5 +1,5 @@
-// Networks attached to scenes with expensive guards: whatever they say, the same events; and with
-// the meter on, the same time.
+// Networks attached to scenes with expensive guards: the events are the same for any weights, and
+// with the meter on the time is the same.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ namespace {
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-/// inputs - hidden - hidden - outputs, with the weights that `next` deals out; it takes any state.
+/// inputs - hidden - hidden - outputs, with weights from `next`; it accepts any state.
 template <class Next>
 Model model_of(std::string_view system, std::size_t inputs, std::size_t hidden, std::size_t outputs,
                Next next)

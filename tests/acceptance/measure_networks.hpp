@@ -1,4 +1,4 @@
-// What is done to every scene with an expensive guard: networks of any weights are attached, and
+// Checks of every scene with an expensive guard: networks with any weights are attached, and
 // the events and times compared with those of runs without.
 #pragma once
 
@@ -27,10 +27,10 @@ struct AnyNetwork {
     Network network;
 };
 
-/// Small gates that clear everything, nothing, or whatever their weights make of it.
+/// Small gates that clear everything, nothing, or an arbitrary set of states.
 [[nodiscard]] std::vector<AnyGate> odd_gates(std::string_view system, std::size_t inputs,
                                              double step);
-/// Gates that cost some 0.2 us an answer, and know nothing.
+/// Gates that cost some 0.2 us per answer, and know nothing.
 [[nodiscard]] std::vector<AnyGate> dear_gates(std::string_view system, std::size_t inputs,
                                               double step);
 /// Predictions for one step.
@@ -45,9 +45,9 @@ struct SameEvents {
     std::string different{};  ///< networks under which events differ
 };
 
-// Rivals are compiled alike: in one function each, and of a type of this source alone. Inlined here
-// and called there, or taken from the object file of another source, the same loop takes up to an
-// eighth less or more.
+// Rivals are compiled in the same way: in one function each, and with a type local to this source.
+// Inlined in one place and called in another, or taken from the object file of another source, the
+// same loop takes up to an eighth less or more.
 namespace {
 
 template <class System>
@@ -74,7 +74,7 @@ void compare_events(SameEvents& scene, const System& system, const Options& opti
     if (hash_of(run) != exact) scene.different += network + "; ";
 }
 
-/// Steps are some `step` [s] long.
+/// Steps have a length of about `step` [s].
 template <class Stepping, class System>
 [[nodiscard]] SameEvents same_events(std::string name, std::string_view known_as,
                                      const System& system, const Options& options, double step)
@@ -116,9 +116,9 @@ struct MeteredRow {
     [[nodiscard]] double ratio() const { return metered / std::min(every, planned); }
 };
 
-/// Two rows: what knows nothing, and what looks too far ahead. The tenth of the samples that was
-/// disturbed least counts. A check of every step is timed in turns with the others unless it takes
-/// so long that this tells nothing.
+/// Two rows: gates that know nothing, and one that predicts too far ahead. The least disturbed
+/// tenth of the samples counts. A check of every step is timed in turns with the others unless it
+/// takes so long that the comparison is meaningless.
 template <class Stepping, class System>
 void time_metered(std::vector<MeteredRow>& rows, const std::string& name, const System& of,
                   const Options& options, double step, double budget)

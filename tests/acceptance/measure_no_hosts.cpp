@@ -1,4 +1,4 @@
-// Without SUNDIALS there is no host to measure in.
+// Without SUNDIALS there is no host program for measurements.
 #include "measure.hpp"
 
 namespace ricochet::bench {

@@ -136,7 +136,7 @@ std::string line(const std::string& name, double seconds, double error, std::uin
                        error, solves);
 }
 
-/// On the reference machine, by the yardstick timed in turns with it.
+/// Time on the reference machine, by the yardstick timed in turns with it.
 double seconds_of(const Work& work)
 {
     const std::vector<Work> works{yardstick(), work};

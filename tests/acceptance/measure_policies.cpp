@@ -45,7 +45,7 @@ StepTrial constant_steps(const StepWorldOptions& options, double h)
     }
 }
 
-/// The iterations after which constant steps of the same scheme are no more wrong.
+/// The iterations with which constant steps of the same scheme reach the same error.
 double iterations_of_constant_steps(const StepWorldOptions& options, double error)
 {
     for (double h = 1.5; h > 0.01; h *= 0.97) {

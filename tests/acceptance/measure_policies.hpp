@@ -5,8 +5,8 @@
 
 namespace ricochet::bench {
 
-/// TQC on a fault of one element by the published reward and by the additive one: what the policies
-/// cost and how wrong they truly are, beside constant steps.
+/// TQC on a fault of one element by the published reward and by the additive one: costs and true
+/// errors of the policies, beside constant steps.
 [[nodiscard]] Measured tqc_by_both_rewards();
 
 }  // namespace ricochet::bench

@@ -30,7 +30,7 @@ namespace ricochet::bench {
 
 namespace {
 
-/// Everything of an event, to be compared bit by bit.
+/// All data of an event, to be compared bit by bit.
 template <class X>
 auto row(const Event<X>& event)
 {
@@ -83,7 +83,7 @@ std::vector<Interruptible> interruptible_runs()
     using Fehlberg = ErrorControlled<Fehlberg78>;
     const test::Balls balls{.balls = 3};
     auto heights = balls.drop(1);
-    heights[2] = 1.5;  // the other two are alike
+    heights[2] = 1.5;  // the other two are equal
     return {
         interruptible<Dopri>("thermostat", Thermostat(), Thermostat::start, {.t_end = 100}),
         interruptible<FixedStep<Rk4>>("ball, to its rest", BouncingBall(),
@@ -138,7 +138,7 @@ private:
     Thermostat thermostat_;
 };
 
-/// Balls whose floors are watched in another order than they lie in.
+/// Balls whose floors are watched in a different order from that of their positions.
 struct ReorderedBalls : test::Balls {
     std::vector<std::size_t> order;
 
@@ -159,7 +159,7 @@ struct ReorderedBalls : test::Balls {
     }
 };
 
-/// A run as something to compare, with guard i called `names[i]`.
+/// A run in comparable form, with guard i called `names[i]`.
 template <class X>
 auto renamed(const Run<X>& run, const std::vector<std::size_t>& names)
 {

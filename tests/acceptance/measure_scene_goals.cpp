@@ -1,5 +1,5 @@
-// What scenes promise of their answers: labels, reversal, collisions of brute force, cradles, rest;
-// and of their cost beside plain runs and common steps.
+// Promises of scenes about their answers: labels, reversal, collisions of brute force, cradles,
+// rest; and about their cost beside plain runs and common steps.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace ricochet::bench {
 
 namespace {
 
-/// Balls above a floor that drag hardly slows: they advance by steps of dopri5.
+/// Balls above a floor that are hardly slowed by drag: they advance by steps of dopri5.
 Scene slowed_balls(int count)
 {
     Scene scene({.gravity = {0, -9.81}});
@@ -36,7 +36,7 @@ Scene slowed_balls(int count)
     return scene;
 }
 
-/// One body that drag slows, as a system of the core.
+/// One body slowed by drag, as a system of the core.
 struct SlowedBody {
     using State = std::array<double, 4>;
     double drag = 0.1;  ///< [1/s]
@@ -46,7 +46,7 @@ struct SlowedBody {
     }
 };
 
-/// Dumbbells that are alike, apart or joined to one state by springs without force.
+/// Equal dumbbells, separate or joined to one state by springs without force.
 Scene equal_dumbbells(int count, bool joined)
 {
     Scene scene;
@@ -80,7 +80,7 @@ bool same_bits(const SceneRun& one, const SceneRun& two, const std::vector<std::
 double lead_back(std::size_t count)
 {
     const Scene scene = test::gas({.count = count});
-    // As many events as have four collisions a disc; those of two discs count for both.
+    // The number of events of four collisions per disc; those of two discs count for both.
     const SceneRun longer = simulate(scene, {.t_end = 1e3, .max_events = 4 * count});
     std::size_t collisions = 0;
     std::uint64_t events = 0;

@@ -48,7 +48,7 @@ Measured time_cave_body()
         rows.push_back(one_guard<Fixed>(fmt::format("rk4 {} ms", 1e3 * step), body,
                                         {.t_end = 1e4 * step, .step = step}, 0.5));
     }
-    // Bounces that are rarer.
+    // Rarer bounces.
     rows.push_back(one_guard<Fixed>("rk4 2 ms, gravity 2 m/s2", CaveBody({.gravity = 2}),
                                     {.t_end = 20, .step = 2e-3}, 0.5));
     rows.push_back(

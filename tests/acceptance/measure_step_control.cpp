@@ -79,7 +79,7 @@ std::vector<StepRule> heuristic()
     });
 }
 
-/// What a ladder of rules needs on a problem, by error; errors are averaged over 15 % of work.
+/// Work of a ladder of rules on a problem, by error; errors are averaged over 15 % of work.
 struct Needs {
     WorkCurve iterations, solves, of_final;
 
@@ -133,7 +133,7 @@ struct Gains {
     double over_constant = 0;
     double over_best = 0;      ///< constant steps or a rule
     double final_slip = 0;     ///< over the best of all, at 1e-3
-    double solves_to_end = 0;  ///< over constant steps that continue when all is at rest
+    double solves_to_end = 0;  ///< relative to constant steps that continue when all is at rest
     std::string line;
 };
 
@@ -171,7 +171,7 @@ Gains gains_on(const Mesh& mesh)
     const double mine = median(iterations);
     const double constant_iterations = of_constant.iterations_at(target);
     const StepTrial at_rest = problem.run({.controller = ConstantStep{}, .step = 1});
-    // One step is 0.125 s of 3 km; what is left out after rest is known from that run.
+    // One step is 0.125 s of 3 km; the part omitted after rest is known from that run.
     const double unit = 0.125 * mesh.side / 3000;
     const double whole = mesh.t_end / (static_cast<double>(at_rest.steps) * unit);
     Gains out{.over_classical = classical / mine,
@@ -326,7 +326,7 @@ Measured time_of_training()
 {
     const auto start = std::clock();
     const auto trained = learn::train_step_policy(learn::fault_family(), {});
-    // Two threads share the work: processor time over two, whatever else the machine does.
+    // Two threads share the work: processor time is halved, independently of other loads.
     const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / 2;
     const Model shipped = load_model(policies / "fault-step-1.safetensors");
     const bool same = shipped.layers.front().weight == trained.model.layers.front().weight;

@@ -1,4 +1,4 @@
-// Every problem whose solution is known: are all events there, none besides, in order?
+// Checks every problem with a known solution: all events are found, no others, and in order.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -54,7 +54,7 @@ KnownSolution ball(const P& problem)
             .run = test::runs(problem.system)};
 }
 
-/// O1 over a thousand periods. A time of up to 9000 is known to its own rounding.
+/// O1 over a thousand periods. A time of up to 9000 is known up to its own rounding.
 KnownSolution impact_oscillator(double frequency)
 {
     const ImpactOscillator system({.frequency = frequency});
@@ -67,7 +67,7 @@ KnownSolution impact_oscillator(double frequency)
 }
 
 /// D3. A touch lies where the guard is within the band, which is about sqrt(2 band) s wide;
-/// the band is for the error of the integration.
+/// the band covers the error of the integration.
 KnownSolution touch(double depth)
 {
     constexpr double band = 1e-12;
@@ -108,12 +108,12 @@ KnownSolution three_roots(bool squared, double shift, double slip)
             .start = {shift},
             .options = {.t_end = 1, .event_tolerance = slip > 0 ? 1e-12 : 0},
             .events = std::move(events),
-            // Degree six in one step is more than a cubic through its ends can show.
+            // A degree of six in one step is more than a cubic through its ends can represent.
             .hows = squared ? std::vector<How>{} : std::vector<How>{How::dopri5_extremum},
             .run = test::runs(system)};
 }
 
-/// With their order as it comes from the guards' own: both fire at every third event.
+/// In the order of the guards: both fire at every third event.
 KnownSolution synchronous(bool swapped)
 {
     const test::Synchronous system{.swapped = swapped, .acts = true};

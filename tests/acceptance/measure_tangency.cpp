@@ -3,7 +3,7 @@
 //     y'' = -y,  y = cos(t + p),  guard y - (1 - depth),  over 20 s
 //
 // A crest higher than the level is crossed twice, 2 asin(sqrt(depth / 2)) to either side
-// of it. What can be asked of a time is the error of the guard over its slope there.
+// of it. The attainable error of a time is the error of the guard divided by its slope there.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -45,8 +45,8 @@ struct Row {
     double guard_error = 0;  ///< largest error of a time, times the slope there
 };
 
-/// The crossings and touches of one run against the closed form: whatever lies nearer to
-/// a crest than half a period belongs to it.
+/// Compares the crossings and touches of one run with the closed form: each belongs to the crest
+/// that is nearer than half a period.
 void score(const Run<NearTangent::State>& run, double depth, double phase, Row& row)
 {
     const double width = depth > 0 ? 2 * std::asin(std::sqrt(depth / 2)) : 0;
@@ -93,8 +93,8 @@ Row measure(double depth)
     return row;
 }
 
-/// Largest departure of the height of the crests from 1, over some runs: by how much the
-/// stepper moves the guard against its level.
+/// Largest departure of the height of the crests from 1, over some runs: the amount by which the
+/// stepper moves the guard relative to its level.
 double stepper_error()
 {
     learn::Random random(static_cast<std::uint64_t>(20'260'101));

@@ -163,7 +163,7 @@ struct OuterSolarSystem {
     }
 };
 
-/// Largest errors of impacts, and how many there were.
+/// Largest errors of impacts, and their number.
 struct ImpactErrors {
     std::size_t found = 0, expected = 0;
     double first_ten = 0, all = 0;

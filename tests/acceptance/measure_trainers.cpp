@@ -72,7 +72,7 @@ private:
     int steps_ = 0;
 };
 
-/// Of one regulator, discounted, over that of the optimal law.
+/// Discounted cost of one regulator relative to the optimal law.
 double relative_cost(const Model& policy)
 {
     // P of the discounted algebraic Riccati equation with b = r = 1/2.
@@ -100,7 +100,7 @@ double relative_cost(const Model& policy)
 using Train =
     std::function<learn::TrainedPolicy(const learn::Environment&, const learn::PolicyTraining&)>;
 
-/// The median of five seeds, and its line.
+/// The median of five seeds, with its line of output.
 double median_cost(const std::string& name, const Train& train, Measured& out)
 {
     std::vector<double> costs;
@@ -117,7 +117,7 @@ double median_cost(const std::string& name, const Train& train, Measured& out)
     return costs[2];
 }
 
-/// Gymnasium's Pendulum-v1, written down again: angle th from upright and rate w,
+/// Gymnasium's Pendulum-v1, reimplemented: angle th from upright and rate w,
 ///
 ///     reward -(th^2 + w^2 / 10 + u^2 / 1000),  w' = 15 sin(th) + 3 u,  |u| <= 2,  |w| <= 8,
 ///
@@ -167,7 +167,7 @@ private:
     int steps_ = 0;
 };
 
-/// The mean of 100 episodes that were not trained on.
+/// The mean of 100 episodes outside the training.
 double mean_return(const std::function<double(const std::vector<double>&)>& act)
 {
     Pendulum pendulum;
@@ -207,7 +207,7 @@ Measured time_of_tqc()
         learn::train_tqc(world.environment(), {.training = {.steps = 20'000, .threads = 2}});
     const double processor = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     const bool done = trained.outcome == learn::PolicyOutcome::finished;
-    // Of both threads together: more than two cores take that have nothing else to do.
+    // The time of both threads together: it exceeds that of two cores that are otherwise idle.
     return {
         .pass = done && processor <= 90,
         .text = fmt::format("{:.1f} s of processor time of two threads, {:.1f} s on the clock ({})",

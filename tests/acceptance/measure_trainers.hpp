@@ -5,13 +5,13 @@
 
 namespace ricochet::bench {
 
-/// TQC with the networks of the source, on an environment that costs next to nothing.
+/// TQC with the networks of the source, on an environment of negligible cost.
 [[nodiscard]] Measured time_of_tqc();
 
 /// Both trainers on a linear-quadratic regulator.
 [[nodiscard]] Measured cost_over_optimum();
 
-/// Both trainers on a pendulum that is to be swung up.
+/// Both trainers on a pendulum that must be swung up.
 [[nodiscard]] Measured swing_up();
 
 }  // namespace ricochet::bench

@@ -1,4 +1,4 @@
-// The verified gate: whatever the weights, the events of the exact detector.
+// The verified gate: for any weights it returns the events of the exact detector.
 #include <fmt/format.h>
 
 #include <array>
@@ -24,9 +24,9 @@ namespace {
 
 using X = BallProblem::State;
 
-/// All that a run returns but what the network was asked and answered, as bits. Its
-/// features read the guard once each time, which is no part of the exact detector's
-/// work and is taken off.
+/// All results of a run except the counts of the network, as bits. The features of the
+/// network read the guard once each time, which is no part of the exact detector's
+/// work and is subtracted.
 std::vector<std::uint64_t> bits_of(const Run<X>& run)
 {
     std::vector<std::uint64_t> bits;
@@ -47,7 +47,7 @@ std::vector<std::uint64_t> bits_of(const Run<X>& run)
     return bits;
 }
 
-/// A 2-8-1 network with the weights that `next` deals out, for every step.
+/// A 2-8-1 network with weights from `next`, for every step.
 template <class Next>
 Network network_of(Next next, double threshold = 0)
 {

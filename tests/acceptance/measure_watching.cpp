@@ -1,5 +1,5 @@
-// What it costs to watch guards: many crossings that are only recorded, and guards that
-// never fire. Always beside the same system without its guards.
+// Cost of watching guards: many crossings that are only recorded, and guards that
+// never fire, always compared with the same system without its guards.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace ricochet::bench {
 
 namespace {
 
-/// Without guards, with the ends examined, with the extremum searched for.
+/// Runs without guards, with the ends examined, and with the extremum searched for.
 struct Trio {
     Timing none, ends, extremum;
 
@@ -101,7 +101,7 @@ struct Row {
     std::string_view peers;
 };
 
-/// `states`: keep the states at the crossings, as the default is.
+/// `states`: keep the states at the crossings, as by default.
 template <class System, class X>
 Row recorded(std::string name, const System& system, const X& x0, std::size_t n, double t_end,
              bool states, double limit, std::string_view peers)

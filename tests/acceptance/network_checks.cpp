@@ -1,4 +1,4 @@
-// What the network must show.
+// Acceptance checks of the network.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ std::filesystem::path file_of(BallModel kind)
 
 // --- on states ---
 
-/// Of no training, no threshold and no report.
+/// A seed that no training, threshold or report uses.
 constexpr std::uint64_t fresh_seed = 20'250'101;
 
 std::string figures(std::string_view set, const Assessment& a)
@@ -93,7 +93,7 @@ Measured assess_any_step()
     const learn::DataSet fresh =
         learn::sample_ball(kind, training, 150'000, 150'000, fresh_seed, true).data;
 
-    // The events with u / (g h^2) in ten decades, as many as there are in each.
+    // The events with u / (g h^2) in ten decades, all there are in each.
     constexpr int lowest = -3;
     constexpr std::size_t decades = 10;
     std::array<std::size_t, decades> counts{};

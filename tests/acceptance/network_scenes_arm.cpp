@@ -1,4 +1,4 @@
-// Networks on the arm, and on what is seen of it through a pinhole.
+// Networks on the arm, and on its projection through a pinhole.
 #include <fmt/format.h>
 
 #include "measure_networks.hpp"
@@ -16,7 +16,7 @@ Options every_ms(double t_end)
     return {.t_end = t_end, .step = 1e-3};
 }
 
-/// A network of single steps needs to know what it is for.
+/// A network of single steps must know its system.
 template <class System>
 struct Named : System {
     using System::System;

@@ -1,4 +1,4 @@
-// What set-valued motion must show.
+// Acceptance checks of set-valued motion.
 #include <vector>
 
 #include "measure.hpp"

@@ -1,4 +1,4 @@
-// Events: nothing lost where guards accumulate, decay, or move faster than the state.
+// Events: none is lost where guards accumulate, decay, or move faster than the state.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -100,7 +100,7 @@ Measured drain()
     return {.pass = worst <= 1e-12, .text = fmt::format("{:.1e} relative", worst)};
 }
 
-/// The same impacts wherever the run ends, and however long steps may be.
+/// The same impacts for any end of the run and any limit of the steps.
 Measured end_anywhere()
 {
     const BouncingBall ball({.gravity = 9.81, .restitution = 0.9});

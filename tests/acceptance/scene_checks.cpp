@@ -1,5 +1,5 @@
-// Scenes of many bodies: what an impact costs where bodies are alone, in the order of time, and in
-// a gas; what sleepers and stiff islands cost the others; what is conserved.
+// Scenes of many bodies: the cost of an impact where bodies are alone, in the order of time, and in
+// a gas; the cost of sleepers and stiff islands to the others; conserved quantities.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ Scene balls(int count)
     return scene;
 }
 
-/// [s] an impact of balls that meet no other.
+/// [s] per impact of balls that meet no other.
 double time_balls(int count, double t_end, bool recorded)
 {
     const Scene scene = balls(count);
@@ -113,7 +113,7 @@ Scene dumbbells(int count, bool one_island)
         scene.spring({.between = {ends[ends.size() - 2], ends.back()},
                       .rest = 0.9,
                       .stiffness = i == 0 ? 1e6 : 20});
-        // A spring without force joins all to one state.
+        // A spring without force joins all bodies to one state.
         if (one_island && i > 0) scene.spring({.between = {ends[0], ends.back()}});
     }
     return scene;
@@ -138,7 +138,7 @@ Measured conserve()
         const Scene scene = test::gas({.count = count});
         const double size = std::sqrt(static_cast<double>(count));
         const double t_end = 6e5 / (static_cast<double>(count) * size);
-        // Where the collisions are discs are nearest: at 20 of them, spread over the run.
+        // The collisions where discs are nearest: at 20 of them, spread over the run.
         SceneOptions options{.t_end = t_end};
         const SceneRun first = simulate(scene, options);
         options.record_events = false;

@@ -8,7 +8,7 @@
 
 namespace ricochet::bench {
 
-/// [s] of this thread's processor.
+/// [s] of processor time of this thread.
 [[nodiscard]] inline double time_of(const std::function<void()>& call)
 {
     timespec from{};
@@ -21,7 +21,7 @@ namespace ricochet::bench {
 }
 
 /// Processor time [s] of a call, the least of three, scaled by the least of the yardsticks beside
-/// it: one that was disturbed would make the call seem fast.
+/// it: a disturbed yardstick would make the call seem fast.
 [[nodiscard]] inline double least_time(const std::function<void()>& call)
 {
     double least = 1e300;
@@ -34,7 +34,7 @@ namespace ricochet::bench {
     return scaled(least, stick);
 }
 
-/// Time of one call over that of another, each the least of `turns` in turns.
+/// Time of one call relative to that of another, each the least of `turns` in turns.
 [[nodiscard]] inline double time_ratio(const std::function<void()>& one,
                                        const std::function<void()>& other, int turns)
 {

@@ -1,4 +1,4 @@
-// What the strike-slip fault and the trainers must show.
+// Acceptance checks of the strike-slip fault and the trainers.
 #include "measure_fault.hpp"
 #include "measure_policies.hpp"
 #include "measure_step_control.hpp"

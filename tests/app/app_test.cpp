@@ -1,4 +1,4 @@
-// `ricochet systems` and `simulate`, and what all commands share.
+// `ricochet systems` and `simulate`, and properties common to all commands.
 #include "app.hpp"
 
 #include <algorithm>
@@ -96,7 +96,7 @@ TEST_F(App, BernsteinProvesTheStepsOfAPolynomialGuard)
     ASSERT_EQ(run["events"].size(), 3U);
     EXPECT_EQ(run["statistics"]["evidence"]["checked"], 0);
     EXPECT_EQ(run["statistics"]["evidence"]["assumed"], 0);
-    // The degree of the ball's guard is read from its text.
+    // The degree of the ball's guard is found from its code.
     const nlohmann::json ball = json(simulate({"--json", "--detector", "bernstein"}));
     EXPECT_EQ(ball["events"].size(), 13U);
     EXPECT_EQ(ball["statistics"]["evidence"]["checked"], 0);
@@ -335,7 +335,7 @@ TEST_F(App, BadSteppingIsRefused)
 
 TEST_F(App, TimeRunsBackwardFromALaterStart)
 {
-    // The ball at rest above the floor came from it: backward it falls like forward, and
+    // The ball at rest above the floor came from it: backward it falls as it does forward, and
     // meets the floor one fall earlier. Rounding of sqrt(2 h / g) and of its addition to
     // 5 s: 2 units in the last place of 5.
     const nlohmann::json run = json(simulate(
@@ -349,7 +349,7 @@ TEST_F(App, TimeRunsBackwardFromALaterStart)
     EXPECT_EQ(times.front(), 5);
     EXPECT_EQ(times.back(), 3);
     EXPECT_TRUE(std::is_sorted(times.rbegin(), times.rend()));
-    // In the file the impact stands between the samples around it.
+    // In the file the impact is between the samples around it.
     std::istringstream lines(content(work() / "b.csv"));
     std::string line;
     std::vector<double> column;

@@ -1,4 +1,4 @@
-// `ricochet certify`, and what `inspect` says of a certificate.
+// `ricochet certify`, and the output of `inspect` about a certificate.
 #include <gtest/gtest.h>
 
 #include <fstream>

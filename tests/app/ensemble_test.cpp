@@ -46,7 +46,7 @@ protected:
         return content(path / "results.npy") + content(path / "results.csv");
     }
 
-    /// Cells of the results, line by line, the names first.
+    /// Cells of the results, line by line, with the names first.
     [[nodiscard]] std::vector<Words> table(const std::string& directory) const
     {
         std::istringstream in(content(work() / directory / "results.csv"));
@@ -59,7 +59,7 @@ protected:
         return out;
     }
 
-    /// Starts an ensemble and sends a signal when it has kept some blocks.
+    /// Starts an ensemble and sends a signal after it has kept some blocks.
     [[nodiscard]] Result signalled(const Words& words, const fs::path& share, int signal) const
     {
         std::error_code error;
@@ -97,7 +97,7 @@ TEST_F(EnsembleApp, RowsAreRunsOfSimulate)
 
 TEST_F(EnsembleApp, ComponentsOfTheStateAreColumns)
 {
-    // Where a parameter gives the component, it is that parameter.
+    // A component that a parameter sets is that parameter.
     write("t.csv", "u\n2\n");
     expect_fine(of_table({}));
     const nlohmann::json two = json(simulate({"--json", "--set", "height=2"}));
@@ -113,7 +113,7 @@ TEST_F(EnsembleApp, ComponentsOfTheStateAreColumns)
     EXPECT_EQ(std::stod(rows[1][5]), rest["state"][0].get<double>());
     EXPECT_NE(rows[2][5], rows[1][5]);
 
-    // Of set-valued systems, too, and of contacts.
+    // Ensembles of set-valued systems too, and of contacts.
     write("s.csv", "u\n1\n1.5\n");
     expect_fine(words("stick-slip", "s.csv"));
     const nlohmann::json slip = json({"simulate", "stick-slip", "--json", "--set", "position=1.5"});
@@ -161,7 +161,7 @@ TEST_F(EnsembleApp, ResultsAreTheSameForAnyThreadsAndShares)
         expect_fine({"ensemble", "--merge", out});
         EXPECT_EQ(results(out), one) << n << " shares";
     }
-    // Rows do not depend on how many there are, nor is another seed the same.
+    // Rows do not depend on their number, and another seed gives others.
     expect_fine(balls("70", {"--out", "few"}));
     EXPECT_EQ(table("few")[70], table("one")[70]);
     expect_fine(balls("70", {"--out", "other", "--seed", "2"}));
@@ -215,7 +215,7 @@ TEST_F(EnsembleApp, HalfABlockAndAByteThatChangedAreRunAgain)
     const std::string expected = results("out");
     const fs::path share = work() / "out" / "share-1-of-1.rows";
     const std::string whole = content(share);
-    // Cut in the header, in the first block, and in the last.
+    // The file is cut in the header, in the first block, and in the last.
     for (const std::size_t size : {std::size_t{10}, whole.size() / 3, whole.size() - 1}) {
         write("out/share-1-of-1.rows", whole.substr(0, size));
         EXPECT_GT(json(words)["rows_run"], 0) << size;
@@ -230,7 +230,7 @@ TEST_F(EnsembleApp, HalfABlockAndAByteThatChangedAreRunAgain)
 
 TEST_F(EnsembleApp, ARowThatCannotBeRunIsAnOutcome)
 {
-    // The low threshold must be below the high one, which no range of one parameter says.
+    // The low threshold must be below the high one, which no range of one parameter can express.
     write("t.csv", "low,high\n18,22\n25,22\n");
     const nlohmann::json run =
         json({"ensemble", "thermostat", "--table", "t.csv", "--out", "out", "--json"});
@@ -260,7 +260,7 @@ TEST_F(EnsembleApp, SharesAreReadFromLaunchers)
     EXPECT_EQ(share({"SLURM_ARRAY_TASK_MIN=0", "SLURM_ARRAY_TASK_ID=10", "SLURM_ARRAY_TASK_COUNT=4",
                      "SLURM_ARRAY_TASK_STEP=10", "SLURM_ARRAY_TASK_MAX=30"}),
               (Pair{2, 4}));
-    // Tasks within a task of an array; a batch script, which has a rank without a size.
+    // Tasks within a task of an array; and a batch script, which has a rank without a size.
     EXPECT_EQ(share({"SLURM_NTASKS=2", "SLURM_PROCID=1", "SLURM_ARRAY_TASK_ID=1",
                      "SLURM_ARRAY_TASK_COUNT=3", "SLURM_ARRAY_TASK_MIN=0"}),
               (Pair{4, 6}));
@@ -361,7 +361,7 @@ TEST_F(EnsembleApp, RequestsThatContradictThemselvesAreRefused)
     refused({"--merge", "none"}, {"no share"});
     refused({"--merge", ".", "--share", "1/2"}, {"alone"});
     refused({"--merge", ".", "--rtol", "1e-3"}, {"alone"});
-    // This network is trained for one gravity.
+    // This network was trained for one gravity.
     write("g.csv", "gravity\n9.81\n");
     refused({"bouncing-ball", "--table", "g.csv", "--out", "o", "--model",
              "bouncing-ball-step-0.01", "--step", "0.01"},

@@ -51,7 +51,7 @@ TEST_F(App, SimulateFaultByImplicitSteps)
     for (const char* controller : {"error", "heuristic", "pi", "filter"}) {
         const nlohmann::json run = with({"--integrator", "bathe", "--controller", controller});
         EXPECT_EQ(run["outcome"], "at_rest") << controller;
-        // Of order 2 at tolerance 1e-3; no controller is off by more than half a percent.
+        // At order 2 and tolerance 1e-3 no controller is off by more than half a percent.
         EXPECT_NEAR(run["mean_slip"].get<double>(), 0.23704, 0.0012) << controller;
     }
     expect_refused({"simulate", "fault", "--integrator", "handover"}, {"handover", "explicit"});
@@ -80,7 +80,7 @@ TEST_F(App, CompareFaultShowsTrueErrors)
         if (method.starts_with("explicit")) worst_explicit = std::max(worst_explicit, error);
         if (method == "published, constant 0.5 s") published = error;
     }
-    // Of order 1, 0.5 s shifts the rupture by half a second of the two or so that it lasts.
+    // At order 1 and 0.5 s the rupture shifts by half a second of the two or so that it lasts.
     EXPECT_GT(published, 0.1);
     EXPECT_LT(worst_explicit, 0.01);
     expect_refused({"compare", "fault", "--set", "elements=1000"}, {"1000"});

@@ -234,7 +234,7 @@ TEST_F(App, NonFiniteWeightsAreRefused)
 
 // --- networks that are wrong ---
 
-/// The any-step model with a last layer that says the same of every step.
+/// The any-step model with a last layer that returns the same for every step.
 Model constant_model(double logit)
 {
     Model model = any_step_model();

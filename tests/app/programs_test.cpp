@@ -8,7 +8,7 @@
 namespace ricochet::programs_test {
 namespace {
 
-/// A program by itself, in the directory of `ricochet`.
+/// Runs a program directly, in the directory of `ricochet`; returns its status.
 int status_of(const std::string& program, const std::string& arguments)
 {
     const fs::path file = fs::path(RICOCHET_APP).parent_path() / program;

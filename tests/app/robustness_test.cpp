@@ -1,4 +1,4 @@
-// What the command line makes of values, files and interrupts that go wrong.
+// Reactions of the command line to invalid values, files and interrupts.
 #include <sys/resource.h>
 #include <sys/stat.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* kernel = RICOCHET_TEST_FIXTURES "/fault_kernels/fault-kernel-1x1-3km.npy";
 
-/// A limit that processes inherit while it lives.
+/// A limit that processes inherit during its life.
 class Limited {
 public:
     Limited(decltype(RLIMIT_AS) resource, rlim_t most) : resource_(resource)
@@ -34,7 +34,7 @@ private:
 };
 
 /// Waits until the process has a handler of its own for the signal, which it installs when its
-/// work begins; then for `work`, so that there is something to keep.
+/// work begins; then for `work`, so that there is a result to keep.
 void wait_for_handler(pid_t child, int signal, std::chrono::milliseconds work)
 {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -111,7 +111,7 @@ TEST_F(Robust, OptionsAndParametersAreGivenOnce)
 
 TEST_F(Robust, NamesTooLongAreRefusedBeforeTheRun)
 {
-    const std::string name(250, 'x');  // 255 are allowed, but not with what a new file adds
+    const std::string name(250, 'x');  // 255 are allowed, but not with the suffix of a new file
     expect_refused(simulate({"--csv", name}), {"--csv", "too long"});
     expect_refused(simulate({"--plot", name + ".svg"}), {"--plot", "too long"});
     expect_refused({"train", "bouncing-ball", "--out", name}, {"--out", "too long"});
@@ -148,7 +148,7 @@ TEST_F(Robust, NoOutputIsWrittenOverAnother)
         {"train", "thermostat", "--out", "m.checkpoint.part", "--checkpoint", "m.checkpoint"},
         {"--out", "--checkpoint"});
     expect_refused({"train", "bouncing-ball", "--out", "m", "--checkpoint", "m/../m"}, {"m"});
-    // Nothing can be lost in a device.
+    // No result can be lost in a device.
     EXPECT_EQ(run(simulate({"--csv", "/dev/null"})).status, 0);
 }
 
@@ -190,7 +190,7 @@ TEST_F(Robust, ACheckpointIsLeftAloneWithoutResume)
         write("m.safetensors.checkpoint", "an earlier training");
         expect_refused(words, {"m.safetensors.checkpoint", "--resume", "remove"});
         EXPECT_EQ(content(work() / "m.safetensors.checkpoint"), "an earlier training");
-        // And what is no checkpoint is not continued from.
+        // A file that is no checkpoint is not continued from.
         Words resumed = words;
         resumed.emplace_back("--resume");
         expect_refused(resumed, {"m.safetensors.checkpoint"});
@@ -206,7 +206,7 @@ TEST_F(Robust, AModelThatCannotBeWrittenIsKeptElsewhere)
                       "--allow-misses"};
     const pid_t child = start(words);
     wait_for_handler(child, SIGINT, Milliseconds(300));
-    // What comes into the way while the training runs.
+    // An obstacle that appears while the training runs.
     fs::create_directory(work() / "ball.safetensors");
     const Result result = wait_for(child);
     EXPECT_EQ(result.status, 1);
@@ -218,7 +218,7 @@ TEST_F(Robust, AModelThatCannotBeWrittenIsKeptElsewhere)
 
 TEST_F(Robust, AFullDiskIsAnError)
 {
-    // Files of a limited size, as if there was no room for more.
+    // Files of a limited size, as if the disk were full.
     const auto limited = [this](rlim_t most, const Words& words) {
         const Limited limit(RLIMIT_FSIZE, most);
         return run(words);
@@ -259,7 +259,7 @@ TEST_F(Robust, APipeIsWaitedForUntilAnInterrupt)
     EXPECT_EQ(wait_for(child).status, 0);
 }
 
-/// A command of a shell, in the directory of the test; its status.
+/// Runs a command of a shell, in the directory of the test; returns its status.
 int shell(const fs::path& directory, const std::string& command)
 {
     const int status = std::system(("cd '" + directory.string() + "' && " + command).c_str());
@@ -271,7 +271,7 @@ TEST_F(Robust, StandardErrorThatTakesNothingChangesNoStatus)
     const std::string bad = RICOCHET_APP " simulate bouncing-ball --rtol -1 ";
     EXPECT_EQ(shell(work(), bad + "2>&-"), 2);
     EXPECT_EQ(shell(work(), bad + "2>/dev/full"), 2);
-    // Closed outputs: no file takes their numbers.
+    // Closed outputs: no file gets their numbers.
     const std::string good = RICOCHET_APP " simulate bouncing-ball --csv ";
     EXPECT_EQ(shell(work(), good + "a.csv >/dev/null"), 0);
     EXPECT_EQ(shell(work(), good + "b.csv >/dev/null 2>&-"), 0);
@@ -344,7 +344,7 @@ TEST_F(Robust, ComparisonsKeepTheMethodsThatWereRun)
 TEST_F(Robust, CompareStepControlShowsHowFarItIs)
 {
     // Minutes of work, of which the first lines of progress are enough. They begin after two
-    // seconds, and elsewhere than on a terminal they are few.
+    // seconds, and there are few of them unless a terminal shows them.
     const Result shown = interrupted({"compare", "step-control", "--system", "fault", "--set",
                                       "elements=7", "friction_drop=0.4", "residual_friction=0.3"},
                                      SIGINT, std::chrono::seconds(5));

@@ -13,7 +13,7 @@ const std::string scenes = RICOCHET_SCENES;
 
 class SceneApp : public App {
 protected:
-    /// A gas in a box, for as long as one likes.
+    /// A gas in a box, for any length of time.
     [[nodiscard]] std::string long_scene() const
     {
         std::ofstream(work() / "long.json")

@@ -127,10 +127,10 @@ TEST_F(App, CompareStepControlShowsEveryRule)
         const std::string name = rule["rule"];
         const bool reached = rule["reached"];
         EXPECT_EQ(reached, rule["error"].get<double>() <= 1e-3) << name;
-        // What a search finds may be worse, and is not said to be as good then.
+        // The result of a search may be worse, and is then not reported as equally good.
         EXPECT_TRUE(reached || name == "searched sequence" || name == "TQC, eq. 7") << name;
         if (name != "TQC, eq. 7") continue;
-        // Six solves a step: one attempt by doubling.
+        // Six solves per step: one attempt by doubling.
         EXPECT_EQ(rule["solves"].get<int>(), 6 * rule["steps"].get<int>());
         EXPECT_GT(rule["error"].get<double>(), 0);
     }
@@ -149,7 +149,7 @@ TEST_F(App, CompareStepControlTakesParametersOfEverySystem)
     for (const auto& rule : mode["rules"]) {
         EXPECT_EQ(rule["reached"].get<bool>(), rule["error"].get<double>() <= 1e-3);
     }
-    // What was asked for is no default, and the policy's limits are not shown.
+    // A requested value is no default, and the policy's limits are not shown.
     EXPECT_FALSE(mode.contains("beyond"));
     const nlohmann::json circuit = one({"diode-circuit", "--set", "current=0.4"});
     ASSERT_EQ(circuit["rules"].size(), 9U);

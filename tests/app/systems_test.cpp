@@ -74,7 +74,7 @@ TEST_F(App, SimulateReachesTheEndOfEverySystemWithEveryStepperAndDetector)
                 const nlohmann::json run = json(words);
                 EXPECT_EQ(run["outcome"], "reached_end");
                 EXPECT_EQ(run["detector"], detector);
-                // The ends alone may miss what is near a tangent.
+                // The ends alone may miss events near a tangent.
                 EXPECT_TRUE(run["events"].size() > 0 || detector == std::string("ends"));
             }
         }
@@ -83,8 +83,8 @@ TEST_F(App, SimulateReachesTheEndOfEverySystemWithEveryStepperAndDetector)
 
 TEST_F(App, TaylorRunsEverySystemWhoseFlowIsAFormulaAndRefusesTheOthers)
 {
-    // Against Fehlberg's method at the same tolerance: at 1e-12 a step errs by 1e-12 of states up
-    // to 70, and the orbit that passes near the Moon magnifies what it meets there by 500.
+    // Against Fehlberg's method at the same tolerance: at 1e-12 a step has an error of 1e-12 of
+    // states up to 70, and the orbit that passes near the Moon magnifies earlier errors by 500.
     Words formulas;
     for (const nlohmann::json& system : json({"systems", "--json"})) {
         const auto name = system["name"].get<std::string>();
@@ -103,7 +103,7 @@ TEST_F(App, TaylorRunsEverySystemWhoseFlowIsAFormulaAndRefusesTheOthers)
         const nlohmann::json run = json(taylor);
         Words fehlberg = taylor;
         fehlberg[4] = "fehlberg78";
-        // Fehlberg's estimate is blind to quadratures; see problems/detest_f4.hpp.
+        // Fehlberg's estimate is zero for quadratures; see problems/detest_f4.hpp.
         if (name == "detest-f4") fehlberg[4] = "dopri5";
         const nlohmann::json expected = json(fehlberg);
         EXPECT_EQ(run["stepper"], "taylor");
@@ -125,7 +125,7 @@ TEST_F(App, CompareFindsEveryEventOfTheSystemsWithGuards)
     // 3e-5 of the orbit that passes near the Moon is the largest measured.
     for (const std::string& name : with_guards) {
         const Result result = run({"compare", name, "--json"});
-        // A slow machine may be told that the program is still at work.
+        // On a slow machine a message may say that the program is still running.
         ASSERT_TRUE(result.err.empty() || result.err.starts_with("ricochet: still running"))
             << result.err;
         const nlohmann::json table = nlohmann::json::parse(result.out);
@@ -275,7 +275,7 @@ TEST_F(App, ParametersReachEverySystem)
     ASSERT_EQ(coulomb["events"].size(), 3U);
     EXPECT_EQ(coulomb["events"][0]["mode_before"], "slip-right");
     EXPECT_NEAR(coulomb["events"][0]["state_after"][0].get<double>(), 1.4, 1e-7);
-    // And one that sticks does so.
+    // A mass that sticks at the start remains so.
     const nlohmann::json stuck =
         json({"simulate", "coulomb-oscillator", "--json", "--set", "position=0.1"});
     EXPECT_EQ(stuck["events"].size(), 0U);

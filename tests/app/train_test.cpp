@@ -40,7 +40,7 @@ TEST_F(App, ModelThatMissesEventsIsOnlyWrittenWhenAllowed)
     EXPECT_NE(refused.err.find("--allow-misses"), std::string::npos) << refused.err;
     EXPECT_EQ(files(), Words{"ball.safetensors.checkpoint"});
 
-    // The best is in the checkpoint, and is what the whole training would have written.
+    // The best weights are in the checkpoint, and are those that the whole training would write.
     EXPECT_EQ(run(train({"--iterations", "1", "--allow-misses", "--resume"})).status, 0);
     EXPECT_EQ(files(), Words{"ball.safetensors"});
     const std::string kept = content(work() / "ball.safetensors");
@@ -175,7 +175,7 @@ TEST_F(App, GateTrainingIsInterruptedWhileItSamples)
                std::chrono::steady_clock::now() < deadline) {
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }
-        // The weights are done; what they miss is counted now.
+        // The weights are final; their misses are counted now.
         if (training_began) std::this_thread::sleep_for(std::chrono::milliseconds(300));
         const auto then = std::chrono::steady_clock::now();
         kill(child, training_began ? SIGTERM : SIGINT);
@@ -218,7 +218,7 @@ TEST_F(App, InterruptedGateTrainingLosesNothing)
 
 TEST_F(App, GateTrainingOnStatesWithoutEventsIsRefused)
 {
-    // A ball that the wall is too far away for.
+    // A ball that never reaches the wall.
     expect_refused({"train", "impact-oscillator", "--kind", "gate", "--out", "gate.safetensors",
                     "--set", "wall=1000", "--iterations", "10"},
                    {"no event"});

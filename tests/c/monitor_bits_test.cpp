@@ -1,4 +1,4 @@
-// The monitor of the C interface finds, to the bit, what that of C++ finds in the same host.
+// The monitor of the C interface finds the same events as the C++ one in the same host, to the bit.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -44,7 +44,7 @@ struct Balls {
     void rest(std::size_t which, double, X& x) const { x[2 * which] = x[2 * which + 1] = 0; }
 };
 
-/// A ball in the wind that has no rest.
+/// A ball in the wind that has no rest rule.
 struct Restless {
     using X = std::array<double, 2>;
     static constexpr std::size_t guard_count = 1;
@@ -59,7 +59,7 @@ struct Restless {
     void reset(std::size_t, double, X& x) const { x = {0, -0.5 * x[1]}; }
 };
 
-/// A clock that strikes every second speeds up what runs against a wall.
+/// A clock that strikes every second speeds up a body that moves against a wall.
 struct Clock {
     using X = std::array<double, 2>;
     static constexpr std::size_t guard_count = 1;
@@ -163,7 +163,7 @@ public:
 
 // --- one host, two monitors ---
 
-/// What happened, as numbers that are compared bit by bit.
+/// The recorded events, as numbers that are compared bit by bit.
 using Story = std::vector<double>;
 
 void tell(Story& story, double t, double remainder, std::span<const double> before,
@@ -344,7 +344,7 @@ public:
         const rc_outcome_code outcome = rc_monitor_outcome(monitor_);
         rc_side side = RC_PLATEAU;
         CHECK_STATUS(RC_OK, rc_monitor_side(monitor_, 0, &side));
-        // Of C++ it is reached_end where the run has not ended.
+        // In C++ it is reached_end where the run has not ended.
         story.insert(story.end(), {static_cast<double>(outcome == RC_RUNNING ? 0 : outcome),
                                    static_cast<double>(rc_monitor_guard(monitor_)),
                                    static_cast<double>(side + 1)});

@@ -16,23 +16,24 @@
 
 namespace ricochet::test {
 
-/// A closed range; of all that is not negative, unless said otherwise.
+/// A closed range; by default of all nonnegative numbers.
 struct Range {
     double least = 0;
     double most = std::numeric_limits<double>::infinity();
 };
 
-/// A controller with what it promises.
+/// A controller with its promised properties.
 struct ControllerCase {
     std::string name;
-    /// A fresh one, where the unit of time is that many seconds; a power of two.
+    /// Makes a new one, where the unit of time is that many seconds; a power of two.
     std::function<StepController(double unit)> make;
-    double accepts = std::numeric_limits<double>::infinity();  ///< largest error, when fresh
+    double accepts = std::numeric_limits<double>::infinity();  ///< largest error accepted by a new
+                                                               ///< controller
     Range next{};                                              ///< factors after accepted steps
     Range retry{};                                             ///< factors after rejected ones
     int order = 2;                          ///< of the error of a closed loop in the step
-    Range settles{};                        ///< errors of that loop in the end
-    std::vector<StepController> refused{};  ///< by `validate`
+    Range settles{};                        ///< final errors of that loop
+    std::vector<StepController> refused{};  ///< rejected by `validate`
 };
 
 inline void PrintTo(const ControllerCase& controller, std::ostream* out)
@@ -40,7 +41,7 @@ inline void PrintTo(const ControllerCase& controller, std::ostream* out)
     *out << controller.name;
 }
 
-/// What a controller says; to a learned one of steps at a tolerance of 1e-3.
+/// The verdict of a controller; a learned one receives steps at a tolerance of 1e-3.
 [[nodiscard]] inline StepVerdict told(StepController& controller, double error, double h)
 {
     return judge(controller, error, h, [] { return StepView{.tolerance = 1e-3}; });
@@ -76,7 +77,7 @@ protected:
         return std::pow(10, std::uniform_real_distribution(-6., 3.)(random_));
     }
 
-    /// Tells it of steps from `h` on, some of them without a solution.
+    /// Gives it the errors of steps from `h` on, some of them without a solution.
     void remember(StepController& controller, int steps, double h = 0.01)
     {
         for (int i = 0; i < steps; ++i) {
@@ -85,7 +86,7 @@ protected:
         }
     }
 
-    /// Calls check(controller) of a fresh one and of some with a past.
+    /// Calls check(controller) with a new one and with some that have a history.
     template <class Check>
     void for_any_past(Check&& check)
     {
@@ -109,7 +110,7 @@ TEST_P(ControllerSuite, EveryFactorIsPositiveAndFiniteWhateverTheErrors)
             const double factor = told(one, error, 0.01).factor;
             EXPECT_GT(factor, 0) << error;
             EXPECT_TRUE(std::isfinite(factor)) << error;
-            // And after it, when the extreme error is the one before.
+            // Checks after it too, when the extreme error is the previous one.
             for (const double after : {0.0, 0.5, 1e3}) {
                 StepController other = one;
                 const double next = told(other, after, 0.01).factor;

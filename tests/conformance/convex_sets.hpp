@@ -46,14 +46,14 @@ template <ConvexSet Set>
     return any;
 }
 
-/// A set with what it is, told by other formulas than its own.
+/// A set with its properties, given by formulas different from its own.
 struct SetCase {
     std::string name;
     std::function<AnySet(double unit)> make;
-    /// By how much a point violates the set's inequalities; 0 or less in it.
+    /// Amount by which a point violates the set's inequalities; 0 or less inside it.
     std::function<double(const Vector&)> violation;
-    /// sup of n.x over the set, infinite where it is not bounded. What is only rounding outside
-    /// of the cone of finite values, against the length of n, is 0.
+    /// sup of n.x over the set, infinite where it is not bounded. Directions outside the cone of
+    /// finite values only by rounding, relative to the length of n, count as 0.
     std::function<double(const Vector& n)> support;
     std::vector<Vector> kinks{};  ///< points where the projection has no derivative
 };
@@ -83,7 +83,7 @@ inline void PrintTo(const SetCase& set, std::ostream* out)
 
 class ConvexSetSuite : public testing::TestWithParam<SetCase> {
 protected:
-    /// Rounding of a projection, of the lengths that enter it.
+    /// Rounding of a projection, relative to the lengths that enter it.
     static constexpr double rounding = 1e-14;
 
     [[nodiscard]] std::size_t dimension() const { return set_.dimension; }
@@ -102,7 +102,7 @@ protected:
         return d;
     }
 
-    /// A point of a length from 1e-3 to 1e3, and now and then with some zeros.
+    /// A point with a length from 1e-3 to 1e3, sometimes with some zeros.
     [[nodiscard]] Vector point()
     {
         std::normal_distribution normal;
@@ -122,7 +122,7 @@ protected:
         return v;
     }
 
-    /// Calls check(z) of random points and of the kinks.
+    /// Calls check(z) with random points and with the kinks.
     template <class Check>
     void for_points(Check&& check, int points = 2000)
     {
@@ -181,7 +181,7 @@ TEST_P(ConvexSetSuite, PointsComeNoFartherApart)
     // |P z - P y|^2 <= (P z - P y).(z - y), and so at most |z - y|^2.
     for_points([&](const Vector& z) {
         Vector y = point();
-        if (length(y) < length(z)) {  // as often as not, near one another
+        if (length(y) < length(z)) {  // in about half the cases near one another
             for (std::size_t i = 0; i < y.size(); ++i) y[i] = z[i] + 1e-3 * y[i];
         }
         const Vector change = less(projected(z), projected(y));
@@ -233,7 +233,7 @@ TEST_P(ConvexSetSuite, TheDerivativeIsThatOfDifferences)
 
 TEST_P(ConvexSetSuite, EveryDerivativeIsSymmetricAndBetweenZeroAndOne)
 {
-    // Of each face's projection, and so of means of them: v.D v >= |D v|^2 >= 0.
+    // For each face's projection, and so for means of them: v.D v >= |D v|^2 >= 0.
     for_points([&](const Vector& z) {
         const std::size_t n = z.size();
         const Vector d = derivative(z);

@@ -17,7 +17,7 @@
 
 namespace ricochet::test {
 
-/// A detector behind functions, with what it declares and promises.
+/// A detector behind functions, with its declared and promised properties.
 struct DetectorCase {
     std::string name;
     std::function<Finding(const HostStep&, Watch&, Crossing, std::uint64_t*)> look;
@@ -26,7 +26,7 @@ struct DetectorCase {
     std::function<bool(double sign, const GuardSample&, const GuardSample&, double touch)>
         leaves_plainly;
     Evidence unsuspected{};        ///< of a step that is not suspected
-    Evidence claims{};             ///< of a guard that no degree is known of, once examined
+    Evidence claims{};             ///< for a guard of unknown degree, once examined
     bool sees_pairs = false;       ///< two crossings in one step, and touches
     std::uint64_t most_calls = 1;  ///< of the guard in one check
 };
@@ -94,7 +94,7 @@ struct Cubic {
 
 class DetectorSuite : public testing::TestWithParam<DetectorCase> {
 protected:
-    /// What the detector says of a step, and the side on which it leaves the guard.
+    /// The finding of the detector for a step, and the side on which it leaves the guard.
     struct Seen : Finding {
         Side side_after = Side::plateau;
         std::uint64_t calls = 0;
@@ -118,7 +118,7 @@ protected:
         return GetParam().suspects(sign, g.value(0), g.rate(0), g.value(1), g.rate(1), 1);
     }
 
-    /// That nothing is found, on no more than what the detector has seen.
+    /// Expects that nothing is found, with evidence no stronger than the detector has.
     static void expect_clear(const Seen& seen)
     {
         EXPECT_FALSE(seen.hit);
@@ -126,7 +126,7 @@ protected:
         EXPECT_EQ(seen.evidence, GetParam().claims);
     }
 
-    /// That `side` of the curve is left between lo and hi.
+    /// Expects that `side` of the curve is left between lo and hi.
     static void expect_bracket(const Seen& seen, const Curve& curve, Side side)
     {
         ASSERT_TRUE(seen.hit);
@@ -168,14 +168,14 @@ protected:
         return out;
     }
 
-    /// One that begins above the surface.
+    /// A cubic that begins above the surface.
     [[nodiscard]] static Cubic cubic(std::mt19937_64& random)
     {
         std::normal_distribution normal;
         return {std::fabs(normal(random)), normal(random), normal(random), normal(random)};
     }
 
-    /// That b is what a is, with values times `factor` and sides changed where that is negative.
+    /// Expects b to equal a with values times `factor`, and with sides changed if that is negative.
     static void expect_same(const Seen& a, const Seen& b, double factor)
     {
         const auto side = [=](Side s) { return factor < 0 ? opposite(s) : s; };
@@ -293,7 +293,7 @@ TEST_P(DetectorSuite, ATouchIsFoundOrHonestlyAssumed)
             EXPECT_EQ(one.evidence, Evidence::assumed);
         }
     }
-    // Only where the side that is touched from counts.
+    // Only the side counts from which the surface is touched.
     EXPECT_FALSE(look(touch, Side::above, Crossing::rising).touch);
 }
 
@@ -303,7 +303,7 @@ TEST_P(DetectorSuite, AStartOnTheSurfaceIsJudgedByTheArmedSide)
     expect_clear(look(up, Side::above, Crossing::either));
     EXPECT_TRUE(look(up.times(-1), Side::above, Crossing::falling).hit);
     EXPECT_TRUE(look(up, Side::below, Crossing::rising).hit);
-    // A residue behind the surface, on the way out of it, and one that never comes out.
+    // A remainder behind the surface, on the way out of it, and one that never comes out.
     const Curve out{[](double s) { return s - 1e-12; }, [](double) { return 1.0; }};
     expect_clear(look(out, Side::above, Crossing::either));
     const Curve sunk{[](double s) { return -1e-12 - s * s; }, [](double s) { return -2 * s; }};
@@ -392,7 +392,7 @@ TEST_P(DetectorSuite, TheDirectionOfTimeChangesNothing)
 TEST_P(DetectorSuite, NotANumberIsNoEvidence)
 {
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    // At the end: the step is examined, and never taken for one that only leaves.
+    // At the end: the step is examined, and never treated as one that only leaves.
     EXPECT_TRUE(GetParam().suspects(1, 1, -1, nan, -1, 1));
     const GuardSample start{.s = 0, .value = 1, .rate = -1};
     EXPECT_FALSE(GetParam().leaves_plainly(1, start, {.s = 1, .value = nan, .rate = -1}, 0));
@@ -408,7 +408,7 @@ TEST_P(DetectorSuite, NotANumberIsNoEvidence)
         EXPECT_EQ(seen.evidence, Evidence::assumed);
     }
     EXPECT_FALSE(look(slope, Side::above, Crossing::falling).hit);
-    // What leaves before the hole is found, and what the ends tell is not hidden by it.
+    // A departure before the hole is found, and the hole does not hide what the ends show.
     for (const double from : {0.0, 0.3}) {
         const Curve wave{[=](double s) { return s > from && s < 0.4 ? nan : std::cos(8 * s); },
                          [](double s) { return -8 * std::sin(8 * s); }};
@@ -459,11 +459,11 @@ TEST_P(DetectorSuite, AStepThatIsNotSuspectedHasNothingToFind)
         expect_clear(look(g.curve(), Side::above, Crossing::either));
     }
     if (GetParam().sees_pairs) {
-        // It turns far from its surface, but what it does there the ends do not show.
+        // It turns far from its surface, but the ends do not show its path there.
         EXPECT_TRUE(GetParam().suspects(1, 1, -1, 1, 1, 1));
         EXPECT_TRUE(GetParam().suspects(-1, -1, 1, -1, -1, 1));
     }
-    // A detector that suspects every step has only those without armed guards to be sure of.
+    // A detector that suspects every step is certain only of those without armed guards.
     EXPECT_TRUE(unsuspected > 1000 || GetParam().unsuspected == Evidence::proved);
 }
 

@@ -90,13 +90,13 @@ template <class Detector>
     return model;
 }
 
-/// Announces an event where the point is at most two steps from a wall.
+/// Announces an event if the point is at most two steps from a wall.
 [[nodiscard]] inline Model true_prediction()
 {
     return shuttle_model("event-classifier", {0.98});
 }
 
-/// Clears the horizon tau where the point is further than that from both walls.
+/// Clears the horizon tau if the point is farther than that from both walls.
 [[nodiscard]] inline Model true_horizons()
 {
     const std::vector<double> horizons{0.02, 0.08, 0.32};
@@ -105,7 +105,7 @@ template <class Detector>
     return model;
 }
 
-/// Clears the level g where the guard is above it.
+/// Clears the level g if the guard is above it.
 [[nodiscard]] inline Model true_levels()
 {
     Model model = shuttle_model("gate-level", {0});
@@ -115,17 +115,17 @@ template <class Detector>
     return model;
 }
 
-/// A gate with a network that tells the truth, and what it promises.
+/// A gate with a network that predicts correctly, and the promises of the gate.
 struct GateCase {
     std::string name;
     std::function<ShuttleRun(const Model&)> run;
-    const ShuttleRun* exact;  ///< of the detector that the gate leaves the other steps to
+    const ShuttleRun* exact;  ///< of the detector to which the gate leaves the other steps
     Model truth;
     bool keeps_events = false;             ///< of the exact detector, with any weights
-    bool returns = false;                  ///< where it finds the guard on its other side
-    bool saves = true;                     ///< exact calls, with a network that tells the truth
-    bool plans = false;                    ///< by bounds on top of what the network clears
-    bool refuses_other_weights = false;    ///< since its proof is of these
+    bool returns = false;                  ///< it finds the guard on its other side
+    bool saves = true;                     ///< exact calls, with a network that predicts correctly
+    bool plans = false;                    ///< by bounds in addition to the cleared intervals
+    bool refuses_other_weights = false;    ///< since its proof is for these
     Evidence put_off = Evidence::checked;  ///< of the steps that it does not examine
 };
 
@@ -166,7 +166,7 @@ protected:
         EXPECT_EQ(run.statistics.checks_put_off, 0U);
     }
 
-    /// The truth's model with every weight from `next`.
+    /// The correct model with every weight from `next`.
     template <class Next>
     [[nodiscard]] static Model with_weights(std::size_t hidden, Next&& next)
     {
@@ -182,7 +182,7 @@ protected:
         return model;
     }
 
-    /// One that clears all that it can, or nothing, wherever it is asked.
+    /// One that clears everything that it can, or nothing, in every state.
     [[nodiscard]] static Model constant(double output)
     {
         Model model = with_weights(2, [] { return 0.0; });
@@ -220,7 +220,7 @@ protected:
                std::equal(a.events.begin(), a.events.end(), b.events.begin(), b.events.end(), same);
     }
 
-    /// Calls check(run) for every hostile network that is not refused.
+    /// Calls check(run) with every hostile network that is not refused.
     template <class Check>
     static void for_hostile(Check&& check)
     {
@@ -259,7 +259,7 @@ TEST_P(GateSuite, AnyWeightsKeepTheEventsWhereThatIsPromised)
 TEST_P(GateSuite, AGuardThatStaysBeyondItsSurfaceIsReturnedToWhereThatIsPromised)
 {
     if (!GetParam().returns) return;
-    // Nothing turns the point back at a wall that is not noticed.
+    // Nothing turns the point back at a wall whose event is missed.
     EXPECT_TRUE(same_events(GetParam().run(constant(-1e9)), exact()));
 }
 
@@ -297,7 +297,7 @@ TEST_P(GateSuite, WhatIsNotLookedAtIsNamed)
 
 TEST_P(GateSuite, OutsideItsBoxNothingIsCleared)
 {
-    if (GetParam().refuses_other_weights) return;  // the box is part of what is proved
+    if (GetParam().refuses_other_weights) return;  // the box is part of the proof
     Model elsewhere = constant(-1e9);
     elsewhere.domain = {{5, 6}, {-2, 2}};
     const ShuttleRun run = GetParam().run(elsewhere);
@@ -334,7 +334,7 @@ TEST_P(GateSuite, AModelForSomethingElseIsRefused)
     expect_refused([](Model& model) { model.recipe = "entrails"; });
     expect_refused([](Model& model) { model.recipe = "state-rate"; });
     if (!GetParam().refuses_other_weights) {
-        // A certificate is of states, and steps may be of any length.
+        // A certificate is about states, and steps may have any length.
         expect_refused([](Model& model) { model.step_min = model.step_max = 0.02; });
     }
 }

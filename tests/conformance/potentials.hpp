@@ -35,13 +35,14 @@ template <PotentialPair Pair>
             .kind = Pair::kind};
 }
 
-/// A pair with the law that it stands for, where it is asked, and what it promises.
+/// A pair with the law that it represents, the domain of the tests, and its promises.
 struct PairCase {
     std::string name;
-    /// With lengths multiplied by a power of two; of another unit none if it has quadratures.
+    /// With lengths multiplied by a power of two; without another unit if it has quadratures.
     std::function<AnyPair(double unit)> make;
     std::function<FrictionAndRate(double v, double xi)> law;
-    std::function<FrictionAndRateGradient(double v, double xi)> gradient{};  ///< of it; may lack
+    std::function<FrictionAndRateGradient(double v, double xi)> gradient{};  ///< its gradient; may
+                                                                             ///< be absent
     DirectEffect effect = DirectEffect::log;
     double v_least = 1e-10, v_most = 1e-2;  ///< [m/s]
     double xi_least = -4, xi_most = 12;
@@ -49,7 +50,7 @@ struct PairCase {
     bool scales = true;
     /// Whether the dual is convex in d there.
     std::function<bool(double d, double xi)> convex = [](double, double) { return true; };
-    /// Largest relative error of all identities against formulas in 113 bits; may lack.
+    /// Largest relative error of all identities against formulas in 113 bits; may be absent.
     std::function<double()> worst_identity{};
     double identity_tolerance = 0;
     double tolerance = 1e-9;         ///< of first derivatives against differences
@@ -65,7 +66,7 @@ inline void PrintTo(const PairCase& pair, std::ostream* out)
 
 class PotentialSuite : public testing::TestWithParam<PairCase> {
 protected:
-    /// Calls check(v, xi), of both signs of v where the law has them.
+    /// Calls check(v, xi), with both signs of v where the law has them.
     template <class Check>
     void for_points(Check&& check, int points = 300)
     {
@@ -78,7 +79,7 @@ protected:
 
     [[nodiscard]] bool odd() const { return GetParam().effect == DirectEffect::asinh; }
 
-    /// From half its least to twice its most; by the logarithm.
+    /// A slip rate from half the least to twice the largest, uniform in the logarithm.
     [[nodiscard]] double slip_rate()
     {
         std::uniform_real_distribution log_v(std::log(GetParam().v_least),
@@ -91,13 +92,13 @@ protected:
         return std::uniform_real_distribution(GetParam().xi_least, GetParam().xi_most)(random_);
     }
 
-    /// -dDdag/dxi of a slip rate.
+    /// -dDdag/dxi at a slip rate.
     [[nodiscard]] double drive(double v, double xi) const
     {
         return -pair_.rate_potential(v, xi).xi;
     }
 
-    /// Five-point difference of f at x; with steps of a thousandth of the scale of f off by 1e-12.
+    /// Five-point difference of f at x; with steps of 1/1000 of the scale of f its error is 1e-12.
     template <class Function>
     [[nodiscard]] static double difference(const Function& f, double x, double h)
     {
@@ -326,7 +327,7 @@ TEST_P(PotentialSuite, AnotherUnitOfLengthChangesNoBit)
     }
 }
 
-/// Whether a call is refused, or answers that it is not a number.
+/// Whether a call is refused, or returns NaN.
 template <class Call>
 [[nodiscard]] bool refuses(const Call& call)
 {

@@ -68,7 +68,7 @@ struct Timed {
     }
 };
 
-/// From 0 to 1 by steps of `step`, examined by Bernstein.
+/// From 0 to 1 in steps of `step`, examined by Bernstein.
 Run<Timed::State> run_timed(const Timed& system, double step)
 {
     return integrate(system, {0.0}, {.t_end = 1, .step = step}, FixedStep<Rk4>{}, Bernstein{});
@@ -215,7 +215,7 @@ TEST(Bernstein, RootsThatRoundingCannotTellApartAreOne)
 
 // --- near-tangent passages ---
 
-/// What Fehlberg78 at 1e-14 makes of a level `depth` below the crest.
+/// The run of Fehlberg78 at 1e-14 for a level `depth` below the crest.
 Run<NearTangent::State> near_tangent(const NearTangent& system)
 {
     return integrate(system, system.start(), {.t_end = 20, .rtol = 1e-14, .atol = 1e-14},
@@ -371,7 +371,7 @@ struct Product {
     double scale = 1;
     Crossing crossing = Crossing::either;
     int degree = 0;
-    bool acts = false;  ///< by a reset that changes nothing
+    bool acts = false;  ///< it has a reset that changes nothing
     static constexpr std::size_t guard_count = 1;
 
     [[nodiscard]] GuardInfo guard_info(std::size_t) const
@@ -440,8 +440,8 @@ double largest_value(const Product& product)
     return largest;
 }
 
-/// Whether the guard is a hundred times further off its surface than what counts as on
-/// it, between any two of its roots and at both ends.
+/// Whether the guard is a hundred times farther from its surface than the tolerance, between any
+/// two of its roots and at both ends.
 bool is_unambiguous(const Product& product)
 {
     const long double clear = 100 * 64 * epsilon * static_cast<long double>(largest_value(product));
@@ -466,7 +466,7 @@ struct Expected {
     double tolerance;
 };
 
-/// Where the guard is as small as what counts as on the surface.
+/// Width of the interval in which the guard counts as on the surface.
 double width_of(const Product& product, const Product::Root& root)
 {
     double lead = std::fabs(product.scale);
@@ -530,7 +530,7 @@ TEST(Bernstein, OfTwentyThousandRandomPolynomialsNoRootIsMissedOrDoubled)
 
 // --- evidence ---
 
-/// How often `stays_on_side` says so of a polynomial with a root in (0, 1].
+/// Number of times that `stays_on_side` claims so for a polynomial with a root in (0, 1].
 int false_proofs(int degree, std::mt19937_64& random)
 {
     std::uniform_real_distribution<double> unit(0, 1);
@@ -621,8 +621,8 @@ TEST(Bernstein, AFlightFromTheFloorIsProvedToBeOne)
 
 TEST(Bernstein, AGuardOfAHigherDegreeThanDeclaredIsNoticedNearItsSurface)
 {
-    // Declared linear, it is taken for a cubic on the step of rk4, until the end of the
-    // step, cos 9 < 0, asks for a closer look.
+    // Declared linear, it is treated as a cubic on the step of rk4, until the end of the
+    // step, cos 9 < 0, requires a closer examination.
     const Timed system{[](double t) { return std::cos(9 * t); }, Crossing::either, 1};
     EXPECT_LE(distance(times(run_timed(system, 1)), {pi / 18, pi / 6, 5 * pi / 18}), 4 * epsilon);
 }

@@ -124,7 +124,7 @@ TEST(Cover, TheForecastIsWhereTwoValuesJustCloseTheStretch)
         EXPECT_TRUE(closes(tau * (1 - 1e-9))) << slope;
         EXPECT_FALSE(closes(tau * (1 + 1e-9))) << slope;
     }
-    // Moving away as fast as the bound: for ever.
+    // Moving away as fast as the bound: the interval is infinite.
     EXPECT_EQ(time_to_look({.distance = 1, .speed = 1, .acceleration = 0}, 1), inf);
     EXPECT_GT(time_to_look({.distance = 1, .speed = 1, .acceleration = 0}, nan), 0);
 }

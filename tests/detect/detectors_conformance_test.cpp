@@ -1,4 +1,4 @@
-// Every detector by the suite of all.
+// Applies the common suite to every detector.
 #include "conformance/detectors.hpp"
 
 #include "ricochet/detect/bernstein.hpp"
@@ -33,11 +33,11 @@ DetectorCase with(const std::string& name, const Detector& detector, Evidence cl
 
 std::vector<DetectorCase> all()
 {
-    // Of a host's step, which has no polynomial, nothing can be proved.
+    // Nothing can be proved about a host's step, which has no polynomial.
     return {with("Ends", Ends{}, Evidence::assumed, 1),
             with("Extremum", Extremum{}, Evidence::checked, 61),
             with("Bernstein", Bernstein{}, Evidence::checked, 100'000),
-            // Which steps it clears is another matter; this is what it does with the others.
+            // The choice of steps that it clears is tested elsewhere; this tests the other steps.
             with("Network", network(), Evidence::assumed, 2),
             with("VerifiedExtremum", Verified<Extremum>(network()), Evidence::checked, 61),
             with("VerifiedEnds", Verified<Ends>(network(), Ends{}), Evidence::assumed, 1)};

@@ -1,5 +1,5 @@
-// Every gate by the suite of all: those that keep the events of their exact detector, and those
-// that are trusted; and what gates answer.
+// Applies the common suite to every gate: those that keep the events of their exact detector, and
+// those that are trusted; and checks the answers of gates.
 #include "conformance/gates.hpp"
 
 #include "ricochet/detect/extremum.hpp"
@@ -34,7 +34,7 @@ std::vector<GateCase> keeping_gates()
     const auto verified = [](const Model& model) { return Verified<>(Network(model)); };
     const auto foreseen = [](const Model& model) { return Foreseen<>(gates::Gate(model)); };
     const auto certified = [](const Model& model) { return Certified<>(model); };
-    // By counts: what a clock decides differs from run to run.
+    // By counts: decisions by a clock differ from run to run.
     const MeterOptions counted{
         .decision = MeterOptions::Decision::counted, .guard = 1e-6, .network = 1e-7, .step = 1e-7};
     std::vector<GateCase> gates{
@@ -78,7 +78,7 @@ INSTANTIATE_TEST_SUITE_P(Keeping, GateSuite, testing::ValuesIn(keeping_gates()),
 INSTANTIATE_TEST_SUITE_P(Trusted, GateSuite, testing::ValuesIn(trusted_gates()),
                          [](const auto& info) { return info.param.name; });
 
-/// What a gate has to answer, from |x| and its levels.
+/// The expected answer of a gate, from |x| and its levels.
 double expected(const Model& model, double x)
 {
     double cleared = 0;
@@ -100,7 +100,7 @@ TEST(Gate, ClearsTheLargestLevelThatItsNetworkSpeaksFor)
                 gate.ask(Shuttle{}, 0, 0, std::array<double, 2>{x, 1});
             EXPECT_EQ(answer.cleared, expected(model, x)) << x;
             EXPECT_FALSE(answer.outside);
-            // Never more than is true.
+            // It never clears more than is true.
             const double wall = 1 - std::fabs(x);
             EXPECT_LE(answer.cleared, std::max(wall, 0.0));
         }
@@ -144,7 +144,7 @@ TEST(CertifiedGate, NeverClearsMoreThanIsProved)
             EXPECT_FALSE(answer.outside);
             EXPECT_LE(answer.cleared, std::max(shuttle.guard(0, at), 0.0)) << x;
             cleared += answer.cleared > 0;
-            // It speaks of the first guard in the first mode.
+            // The gate is for the first guard in the first mode.
             EXPECT_EQ(gate.level(shuttle, 1, 0, 0, at).cleared, 0);
             EXPECT_EQ(gate.level(shuttle, 0, 1, 0, at).cleared, 0);
         }

@@ -1,4 +1,4 @@
-// Networks that are asked only while it pays.
+// Networks that are evaluated only while that pays.
 #include "ricochet/detect/gates.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ constexpr double inf = std::numeric_limits<double>::infinity();
 struct Shuttle {
     using State = X;
     static constexpr std::string_view name = "shuttle";
-    double loose = 1;  ///< factor of the bound above the truth
+    double loose = 1;  ///< factor of the bound relative to the exact value
 
     template <class V>
     void flow(double, const V& x, V& dxdt) const
@@ -83,7 +83,7 @@ Model shuttle_model()
     return model;
 }
 
-/// Says of every state that there will be no event for so long, or never does (threshold -1).
+/// Predicts in every state that no event occurs for so long, or never does so (threshold -1).
 gates::Gate horizon_gate(double horizon, double threshold = 1)
 {
     Model model = shuttle_model();
@@ -93,7 +93,7 @@ gates::Gate horizon_gate(double horizon, double threshold = 1)
     return gates::Gate(model);
 }
 
-/// logit |x|, with what has been proved of it.
+/// logit |x|, with the margins that have been proved.
 Model certified_model(std::vector<double> margins)
 {
     Model model = shuttle_model();
@@ -173,7 +173,7 @@ TEST(Metered, AskingIsStoppedWhereItDoesNotPay)
 
 TEST(Metered, AHostileNetworkIsFoundOutByTheStepsItTakesBack)
 {
-    // Twenty steps further than any interval can be closed, at a guard and a network at no cost.
+    // Twenty steps farther than any interval can be closed, with a guard and a network at no cost.
     const Foreseen bold(horizon_gate(0.25), unchecked);
     Shuttle loose{.loose = 4};
     const auto planned = integrate(loose, at_centre, fifty_seconds, Fixed{}, Planned(unchecked));
@@ -221,7 +221,7 @@ void expect_same_events_while_ways_change(const Shuttle& system, const Options& 
     EXPECT_EQ(checked.run.statistics.network_calls, 0U);
     EXPECT_EQ(checked.run.statistics.checks_put_off, 0U);
     EXPECT_GE(checked.run.statistics.guard_calls, exact.statistics.steps);
-    // Looks at no cost, and all the time for trials: no way is left for long.
+    // Checks at no cost, and all the time for trials: no alternative stays for long.
     MeterOptions restless = counted(0, 0);
     restless.trials = 1;
     for (const std::uint64_t piece : {1U, 7U, 50U}) {
@@ -235,7 +235,7 @@ void expect_same_events_while_ways_change(const Shuttle& system, const Options& 
 
 TEST(Metered, EventsStayTheSameWhereEveryStepIsCheckedForAWhile)
 {
-    // A bound four times too large makes intervals be taken back.
+    // With a bound four times too large, intervals are rolled back.
     expect_same_events_while_ways_change<Fixed>(Shuttle{.loose = 4}, fifty_seconds);
     expect_same_events_while_ways_change<ErrorControlled<Dopri5>>(
         Shuttle{.loose = 4}, {.t_end = 50, .rtol = 1e-9, .atol = 1e-9, .h_max = 0.02});
@@ -244,7 +244,7 @@ TEST(Metered, EventsStayTheSameWhereEveryStepIsCheckedForAWhile)
 TEST(Metered, PlanningIsLeftWhereItCostsMoreThanItSaves)
 {
     const MeterOptions options = counted(1e-7, 1e-6);
-    // Calls of the guard per step: one if every step is checked; planned, ten, or a tenth.
+    // Calls of the guard per step: one if every step is checked; ten, or a tenth, if planned.
     for (const double planned : {10.0, 0.1}) {
         detail::Meter meter(options, 1);
         Statistics counts;
@@ -257,7 +257,7 @@ TEST(Metered, PlanningIsLeftWhereItCostsMoreThanItSaves)
             meter.review(counts);
         }
         EXPECT_EQ(meter.reading().checks, planned > 1);
-        // Of the first 8 pieces half are planned in any case, and trials are few.
+        // Half of the first 8 pieces are planned in any case, and trials are few.
         if (planned > 1) {
             EXPECT_GT(checked, 85 * options.piece);
         } else {
@@ -308,7 +308,7 @@ TEST(Metered, APredictionThatSavesNothingIsHardlyAskedFor)
 
 TEST(Metered, AWrongBoundIsNamedUnderAGate)
 {
-    const Shuttle boastful{.loose = 0.25};  // four times as fast as it says
+    const Shuttle boastful{.loose = 0.25};  // four times as fast as declared
     const Foreseen foreseen(horizon_gate(0.02), {.check_bounds = true});
     const auto run = integrate(boastful, at_centre, fifty_seconds, Fixed{}, foreseen);
     ASSERT_EQ(run.outcome, Outcome::wrong_bound);

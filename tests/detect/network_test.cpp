@@ -214,7 +214,7 @@ TEST(Network, AModelForOneStepIsRefusedUnderErrorControl)
 
 TEST(Network, OutsideItsDomainNothingIsCleared)
 {
-    // The model knows heights up to some 12 m; a ball from 1000 m is examined until
+    // The model covers heights up to some 12 m; a ball from 1000 m is examined until
     // it has come down that far, and by then it is too fast.
     const auto run = integrate(BouncingBall(), {1000.0, 0.0}, {.t_end = 14, .step = 0.01},
                                FixedStep<Rk4>{}, Network(paper_model()));

@@ -41,7 +41,7 @@ bool same_bits(const X& a, const X& b)
                       [](double p, double q) { return same_bits(p, q); });
 }
 
-/// All that a run says about the motion, to the last bit.
+/// All results of a run about the motion, to the last bit.
 void expect_same(const PlanRun& exact, const PlanRun& planned)
 {
     EXPECT_EQ(exact.outcome, planned.outcome) << name(planned.outcome);
@@ -199,7 +199,7 @@ TEST(Planned, RandomRoomsHaveTheEventsOfTheExactDetector)
             rollbacks += run->statistics.rollbacks;
         }
     }
-    // The bounds did most of the work, and the ways back were taken.
+    // The bounds did most of the work, and the fallbacks were exercised.
     EXPECT_GT(events, 2000u);
     EXPECT_GT(proved, steps * 8 / 10);
     EXPECT_GT(rollbacks, 100u);
@@ -232,7 +232,7 @@ TEST(Planned, BackwardRunsHaveTheEventsOfTheExactDetector)
         X start;
         Room room = random_room(random, start);
         room.restitution = 1;
-        // Backward in time the velocity after an event is the one with which it leads away.
+        // Backward in time the velocity after an event is the one that leads away from it.
         struct Backward : Room {
             void reset(double t, X& x) const
             {
@@ -273,7 +273,7 @@ TEST(Planned, BernsteinAsTheExactDetectorKeepsItsEvents)
     }
 }
 
-/// Every disc is a guard: some reflect, some only say that their zone was entered or left.
+/// Every disc is a guard: some reflect, others only record that their zone was entered or left.
 struct ManyDiscs {
     using State = X;
     std::vector<Disc> discs;
@@ -351,7 +351,7 @@ TEST(Planned, ManyGuardsInAnyOrderHaveTheEventsOfTheExactDetector)
     EXPECT_GT(events, 200u);
 }
 
-/// The same, its guards and their rates only all at once.
+/// The same system, which gives its guards and their rates only all together.
 struct TogetherDiscs {
     using State = X;
     ManyDiscs many;
@@ -437,8 +437,8 @@ TEST(Planned, AGuardThatIsNeverApproachedIsHardlyCalled)
 
 TEST(Planned, LookingAheadSavesLooks)
 {
-    // Away from a wall at the full speed two values cover any interval; one covers a distance
-    // as long as that behind it, which takes log2(1000) looks from 0.01 to 10.
+    // When the point moves away from a wall at the full speed, two values cover any interval; one
+    // covers a distance equal to that to the wall, which takes log2(1000) checks from 0.01 to 10.
     struct Leaving {
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0, 0, 0}; }
         double guard(double, const X& x) const { return x[0]; }
@@ -530,7 +530,7 @@ TEST(Planned, ModesAndTimeEventsAreThoseOfTheExactDetector)
     }
 }
 
-/// The room, with whatever bounds a test deals out.
+/// The room, with bounds set by the test.
 struct HostileRoom : Room {
     double speed = nan;
     double acceleration = nan;
@@ -576,7 +576,7 @@ TEST(Planned, AWrongSpeedBoundIsNamed)
     for (const bool check : {true, false}) {
         const auto run = integrate(slow, start, options, Fixed{},
                                    Planned({.two_ended = false, .check_bounds = check}));
-        // Unchecked it is seen where the ball is found beyond the wall.
+        // Without checks the violation is found where the ball is beyond the wall.
         ASSERT_EQ(run.outcome, Outcome::wrong_bound);
         EXPECT_EQ(run.guard, 0u);
         ASSERT_TRUE(run.wrong_bound);
@@ -585,7 +585,7 @@ TEST(Planned, AWrongSpeedBoundIsNamed)
         EXPECT_TRUE(same_bits(wrong.value, room.guard(0, wrong.x)));
         EXPECT_GT(std::fabs(wrong.value - wrong.value_then), wrong.allowed);
         EXPECT_GT(wrong.t, wrong.since);
-        // What was allowed is what the bound says, with its margin of one per cent.
+        // The allowed value is that of the bound, with its margin of one per cent.
         EXPECT_NEAR(wrong.allowed, 1.01 * 0.4 * (wrong.t - wrong.since), 1e-9);
     }
 }
@@ -606,10 +606,10 @@ TEST(Planned, AWrongLowerBoundIsNamed)
     EXPECT_TRUE(run.wrong_bound->lower_bound);
 }
 
-/// x0 comes and goes; armed below its surface at the start.
+/// x0 oscillates; the guard is armed below its surface at the start.
 struct Outside {
     using State = X;
-    double above = 0;  ///< added to the guard where it claims to be its upper bound
+    double above = 0;  ///< added to the guard in its claimed upper bound
 
     static constexpr GuardInfo guard_info(std::size_t)
     {
@@ -639,7 +639,7 @@ TEST(Planned, AnUpperBoundSavesLooksBelowTheSurfaceAndKeepsTheEvents)
 TEST(Planned, AWrongUpperBoundIsNamed)
 {
     OutsideWithBound low;
-    low.above = -0.1;  // says that the guard is lower than it is
+    low.above = -0.1;  // claims that the guard is lower than it is
     const auto run = integrate(low, X{-0.4, 0.1, 0, 0}, {.t_end = 60, .step = 0.01}, Fixed{},
                                Planned({.check_bounds = true}));
     ASSERT_EQ(run.outcome, Outcome::wrong_bound);
@@ -649,8 +649,8 @@ TEST(Planned, AWrongUpperBoundIsNamed)
     EXPECT_NEAR(run.wrong_bound->value - run.wrong_bound->allowed, 0.1, 1e-12);
 }
 
-/// The distance to the room's wall is a lower bound of that to whatever is nearest, less the
-/// largest disc's way into it.
+/// The distance to the room's wall is a lower bound of the distance to the nearest obstacle, minus
+/// the largest protrusion of a disc into the room.
 struct TabulatedRoom : Room {
     [[nodiscard]] double lower_bound(double t, const X& x) const
     {
@@ -698,7 +698,7 @@ TEST(Planned, AGuardThatIsNotANumberEndsTheRunWhereItDid)
     };
     const auto run = expect_planned_same<Fixed>(FastHole{{room}}, start, options);
     EXPECT_EQ(run.outcome, Outcome::non_finite);
-    // A guard with a bound is promised to be a number; its hole is met where it is examined.
+    // A guard with a bound is promised to be a number; its hole is found where it is evaluated.
     const auto planned = integrate(Hole{room}, start, options, Fixed{}, Planned{});
     EXPECT_EQ(planned.outcome, Outcome::non_finite);
     EXPECT_GE(planned.t, run.t);
@@ -706,7 +706,7 @@ TEST(Planned, AGuardThatIsNotANumberEndsTheRunWhereItDid)
 
 TEST(Planned, AFlowThatFailsBeyondAnEventIsNotBlamed)
 {
-    // The square root is of a negative number beyond the wall at x = 1.
+    // Beyond the wall at x = 1 the square root has a negative argument.
     struct Edge {
         void flow(double, const X& x, X& dxdt) const
         {
@@ -802,7 +802,7 @@ TEST(Planned, ARunThatIsCutShortEndsWhereItDid)
     }
     expect_planned_same<Fixed>(room, start, {.t_end = 5, .step = 0.01, .stop_at_event = true});
 
-    // Cancelled within an interval: whatever is returned is final.
+    // Cancelled within an interval: all returned results are final.
     std::atomic<bool> cancelled = false;
     Options options{.t_end = 5, .step = 0.01};
     options.cancelled = &cancelled;
@@ -840,15 +840,15 @@ TEST(Planned, StatesSizedAtRunTimeHaveTheEventsOfTheExactDetector)
         EXPECT_EQ(exact.events[k].after, planned.events[k].after);
     }
     EXPECT_EQ(exact.x, planned.x);
-    // 15 000 steps, and about ten events with a few looks each to approach and to leave.
+    // 15 000 steps, and about ten events with a few checks each to approach and to leave.
     EXPECT_LT(planned.statistics.guard_calls, 30 * exact.events.size());
 }
 
 TEST(Planned, AnEventTakesFiveExactCallsToLocateOnAverage)
 {
-    // A guard with a rate of its own: after the examines the ends of the step that holds the
-    // event there is one at each sample of Newton's method, two that close the bracket and
-    // one that arms the guard again.
+    // A guard with a rate of its own: after the checks of the ends of the step that holds the event
+    // there is one evaluation at each sample of Newton's method, two that close the bracket and one
+    // that arms the guard again.
     Room room;
     room.gravity = 0;
     struct Rated : Room {
@@ -861,7 +861,7 @@ TEST(Planned, AnEventTakesFiveExactCallsToLocateOnAverage)
     const Options options{.t_end = 200, .step = 0.01};
     const auto run = expect_planned_same<Fixed>(Rated{room}, start, options);
     const auto looks = integrate(Rated{room}, start, options, Fixed{});
-    // Without a plan every step has one call; what is left belongs to the events.
+    // Without a plan every step has one call; the remaining calls belong to the events.
     const double extra = static_cast<double>(looks.statistics.guard_calls - looks.statistics.steps);
     EXPECT_GT(run.statistics.events, 30u);
     EXPECT_LE(extra / static_cast<double>(run.statistics.events), 5);
@@ -912,11 +912,11 @@ TEST(SlopeSkip, FindsWhatIsApproachedSmoothly)
 
 // --- bounds that cover the rest of the run ---
 
-/// A ball that falls from 10 m at 9.81 m/s^2, with whatever it promises.
+/// A ball that falls from 10 m at 9.81 m/s^2, with adjustable promises.
 struct Promising {
     using State = std::array<double, 2>;
     double speed = 0;         ///< added to |v|
-    double acceleration = 0;  ///< that it admits
+    double acceleration = 0;  ///< the declared acceleration
     double stretch = 1;       ///< the Lipschitz constant
     void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -9.81}; }
     [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
@@ -939,8 +939,8 @@ Run<std::array<double, 2>> promised(const Promising& ball, bool check, double t_
 
 TEST(PlannedBounds, OneThatCoversTheRestOfTheRunIsNamedAllTheSame)
 {
-    // At rest and without acceleration the guard would never change. At 8 s the ball, which
-    // nobody has seen fall, would be 300 m below the floor.
+    // At rest and without acceleration the guard would never change. At 8 s the ball, whose fall
+    // no check has seen, would be 300 m below the floor.
     for (const bool check : {false, true}) {
         for (const Promising& ball :
              {Promising{}, Promising{.acceleration = 9.81, .stretch = 0},
@@ -951,7 +951,7 @@ TEST(PlannedBounds, OneThatCoversTheRestOfTheRunIsNamedAllTheSame)
             EXPECT_EQ(run.wrong_bound->guard, 0u);
             EXPECT_GT(run.wrong_bound->value_then - run.wrong_bound->value,
                       run.wrong_bound->allowed);
-            // Sampled in every 64th step; else seen when it is over.
+            // It is sampled in every 64th step, or else checked at the end of the run.
             EXPECT_LT(run.t, check ? 2.5 : 8.1);
         }
         EXPECT_EQ(promised({.acceleration = 9.81}, check).outcome, Outcome::reached_end);
@@ -970,7 +970,7 @@ TEST(PlannedBounds, ThoseThatAreNoBoundsCoverNothingAndAreNamedIfChecked)
     }
 }
 
-/// The same of which only the sign is known: bounds say nothing of it, and are not asked.
+/// The same with only the sign known: bounds do not apply, and are not evaluated.
 struct PromisingSign : Promising {
     [[nodiscard]] bool guard(double, const State& x) const { return x[0] > 0; }
 };

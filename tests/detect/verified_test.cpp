@@ -18,7 +18,7 @@ namespace {
 using X = std::array<double, 2>;
 using BallRun = ricochet::Run<X>;
 
-/// A 2-8-1 network for the ball with the weights that `next` deals out.
+/// A 2-8-1 network for the ball with weights from `next`.
 template <class Next>
 Model model_of(Next next)
 {

@@ -59,7 +59,7 @@ TEST(FaultEnergy, BatheStepsKeepTheBalanceToTheirOrder)
 
 TEST(FaultEnergy, RateAndStateFrictionKeepsTheBalance)
 {
-    // The trapezoidal rule over the steps is of order 2 whatever theirs is.
+    // The trapezoidal rule over the steps is of order 2 for any order of the steps.
     const StrikeSlipFault small({.elements = 3});
     const FaultFriction sliding{.plate_velocity = 1e-3, .slip_rate = 2e-3, .overload = 1e-3};
     for (const int order : {1, 2, 4}) {

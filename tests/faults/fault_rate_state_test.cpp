@@ -26,7 +26,7 @@ Eigen::VectorXd uneven(Eigen::Index n, double phase)
     return out;
 }
 
-/// (a - b) / |b|, the largest.
+/// The largest of (a - b) / |b|.
 double apart(const Eigen::VectorXd& a, const Eigen::VectorXd& b)
 {
     return ((a - b).array() / b.array().abs()).abs().maxCoeff();
@@ -131,8 +131,8 @@ TEST(FaultRateState, EquationsAreThoseOfAnExplicitIntegration)
 
 TEST(FaultRateState, UniformFaultSlipsSymmetrically)
 {
-    // Elements that mirror each other differ by the stages' tolerance, times the growth of what
-    // is not symmetric over a few characteristic times.
+    // Elements that mirror each other differ by the stages' tolerance, times the growth of
+    // asymmetries over a few characteristic times.
     constexpr int n = 5;
     const StrikeSlipFault fault({.elements = n});
     const FaultFriction friction{.normal_stress = 20e6, .slip_rate = 1e-6, .overload = 1e-3};
@@ -203,7 +203,7 @@ TEST(FaultRateState, EliminationHasTheSlopeOfDifferences)
 
 TEST(FaultRateState, StageIsSolvedForVelocitiesOverTwelveDecades)
 {
-    // A stage is made to have a solution that is known: v between 1e-12 and 1 m/s. With friction
+    // A stage is constructed with a known solution: v between 1e-12 and 1 m/s. With friction
     // that rises with V the solution is the only one.
     const StrikeSlipFault fault({.elements = 8});
     RateStateParameters p = FaultFriction{}.law;
@@ -386,8 +386,8 @@ TEST(FaultRateState, OrderFourBringsABrakedElementToRest)
 
 TEST(FaultRateState, OrderFourGoesOnAfterAnEarthquake)
 {
-    // Every element is braked to rest in it. With order 4 alone they creep for ever, at a velocity
-    // that the length of the steps decides, and the steps stay at 1e-5 s.
+    // Every element is braked to rest in it. With order 4 alone they creep forever, at a velocity
+    // that depends on the length of the steps, and the steps stay at 1e-5 s.
     const StrikeSlipFault fault({.elements = 4});
     FaultFriction friction;
     friction.law = {.a = 0.006, .b = 0.024, .f_star = 0.6, .v_star = 1e-6, .d_rs = 0.006};
@@ -399,7 +399,7 @@ TEST(FaultRateState, OrderFourGoesOnAfterAnEarthquake)
         EXPECT_EQ(r.unsolved, 0U) << overload;
         EXPECT_GE(r.earthquakes.size(), 2U) << overload;
         EXPECT_LT(r.earthquakes.front().end - r.earthquakes.front().start, 20) << overload;
-        // Of few attempts.
+        // Few attempts are needed.
         EXPECT_LT(20 * r.handed_over, r.rupture.statistics.steps) << overload;
         // Both orders keep 1e-3 of the velocity.
         const RateStateRupture second = simulate(fault, options, friction, {.order = 2});

@@ -179,7 +179,7 @@ TEST(StrikeSlipFault, RefusesWrongParameters)
     EXPECT_TRUE(contains(with([](auto& p) { p.side = -1; }), "side"));
     EXPECT_TRUE(contains(with([](auto& p) { p.poisson = 0.5; }), "poisson"));
     EXPECT_TRUE(contains(with([](auto& p) { p.overload = 0; }), "overload"));
-    // Refused from the estimate: nothing of that size is made first.
+    // Refused by the estimate, before anything of that size is made.
     const std::string large = with([](auto& p) { p.elements = 100'000; });
     EXPECT_TRUE(contains(large, "memory_limit")) << large;
     const std::string layers = with([](auto& p) {
@@ -280,7 +280,7 @@ TEST_F(KernelFile, ThatIsNoneIsRefused)
 
 TEST(Rupture, OneElementHasTheKnownSlipArrestAndPeak)
 {
-    // Computed once to 1e-12 as a smooth equation up to the arrest.
+    // The value was computed once to 1e-12 as a smooth equation up to the arrest.
     const Rupture r = simulate(StrikeSlipFault(), {.t_end = 30});
     EXPECT_EQ(r.outcome, Outcome::at_rest);
     EXPECT_EQ(r.t, 30);
@@ -322,7 +322,7 @@ TEST(Rupture, IsOfOrderFiveBeforeTheFirstArrestAndTwoAfterIt)
     // Halving divides the error by 32, and more than 2^3.5 where the next term counts.
     const double before = slip(7, 0.02);
     EXPECT_GT(std::abs(slip(7, 0.5) - before) / std::abs(slip(7, 0.25) - before), 11.3);
-    // Over four halvings, single ratios being ragged: at least 2^(4 * 1.6) in all.
+    // Over four halvings, since single ratios are irregular: at least 2^(4 * 1.6) in all.
     const double after = slip(30, 0.0078125 / 4);
     EXPECT_GT(std::abs(slip(30, 0.25) - after) / std::abs(slip(30, 0.015625) - after), 84);
 }
@@ -389,8 +389,8 @@ Rupture bathe(const StrikeSlipFault& fault, double step, const BatheOptions& opt
 
 TEST(FaultBathe, PublishedSchemeGivesThePublishedSlips)
 {
-    // As the source's own code, with its stages solved to the last digit: 234.268 and 229.058 mm,
-    // 243.671 and 238.089 mm.
+    // Values of the source's own code, with its stages solved to the last digit: 234.268 and
+    // 229.058 mm, 243.671 and 238.089 mm.
     const StrikeSlipFault one;
     const StrikeSlipFault hundred(
         {.elements = 10, .kernel = kernels / "fault-kernel-10x10-3km.npy"});
@@ -420,7 +420,7 @@ TEST(FaultBathe, AveragedSchemeIsOfOrderTwoThroughAllArrests)
             EXPECT_EQ(r.outcome, Outcome::at_rest);
             EXPECT_EQ(r.statistics.arrests, 100U);
             const double error = std::abs(r.mean_slip - exact);
-            // 4 for each halving, give or take where a step's end falls beside an arrest.
+            // 4 for each halving, approximately, since a step's end may fall beside an arrest.
             if (before > 0) {
                 EXPECT_NEAR(before / error, 4, 0.5) << step;
             }
@@ -440,7 +440,8 @@ TEST(FaultBathe, FreeEstimateControlsTheError)
                                  .estimate = ErrorEstimate::embedded,
                                  .rtol = rtol});
         const double error = std::abs(r.mean_slip / exact - 1);
-        // At least half an order for each of the tolerance: the error falls with its power 2/3.
+        // At least half an order for each order of the tolerance: the error falls with its power
+        // 2/3.
         EXPECT_LT(error, before / 2) << rtol;
         before = error;
     }

@@ -1,4 +1,4 @@
-// Every pair of potentials by the suite of all.
+// Applies the common suite to every pair of potentials.
 #include "conformance/potentials.hpp"
 
 #include <vector>
@@ -11,7 +11,7 @@
 namespace ricochet::test::potentials_conformance_test {
 namespace {
 
-/// Where w is of the order of V, and every term of the asinh form counts.
+/// Parameters with w of the order of V, so that every term of the asinh form matters.
 const RateStateParameters weak{.a = 0.03, .f_star = 0.05};
 
 RateStateParameters scaled(RateStateParameters p, double unit)
@@ -40,8 +40,8 @@ PairCase exact(const std::string& name, const RateStateParameters& p)
                              .worst();
                      },
                  // Every term of the formulas is a few roundings of 1.1e-16 from its value; the
-                 // exponent (f* + b xi) / a of w, up to 90, multiplies its own by as much, squared
-                 // in the tilt of the friction: 1e-13 leaves a factor of two.
+                 // exponent (f* + b xi) / a of w, up to 90, multiplies its rounding by as much,
+                 // squared in the tilt of the friction: 1e-13 leaves a factor of two.
                  .identity_tolerance = 1e-13};
     if (Law::evolution == StateEvolution::slip) {
         // Convex above V theta / D_RS = 1/e, with s = -d/b for V.

@@ -38,7 +38,7 @@ TEST(FrictionHistories, FollowTheProtocol)
         EXPECT_NO_THROW(validate(h));
         EXPECT_GE(*std::min_element(h.v.begin(), h.v.end()), 1e-7 * (1 - 1e-12));
         EXPECT_LE(*std::max_element(h.v.begin(), h.v.end()), 1e-3 * (1 + 1e-12));
-        // Where a jump, or a corner, is.
+        // Counts jumps and corners.
         std::size_t changes = 0;
         const bool linear = h.between == FrictionHistory::Between::linear;
         for (std::size_t n = linear ? 2 : 1; n < h.v.size(); ++n) {
@@ -58,7 +58,7 @@ TEST(FrictionHistories, FollowTheProtocol)
 
 TEST(FrictionHistories, ExactStateIsTheIntegratedOne)
 {
-    // The reference is good to 1e-17, the exact state to a few roundings per interval.
+    // The reference has an error of 1e-17, the exact state a few roundings per interval.
     const RateStateParameters p;
     for (const FrictionHistory& h : make_histories(6, 11)) {
         EXPECT_LE(relative_error(h.friction, test::theta_friction(p, h)), 1e-14);
@@ -105,8 +105,8 @@ TEST(FrictionHistories, RefuseWhatIsNoHistory)
 
 TEST(IdentifyAgeingLaw, FindsTheParametersOfCleanHistories)
 {
-    // Other parameters and another start than the generator's defaults, so that nothing can
-    // be there by accident.
+    // Other parameters and another start than the generator's defaults, so that the result
+    // is no coincidence.
     const RateStateParameters p{.a = 0.02, .b = 0.013, .f_star = 0.6, .d_rs = 7e-6};
     std::vector<FrictionHistory> histories = make_histories(24, 3, p);
     for (FrictionHistory& h : histories) h.friction = ageing_friction(p, h, 0.8);

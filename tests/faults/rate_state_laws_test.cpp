@@ -198,7 +198,7 @@ TEST(IncrementalPotential, IsConvexUpToTheBoundAndNotBeyond)
         // The closed form of the margin, against the Hessian; both cancel at small V.
         EXPECT_NEAR(convexity_margin(j), ageing_convexity_margin(p, block, h, v, xi), 1e-12);
     }
-    // Sharp: fast sliding of an old contact, one part in a hundred above the bound.
+    // The bound is sharp: fast sliding of an old contact fails one part in a hundred above it.
     const double h = 1.01 * bound;
     const auto j = incremental_potential(pair, block, {.xi = 30}, h, 1e3 * h, 30);
     EXPECT_LT(convexity_margin(j), 0);

@@ -29,7 +29,7 @@ AdditivePair::Parameters exact_parameters()
     return in_domain(test::linear_nets());
 }
 
-/// Units with something to them.
+/// Nonlinear units.
 AdditivePair::Parameters crooked_parameters()
 {
     return in_domain(test::crooked_nets());
@@ -119,7 +119,7 @@ TEST(PairFile, RefusesWhatItIsNot)
     says(refusal([](auto& j) { j["rate"]["shift"] = {1}; }), "expected 3 numbers, found 1");
     says(refusal([](auto& j) { j["direct"]["offset"] = 0.6; }), "self test: friction");
     says(refusal([](auto& j) { j["v_star"] = "fast"; }), "expected a number");
-    // Of another type than it should be.
+    // The value has another type than it should.
     says(refusal([](auto& j) { j["format"] = 3; }), "expected format");
     says(refusal([](auto& j) { j["version"] = "1"; }), "expected version 1, found \"1\"");
     says(refusal([](auto& j) { j["version"] = 1.5; }), "expected version 1, found 1.5");
@@ -128,7 +128,7 @@ TEST(PairFile, RefusesWhatItIsNot)
     says(refusal([](auto& j) { j["self_test"]["v"] = -1; }), "self test: \"v\" must be positive");
     says(refusal([](auto& j) { j["state"]["scale"] = true; }), "expected at most 8 numbers");
     says(refusal([](auto& j) { j["state"]["scale"][0] = nullptr; }), "expected numbers");
-    // A domain is none, or an interval of slip rates and one of states.
+    // A domain is absent, or an interval of slip rates and one of states.
     const auto domain = [&](double v_min, double v_max, double xi_min, double xi_max) {
         return refusal([=](auto& j) {
             j["domain"] = {
@@ -144,7 +144,7 @@ TEST(PairFile, RefusesWhatItIsNot)
     says(domain(1e-9, 1e300, -5, 25), rates);
     says(domain(1e-9, 1e-3, 25, -5), states);
     says(domain(1e-9, 1e-3, -5, 1e4), states);
-    // Deeper than any file is, and longer than anybody reads.
+    // Deeper and longer than any valid file.
     const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
     for (const std::string& text : {deep, "{\"format\": " + deep + '}'}) {
         try {
@@ -155,7 +155,7 @@ TEST(PairFile, RefusesWhatItIsNot)
         }
     }
     EXPECT_LT(refusal([](auto& j) { j["format"] = std::string(100'000, 'x'); }).size(), 200u);
-    // Units with which quotients or products leave the doubles.
+    // Units with which quotients or products overflow or underflow.
     says(refusal([](auto& j) { j["v_star"] = 5e-324; }), "v_star");
     says(refusal([](auto& j) { j["beta"] = 1e308; }), "beta");
     EXPECT_THROW((void)parse_pair("[", "x"), PotentialFileError);
@@ -263,7 +263,7 @@ TEST(TrainFriction, FindsAStateThatItIsNotTold)
     EXPECT_LT(fit.training_error, 2e-3);  // the best function of V alone leaves 2e-2
     ASSERT_TRUE(fit.pair().has_value());
     EXPECT_EQ(fit.pair()->fitted(), 71U);
-    // The pair, run by other steps, is the fit.
+    // The pair, run with other steps, agrees with the fit.
     const auto along = friction_along(*fit.pair(), histories[1], 0, 32);
     EXPECT_LE(relative_error(along, fit.friction(histories[1], 2)), 1e-5);
     EXPECT_EQ(fit.internal(histories[0]).size(), 1U);
@@ -323,7 +323,7 @@ TEST(FrictionStudy, MethodsAgreeOnASliderThatSlidesSteadily)
 
 TEST(FrictionStudy, TheExactPairMovesSlidersAsTheLawDoes)
 {
-    // The pair of linear nets is the law: only rounding is between the two.
+    // The pair of linear nets is the law: they differ only by rounding.
     SliderState a = slider_case_start();
     SliderState b = a;
     const SliderCase c = slider_cases(1)[40];

@@ -25,8 +25,8 @@ SpringSlider stick_slip()
 
 TEST(RateStateSlider, HasTheEventsOfVariationalSteps)
 {
-    // Both at 1e-10 of every step, over one cycle; between two methods the errors of some
-    // thousand steps are left, and log V changes by 10 to 1e3 per second at the threshold.
+    // Both at 1e-10 for every step, over one cycle; between two methods the errors of some
+    // thousand steps remain, and log V changes by 10 to 1e3 per second at the threshold.
     const SpringSlider slider = stick_slip();
     const SliderState start = slider_case_start();
     const RateStateSlider system(slider, threshold);

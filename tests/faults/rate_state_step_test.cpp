@@ -121,8 +121,8 @@ TEST(VariationalStep, EveryEvolutionLawHasItsOrder)
 
 TEST(VariationalStep, StageWithoutARepresentableSlipRateIsNotSolved)
 {
-    // f* + a log(V / V*) + b xi = 0.1 needs V = V* e^-5000 with a = 1e-4: the log form has no such
-    // double, and says so as every stage does.
+    // f* + a log(V / V*) + b xi = 0.1 requires V = V* e^-5000 with a = 1e-4: the log form has no
+    // such double, and every stage reports so.
     RateStateParameters p;
     p.a = 1e-4;
     const RateStateLaw<StateEvolution::slip, DirectEffect::log> slip(p);
@@ -134,7 +134,7 @@ TEST(VariationalStep, StageWithoutARepresentableSlipRateIsNotSolved)
 
 TEST(VariationalStep, SolvesAdversarialSteps)
 {
-    // Any history, also of the wrong sign, any step from microseconds to hours.
+    // Any history, even of the wrong sign, and any step from microseconds to hours.
     std::mt19937_64 random(8);
     std::uniform_real_distribution<double> unit(0, 1);
     const auto log_uniform = [&](double a, double b) {

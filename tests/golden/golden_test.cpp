@@ -1,9 +1,9 @@
-// The bits of today's runs: every system of the command line by every method, detector and locator
-// that it takes.
+// The bits of the present runs: every system of the command line with every method, detector and
+// locator that it accepts.
 //
 // A line of runs.txt is a run: a hash of its outcome, its events (times, states before and after,
 // modes, slopes, errors) and its end, and its counts. A change of the engine that is meant to keep
-// the bits keeps this file; one that is not says in its commit which lines change and why. The
+// the bits keeps this file; for any other change, the commit states which lines change and why. The
 // file holds for one mathematical library, which its first line identifies by a hash of its own:
 // with another the runs and their numbers of events are compared. RICOCHET_WRITE_GOLDEN=1 writes
 // runs.txt anew.
@@ -48,7 +48,7 @@ private:
     std::uint64_t value_ = 0xcbf29ce484222325ULL;
 };
 
-/// Of the functions of the mathematical library that the systems use.
+/// Hash of the functions of the mathematical library that the systems use.
 std::uint64_t mathematical_library()
 {
     Hash hash;
@@ -145,7 +145,7 @@ std::vector<std::string> all_lines()
     return out;
 }
 
-/// The run and its number of events, without what depends on the last bits.
+/// The run and its number of events, without the part that depends on the last bits.
 std::string without_bits(const std::string& line)
 {
     const std::size_t events = line.find(" events=");

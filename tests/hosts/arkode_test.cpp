@@ -35,7 +35,7 @@ private:
     std::unique_ptr<hosts::ErkStep> host_;
 };
 
-/// The flow is taken implicitly.
+/// The flow is integrated implicitly.
 template <class System>
 class ArkOf {
 public:

@@ -30,7 +30,7 @@ public:
     [[nodiscard]] hosts::BulletBody host(double length) { return {{&world_, &body_}, 0, length}; }
     void move_up() { move_to(0, 0, 5); }
 
-    /// Ten metres in single precision.
+    /// Rounding of ten metres in single precision.
     static constexpr double rounding = sizeof(btScalar) == 4 ? 2e-6 : 1e-12;
 
 private:

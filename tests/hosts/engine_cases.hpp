@@ -64,7 +64,7 @@ struct Gate {
 struct EngineFall {
     double z, v, t = 0;
 
-    /// To the next impact: the root of z + s (v - g s) in the step in which it lies.
+    /// Advances to the next impact: the root of z + s (v - g s) in the step that contains it.
     void fall(double length, double first)
     {
         for (double h = first;; h = length) {

@@ -1,4 +1,4 @@
-// Cases for every host: its motion, the library's events.
+// Cases for every host: the host computes the motion, the library the events.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ TYPED_TEST_SUITE_P(InHost);
 
 TYPED_TEST_P(InHost, TheBallHasItsThirteenImpacts)
 {
-    // A parabola is within every method; what is left is what a tolerance of 1e-10 leaves of it.
+    // Every method is exact on a parabola; the remaining error is that of a tolerance of 1e-10.
     const BouncingBall ball;
     const auto result = run<TypeParam>(ball, {10, 0}, 20.5);
     ASSERT_EQ(result.events.size(), 13u);
@@ -40,7 +40,7 @@ TYPED_TEST_P(InHost, StickSlipChangesItsModes)
     ASSERT_EQ(result.cuts.size(), 8u);
     for (int k = 0; k < 8; ++k) {
         const auto& cut = result.cuts[std::size_t(k)];
-        // An error where it sticks delays the next slip by five times as much.
+        // An error of the sticking place delays the next slip by five times as much.
         EXPECT_NEAR(cut.t.value, StickSlip::event_time(k), 1e-7);
         EXPECT_EQ(cut.mode_after, k % 2 == 0 ? StickSlip::slips : StickSlip::sticks);
         ASSERT_EQ(cut.fired.size(), 1u);
@@ -64,7 +64,7 @@ TYPED_TEST_P(InHost, ImpactsAccumulateAndTheBallRests)
     EXPECT_EQ(result.verdict, Verdict::rests);
     ASSERT_FALSE(result.cuts.empty());
     EXPECT_TRUE(result.cuts.back().accumulation);
-    // Flights as low as the absolute tolerance, 3e-7 s, are no longer resolved by the host.
+    // The host no longer resolves flights as low as the absolute tolerance, 3e-7 s.
     EXPECT_NEAR(result.cuts.back().t.value, ball.zeno_time(1), 1e-6);
     EXPECT_EQ(result.end, (BouncingBall::State{0, 0}));
     EXPECT_EQ(result.t, 5);
@@ -72,7 +72,7 @@ TYPED_TEST_P(InHost, ImpactsAccumulateAndTheBallRests)
 
 TYPED_TEST_P(InHost, PairsOfCrossingsAtACrestAreFound)
 {
-    // They are as far apart as the host's own error of the crest, below `least_depth`, leaves them.
+    // Their distances have the host's own error of the crest, below `least_depth`.
     for (const double depth : {1e-2, 1e-4, 1e-6, 1e-8, 1e-9, 1e-10}) {
         if (depth < TypeParam::least_depth) continue;
         const auto result = run<TypeParam>(Crests{depth}, {0, 1}, 18,
@@ -115,7 +115,7 @@ TYPED_TEST_P(InHost, PlateausEndAsInARunOfTheLibrary)
         ASSERT_EQ(result.events.size(), expected.events.size()) << "sign " << sign;
         for (std::size_t k = 0; k < result.events.size(); ++k) {
             EXPECT_EQ(result.events[k].kind, expected.events[k].kind);
-            // Where a plateau ends is a matter of the step; the crossing is not.
+            // The end of a plateau depends on the step; the crossing does not.
             if (expected.events[k].t > 2) {
                 EXPECT_NEAR(result.events[k].t, expected.events[k].t, 1e-9);
             }

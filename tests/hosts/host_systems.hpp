@@ -21,7 +21,7 @@ struct Tolerances {
     double atol = 1e-13;
 };
 
-/// The flow of a system as a callback of C sees it.
+/// The flow of a system in the form of a callback of C.
 template <class System>
 struct FlowOf {
     const System* system;
@@ -44,8 +44,8 @@ struct FlowOf {
 
 // --- systems ---
 
-/// A mass of 1 kg on a belt of 0.2 m/s, held by a spring of 1 N/m and by friction, 1 N where it
-/// sticks, 0.5 N where it slips.
+/// A mass of 1 kg on a belt of 0.2 m/s, held by a spring of 1 N/m and by friction, 1 N while it
+/// sticks, 0.5 N while it slips.
 struct StickSlip {
     using State = std::array<double, 2>;  ///< position [m], velocity [m/s]
     enum : Mode { sticks, slips };
@@ -72,9 +72,9 @@ struct StickSlip {
         return which == sticks ? slips : sticks;
     }
 
-    /// Of event k = 0, 1, ... from (0, belt), sticking [s]. It sticks from 0 to `holding`, and
+    /// Time of event k = 0, 1, ... from (0, belt), sticking [s]. It sticks from 0 to `holding`, and
     /// slips from (a, belt) to (-a, belt) around the point where spring and friction balance,
-    /// clockwise by pi + 2 atan(belt / a), a = holding - sliding; where it sticks again it is at 0.
+    /// clockwise by pi + 2 atan(belt / a), a = holding - sliding; when it sticks again it is at 0.
     [[nodiscard]] static double event_time(int k)
     {
         const double held = holding / belt;
@@ -136,7 +136,7 @@ struct Plateau {
     }
 };
 
-/// x' = -x, and one more every second.
+/// x' = -x, with an increase of one every second.
 struct Dosed {
     using State = std::array<double, 1>;
 

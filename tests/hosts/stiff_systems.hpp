@@ -1,4 +1,4 @@
-// Stiff hybrid systems, which explicit methods crawl through.
+// Stiff hybrid systems, on which explicit methods are slow.
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace ricochet::hosts_test {
 
-/// Robertson's reaction with a valve: it opens where the first species has fallen to 0.5 and
-/// closes where it is back at 0.7. What flows in of the first flows out of the third.
+/// Robertson's reaction with a valve: it opens when the first species has fallen to 0.5 and
+/// closes when it is back at 0.7. The inflow of the first equals the outflow of the third.
 struct RobertsonValve {
     using State = std::array<double, 3>;
     enum : Mode { closed, open };

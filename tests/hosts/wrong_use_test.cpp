@@ -1,4 +1,4 @@
-// What a host does wrong is said, with what was expected.
+// Errors of a host are reported, with the expected behaviour.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -118,7 +118,7 @@ TEST(WrongUse, AnotherDimensionIsRefused)
 TEST(WrongUse, AFailingIntegratorIsNamed)
 {
     Started started({10, 0});
-    // A first step that goes back.
+    // The first step goes back.
     CVodeSetErrFile(started.made.memory(), nullptr);
     CVodeSetInitStep(started.made.memory(), -1);
     expect_refusal<std::runtime_error>([&] { started.host().step(1); }, "CVODE: returned -");

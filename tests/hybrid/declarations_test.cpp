@@ -1,5 +1,5 @@
-// Every declaration that a system can get wrong is told from the right one. What
-// `check_declarations` refuses is what is not `absent` or `fits` here.
+// Every wrong declaration of a system is distinguished from the right one. `check_declarations`
+// refuses those that are neither `absent` nor `fits` here.
 
 #include "ricochet/detail/declarations.hpp"
 
@@ -26,7 +26,7 @@ using X = std::array<double, 2>;
 
 enum Phase : Mode { off, on };
 
-/// A falling point: a flow and no more.
+/// A falling point: only a flow.
 struct Falling {
     using State = X;
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
@@ -112,7 +112,7 @@ TEST(Declarations, WhatIsNotThereIsAbsent)
     EXPECT_EQ((detail::time_reset_declaration<S, X>()), Declaration::absent);
 }
 
-/// A wrapper that has what the wrapped has.
+/// A wrapper that has the members of the wrapped system.
 template <bool has>
 struct Wrapper : Falling {
     double guard(double, const X& x) const requires has { return x[0]; }
@@ -136,7 +136,7 @@ struct EnabledOfNothing : Falling {
     bool enabled(std::size_t, Mode) const { return true; }
 };
 
-/// `crossing` is a word of its own here.
+/// `crossing` has another meaning here.
 struct Junction : FallingOntoFloor {
     double crossing(double width) const { return width; }
 };

@@ -1,4 +1,4 @@
-// Dual numbers, which functions take them, and what they replace: rates and degrees of guards.
+// Dual numbers, functions that take them, and their uses: rates and degrees of guards.
 #include "ricochet/dual.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ namespace {
 
 using X = std::array<double, 2>;
 
-/// Every function that duals have, each once.
+/// Every function of duals, each once.
 template <class S>
 std::vector<S> functions_of(const S& x, const S& y)
 {
@@ -50,8 +50,8 @@ std::vector<S> functions_of(const S& x, const S& y)
             pow(2.0, x), max(x, y), min(x, y)};
 }
 
-// The central difference over h = 1e-6 in long double errs by h^2 / 6 times the third derivative,
-// at most 500 here, and by rounding, 1e-19 / 1e-6: together 1e-10.
+// The central difference over h = 1e-6 in long double has an error of h^2 / 6 times the third
+// derivative, at most 500 here, and of rounding, 1e-19 / 1e-6: together 1e-10.
 TEST(Dual, DerivativesAreThoseOfDifferences)
 {
     const double x = 0.4, y = 1.3;
@@ -71,7 +71,7 @@ TEST(Dual, DerivativesAreThoseOfDifferences)
     }
 }
 
-// What does not move has no derivative, even where the function has none.
+// A constant has no derivative, even where the function has none.
 TEST(Dual, ARootAtZeroStandsStill)
 {
     EXPECT_EQ(sqrt(Dual<1>(0)).slope[0], 0);
@@ -110,7 +110,7 @@ struct Plain {
     [[nodiscard]] static constexpr GuardInfo guard_info() { return {.crossing = Crossing::either}; }
 };
 
-/// Takes anything, but is no template over one scalar: it calls functions of doubles.
+/// Takes any argument, but is no template over one scalar: it calls functions of doubles.
 struct Careless {
     using State = X;
     void flow(auto, const auto& x, auto& dxdt) const
@@ -188,7 +188,7 @@ void expect_same_runs(const A& a, const B& b)
     }
 }
 
-// A guard that returns a component has the rate that the component has, to the last bit, and no
+// A guard that returns a component has the rate of the component, to the last bit, and no
 // call of the guard is spent on it.
 TEST(DualRates, RunsHaveTheBitsOfThoseWithAWrittenRate)
 {
@@ -202,7 +202,7 @@ TEST(DualRates, WhatTakesAnythingGoesOnAsItIs)
     EXPECT_GE(run.events.size(), 8u);
 }
 
-/// The rate of the guard as it was written before duals had it.
+/// The rate of the guard as written by hand before duals.
 template <class System>
 double rate_of(const System& system, std::size_t which, Mode mode, const typename System::State& x,
                const typename System::State& dxdt)
@@ -229,7 +229,7 @@ TEST(DualRates, AreThoseOfTheReadySystems)
     EXPECT_EQ(rate_of(HenonHeiles(), 0, 0, {1, 2, 3, 4}, {5, 6, 7, 8}), 7);
 }
 
-// The three bodies write theirs; a product is differentiated in another order.
+// The rates of three bodies are written; a product is differentiated in another order.
 TEST(DualRates, AgreeWithOneThatIsWritten)
 {
     const std::array<double, 4> x{1.1, 0.2, -0.3, -1}, f{-0.3, -1, 0.4, 0.6};
@@ -253,7 +253,7 @@ int degree_of_guard(const System& system, std::size_t which)
     return guard_info_of<typename System::State>(system, which).degree;
 }
 
-// Where a system wrote the degree of its guard before, it is what the text of the guard has.
+// Where a system used to declare the degree of its guard, it equals the one found from the code.
 TEST(Degree, OfTheReadySystems)
 {
     EXPECT_EQ(degree_of_guard(BouncingBall(), 0), 1);
@@ -270,7 +270,7 @@ TEST(Degree, OfTheReadySystems)
     }
 }
 
-/// Guard number `which` is a polynomial of degree `degrees[which]`, or none: 0.
+/// Guard number `which` is a polynomial of degree `degrees[which]`, or none for 0.
 struct Polynomials {
     using State = X;
     static constexpr std::size_t guard_count = 10;

@@ -23,7 +23,7 @@ using test::tight;
 
 // --- two surfaces ---
 
-/// Constant fields in the four quadrants of (x, y), and a third component that tells
+/// Constant fields in the four quadrants of (x, y), with a third component that shows
 /// which of them act.
 struct Quadrants {
     static constexpr std::size_t surface_count = 2;
@@ -49,7 +49,7 @@ struct Quadrants {
 
 using Two = Filippov<Quadrants>;
 
-/// The mode with the surfaces numbered the other way.
+/// The mode with the surfaces numbered in the other order.
 Mode mirrored(Mode mode)
 {
     return Two::mode_of(Two::place(1, mode), Two::place(0, mode));
@@ -222,8 +222,8 @@ TEST(Filippov, MeetingOfSlidingMotionsIsSeenAlongTheOtherSurface)
 }
 
 /// y'' = -2 Sgn(y) - Sgn(y') + force: finite-time control by twisting (Levant, Int. J.
-/// Control 58, 1993). Both surfaces meet at rest, where the rate of y is no field's to
-/// choose.
+/// Control 58, 1993). Both surfaces meet at rest, where the rate of y does not depend on the
+/// field.
 struct Twisting {
     static constexpr std::size_t surface_count = 2;
     using State = std::array<double, 2>;
@@ -254,7 +254,7 @@ TEST(Filippov, TwistingComesToRestInFiniteTime)
     EXPECT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_EQ(run.mode, (Two::mode_of(s, s)));
     // Some 120 events, each at its root to the rounding of times around 4; the last are
-    // told apart no longer, or seen to accumulate.
+    // no longer distinguished, or found to accumulate.
     EXPECT_NEAR(run.events.back().t, t_rest, 1e-12);
     EXPECT_NEAR(run.x[0], 0, 1e-25);
     EXPECT_EQ(run.x[1], 0);
@@ -271,7 +271,7 @@ TEST(Filippov, TwistingStaysAtRestAgainstAPerturbation)
     EXPECT_EQ(run.x[1], 0);
 }
 
-/// Four fields that turn around the intersection and hold it. That of the third quadrant
+/// Four fields that turn around the intersection and hold it. The field of the third quadrant
 /// leads to y = 0 until t = 1 and away from it afterwards.
 struct Turning {
     static constexpr std::size_t surface_count = 2;
@@ -306,7 +306,7 @@ TEST(Filippov, AFieldThatTurnsAwayDoesNotEndSlidingThatOthersHold)
 }
 
 /// x' = 1.1 - a - b and y' = c - a b while sliding, with c rising: the shares that keep
-/// both still meet their double at c = 1.1^2 / 4 = 0.3025, at t = 1.
+/// both still merge with a second solution at c = 1.1^2 / 4 = 0.3025, at t = 1.
 struct Vanishing {
     static constexpr std::size_t surface_count = 2;
     using State = std::array<double, 2>;
@@ -341,7 +341,7 @@ TEST(Filippov, SlidingOnBothSurfacesEndsWhereItsCombinationCeasesToExist)
     EXPECT_NEAR(run.x[1], 0.1525 + 0.025 * 3, 1e-13);
 }
 
-/// A node on two oblique planes, with a third component that moves along.
+/// A node on two oblique planes, with a third component.
 struct Oblique {
     static constexpr std::size_t surface_count = 2;
     using State = std::array<double, 3>;
@@ -424,7 +424,7 @@ TEST(Filippov, AStartOnTheWrongSideOfASurfaceIsRefused)
 TEST(Filippov, SpiralsOfAnyContractionEndOnTheIntersection)
 {
     // Four quadrants that shrink the distance by factors from 3 to 1/300 each: crossings
-    // that accumulate so fast that four of them are soon told apart no longer, and so
+    // may accumulate so fast that four of them are soon no longer distinguished, or so
     // slowly that there are hundreds.
     std::mt19937 random(1);
     std::uniform_real_distribution<double> number(0, 1);
@@ -468,7 +468,7 @@ struct SuperTwisting {
 TEST(Filippov, SlidingOfSecondOrderNeedsItsRateAsASecondSurface)
 {
     const auto one = run_from(Filippov<SuperTwisting<1>>(), {1.0, 0.5}, 20);
-    EXPECT_NE(one.outcome, Outcome::reached_end);  // says that it cannot continue
+    EXPECT_NE(one.outcome, Outcome::reached_end);  // it reports that it cannot continue
     EXPECT_LT(one.t, 2);
     const auto two = run_from(Filippov<SuperTwisting<2>>(), {1.0, 0.5}, 20);
     EXPECT_EQ(two.outcome, Outcome::reached_end);
@@ -548,7 +548,7 @@ struct Steep {
     }
 };
 
-/// How many of `runs` random motions end elsewhere with steep switching.
+/// Number of `runs` random motions that end elsewhere with steep switching.
 template <std::size_t surfaces>
 int count_disagreements(unsigned seed, int runs, bool curved)
 {
@@ -566,7 +566,7 @@ int count_disagreements(unsigned seed, int runs, bool curved)
         for (std::size_t k = 0; k < 3; ++k) {
             difference = std::max(difference, std::fabs(sharp.x[k] - smooth.x[k]));
         }
-        // The width of the layer, 1e-4, times what 10 s make of it.
+        // The width of the layer, 1e-4, times its growth in 10 s.
         disagreements += difference > 0.01;
     }
     return disagreements;
@@ -588,7 +588,7 @@ TEST(Filippov, TwoSurfacesGiveTheLimitOfSteepSwitching)
 
 // --- the order in which the surfaces are written ---
 
-/// Whether the mode says where the state is; planes are kept to rounding.
+/// Whether the mode agrees with the state; planes are kept to rounding.
 bool is_where_it_says(const Quadrants& fields, Mode mode, const std::array<double, 3>& x)
 {
     for (const std::size_t i : {0u, 1u}) {
@@ -674,8 +674,8 @@ TEST(FilippovRates, WhereTheSharesStayInsideTheyKeepBothSurfacesStill)
     EXPECT_GT(held, 1000);  // else nothing was tested
 }
 
-/// The same by Euler's method with small steps for a long time; none if it does not
-/// come to an end.
+/// The same by Euler's method with small steps for a long time; nothing if it does not
+/// reach an end.
 std::optional<detail::Places> followed_by_euler(const detail::RegionRates& r, double first,
                                                 double second)
 {
@@ -716,7 +716,7 @@ TEST(FilippovRates, FollowingTheSharesAgreesWithSmallSteps)
 
 TEST(FilippovRates, SharesLeaveThroughCornersAndEdgesAsTheRatesSay)
 {
-    // A node holds; two fields beside y = 0 that lead on to x > 0 let it go there.
+    // A node holds; two fields beside y = 0 that lead on to x > 0 release it there.
     const detail::RegionRates node = {{{1, -1, 1, -1}, {1, 1, -1, -1}}};
     EXPECT_EQ(detail::follow_shares(node, {0, 0}).to, (detail::Places{s, s}));
     const detail::RegionRates along = {{{1, 0.5, 1, 0.25}, {1, 1, -1, -1}}};

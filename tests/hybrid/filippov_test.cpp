@@ -145,7 +145,7 @@ constexpr double belt_stick_time = 4.2959995254801548834;
 constexpr double belt_stick_place = -0.54100635387008475;
 constexpr double belt_period = 12.001031294830578647;
 
-// --- what meets at a surface ---
+// --- meetings at a surface ---
 
 TEST(Filippov, ConstantFieldsAreRecognisedByTheirSigns)
 {
@@ -172,7 +172,7 @@ TEST(Filippov, ARunStartsWhereTheFieldsLead)
     EXPECT_EQ(start(1, -1), Place::sliding);
     EXPECT_EQ(start(1, 3), Place::above);
     EXPECT_EQ(start(-3, -1), Place::below);
-    // Repulsive: the more decided of the two, of equals the upper.
+    // Repulsive: the faster field is chosen, or of equal ones the upper.
     EXPECT_EQ(start(-1, 2), Place::above);
     EXPECT_EQ(start(-2, 1), Place::below);
     EXPECT_EQ(start(-1, 1), Place::above);
@@ -199,7 +199,7 @@ TEST(Filippov, TangentFieldsAreRecognisedByTheirBending)
         EXPECT_EQ(meeting(-scale, scale), Meeting::repulsive) << scale;
         EXPECT_EQ(meeting(scale, -scale), Meeting::attractive) << scale;
     }
-    // Moving along: the same, but one rate is of the order of rounding.
+    // The same while moving along, but one rate is of the order of rounding.
     EXPECT_EQ(Filippov<Belt>().meeting(0, 0, 0, std::array{1.0, 0.2}), Meeting::crossing_down);
     EXPECT_EQ(Filippov<Belt>().meeting(0, 0, 0, std::array{1 - 1e-9, 0.2}), Meeting::attractive);
     EXPECT_EQ(Filippov<Belt>().meeting(0, 0, 0, std::array{-1.0, 0.2}), Meeting::attractive);
@@ -248,7 +248,7 @@ TEST(Filippov, ARelayReachesItsSurfaceOnceAndStaysThere)
 
 TEST(Filippov, TheSlidingModeEndsAtZeroForEver)
 {
-    // 0.15 s of motion at rtol 1e-12 leaves a few 1e-14 s: 1e-12 s is asked for.
+    // 0.15 s of motion at rtol 1e-12 leaves a few 1e-14 s: 1e-12 s is required.
     const std::array<std::array<double, 3>, 2> cases = {
         {{1.75, 0.15, 0.093315472931294579027}, {1.5, 0.1, 0.076589082534055237469}}};
     for (const auto& [amplitude, w0, t_zero] : cases) {
@@ -259,7 +259,7 @@ TEST(Filippov, TheSlidingModeEndsAtZeroForEver)
         EXPECT_NEAR(run.events[0].t, t_zero, 1e-12);
         EXPECT_EQ(run.events[0].after[0], 0);
         EXPECT_EQ(run.x[0], 0);
-        // The average of the switching holds the forcing.
+        // The average of the switching balances the forcing.
         EXPECT_NEAR(2 * (2 * system.shares(run.mode, run.t, run.x)[0] - 1),
                     amplitude * std::sin(50 * 0.5), 1e-15);
     }
@@ -480,7 +480,7 @@ TEST(Filippov, ACurvedSurfaceIsLeftAtAPointKnownInClosedForm)
     EXPECT_NEAR(run.events[0].t, t_exit, 5e-12);
     EXPECT_NEAR(run.events[0].after[0], -0.5, 5e-12);
     EXPECT_NEAR(run.events[0].after[1], std::sqrt(0.75), 5e-12);
-    // Back on the circle, on the inner side of it, as near as it can be told.
+    // Back on the circle, on its inner side, as near as doubles allow.
     EXPECT_LE(system.fields().surface(0, 0, run.events[0].after), 0);
     EXPECT_GE(system.fields().surface(0, 0, run.events[0].after), -1e-15);
     // Inside: radius' = cos(angle) + 1/2, angle' = 1.
@@ -493,7 +493,7 @@ TEST(Filippov, ACurvedSurfaceIsLeftAtAPointKnownInClosedForm)
 TEST(Filippov, DriftOffACurvedSurfaceIsTheErrorOfTheStepsAndCanBeRestored)
 {
     // 1000 s, 318 turns. Each of some 300 steps per turn may leave 1e-9 of the radius:
-    // it is far less in fact, and a restoring rate of 1/s keeps what a second leaves.
+    // it is far less in fact, and a restoring rate of 1/s removes the errors within a second.
     const auto drift = [](double restoring_rate) {
         const Filippov<Circle> system({.ends = false}, {.restoring_rate = restoring_rate});
         const std::array<double, 2> x0 = {1.0, 0.0};
@@ -527,7 +527,7 @@ TEST(Filippov, WithoutASurfaceRateADifferenceServes)
     const std::array<double, 2> x0 = {1.0, 0.0};
     const auto run = integrate(system, x0, tight(t_exit + 0.5, system.start_mode(0, x0)));
     ASSERT_EQ(run.events.size(), 1u);
-    // The difference is good to 1e-10 of the rate.
+    // The difference has an error of 1e-10 of the rate.
     EXPECT_NEAR(run.events[0].t, t_exit, 1e-9);
     EXPECT_NEAR(run.events[0].after[0], -0.5, 1e-9);
 }
@@ -596,7 +596,7 @@ TEST(Filippov, EveryStateTypeGivesTheSameBits)
 
 // --- bad input ---
 
-/// A field that has no value above.
+/// A field that is not defined above.
 struct Broken {
     static constexpr std::size_t surface_count = 1;
     using State = std::array<double, 1>;
@@ -620,7 +620,7 @@ TEST(Filippov, AFieldWithoutAValueEndsTheRunWhereItIsMet)
     EXPECT_NEAR(run.x[0], 0, 1e-14);
 }
 
-/// A surface that has no value from t = 1 on.
+/// A surface that is not defined from t = 1 on.
 struct Lost {
     static constexpr std::size_t surface_count = 1;
     using State = std::array<double, 1>;

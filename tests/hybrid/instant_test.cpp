@@ -24,7 +24,7 @@ TEST(Instant, TwoSumIsExactInEitherOrder)
 TEST(Instant, AMillionStepsEndWhereTheirProductEnds)
 {
     // 0.1 is not a double; the sum of n of its roundings is n fl(0.1), and fma
-    // rounds that product once. The carried time keeps within one more rounding of
+    // rounds that product once. The error of the carried time is at most one more rounding of
     // the remainder, far below an ulp of the time, where t += h is off by 1e-6.
     const double h = 0.1;
     const int n = 1'000'000;

@@ -1,4 +1,4 @@
-// With all headers and `using namespace ricochet`, everyday names are still the user's own.
+// With all headers and `using namespace ricochet`, everyday names remain the user's own.
 
 #include <gtest/gtest.h>
 
@@ -161,7 +161,7 @@
 
 using namespace ricochet;
 
-// One type of each name, and a use of it, which would be ambiguous if the library had one.
+// One type for each name, and a use of it, which would be ambiguous if the library had the name.
 #define EVERYDAY(name)                                 \
     struct name {                                      \
         double value = 1;                              \

@@ -1,4 +1,4 @@
-// Impacts that accumulate: no reset is dropped, and nothing flutters for ever.
+// Impacts that accumulate: no reset is dropped, and no guard flutters forever.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -32,11 +32,11 @@ TEST(Accumulation, OfThreeThousandRandomBallsNoneFallsThroughItsFloorOrFlutters)
 TEST(Accumulation, AReboundTooSlowToBeToldIsARebound)
 {
     // Restitution 0.07 on a vibrating floor: the third interval is the last that time resolves,
-    // and a difference quotient does not tell which way the ball goes after it.
+    // and a difference quotient does not determine the direction of the ball after it.
     EXPECT_EQ(fault_of(70164), "");
 }
 
-/// A drop falls from rest; where it lands the next one starts from rest, at the height h.
+/// A drop falls from rest; when it lands the next one starts from rest, at the height h.
 struct DrippingTap {
     double height = 1;
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -10}; }
@@ -45,7 +45,7 @@ struct DrippingTap {
     void rest(double, X& x) const { x = {-1, 0}; }
 };
 
-/// A timer whose guard is flat, or saturated, where its reset puts it.
+/// A timer whose guard is flat, or saturated, at the place where its reset puts it.
 struct SaturatedTimer {
     double largest = 1;
     void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
@@ -79,7 +79,7 @@ struct BallOnHighFloor {
 };
 
 /// Once per second guard 0 lifts the second component over the surface of guard 1, whose reset puts
-/// it back. Between these the second component stands still.
+/// it back. Between these events the second component stands still.
 struct Counter {
     std::size_t guard_count = 2;
     void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
@@ -105,7 +105,7 @@ TEST(Accumulation, AGuardThatAnotherResetCarriesAcrossOncePerSecondDoesNotAccumu
 TEST(Accumulation, ImpactsThatAreLocatedLateDoNotFlutter)
 {
     // Each impact is late by up to the tolerance and put back on the floor: the intervals stop
-    // shrinking where that feeds them.
+    // shrinking where the added energy balances the loss.
     for (const double floor : {1e4, 1e5, -1e6}) {
         for (const double tolerance : {1e-5, 1e-4, 1e-3}) {
             for (const double e : {0.5, 0.8, 0.95}) {
@@ -152,7 +152,7 @@ TEST(Accumulation, TheSameCrossingSeenAgainIsStillOneEvent)
 
 TEST(Accumulation, RestHoldsOnlyOnAFloorThatStaysWhereItIs)
 {
-    // Without a mode of rest the state stands still, which on a moving floor it must not.
+    // Without a mode of rest the state stands still, which is wrong on a moving floor.
     const RestingBall moving{{.floor = {.velocity = 0.5, .restitution = 0.5}}};
     EXPECT_EQ(integrate(moving, X{1, 0}, {.t_end = 20}).outcome, Outcome::zeno);
     const RestingBall fixed{{.floor = {.height = 1000, .restitution = 0.5}}};
@@ -175,7 +175,7 @@ TEST(Accumulation, ABallAtRestIsLiftedOffByAVibratingFloor)
     EXPECT_LE(run.statistics.events, 40 * rests);
 }
 
-/// Sticks and slips in turn, at intervals that are equal but for rounding.
+/// Sticks and slips in turn, at intervals that are equal except for rounding.
 struct Relay {
     static constexpr std::size_t guard_count = 2;
     static constexpr std::size_t mode_count = 2;
@@ -195,14 +195,14 @@ TEST(Accumulation, IntervalsThatShrinkByRoundingDoNotAccumulate)
     EXPECT_EQ(run.events.size(), 100u);
 }
 
-/// Two equal balls on a floor that moves, on which they come to rest; a bit of the mode each.
+/// Two equal balls on a moving floor, on which they come to rest; one bit of the mode for each.
 struct PairOnMovingFloor {
     using State = std::array<double, 4>;
     static constexpr std::size_t guard_count = 2;
     static constexpr std::size_t mode_count = 4;
     double restitution = 0.5;
     double speed = 0;               // of the floor
-    std::array<double, 2> floor{};  // at first
+    std::array<double, 2> floor{};  // at the start
 
     [[nodiscard]] double floor_at(std::size_t i, double t) const { return floor[i] + speed * t; }
     [[nodiscard]] bool enabled(std::size_t i, Mode mode) const { return (mode >> i & 1) == 0; }
@@ -239,7 +239,7 @@ struct PairOnMovingFloor {
 
 TEST(Accumulation, BodiesThatComeToRestTogetherOnAMovingFloor)
 {
-    // The limit of the first lies ahead of its last impact by what rounding leaves of a flight,
+    // The limit of the first lies beyond its last impact by the rounding of a flight,
     // in which the floor would pass the second, or leave it.
     for (const double speed : {0.161, -0.292}) {
         for (const double floor : {0.0, 37.2}) {
@@ -248,7 +248,7 @@ TEST(Accumulation, BodiesThatComeToRestTogetherOnAMovingFloor)
             const auto run = integrate(
                 pair, PairOnMovingFloor::State{floor + 1, speed, floor + 1, speed}, {.t_end = 3});
             ASSERT_EQ(run.outcome, Outcome::reached_end) << speed << " " << floor;
-            // t0 + 2 t0 e / (1 - e), and what the location of so many impacts leaves.
+            // t0 + 2 t0 e / (1 - e), and the errors of locating so many impacts.
             const double fall = std::sqrt(2 / 9.81);
             const double limit = fall * (1 + 2 * 0.6 / 0.4);
             int rests = 0;
@@ -264,8 +264,8 @@ TEST(Accumulation, BodiesThatComeToRestTogetherOnAMovingFloor)
 
 TEST(Accumulation, NoBodyFallsThroughWhereAnotherRebounds)
 {
-    // Thrown up together from two floors, so that impacts coincide but for rounding: at one of the
-    // first the second is a unit in the last place below its floor.
+    // Thrown up together from two floors, so that impacts coincide except for rounding: at one of
+    // the first the second is a unit in the last place below its floor.
     const PairOnMovingFloor pair{.restitution = 0.61225596540089211,
                                  .speed = 0.27965981389702688,
                                  .floor = {-0.16113326978938503, 1.3236337156829157}};
@@ -279,7 +279,7 @@ TEST(Accumulation, NoBodyFallsThroughWhereAnotherRebounds)
     }
 }
 
-/// Balls above floors that move together, side by side; a mode for each set of those at rest.
+/// Balls above floors that move together, side by side; one mode for each set of those at rest.
 struct BallsSideBySide {
     using State = std::array<double, 4>;
     static constexpr std::size_t guard_count = 2;
@@ -320,8 +320,8 @@ struct BallsSideBySide {
 
 TEST(Accumulation, OfBallsThatBounceTogetherIsThatOfEach)
 {
-    // Equal but for rounding: in a step of a few 1e-14 s one has its impact, and of the other,
-    // which has just had its own, rounding leaves the sign.
+    // Equal except for rounding: in a step of a few 1e-14 s one ball has its impact, and the sign
+    // of the other's guard, after its own impact, is decided by rounding.
     for (int k = 0; k < 300; ++k) {
         const double u = std::fmod(0.618033988749895 * k, 1.0);
         const double w = std::fmod(0.754877666246693 * k, 1.0);

@@ -72,7 +72,7 @@ TEST(Allocation, NoneInTheLoopWithAPlan)
     const Bounded ball;
     const std::array<double, 2> start = {10.0, 0.0};
     const Options options{.t_end = 20.5, .step = 0.001, .record_events = false};
-    // The starts of tentative steps are kept in room that is made once, with the simulation.
+    // The starts of tentative steps are kept in memory that is allocated once, with the simulation.
     Simulation<Bounded, std::array<double, 2>, FixedStep<Rk4>, Planned<>> simulation(ball, start,
                                                                                      options);
     const auto before = testing_support::allocations();
@@ -82,7 +82,7 @@ TEST(Allocation, NoneInTheLoopWithAPlan)
     EXPECT_GT(run.statistics.rollbacks, 0u);
 }
 
-/// Heap allocations of a guard, its rate and its bound, at a place that is new to them.
+/// Heap allocations of a guard, its rate and its bound, at a place not evaluated before.
 template <class System>
 std::uint64_t allocations_of_guard(const System& system, typename System::State x)
 {

@@ -1,5 +1,5 @@
-// An absolute tolerance for each component. Counted in other units, powers of two, a component's
-// tolerance goes with it, and no rounding differs: the run is the same to the last bit.
+// An absolute tolerance for each component. In other units, powers of two, a component's
+// tolerance scales with it, and no rounding differs: the run is the same to the last bit.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -68,7 +68,7 @@ void expect_the_same_in_other_units(std::size_t n)
     const auto stepping = ErrorControlled<Method>{};
     const Options one{.t_end = 20, .step = 0.1, .rtol = 1e-7, .atol = ordinary};
     Options each = one;
-    each.atol = 1e300;  // of no component
+    each.atol = 1e300;  // applies to no component
     each.component_atol = scaled.tolerances(n);
     const auto expected = integrate(plain, plain.start(n), one, stepping);
     const auto found = integrate(scaled, scaled.start(n), each, stepping);
@@ -89,7 +89,7 @@ TEST(ComponentAtol, IsCountedInTheUnitsOfItsComponent)
     expect_the_same_in_other_units<std::vector<double>, Fehlberg78>(7);
 }
 
-/// Without a guard: steps in a row.
+/// A system without a guard: consecutive steps.
 struct Decay {
     using State = std::array<double, 2>;
     void flow(double, const State& x, State& dxdt) const { dxdt = {-x[0], -50 * x[1]}; }
@@ -107,7 +107,7 @@ TEST(ComponentAtol, SparesStepsOfAComponentThatDoesNotMatter)
         integrate(Decay{}, {1, 1}, {.t_end = 1, .rtol = 1e-12, .atol = 1e-9}).statistics.steps);
 }
 
-/// A second component comes in at t = 1.
+/// A second component is added at t = 1.
 struct Splitting {
     using State = std::vector<double>;
     void flow(double, const State& x, State& dxdt) const

@@ -1,4 +1,4 @@
-// Every step controller by the suite of all.
+// Applies the common suite to every step controller.
 #include "conformance/controllers.hpp"
 
 #include <memory>
@@ -91,7 +91,7 @@ std::vector<ControllerCase> all()
          .order = 6,
          .settles = around(1)},
         // 0.9 error^-0.35 error^-0.2 is 1 at 0.83, but a loop that rejects a step on its way there
-        // goes round it for ever, with errors of 0.38, 0.70 and 1.07.
+        // cycles around it forever, with errors of 0.38, 0.70 and 1.07.
         {.name = "Classic",
          .make = always(ClassicStep{}),
          .accepts = 1,
@@ -99,7 +99,7 @@ std::vector<ControllerCase> all()
          .retry = {0.6, 0.6},
          .settles = {0.36, 1.1},
          .refused = {ClassicStep{.down = 1.5}, ClassicStep{.down = 0}}},
-        // error^-3 is 1.8. Nothing draws its error to a value.
+        // error^-3 is 1.8. The error does not converge to a value.
         {.name = "PrintedPi",
          .make = always(PrintedPiStep{}),
          .accepts = std::pow(1.8, -1.0 / 3),
@@ -111,7 +111,7 @@ std::vector<ControllerCase> all()
              [=](double unit) {
                  return prescribed({0.01 * unit, 0.25 * unit, 0.125 * unit});
              },
-         .next = {12.5, 25},  // of the steps of 0.01 that are asked about
+         .next = {12.5, 25},  // for the requested steps of 0.01
          .refused = {PrescribedSteps{}, prescribed({}), prescribed({0.1, 0}), prescribed({0.1, -1}),
                      prescribed({0.1, nan})}},
         learned("LearnedOfNothing", 0),

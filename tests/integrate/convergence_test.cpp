@@ -32,7 +32,7 @@ double largest_error(double h)
 
 /// Observed order between steps h and h / 4. Both are small enough for the leading
 /// term to dominate and large enough for the error to stay above rounding, 1e-13;
-/// what is left of the next term moves the observed order by a few tenths.
+/// the next term changes the observed order by a few tenths.
 template <class Method>
 double observed_order(double h)
 {
@@ -65,7 +65,7 @@ TEST(Convergence, Fehlberg78KeepsOrderSevenAtLeastThroughEvents)
     EXPECT_GE(observed_order<Fehlberg78>(0.8), 6.8);
 }
 
-/// Error against tolerance: two decades of tolerance must buy at least one of error.
+/// Error against tolerance: two decades of tolerance must give at least one of error.
 template <class Method>
 void expect_proportional()
 {

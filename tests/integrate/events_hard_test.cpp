@@ -1,4 +1,4 @@
-// Events where loops like ours have lost or doubled them: plateaus, touches of any order,
+// Events that similar loops have lost or doubled: plateaus, touches of any order,
 // rest that is disturbed, coincidences, starts on a surface.
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ using X3 = std::array<double, 3>;
 
 // --- plateaus ---
 
-/// Falls to zero at t = 1 and stays there, until t = 2 or for ever.
+/// Falls to zero at t = 1 and stays there, until t = 2 or forever.
 struct Arriving {
     double leaves = std::numeric_limits<double>::infinity();
     void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
@@ -114,7 +114,7 @@ TEST(HardEvents, AGuardSetDownOnItsSurfaceHasItsEventWhenItLeaves)
 
 // --- rest ---
 
-/// A floor on which nothing presses until t = 1, then something does.
+/// A floor without a pressing force until t = 1, and with one afterwards.
 struct Pressed {
     std::size_t guard_count = 1;
     [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
@@ -136,7 +136,7 @@ TEST(HardEvents, AFloorHoldsWhatIsPressedOntoItLater)
     EXPECT_EQ(run.x[1], 0);
 }
 
-/// The same floor, from which a force lifts.
+/// The same floor, with a lifting force.
 struct Lifted : Pressed {
     void flow(double t, const X& x, X& dxdt) const { dxdt = {x[1], t}; }
 };
@@ -195,7 +195,7 @@ TEST(HardEvents, AnythingKickedIntoItsFloorBouncesOrRests)
 
 // --- touches ---
 
-/// (x - 1/2)^power, which touches where the power is even.
+/// (x - 1/2)^power, which touches zero for an even power.
 struct Flat {
     int power;
     Crossing crossing = Crossing::either;
@@ -397,7 +397,7 @@ TEST(HardEvents, AnAccumulationDoesNotOvertakeATimeEvent)
 
 // --- predicates, snapshots, numbers ---
 
-/// Guard 1 is carried across its surface by the reset of guard 0, but does not count.
+/// The reset of guard 0 carries guard 1 across its surface, but that does not count.
 struct Ruled {
     std::size_t guard_count = 2;
     void flow(double, const X3&, X3& dxdt) const { dxdt = {1, 0, 0}; }
@@ -531,8 +531,8 @@ struct StraightGuard {
 
 TEST(HardEvents, AnEventAtTheEndOfAStepHasTheStateOfTheStep)
 {
-    // The guard reaches zero where a step ends, up to rounding. The other component is that of
-    // rk4, h^5 / 120 a step off exp(-t): nothing may be gone along the tangent.
+    // The guard reaches zero at the end of a step, up to rounding. The other component is that of
+    // rk4, off exp(-t) by h^5 / 120 per step: no state may be extrapolated along the tangent.
     for (const double h : {0.125, 0.1, 0.05}) {
         for (const double at : {0.5, 0.75, 1.0}) {
             const auto run =
@@ -573,7 +573,7 @@ struct Pole {
 TEST(HardEvents, APoleIsPassedAsAJumpAndDoesNotHideTheNext)
 {
     // From 1 at rest, 0.3 is passed twice in each of three turns. Beside the pole the guard is
-    // 1e16, of which the event, with its band and its size, must not leave anything behind.
+    // 1e16, and the event, with its tolerance and its size, must not leave any trace of it.
     for (const bool resets : {true, false}) {
         const auto run = integrate(Pole{.resets = resets}, {1.0, 0.0},
                                    {.t_end = 18.8, .rtol = 1e-9, .atol = 1e-9});
@@ -581,8 +581,8 @@ TEST(HardEvents, APoleIsPassedAsAJumpAndDoesNotHideTheNext)
         ASSERT_EQ(run.events.size(), 6u);
         for (const auto& event : run.events) {
             EXPECT_EQ(event.kind, EventKind::jump);
-            // On the other side already, by some units in the last place; of an event that is only
-            // recorded the state is the polynomial's, which is off by the error of the step.
+            // On the other side already, by some units in the last place; if the event is only
+            // recorded, the state is the polynomial's, which has the error of the step.
             EXPECT_NEAR(event.before[0], 0.3, resets ? 1e-14 : 1e-9);
             EXPECT_NE(event.before[0], 0.3);
         }
@@ -603,7 +603,7 @@ struct Ball {
 TEST(HardEvents, ImpactsDoNotDependOnHowFarTheEndLies)
 {
     // All of them happen within 8.6 s, and the longest of their flights is the second, 0.81 s:
-    // steps of more than two flights are never taken.
+    // a step never exceeds two flights.
     std::vector<double> expected;
     for (const double t_end : {30.0, 31.0, 1e3, 1e6, 1e9, 1e15, 1e100, 1e300}) {
         for (const double h_max : {1.7, 5.0, 1e3, 1e300}) {
@@ -618,8 +618,8 @@ TEST(HardEvents, ImpactsDoNotDependOnHowFarTheEndLies)
     EXPECT_GT(expected.size(), 200u);
 }
 
-/// A weight on a spring, a surface that moves under it, and beside the guard with the reset one
-/// that has the same surface and is only recorded, computed in another way.
+/// A weight on a spring, a surface that moves under it, and a guard with a reset beside a
+/// recorded one with the same surface, which is computed in a different way.
 struct CountedCrossings {
     std::size_t guard_count = 2;
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const { return {.resets = which == 0}; }
@@ -634,8 +634,8 @@ struct CountedCrossings {
 
 TEST(HardEvents, ARecordedGuardHasItsEventOnceWhereAResetSharesItsSurface)
 {
-    // The two tell their surface by no more than their roundings, and the reset is applied where
-    // the first of them is: it may leave the state on the way to the other, or a rounding past it.
+    // The two determine their surface only up to their roundings, and the reset is applied where
+    // the first of them is zero: the state may still be before the other, or a rounding beyond it.
     for (int i = 0; i < 18; ++i) {
         const auto run = integrate(CountedCrossings{}, X{1.328 + 0.0006 * i, 0.3},
                                    {.t_start = 7, .t_end = 40, .rtol = 1e-11, .h_max = 0.3});
@@ -665,7 +665,7 @@ TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
 }
 
 /// A crest one unit in the last place high, where the guard is zero at a great many offsets; its
-/// rate is said to fall there, as that of a flow that jumps at the surface does.
+/// declared rate falls there, like that of a flow that jumps at the surface.
 struct RoundedCrest {
     static constexpr Crossing crossing = Crossing::either;
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
@@ -682,7 +682,7 @@ TEST(HardEvents, ARateThatContradictsASurfaceOfRoundingIsNotFollowedForEver)
     const auto run = integrate(RoundedCrest{}, X{0.99999999999999978, 3.1083531824869161e-08},
                                {.t_end = 3 * step, .step = step}, FixedStep<Rk4>{});
     EXPECT_EQ(run.outcome, Outcome::reached_end);
-    // Nine of a row, and a doubling of what is left out after each: 30 of them span the step.
+    // Nine in a row, and a doubling of the omitted part after each: 30 of them span the step.
     EXPECT_LE(run.events.size(), 3 * 30 * 9U);
 }
 
@@ -723,7 +723,7 @@ struct RootAtAnEnd {
 TEST(HardEvents, ACrossingAtTheEndOfAStepLeavesTheGuardArmedForTheNext)
 {
     // Where x is off + s, its rounding hides the guard's sign in the rest of the step; its rate
-    // tells that it goes on.
+    // shows that it continues.
     for (const double off : {0.0, 1.0, 10.0, 100.0, 1e4}) {
         for (const double gap : {0.02, 0.2}) {
             for (const double step : {0.25, 0.125}) {

@@ -1,4 +1,4 @@
-// The semantics of events: many guards, modes, order, progress, and what other
+// The semantics of events: many guards, modes, order, progress, and events that other
 // systems lose.
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ bool same_bits(const ricochet::Run<State>& a, const ricochet::Run<State>& b)
     return true;
 }
 
-// --- looking inside the step ---
+// --- evaluations inside the step ---
 
 /// y' = 3 t^2 + 12 t - 4, y(-8) = -120: y = (t + 6) (t + 2) (t - 2). A cubic that
 /// other integrators step across (scipy issue 9228).
@@ -187,7 +187,7 @@ TEST(Events, ATouchIsReportedOnceWhereverTheStepsFall)
 
 TEST(Events, ADeclaredBandTurnsDipsOfLessThanItIntoTouches)
 {
-    // Crests of cos(t + 1) that reach beyond the level by less than the band, or fall short
+    // Crests of cos(t + 1) that exceed the level by less than the band, or fall short
     // of it by less, are one touch each, wherever the steps fall; higher ones are crossed.
     const auto kinds = [](double depth, double touch, double h_max) {
         const ricochet::NearTangent system({.depth = depth, .phase = 1, .touch = touch});
@@ -408,7 +408,7 @@ TEST(Events, ABallOfAnyRestitutionNeverFallsThroughTheFloor)
 TEST(Events, AnElasticBallKeepsItsEnergy)
 {
     // In steps of at most a fifth of a flight the energy keeps its last bit; 4 units in
-    // the last place per bounce and 1e-10 in all are asked for.
+    // the last place per bounce and 1e-10 in all are required.
     const BouncingBall ball({.gravity = 9.81, .restitution = 1});
     const Options options{.t_end = 1e5, .h_max = 0.2, .record_events = false};
     Simulation<BouncingBall, X> simulation(ball, {1.0, 0.0}, options);
@@ -510,7 +510,7 @@ TEST(Events, AStepThatEndsNextToTheSurfaceMissesNothing)
 
 TEST(Events, AGuardOfAnyKindOfStartIsArmedByItsMotion)
 {
-    // x = t from the surface up: rises off it, so only a later return would count.
+    // x = t from the surface upward: it rises off it, so only a later return would count.
     const Milestones line{.places = {0.0}, .resetting = true};
     EXPECT_EQ(integrate(line, X1{0}, {.t_end = 1}).events.size(), 0u);
 }
@@ -619,7 +619,7 @@ TEST(Events, AResetMayChangeTheDimension)
 
 TEST(Events, AGuardCountsOnlyWhereItIsEnabled)
 {
-    // Once round the unit circle: the axis y = 0 is crossed at pi and 2 pi, and only
+    // One turn on the unit circle: the axis y = 0 is crossed at pi and 2 pi, and only
     // the half axis x > 0 counts.
     struct HalfAxis {
         std::size_t guard_count = 1;
@@ -836,7 +836,7 @@ TEST(Events, AGuardThatHasPassedWithoutAnEventIsFlippedFromItsNewSide)
 
 TEST(Events, ANotificationThatCoincidesWithAResetIsNotLost)
 {
-    // Every impact is noted by a twin of the floor that only watches.
+    // A twin of the floor, with a guard that is only recorded, records every impact.
     struct Twin {
         std::size_t guard_count = 2;
         bool swapped = false;
@@ -875,7 +875,7 @@ TEST(Events, AResetBehindTheSurfaceIsNamed)
 
 TEST(Events, ContradictoryDeclarationsAreRefused)
 {
-    // A guard that bounds the motion from above zero cannot count its rising.
+    // The rising of a guard that bounds the motion from below cannot count.
     struct Rising : BouncingBall {
         Crossing crossing = Crossing::rising;
     };
@@ -974,7 +974,7 @@ TEST(Events, TheSolutionHasALimitOnEitherSideOfAnEvent)
 
 TEST(Events, TimeMayRunBackward)
 {
-    // Back through the third impact of an inelastic ball that gains what it lost.
+    // Back through the third impact of an inelastic ball that gains the energy it lost.
     struct Reversed : BouncingBall {
         void reset(double, X& x) const { x = {0, -x[1] / 0.9}; }
     };

@@ -15,7 +15,7 @@ struct Interrupted {
     std::size_t call;
 };
 
-/// A ball on a floor whose functions throw at one call, which all of them count.
+/// A ball on a floor whose functions throw at one call, counted over all of them.
 struct Interruptible {
     using State = std::array<double, 2>;
     std::size_t* calls;
@@ -56,7 +56,7 @@ struct Finished {
     bool operator==(const Finished&) const = default;
 };
 
-/// Goes to the end by `go`, again and again after each exception.
+/// Runs to the end by `go`, repeatedly after each exception.
 template <class Go>
 Finished finish(const Interruptible& ball, std::size_t& exceptions, const Go& go)
 {
@@ -102,8 +102,8 @@ void expect_same_whichever_call_throws(const Go& go)
     }
 }
 
-// Every call of flow, guard, reset and rest of a run throws once; what follows is the next step
-// from the last that was complete, whose bits are those of a run in which nothing was thrown.
+// Every call of flow, guard, reset and rest of a run throws once; the run then continues with the
+// next step from the last complete one, with the bits of a run in which nothing was thrown.
 TEST(Exceptions, AStepThatThrowsIsTakenAgainWithTheSameBits)
 {
     expect_same_whichever_call_throws([](auto& simulation) {

@@ -35,8 +35,8 @@ double impact_error(const Run<X>& run, const BouncingBall& ball, double height)
 // An impact that is late by d finds the ball faster by g d, which makes all later
 // flights longer: d grows to d (1 + 2 r / (1 - r)) = 19 d. Each of 13 impacts is
 // located to the spacing of its offset, at most 4.4e-16 s and late by half of that
-// on average; their sum is below 13 * 19 * 2.2e-16 = 5.4e-14 s at worst and half a
-// dozen times less where they scatter. The bound asked for is 2e-14 s.
+// on average; their sum is below 13 * 19 * 2.2e-16 = 5.4e-14 s at worst and about a
+// sixth of that where they scatter. The required bound is 2e-14 s.
 TEST(Integrate, FixedStepsMeetThePapersImpactsAtEveryStep)
 {
     const BouncingBall ball;
@@ -58,7 +58,7 @@ void expect_paper_impacts(double rtol)
     const auto run = integrate(ball, {10.0, 0.0}, {.t_end = 20.5, .rtol = rtol, .atol = rtol / 100},
                                ErrorControlled<Method>{}, Detector{});
     ASSERT_EQ(run.events.size(), 13u) << rtol;
-    // A flight in one step: the two halves of the parabola, 36 m, cancel at the
+    // With a flight in one step the two halves of the parabola, 36 m, cancel at the
     // impact, and half an ulp of each, 3.6e-15 m, is 2.5e-16 s at 14 m/s. With the
     // late half ulp of location that makes at most 13 * 19 * 7e-16 s = 1.7e-13 s.
     EXPECT_LE(impact_error(run, ball, 10), 1.7e-13) << rtol;
@@ -111,7 +111,7 @@ TEST(Integrate, BallsOfOtherRestitutionsMeetTheirImpacts)
     }
 }
 
-// --- what an event says of itself ---
+// --- data of an event ---
 
 TEST(Integrate, AnEventCarriesItsBracketSlopeAndStates)
 {
@@ -200,7 +200,7 @@ TEST(Integrate, SamplingDoesNotChangeTheRun)
     EXPECT_EQ(plain.events.back().t, sampled.events.back().t);
 }
 
-// --- systems that declare less, or more ---
+// --- systems with fewer or more declarations ---
 
 TEST(Integrate, ASystemWithoutAGuardIsAPlainOde)
 {
@@ -311,7 +311,7 @@ TEST(Integrate, AResetThatLeavesTheResidueOfLocationIsArmedByItsRate)
 
 // --- endings ---
 
-/// A ball that does not say how it rests.
+/// A ball without a rest rule.
 struct RestlessBall {
     using State = X;
     double restitution = 0.9;
@@ -496,7 +496,7 @@ TEST(Integrate, AStiffToleranceThatCannotBeMetUnderflows)
     EXPECT_LE(run.t, 0.5 + 1e-6);
 }
 
-// --- starts that make no sense ---
+// --- meaningless starts ---
 
 template <class System>
 std::string refusal(const System& system, const X& start)

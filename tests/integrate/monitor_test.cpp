@@ -36,7 +36,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Monitor, TheBouncingBallHasItsThirteenImpacts)
 {
-    // The method is exact on a parabola, so that all that is left is rounding: at each of 200 steps
+    // The method is exact on a parabola, so the only error is rounding: at each of 200 steps
     // at most 1e-15 m of the height, at 5 m/s or more.
     for (const double h : {0.5, 0.25, 0.1}) {
         const BouncingBall ball;
@@ -75,7 +75,7 @@ struct Lines {
     void reset(std::size_t, double, X& x) const { x = {-0.9, -x[1]}; }
 };
 
-/// Steps whose paths are declared to be the cubics that they are.
+/// Steps whose paths are declared to be cubics, as they are.
 template <class Step>
 struct CubicStep {
     static constexpr bool is_cubic = true;
@@ -99,9 +99,10 @@ struct Cubics {
     [[nodiscard]] X rate(const X& dxdt) const { return dxdt; }
 };
 
-// Up to 1e-9 below the crest lines are passed twice within a step. Where a step is a cubic, and a
-// guard of degree 1, the values and rates at its ends tell all that a value inside tells: the
-// events are the same to the bit, and most steps take one evaluation of each guard, not two.
+// Up to 1e-9 below the crest, lines are passed twice within a step. If a step is a cubic, and a
+// guard of degree 1, the values and rates at its ends contain all the information of a value
+// inside: the events are the same to the bit, and most steps take one evaluation of each guard, not
+// two.
 TEST(Monitor, CubicStepsKeepTheirEventsWithFewerEvaluations)
 {
     for (const double h : {0.3, 0.1, 0.07, 0.01}) {
@@ -128,7 +129,7 @@ TEST(Monitor, CubicStepsKeepTheirEventsWithFewerEvaluations)
     }
 }
 
-/// Back and forth at constant speed between walls at 0 and 1, and a mark between them. With
+/// Moves back and forth at constant speed between walls at 0 and 1, with a mark between them. With
 /// dyadic numbers nothing is rounded.
 struct Shuttle {
     std::size_t guard_count = 3;
@@ -306,7 +307,7 @@ TEST(Monitor, PairsOfCrossingsInOneStepAreFoundDownToRounding)
         EventMonitor monitor(system, X{});
         const auto run = drive(system, monitor, system.start(), 3, 0.73);
         ASSERT_EQ(run.events.size(), 1u) << system.depth;  // the falling one of the two
-        // What rounding makes of the height, 4e-16, moves it by that over its rate.
+        // The rounding of the height, 4e-16, moves the root by its ratio to the rate.
         const double root = 1 - std::sqrt(system.depth);
         EXPECT_NEAR(run.events[0].t, root, 2e-15 / std::sqrt(system.depth) + 1e-15);
     }
@@ -585,7 +586,7 @@ TEST(Monitor, AHostMayRunBackward)
     EXPECT_EQ(monitor.t().value, -2);
 }
 
-// --- guards that need no look ---
+// --- guards that need no evaluation ---
 
 /// A body in a circular arena, whose distance from the wall changes no faster than it moves.
 struct Arena {
@@ -696,7 +697,7 @@ TEST(Monitor, ASnapshotGoesOnWithTheSameBits)
     EXPECT_EQ(other.x()[0], host.x()[0]);
 }
 
-// --- what a host may not do ---
+// --- misuse by a host ---
 
 struct Shown {
     double t = 0, length = 0.1;
@@ -729,7 +730,7 @@ TEST(MonitorRefusals, StepsOutOfTurn)
     // Nothing has changed.
     EXPECT_EQ(monitor.examine(Shown{}), Verdict::stands);
     EXPECT_EQ(monitor.t().value, 0.1);
-    // A host that forgets to resume.
+    // The host forgets to resume.
     const Shown falls{
         .t = 0.1, .a = {10, -0.1}, .b = {-1, -0.2}, .ra = {-110, -1}, .rb = {-110, -1}};
     ASSERT_EQ(monitor.examine(falls), Verdict::cut);
@@ -751,7 +752,7 @@ struct Failing : Counter {
 
 TEST(MonitorRefusals, AfterAnExceptionTheGuardsAreArmedAnew)
 {
-    // Half armed, guard 1 would be lost: it has been carried across its surface.
+    // If guard 1 were only half armed it would be lost: it has been carried across its surface.
     for (int calls = 0; calls < 4; ++calls) {
         const Failing system;
         EventMonitor monitor(system, X{});
@@ -798,7 +799,7 @@ struct BrokenStep {
 
 TEST(MonitorRefusals, StatesInsideAStepThatAreNotFinite)
 {
-    // Taken for values far above the surface, they would place the event at the end of the step.
+    // Treated as values far above the surface, they would place the event at the end of the step.
     const auto examined = [](const auto& step) {
         const BouncingBall ball;
         EventMonitor monitor(ball, X{});
@@ -893,7 +894,7 @@ TEST(MonitorRefusals, AGuardThatIsNoNumberEndsTheRun)
     const auto run = drive(system, monitor, X1{1}, 2, 0.3);
     EXPECT_EQ(run.verdict, Verdict::ended);
     EXPECT_EQ(run.outcome, Outcome::non_finite);
-    EXPECT_NEAR(run.t, 0.9, 1e-12);  // where the last good step ended
+    EXPECT_NEAR(run.t, 0.9, 1e-12);  // the end of the last good step
     EXPECT_NEAR(run.x[0], 0.1, 1e-12);
 }
 

@@ -47,7 +47,7 @@ void expect_same_bits(const State& ours, const State& theirs)
     }
 }
 
-/// Steps of random lengths from random states, forward and backward, with all that they give.
+/// Steps of random lengths from random states, forward and backward, with all their results.
 template <class Ours, template <class...> class Theirs, class State>
 void expect_bits_of_odeint(State x)
 {
@@ -125,7 +125,7 @@ TEST(Odeint, ADepartureFromTheTangentIsTheSameStep)
     EXPECT_NEAR(ours.x1()[1], x[1], 4e-16);
 }
 
-/// The explicit midpoint rule, as little as odeint's Stepper concept asks for.
+/// The explicit midpoint rule, with the minimum that odeint's Stepper concept requires.
 struct Midpoint {
     using stepper_category = odeint::stepper_tag;
     static constexpr unsigned short order() { return 2; }

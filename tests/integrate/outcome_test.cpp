@@ -43,7 +43,7 @@ TEST(WrongDimension, AFlowThatLosesAComponentAtTheStartIsRefused)
               "written in place");
 }
 
-/// Two of three merge at t = 1; without a mode only by declaration.
+/// Two of three merge at t = 1; without a mode this happens only by declaration.
 struct Merging {
     using State = V;
     void flow(double, const V&, V& dxdt) const
@@ -85,7 +85,7 @@ TEST(Stalled, ARunWhoseTimeStandsStillEnds)
     EXPECT_LT(run.statistics.steps, 2001u);
     EXPECT_NE(std::string(describe(run.outcome)).find("stall_steps"), std::string::npos);
 
-    // Of a span of 1e-6 s a thousand steps are 1e-7; and who asks for it may wait.
+    // For a span of 1e-6 s a thousand steps are 1e-7; a longer wait must be requested.
     Options shorter = options;
     shorter.t_end = 1e-6;
     EXPECT_EQ(integrate(Sawtooth{}, {0}, shorter).outcome, Outcome::step_limit);

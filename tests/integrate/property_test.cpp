@@ -1,4 +1,4 @@
-// Random hybrid systems, run by every method, against what they must do.
+// Random hybrid systems, run by every method, against their exact runs.
 //
 // The flows are polynomials, on which the methods are exact, so that a step may be as
 // long as a flight and hold any number of crossings.
@@ -39,7 +39,7 @@ TEST(RandomSystems, LoseNoEventInventNoneAndDoNotDependOnTheOrderOfTheirGuards)
 {
     const PropertyReport report = test::check_random_systems(1, 2000);
     EXPECT_EQ(report.wrong(), 0u) << text(report);
-    // The sample is worth something.
+    // The sample is large enough.
     EXPECT_GT(report.events, 5000u);
     EXPECT_GT(report.together, 100u);
     EXPECT_GT(report.cascades, 300u);
@@ -49,8 +49,8 @@ TEST(RandomSystems, LoseNoEventInventNoneAndDoNotDependOnTheOrderOfTheirGuards)
 // --- the check itself ---
 
 /// A stone thrown up, x_0'' = -1. Guard 0 records x_0 = 3 / 8 both ways, guard 1 throws it
-/// up again from x_0 = 0 with the speed 1, and guard 2, flipped by that, records the speed
-/// 1 / 2 being exceeded.
+/// up again from x_0 = 0 with the speed 1, and guard 2, flipped by that, records that the
+/// speed exceeds 1 / 2.
 RandomProblem throws()
 {
     RandomProblem problem;
@@ -89,7 +89,7 @@ TEST(ExactMotion, FollowsAStoneThatIsThrownUpAgain)
 
 TEST(ExactMotion, DeclinesWhatHangsByAThread)
 {
-    // Guard 0 is put so that the stone just touches its level.
+    // Guard 0 is placed so that the stone just touches its level.
     RandomProblem problem = throws();
     problem.system.guards_of[0].level = 0.125 + 0.875 * 0.875 / 2;
     learn::Random random(1);

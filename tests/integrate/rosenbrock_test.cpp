@@ -39,7 +39,7 @@ struct Following {
 // The numbers are those of boost::numeric::odeint::rosenbrock4<double>::do_step and calc_state with
 // exact Jacobians (Boost 1.74). Sums are formed in another order: a few units in the last place of
 // the terms, which are up to a hundred times an increment. (Where the flow depends on the time,
-// odeint's is of order 1: its d4 has the wrong sign.)
+// odeint's method is of order 1: its d4 has the wrong sign.)
 TEST(Rosenbrock, StepsAreThoseOfOdeint)
 {
     const auto robertson =
@@ -185,8 +185,8 @@ TEST(Rosenbrock, ASnapshotGoesOnWithTheSameBits)
     EXPECT_EQ(whole.t(), other.t());
 }
 
-// Samples are steps of their own. Between steps the solution is a cubic: of the fourth derivative,
-// which is one here, h^4 / 30 is left, 3e-8 where steps are 0.03.
+// Samples are steps of their own. Between steps the solution is a cubic: the fourth derivative,
+// which is one here, leaves h^4 / 30, or 3e-8 for steps of 0.03.
 TEST(Rosenbrock, SamplesAndSolutionAreThoseOfTheMotion)
 {
     std::vector<double> times;
@@ -232,9 +232,9 @@ struct Kicked {
     void time_reset(double, State& x) const { x[0] += 1; }
 };
 
-// At 0.5 the motion never is, which stays above 0.8; the interpolant of a step that is longer than
-// the transient is there, since it swings by 0.94 to the other side of 1 + 0.2 sin t. At 1.5 it is
-// twice each second: where it is moved up, and on its way back, unless an event takes it back at
+// The motion stays above 0.8 and never reaches 0.5; the interpolant of a step that is longer than
+// the transient does, since it swings by 0.94 to the other side of 1 + 0.2 sin t. The motion is at
+// 1.5 twice each second: when it is moved up, and on its way back, unless an event takes it back at
 // the same instant.
 TEST(Rosenbrock, TransientsShorterThanAStepHaveNoEventsOfTheirOwn)
 {
@@ -253,7 +253,7 @@ TEST(Rosenbrock, TransientsShorterThanAStepHaveNoEventsOfTheirOwn)
     }
 }
 
-// There and back, each way with an error of some rtol; the turning points are met again.
+// There and back, each way with an error of some rtol; the turning points are reached again.
 TEST(Rosenbrock, RunsBackward)
 {
     const Options options{.t_end = 5, .rtol = 1e-9, .atol = 1e-11};

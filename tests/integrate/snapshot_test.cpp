@@ -1,4 +1,4 @@
-// A snapshot says which run it is of, and is read only where it makes sense.
+// A snapshot identifies its run, and is read only where it is valid.
 
 #include "ricochet/integrate/snapshot.hpp"
 
@@ -28,7 +28,7 @@ using test::refused_by;
 using test::saved_ball;
 using X = Ball::State;
 
-/// Of another name.
+/// A system with another name.
 struct Named : Ball {
     std::string name = "marble";
 };
@@ -46,7 +46,7 @@ TEST(Snapshot, BelongsToOneKindOfRun)
 {
     const Snapshot saved = saved_ball(options);
     EXPECT_EQ(refused_by(saved, Ball{}, options), "accepted");
-    // Where the run ends, its first step and what it keeps are free.
+    // The end of the run, its first step and its records may differ.
     EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 9, .step = 0.1, .record_steps = true}),
               "accepted");
 
@@ -126,8 +126,8 @@ TEST(Snapshot, NumbersThatAreNoStateAreRefusedAndChangeNothing)
     const Snapshot good = simulation.save();
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const double infinity = std::numeric_limits<double>::infinity();
-    // Time, its remainder, the state, its remainder, its rate, the next step, the first, and of the
-    // last event its time and the longest step after it.
+    // The time, its remainder, the state, its remainder, its rate, the next step, the first step,
+    // and the time of the last event and the longest step after it.
     for (std::size_t i = 0; i <= 11; ++i) {
         for (const double wrong : {nan, infinity, -infinity}) {
             Snapshot bad = good;

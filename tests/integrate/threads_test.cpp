@@ -1,5 +1,5 @@
 // Eight threads share one system and one model: their runs are those of one thread, bit for bit.
-// Built with the thread sanitizer, too, which sees what equal results may hide.
+// It is built with the thread sanitizer too, which finds errors that equal results may hide.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -32,7 +32,7 @@ const std::string models = RICOCHET_MODELS "/";
 
 using Numbers = std::vector<double>;
 
-/// What `work` returns in one thread and in each of eight that begin together.
+/// The results of `work` in one thread and in each of eight that begin together.
 void expect_the_same_in_eight_threads(const std::function<Numbers()>& work)
 {
     const Numbers alone = work();

@@ -34,7 +34,7 @@ TEST(Adam, TwoStepsFollowTheFormula)
 TEST(Adam, FindsTheMinimumOfAnIllConditionedQuadratic)
 {
     // f = (p0 - 3)^2 / 2 + 1e4 (p1 + 2)^2 / 2. With a rate that falls to zero the
-    // steps do so as well, and the iterate ends within a few of the last ones.
+    // steps do so as well, and the error of the iterate is a few of the last ones.
     Adam adam(2, {});
     std::vector<double> p{0, 0};
     const int iterations = 20'000;

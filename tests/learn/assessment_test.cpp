@@ -67,7 +67,7 @@ TEST(Assessment, MissBoundIsThreeOverNWithoutMissesAndClopperPearsonWith)
     EXPECT_EQ(miss_bound(0, 0), 1);
     EXPECT_EQ(miss_bound(0, 2), 1);
     EXPECT_EQ(miss_bound(5, 5), 1);
-    // By definition, as few misses as were seen have probability 0.05 at the bound.
+    // By definition, so few misses have probability 0.05 at the bound.
     const double p = miss_bound(1, 100);
     EXPECT_NEAR(std::pow(1 - p, 100) + 100 * p * std::pow(1 - p, 99), 0.05, 1e-12);
 }

@@ -1,4 +1,4 @@
-// The trainings behind the stored models, whole: less than a minute of one core.
+// The complete trainings of the stored models: less than a minute on one core.
 #include <gtest/gtest.h>
 
 #include "ricochet/learn/bouncing_ball.hpp"

@@ -19,7 +19,7 @@ namespace {
 
 using State = BouncingBall::State;
 
-/// A stored model, asked about states of a ball.
+/// A stored model, evaluated on states of a ball.
 class Stored {
 public:
     explicit Stored(const std::string& file)
@@ -109,8 +109,8 @@ TEST(BallTraining, KindsAreFoundByTheirNames)
 
 TEST(BallTraining, LabelsOfAnyStepAreThoseOfTheLine)
 {
-    // Features of a relative error of 1e-15 are logarithms up to 48, so ratios come
-    // back within 1e-13, and a state with a relative margin above 1e-9 is on its
+    // Features with a relative error of 1e-15 are logarithms up to 48, so ratios are
+    // recovered within 1e-13, and a state with a relative margin above 1e-9 is on its
     // side of the line.
     const SurfaceSample sample =
         sample_ball(BallModel::any_step, ball_training(BallModel::any_step), 5000, 5000, 1, true);
@@ -201,7 +201,7 @@ TEST(StoredFixedStep, FindsThe13ImpactsOfThePapersRun)
     const Counts counts = bounce(fixed_step(), BouncingBall{}, 10, 20.5, 0.01);
     EXPECT_EQ(counts.impacts, 13);
     EXPECT_EQ(counts.misses, 0);
-    EXPECT_LE(counts.false_alarms, 13);  // those inside the band; there are 2056 steps
+    EXPECT_LE(counts.false_alarms, 13);  // at most those inside the band; there are 2056 steps
 }
 
 TEST(StoredFixedStep, AlarmsOnTheExactBoundaryOfItsBox)

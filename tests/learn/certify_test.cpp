@@ -88,7 +88,7 @@ struct RandomBox {
     std::vector<double> lower, upper;
 };
 
-/// Edges from nothing to the whole domain.
+/// Edges from zero to the whole domain.
 RandomBox random_box(std::size_t n, Random& random)
 {
     RandomBox box;
@@ -144,8 +144,8 @@ TEST(NetworkBounds, HoldsEverySampledLogitExactAndComputed)
 
 TEST(NetworkBounds, OfOnePointAreAsTightAsTheRoundingOfItsEvaluation)
 {
-    // On a point no ReLU is undecided (but for one that is zero to rounding), so that the bounds
-    // are the logit +- the evaluation error, plus what rounding in double adds.
+    // At a point no ReLU is undecided (except for one that is zero to rounding), so the bounds
+    // are the logit +- the evaluation error, plus rounding in double.
     Random random(2);
     for (const Precision precision : {Precision::f32, Precision::f64}) {
         const Model model = random_network({3, 16, 16, 1}, 2, precision, random);
@@ -191,7 +191,7 @@ TEST(NetworkBounds, AreOutwardWhereThereIsNothingButRounding)
 
 TEST(NetworkBounds, OfPartsAreInsideThoseOfTheWholeUpToTheRelaxation)
 {
-    // Halving a box often enough closes in on the true range: bounds that do not converge prove
+    // Repeated halving of a box must converge to the true range: bounds that do not converge prove
     // nothing. At 2^-12 of the domain hardly a ReLU is undecided.
     Random random(4);
     const Model model = random_network({2, 16, 16, 1}, 2, Precision::f64, random);
@@ -211,7 +211,7 @@ TEST(NetworkBounds, OfPartsAreInsideThoseOfTheWholeUpToTheRelaxation)
             }
         }
         const Interval range = bounds_of(bounds, box);
-        // Slopes are at most some 30 here, a bend changes the range by a share of that.
+        // Slopes are at most some 30 here, and a bend changes the range by a fraction of that.
         EXPECT_GE(range.lower, low - 30 * 0x1p-12);
         EXPECT_LE(range.upper, high + 30 * 0x1p-12);
     }
@@ -283,8 +283,8 @@ struct Room {
 };
 static_assert(SlackedGuard<Room, Room::State>);
 
-/// logit = max of a(|x|), b(|y|) and a roof over the pillar, made by hand: below -0.25 it is
-/// clear by about a quarter.
+/// logit = max of a(|x|), b(|y|) and a roof over the pillar, constructed by hand: below -0.25 the
+/// guard is clear by about a quarter.
 Model room_model()
 {
     Model model;
@@ -389,7 +389,7 @@ TEST(Certify, RefutesAThresholdThatIsTooHighWithAState)
 
 TEST(Certify, ListsUnprovedBoxesThatAreAskedExactly)
 {
-    // So near to what can be proved that boxes of 1/32 of the domain do not do.
+    // So near to the provable limit that boxes of 1/32 of the domain do not suffice.
     Model model = room_model();
     model.threshold = 1.45;
     const learn::CertifiedModel out = learn::certify(
@@ -412,7 +412,7 @@ TEST(Certify, ListsUnprovedBoxesThatAreAskedExactly)
             }
         }
     }
-    EXPECT_GT(kept_back, 0);  // or the list would be idle
+    EXPECT_GT(kept_back, 0);  // otherwise the list would be useless
 
     const learn::CertifiedModel fewer =
         learn::certify(model, room_problem(),
@@ -560,7 +560,7 @@ TEST(Certify, AGateOfHorizonsIsRefused)
 
 TEST(Certify, DoesNotTrustASlackOrGuardThatIsNotANumber)
 {
-    // All that is left to prove with is the logit: whatever may clear stays unproved.
+    // The logit is then the only means of proof: states that may be cleared remain unproved.
     Model model = room_model();
     model.threshold = 1;
     auto no_slack = room_problem();
@@ -604,7 +604,7 @@ protected:
 
 TEST_F(CertifyFiles, StoppedAndResumedItGivesTheSameRecordOnAnyNumberOfThreads)
 {
-    // Fine enough for some 1e5 boxes, so that there is something to stop.
+    // Fine enough for some 1e5 boxes, so that the proof can be stopped.
     learn::CertifyOptions options{
         .margin = 0.01, .levels = 2, .closest = 1e-3, .smallest = 1.0 / 65536, .threads = 1};
     const std::string whole =
@@ -649,7 +649,7 @@ TEST_F(CertifyFiles, OutOfTimeKeepsAPartialRecord)
     const learn::CertifiedModel all = learn::certify(room_model(), room_problem(), options);
     EXPECT_TRUE(all.proved());
 
-    // Of another model, or another guard, it is refused; and so is half of it.
+    // With another model or another guard the checkpoint is refused, and so is half of it.
     const auto refusal = [&](const Model& model, const learn::GuardProblem& problem) {
         return sentence<std::runtime_error>(
             [&] { static_cast<void>(learn::certify(model, problem, options)); });
@@ -678,7 +678,7 @@ TEST_F(CertifyFiles, OutOfMemoryKeepsAPartialRecord)
     ASSERT_TRUE(whole.proved());
     const std::uint64_t all = asked;
 
-    // A guard that finds no memory, at any time from the first call to the last but one in a
+    // A guard that runs out of memory, at any time from the first call to the last but one in a
     // hundred: in a search, an estimate or a proof.
     options.checkpoint = checkpoint_;
     int partial = 0;
@@ -765,7 +765,7 @@ TEST(Certificate, IsVoidOnAnyChange)
     EXPECT_NE(why([](Model& m) { m.precision = Precision::f64; }), "");
     EXPECT_NE(why([](Model& m) { m.activation = Activation::tanh; }), "");
 
-    // Through a file it stays what it was.
+    // A file preserves it.
     const Model again = parse_model(to_safetensors(good), "room");
     EXPECT_EQ(again.certificate, good.certificate);
     EXPECT_EQ(why_void(again), "");

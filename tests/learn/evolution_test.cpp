@@ -28,7 +28,7 @@ double sphere(std::span<const double> x)
     return sum;
 }
 
-/// Of condition 1e4, its axes those of the components.
+/// Condition number 1e4, with axes along the components.
 double ellipsoid(std::span<const double> x)
 {
     double sum = 0;
@@ -61,7 +61,7 @@ TEST(Evolution, TakesTheSpreadsOfAnEllipsoidOfConditionTenThousand)
                                          {.seed = 3, .max_evaluations = 40'000, .target = 1e-16});
     EXPECT_EQ(found.outcome, EvolutionOutcome::target) << describe(found.outcome);
     // Seven seeds took 5300 to 5800. With one spread for all components the slowest would
-    // take the condition times as long as the sphere.
+    // take as many times longer than the sphere as the condition number.
     EXPECT_LT(found.evaluations, 8'000U);
 }
 
@@ -87,8 +87,8 @@ TEST(Evolution, GivesUpWhereEverythingIsRefused)
 
 TEST(Evolution, IsNotMisledByNoise)
 {
-    // Noise of 1 % of the score, from the bits of x. The mean is nearer than the best one
-    // seen was worth, which was chosen for its luck.
+    // Noise of 1 % of the score, from the bits of x. The mean is nearer to the optimum than the
+    // best sample seen, which was selected for its luck.
     const Objective noisy = [](std::span<const double> x) {
         std::uint64_t hash = 1;
         for (const double value : x) {
@@ -162,14 +162,14 @@ TEST(Evolution, RefusesAnAlteredCheckpoint)
 
 TEST(Evolution, RefusesACheckpointOfOtherLengths)
 {
-    // As if somebody had changed it and its checksum: the mean is a component shorter.
+    // As if the file had been changed with its checksum: the mean is a component shorter.
     const std::filesystem::path file = scratch("evolution_short.checkpoint");
     const std::vector<double> start(3, 2.0);
     EvolutionOptions options{.max_evaluations = 100, .checkpoint = file};
     (void)evolve(sphere, start, options);
     const std::string_view line = "ricochet evolution checkpoint 1\n";
     const std::string bytes = read_checkpoint(line, file);
-    constexpr std::size_t mean = 8 * (1 + 3 + 1 + 4 + 1);  // after which its length comes
+    constexpr std::size_t mean = 8 * (1 + 3 + 1 + 4 + 1);  // its length follows here
     ASSERT_EQ(bytes[mean], 3);
     Writer shorter;
     for (std::size_t i = 0; i < bytes.size(); i += 8) {
@@ -189,9 +189,9 @@ TEST(Evolution, IsNotLostWithItsCheckpoint)
     const std::filesystem::path file = scratch("evolution_full.checkpoint");
     std::filesystem::remove_all(file);
     const std::vector<double> start(3, 2.0);
-    // What cannot be written at the start is an error: nothing is lost yet.
+    // A failure to write at the start is an error: nothing is lost yet.
     EXPECT_THROW((void)evolve(sphere, start, {.checkpoint = file / "nowhere"}), std::runtime_error);
-    // Later it is not: here a directory comes into the way.
+    // Later it is not an error: here a directory takes the place.
     int calls = 0;
     const Objective score = [&](std::span<const double> x) {
         if (++calls == 50) std::filesystem::create_directory(file);

@@ -16,7 +16,7 @@ namespace {
 
 using State = std::array<double, 2>;
 
-/// A guard that is not curved, and no more than a guard.
+/// A guard without a declared curvature, or anything else.
 struct Ramp {
     void flow(double, const State&, State& dxdt) const { dxdt = {1, 0}; }
     [[nodiscard]] double guard(double, const State& x) const { return x[0]; }

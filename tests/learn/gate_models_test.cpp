@@ -97,7 +97,7 @@ Model shuttle_model()
     return model;
 }
 
-/// Clears the horizon tau where |x| < 1 - tau: at unit speed no wall is met before.
+/// Clears the horizon tau if |x| < 1 - tau: at unit speed no wall is met earlier.
 /// Hidden: max(x, 0), max(-x, 0), whose sum is |x|.
 Model true_horizons(const std::vector<double>& horizons)
 {
@@ -280,15 +280,15 @@ TEST(Calibrated, FindsTheEventsOfTheExactDetectorInFewerCalls)
     EXPECT_EQ(s.evidence.proved, 0U);
     EXPECT_GT(s.network_calls, 100U);
     EXPECT_EQ(s.outside_domain, 0U);
-    // A flight of 200 steps is crossed in 0.32 s ahead at most, and each event is located in some
-    // 50 bisections.
+    // A flight of 200 steps is covered in at most 0.32 s at a time, and each event is located in
+    // some 50 bisections.
     EXPECT_LT(s.guard_calls, exact.statistics.guard_calls / 2);
     EXPECT_EQ(s.rollbacks, 0U);
 }
 
 TEST(Calibrated, ComesBackToAnEventThatTheGateDidNotSeeComing)
 {
-    // Clears 0.32 s always. Beyond a wall the point stays there, so that the check sees it.
+    // Always clears 0.32 s. Beyond a wall the point stays there, so that the check finds it.
     Model bold = true_horizons({0.32});
     bold.levels[0].threshold = 1e9;
     const Options options{.t_end = 50, .step = 0.01};
@@ -302,7 +302,7 @@ TEST(Calibrated, ComesBackToAnEventThatTheGateDidNotSeeComing)
 TEST(Calibrated, LooksAtEveryStepOutsideOfItsBoxAndCountsThem)
 {
     Model model = true_horizons({0.02, 0.04, 0.08});
-    model.domain[0] = {-1, 0};  // half of the way
+    model.domain[0] = {-1, 0};  // half of the path
     const Options options{.t_end = 50, .step = 0.01};
     const auto exact = integrate(Shuttle{}, at_centre, options, Fixed{});
     const auto gated =
@@ -319,7 +319,7 @@ TEST(Calibrated, LooksAtEveryStepOutsideOfItsBoxAndCountsThem)
 
 TEST(CalibratedBounds, LooksLessThanThePlannerAlone)
 {
-    // Without looking ahead; with it the planner closes half a flight by two checks.
+    // Without looking ahead; otherwise the planner closes half a flight by two checks.
     const PlannerOptions planning{.two_ended = false};
     const Options options{.t_end = 50, .step = 0.01};
     const Measured::State start{0, 1};

@@ -177,7 +177,7 @@ TEST(PolicyLosses, OfTqcAreThoseOfPyTorch)
     }
 }
 
-/// TD3 as the fixture has it.
+/// TD3 with the data of the fixture.
 struct Td3Problem {
     const json& given = fixture().at("td3");
     Td3Losses<double> losses{{.observations = number("observations"),

@@ -138,7 +138,7 @@ void expect_same_layers(const Model& a, const Model& b)
     }
 }
 
-/// Root mean square of what it misses the best action of the bandit by.
+/// Root mean square of the distance from the best action of the bandit.
 double miss(const TrainedPolicy& trained)
 {
     const Mlp<float> policy(trained.policy);
@@ -164,7 +164,7 @@ TEST_P(PolicyTrainingWith, NearsTheOptimalReturnOfALinearQuadraticRegulator)
 {
     // The cost to go is P x^2 with P = 1 + g P - g^2 P^2 b^2 / (r + g b^2 P), b = r = 1/2, and the
     // optimal action -K x with K = g b P / (r + g b^2 P) = 0.93 stays inside [-1, 1]. The episodes
-    // are cut, not over: a trainer that took them for over would learn another P.
+    // are cut, not terminal: a trainer that treated them as terminal would learn another P.
     constexpr double g = Regulator::discount;
     constexpr double a2 = g / 4;
     constexpr double a1 = 0.5 - g / 4 - g / 2;
@@ -195,8 +195,8 @@ TEST_P(PolicyTrainingWith, NearsTheOptimalReturnOfALinearQuadraticRegulator)
     }
     std::ranges::sort(costs);
     EXPECT_GT(costs.front(), 1 - 1e-6);  // nothing is better
-    // Eight seeds cost 1.001 to 1.025 times the optimum with TQC, 1.01 to 1.10 with TD3. Not
-    // acting at all costs 10 x^2, five times as much. The median, for bits
+    // Eight seeds cost 1.001 to 1.025 times the optimum with TQC, 1.01 to 1.10 with TD3. Zero
+    // action costs 10 x^2, five times as much. The median is tested because bits
     // differ between instruction sets.
     EXPECT_LT(costs[1], 1.12);
 }
@@ -259,7 +259,8 @@ TEST_P(PolicyTrainingWith, StartsFromTheNetworksOfAnother)
     const TrainedPolicy first = train(
         bandit(),
         {.steps = 2000, .random_steps = 200, .batch = 64, .polyak = 0.02, .checkpoint = file});
-    // Fifty updates from other transitions change little; without a start they teach little.
+    // Fifty updates from other transitions change little; without initial networks they teach
+    // little.
     PolicyTraining options{.steps = 100, .random_steps = 50, .batch = 64, .seed = 9};
     const TrainedPolicy fresh = train(bandit(), options);
     options.start_from = file;
@@ -284,7 +285,7 @@ TEST_P(PolicyTrainingWith, RefusesTheCheckpointOfAnotherTraining)
     options.seed = 2;
     EXPECT_THROW((void)train(regulator(), options), std::runtime_error);
     options.seed = 1;
-    // The same, but for what it starts from.
+    // The same, except for the start.
     Environment other = regulator();
     other.reset = [reset = other.reset](std::uint64_t seed, std::span<double> observation) {
         reset(seed + 1, observation);

@@ -25,7 +25,7 @@ struct Episode {
     std::array<double, 9> observation{};  // the last
 };
 
-/// An episode by a rule for actions.
+/// An episode with a rule for actions.
 template <class Action>
 Episode act(const StepWorld& world, const Action& action)
 {
@@ -63,7 +63,7 @@ TEST(StepWorld, ActionsSpanTheSteps)
     }
 }
 
-// The episode is the run: to the bit, whatever the estimate and scheme.
+// The episode is the run, to the bit, for any estimate and scheme.
 TEST(StepWorld, AConstantActionIsAConstantStepOfAFault)
 {
     const StrikeSlipFault fault({.elements = 2});
@@ -85,7 +85,7 @@ TEST(StepWorld, AConstantActionIsAConstantStepOfAFault)
         EXPECT_EQ(episode.trial.steps, run.statistics.steps);
         EXPECT_EQ(episode.trial.solves, run.statistics.solves);
         EXPECT_EQ(episode.trial.iterations, run.statistics.iterations);
-        // A function of the final slip, which is the same double.
+        // The error is a function of the final slip, which is the same double.
         const Rupture other = simulate(fault, {.t_end = 20,
                                                .step = 0.01 * fault.time_unit(),
                                                .rtol = std::numeric_limits<double>::infinity()});
@@ -104,13 +104,13 @@ TEST(StepWorld, AConstantActionIsAConstantStepOfAnInclusion)
     const StepTrial run =
         problem.run({.controller = ConstantStep{}, .step = h / problem.usual_step});
     EXPECT_EQ(episode.trial.steps, run.steps);
-    // h / usual_step * usual_step is h to a rounding, which is what the errors then differ by.
+    // h / usual_step * usual_step is h up to a rounding, by which the errors then differ.
     EXPECT_NEAR(episode.trial.error, run.error, 1e-12);
     EXPECT_NEAR(episode.trial.final_error, run.final_error, 1e-12);
 }
 
-// Without a discount equation 7 pays for the time covered, however many steps cover it: the sum of
-// (h - h_min) / (h_max - h_min) is (T - n h_min) / (h_max - h_min).
+// Without a discount equation 7 rewards the time covered, independently of the number of steps: the
+// sum of (h - h_min) / (h_max - h_min) is (T - n h_min) / (h_max - h_min).
 TEST(StepWorld, ThePublishedReturnTelescopes)
 {
     const double t_end = 0.5;
@@ -135,7 +135,7 @@ TEST(StepWorld, ThePublishedReturnTelescopes)
     EXPECT_GT(small.attempts, 700U);
 }
 
-// So the error alone decides: of constant steps the smallest are paid best.
+// So the error alone decides: among constant steps the smallest have the largest return.
 TEST(StepWorld, ThePublishedReturnIsLargestForTheSmallestSteps)
 {
     StepWorldOptions options = published_step_world();
@@ -179,7 +179,7 @@ TEST(StepWorld, AdditiveRewardsAreMinusTheCostOfTheRun)
     }
 }
 
-// Steps of a fault that are too long have no solution: nothing moves, and in the end it is over.
+// Steps of a fault that are too long have no solution: nothing moves, and finally the episode ends.
 TEST(StepWorld, StepsWithoutASolutionArePunished)
 {
     const StepWorldOptions options{.scale = StepScale::linear, .h_min = 0.01};
@@ -192,7 +192,7 @@ TEST(StepWorld, StepsWithoutASolutionArePunished)
     EXPECT_EQ(episode.trial.steps, 0U);
 }
 
-// Sums of a state of 1e308 overflow: infinity less infinity.
+// Sums of a state of 1e308 overflow: infinity minus infinity.
 TEST(StepWorld, ANotANumberEndsTheEpisode)
 {
     for (const ErrorEstimate estimate : {ErrorEstimate::none, ErrorEstimate::embedded}) {
@@ -215,7 +215,7 @@ TEST(StepWorld, AttemptsAreLimited)
     EXPECT_EQ(episode.attempts, 7U);
 }
 
-// A policy that answers the same whatever it sees.
+// A policy with a constant output.
 TEST(StepWorld, PoliciesAreFollowed)
 {
     const StepWorld world = step_world(SlidingMode{}, 0.15, 0.5, {.h_min = 1e-4});
@@ -249,7 +249,7 @@ TEST(StepWorld, RefusesOptionsThatCannotBe)
     }
     refused({.h_min = 0.1, .h_max = 0.05});
     refused({.max_attempts = 0});
-    // The free estimate is not of the source's first stage.
+    // The free estimate does not apply to the source's first stage.
     refused({.first_stage = FirstStage::at_end});
 }
 

@@ -23,14 +23,14 @@ LearnedStep rule_of(const StepLayout& layout, const std::vector<double>& weights
 TEST(WorkCurve, FindsTheWorkAfterWhichTheErrorStaysBelow)
 {
     WorkCurve curve;
-    // The second point is there by luck: the third is above it.
+    // The second point is an accident: the third is above it.
     for (const auto& [work, error] : {std::pair{0.0, 0.0}, {1.0, -4.0}, {2.0, -2.0}, {3.0, -4.0}}) {
         curve.add(work, error);
     }
     curve.finish();
     EXPECT_DOUBLE_EQ(curve.work_at(-3), 2.5);
     EXPECT_DOUBLE_EQ(curve.work_at(-4), 3);
-    // Beyond the ends as of order 2: four times less error for twice the work.
+    // Beyond the ends the curve has order 2: four times less error for twice the work.
     EXPECT_DOUBLE_EQ(curve.work_at(-6), 4);
     EXPECT_DOUBLE_EQ(curve.work_at(2), -1);
 }
@@ -56,7 +56,7 @@ TEST(StepProblem, PrescribedStepsAreTaken)
         std::make_shared<const std::vector<double>>(std::vector<double>{0.01, 0.02, 0.005, 0.0125});
     const StepTrial trial = problem.run({.controller = PrescribedSteps{.lengths = lengths}});
     EXPECT_TRUE(trial.ended);
-    // 0.0475, and once more the last for what is left.
+    // 0.0475, and a last one for the remainder.
     EXPECT_EQ(trial.steps, 5U);
     const auto none = std::make_shared<const std::vector<double>>(std::vector<double>{0.01, 0});
     EXPECT_THROW((void)problem.run({.controller = PrescribedSteps{.lengths = none}}),
@@ -81,14 +81,14 @@ TEST(StepScore, OfTheClassicalRuleIsNearZero)
     const StepScore score(family, 1);
     const LearnedStep plain = rule_of(family.layout);
     for (const StepScore::Part& part : score.parts(plain)) {
-        // Its own curve is one of two that it is compared with, at the tolerances between those
-        // of the curve: no better, and as ragged as six problems are.
+        // Its own curve is one of the two with which it is compared, at tolerances between those
+        // of the curve: it is no better, and as irregular as six problems are.
         EXPECT_LT(part.gain, 0.15);
         EXPECT_EQ(part.off, 0.0);
         EXPECT_EQ(part.failed, 0.0);
     }
     EXPECT_EQ(score(plain), score(plain));
-    // Steps four times longer or shorter than asked for are no bargain.
+    // Steps four times longer or shorter than requested are no gain.
     for (const double value : {-2.0, 2.0}) {
         std::vector<double> weights(step_policy_weights, 0.0);
         weights.back() = value;
@@ -123,7 +123,7 @@ TEST(StepTraining, ImprovesAndResumesToTheSameBits)
 
 TEST(StepTraining, StopsInTheMidstOfARunAndResumesToTheSameBits)
 {
-    // In the classical rules that are run first, in the search, and after it.
+    // Interrupts in the classical rules that are run first, in the search, and after it.
     const StepFamily family = sliding_mode_family(5, 1);
     const auto directory =
         std::filesystem::temp_directory_path() / ("step-stopping-" + std::to_string(getpid()));

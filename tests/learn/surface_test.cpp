@@ -41,7 +41,7 @@ struct Floor {
 };
 static_assert(SurfaceProblem<Floor>);
 
-/// x' = -1 towards a surface at 0, from which nothing limits the way back.
+/// x' = -1 towards a surface at 0; backward nothing limits the motion.
 struct Wall {
     using State = double;
 
@@ -64,7 +64,7 @@ TEST(Surface, LabelsAreThoseOfTheExactBoundary)
     for (std::size_t i = 0; i < sample.data.size(); ++i) {
         const auto x = sample.data.row(i);
         const double end = x[0] + x[1] * h - gravity * h * h / 2;
-        // Where rounding decides the label, it may decide either way.
+        // Where rounding decides the label, either label is accepted.
         if (std::abs(end) < 1e-15) continue;
         EXPECT_EQ(sample.data.labels[i] != 0, end <= 0) << x[0] << ' ' << x[1];
     }
@@ -149,7 +149,7 @@ TEST(Surface, RefusesWhatCannotBeSampled)
     EXPECT_THROW((void)sample_surface(Floor{}, fall, {.step = 0}), std::invalid_argument);
     EXPECT_THROW((void)sample_surface(Floor{}, fall, {.step = -0.1}), std::invalid_argument);
     EXPECT_THROW((void)sample_surface(Floor{}, fall, {.margin = 1}), std::invalid_argument);
-    // Nothing ever comes nearer, so there are no clear states to be had.
+    // Nothing ever comes nearer, so there are no clear states.
     const auto stand = [](double x, double) { return x; };
     EXPECT_THROW((void)sample_surface(Wall{}, stand, {.events = 1, .clear = 1}),
                  std::invalid_argument);

@@ -37,7 +37,7 @@ public:
             losses.critic().initialise(targets.data() + c * losses.critic().size(), random);
         }
         losses.actor().draw(noise, random);
-        // Noise large enough for its share of the gradient to be seen.
+        // Noise large enough for its part of the gradient to be visible.
         for (std::size_t j = 0; j < 4; ++j) {
             for (std::size_t a = 0; a < 2; ++a) {
                 actor[losses.actor().deviation_offset() + j * padded<double>(2) + a] =
@@ -231,7 +231,7 @@ TEST(TqcLosses, DropsTheTopQuantilesOfAllCriticsTogether)
 template <class T>
 void expect_same_products(InstructionSet set, double tolerance)
 {
-    // 13 x 21 times 21 x 16, and its outer product: odd sizes, blocks and what is left of them.
+    // 13 x 21 times 21 x 16, and its outer product: odd sizes, with whole blocks and remainders.
     if (!supported(set)) GTEST_SKIP() << "not on this processor";
     Random random(5);
     const auto fill = [&](std::size_t n) {

@@ -46,14 +46,14 @@ TEST(TrainClassifier, AnySystemGetsANetworkFromItsOwnRuns)
     EXPECT_EQ(trained.model.recipe, "state");
     EXPECT_EQ(trained.model.step_min, 0.02);
     ASSERT_TRUE(trained.report.fresh.has_value());
-    // It has learned something: nearly all events are foreseen, and most clear states are cleared.
+    // The network has learned: nearly all events are predicted, and most clear states are cleared.
     const Assessment& fresh = *trained.report.fresh;
     EXPECT_LT(fresh.miss_bound, 0.02);
     EXPECT_GT(fresh.cleared_share, 0.7);
     EXPECT_GE(trained.trial.events, 200u);
     EXPECT_LT(trained.trial.network_calls, trained.trial.exact_calls / 2);
     EXPECT_LE(50 * trained.trial.missed, trained.trial.events);
-    // The guard is a subtraction: no network pays, and the trial says so.
+    // The guard is a subtraction: no network pays, and the trial reports so.
     EXPECT_FALSE(trained.trial.pays());
     EXPECT_NE(trained.trial.describe().find("is faster"), std::string::npos)
         << trained.trial.describe();

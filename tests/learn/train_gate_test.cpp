@@ -98,7 +98,7 @@ GateTraining quick()
     return training;
 }
 
-/// Of a progress report: states are not being sampled, nor events compared.
+/// Whether a progress report belongs to the training, not to sampling or comparing events.
 bool trains(const Progress& progress)
 {
     return progress.stage == "training";
@@ -111,7 +111,7 @@ TEST(TrainGate, SavesMostChecksOfABlackBoxAndKeepsItsEvents)
     EXPECT_EQ(trained.report.outcome, TrainingOutcome::finished) << to_json(trained.report);
     EXPECT_GE(trial.events, 300U);
     EXPECT_EQ(trial.misses, 0U);
-    // Some 50 calls of 200 steps locate an event; the looks of the others are to go.
+    // Some 50 calls in 200 steps locate an event; the checks of the other steps should disappear.
     EXPECT_GT(trial.gain(), 2) << to_json(trained.report);
     EXPECT_EQ(trained.model.calibration.events, trial.events);
     EXPECT_NEAR(trained.model.calibration.miss_bound, 3.0 / static_cast<double>(trial.events),
@@ -176,7 +176,7 @@ TEST(TrainGate, LearnsLevelsFromBelow)
     for (std::size_t k = 1; k < levels.size(); ++k) {
         EXPECT_LE(levels[k].threshold, levels[k - 1].threshold);
     }
-    // In a run of its own what is cleared is not more than the guard.
+    // In a separate run the cleared level never exceeds the guard.
     const gates::Gate gate(trained.model);
     const auto run = integrate(MeasuredTable{}, X{0, 0.3, 0.4, 0.1},
                                {.t_end = 30,
@@ -364,7 +364,7 @@ TEST(TrainGate, RefusesRunsWithoutEventsAndRunsOfNothingButEvents)
                   }());
               }).find("hold no event"),
               std::string::npos);
-    training.levels = {1000};  // of horizons that every run ends before
+    training.levels = {1000};  // for horizons beyond the end of every run
     training.validation_events = 20;
     EXPECT_NE(refusal([&] {
                   (void)train_gate(Table{}, on_the_table(), Fixed{}, {}, training);
@@ -377,7 +377,7 @@ TEST(TrainGate, RefusesRunsWithoutEventsAndRunsOfNothingButEvents)
               std::string::npos);
 }
 
-/// It says that it is half as fast as it is.
+/// It declares half of its speed.
 struct BoastfulTable : MeasuredTable {
     static constexpr std::string_view name = "boastful-table";
     template <class V>

@@ -1,4 +1,4 @@
-// Training sets made again, beside what training_data/ holds of them.
+// Training sets generated again, compared with the data in training_data/.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -52,8 +52,8 @@ inline bool same_elementary_functions()
 }
 
 /// Expects the numbers of two CSV files to be equal to 1e-9, relative to the larger of 1 and the
-/// number. Where exp or sin is rounded otherwise, the first rows were found to differ by 2e-10 at
-/// most: error control takes other steps.
+/// number. Where exp or sin is rounded differently, the first rows were found to differ by 2e-10 at
+/// most: error control then takes other steps.
 inline void expect_nearly_equal_rows(const std::string& expected, const std::string& found)
 {
     std::istringstream a(expected);
@@ -96,8 +96,8 @@ inline void expect_stored(std::string_view model, const TrainingSet& set)
     expect_nearly_equal_rows(stored_csv, csv);
 }
 
-/// Checks that the features of a gate's training part have the mean that the shipped network takes
-/// from them, to `tolerance` standard deviations, and lie in its box: it was trained on these
+/// Checks that the features of a gate's training part have the mean that the shipped network
+/// subtracts, to `tolerance` standard deviations, and lie in its box: it was trained on these
 /// states.
 inline void expect_trained_on(std::string_view gate, const TrainingSet& set, double tolerance)
 {

@@ -121,7 +121,7 @@ TEST(FrictionSet, SpansTheSlipRatesThatTheModelIsFor)
 
 class Program : public App {
 protected:
-    /// Status 2, one sentence with this piece, nothing printed and no file more.
+    /// Status 2, one sentence with this piece, nothing printed and no additional file.
     void expect_one_sentence(const Words& words, std::string_view piece) const
     {
         const Words before = files();

@@ -16,7 +16,7 @@ INSTANTIATE_TYPED_TEST_SUITE_P(Newton, LocatorSuite, Newton);
 
 TEST(Newton, AParabolaCostsOneStep)
 {
-    // The first guess is exact on cubics, and what is left is closed along the flow.
+    // The first guess is exact on cubics, and the remaining error is removed along the flow.
     const HostStep step(
         19.0, [](double s) { return s * (2.5 - s); }, [](double s) { return 2.5 - 2 * s; });
     (void)locate<Newton>(step, Side::above);
@@ -40,8 +40,8 @@ TEST(Newton, TheSlopeIsTheRateOfTheGuardAtTheEvent)
 
 TEST(Newton, ARootOfHigherOrderCostsAtMostSixtySteps)
 {
-    // Newton's method alone gains a factor of 1 - 1/m a sample, which took 100 steps for m = 3 and
-    // 134 for m = 5.
+    // Newton's method alone gains a factor of 1 - 1/m per sample, which took 100 steps for m = 3
+    // and 134 for m = 5.
     for (const int order : {3, 5}) {
         for (const double root : {0.3, 0.7}) {
             const HostStep step(
@@ -86,7 +86,7 @@ constexpr double root = 0.3141592653589793;
 
 TEST(Newton, FlatRootsWithoutARateAreLocatedToNeighbouringDoubles)
 {
-    // The difference that stands for the rate spans 2e-5, and says nothing nearer than that.
+    // The difference that replaces the rate spans 2e-5, and contains no information below that.
     for (const auto function :
          {+[](double x) { return std::pow(x - root, 3); },
           +[](double x) { return std::pow(x - root, 5); },

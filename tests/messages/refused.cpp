@@ -15,7 +15,7 @@ struct Falling {
     double guard(double, const X& x) const { return x[0]; }
 };
 
-/// Names of their own purpose.
+/// Names with a purpose of their own.
 struct Allowed : Falling {
     struct Rest {};
     double gard = 1, lower = 0;
@@ -24,7 +24,7 @@ struct Allowed : Falling {
     void enable() const {}
 };
 
-/// Names that are meant.
+/// Names that are intended.
 struct Unchecked : Falling {
     static constexpr bool unchecked_names = true;
     void Reset() const {}

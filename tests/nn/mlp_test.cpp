@@ -60,7 +60,7 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b)
            (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
 }
 
-/// What a constructor says when it refuses, or nothing.
+/// The message of a constructor that refuses, or nothing.
 std::optional<std::string> refusal(const Model& model)
 {
     try {
@@ -196,7 +196,7 @@ Model bare_tanh()
 TYPED_TEST(MlpTest, TanhIsWithinFiveUlp)
 {
     // An ulp of the result is 2 u times its power of two. The arguments are evenly
-    // spread over the representable numbers from 2^-30 to 32, where exponents count
+    // spread over the representable numbers from 2^-30 to 32, so that exponents count
     // as much as mantissas.
     const Mlp<TypeParam> mlp(bare_tanh());
     using Bits = std::conditional_t<sizeof(TypeParam) == 4, std::uint32_t, std::uint64_t>;

@@ -1,5 +1,5 @@
 // RICOCHET_TEST_FIXTURES is the folder of the stored files. RICOCHET_PYTHON_WITH_TORCH,
-// where there is one, is a Python that has PyTorch, and RICOCHET_EXPORT_SCRIPT the script
+// if it exists, is a Python with PyTorch, and RICOCHET_EXPORT_SCRIPT is the script
 // that it runs.
 #include "ricochet/nn/model.hpp"
 
@@ -49,7 +49,7 @@ Model example()
     return model;
 }
 
-/// A file taken apart, so that tests can change its parts.
+/// The parts of a file, which tests can change.
 struct File {
     explicit File(const Model& model, const LoadOptions& options = {})
     {
@@ -85,7 +85,7 @@ std::vector<std::byte> join(const File& file)
     return join(file.header.dump(), file.data);
 }
 
-/// What is said about a file that is refused, or "".
+/// The message about a file that is refused, or "".
 std::string refusal(const std::vector<std::byte>& bytes, const LoadOptions& options = {})
 {
     try {
@@ -204,7 +204,7 @@ TEST(Safetensors, AGivenSelfTestIsKept)
 {
     Model model = example();
     model.self_test = parse_model(to_safetensors(model), "m").self_test;
-    model.self_test.input[0] += 1e-9;  // far below what rounding to float lets through
+    model.self_test.input[0] += 1e-9;  // far below the tolerance for rounding to float
     const Model read = parse_model(to_safetensors(model), "m");
     EXPECT_EQ(read.self_test.input, model.self_test.input);
     EXPECT_EQ(read.self_test.output, model.self_test.output);
@@ -229,13 +229,13 @@ TEST(Safetensors, TheDataBeginAtAMultipleOfEightBytes)
 
 TEST(Safetensors, UnknownMetadataAreIgnored)
 {
-    // Other tools leave their own, e.g. format: pt.
+    // Other tools leave their own entries, e.g. format: pt.
     EXPECT_EQ(refusal_with_metadata("format", "pt"), "");
 }
 
 TEST(Safetensors, NonFiniteWeightsAreAcceptedOnRequest)
 {
-    // max(0, x) keeps the NaN, so both logits are NaN, as the self-test says.
+    // max(0, x) keeps the NaN, so both logits are NaN, as stored in the self-test.
     Model model = example();
     model.activation = Activation::relu;
     model.layers[0].weight[4] = nan;
@@ -341,7 +341,7 @@ TEST(Safetensors, RefusesAKeyThatAppearsTwice)
 {
     EXPECT_EQ(refusal(join(R"({"a": {}, "b": {"c": 1, "c": 2}})", {})),
               "m.safetensors: header: key \"c\" appears twice");
-    // The same key in two objects is none of this.
+    // The same key in two objects is no duplicate.
     EXPECT_EQ(refusal(join(R"({"a": {"c": 1}, "b": {"c": 2}})", {})),
               "m.safetensors: tensor \"a\": expected \"dtype\", found none");
 }

@@ -1,4 +1,4 @@
-// Built with -O3 -march=native where the compiler knows it, as users build header-only
+// Built with -O3 -march=native where the compiler supports it, as users build header-only
 // code, and linked with a library built for the baseline.
 #include "ricochet/nn/mlp.hpp"
 

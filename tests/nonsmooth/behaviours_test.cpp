@@ -1,5 +1,5 @@
-// What a solver of variational inequalities is expected to do on problems that are hardly ones:
-// behaviours that the reference implementation of the Bathe integrator tests for itself.
+// Expected behaviour of a solver of variational inequalities on nearly trivial problems, which
+// the reference implementation of the Bathe integrator also tests.
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 using namespace sets;
 
-/// A set that is everything: its projection is the identity, and the reaction zero.
+/// The whole space as a set: its projection is the identity, and the reaction is zero.
 struct Everything {
     [[nodiscard]] static std::size_t dimension() { return 5; }
     static void project(std::span<const double> z, std::span<double> p)
@@ -77,8 +77,8 @@ struct Decay {
 
 TEST(NonsmoothBehaviours, NoStepIsShorterThanTheLeastOne)
 {
-    // The tolerance cannot be met at the least step: the run says so, and no step taken was
-    // shorter, but for the last one of a run that ends.
+    // The tolerance cannot be met at the least step: the run reports so, and no step was
+    // shorter, except for the last one of a run that ends.
     const double h_min = 1e-3;
     SetValuedMotion<Decay> motion(Decay{}, Decay::Vector::Constant(1.0),
                                   {.t_end = 1,
@@ -96,7 +96,7 @@ TEST(NonsmoothBehaviours, NoStepIsShorterThanTheLeastOne)
     EXPECT_GE(shortest, h_min);
 }
 
-/// 300 masses in a row on springs, rubbing on the floor.
+/// 300 masses in a row on springs, with friction on the floor.
 struct Chain {
     static constexpr int state_size = Eigen::Dynamic;
     static constexpr int reaction_size = Eigen::Dynamic;
@@ -155,7 +155,7 @@ TEST(NonsmoothBehaviours, AChainOfThreeHundredUnknownsIsFollowed)
                                   {.t_end = 1, .step = 0.1});
     ASSERT_EQ(motion.run(), Outcome::reached_end);
     EXPECT_TRUE(motion.state().w.allFinite());
-    // The front has passed a few masses; the rest is held by the floor, to the residual.
+    // The front has passed a few masses; the floor holds the others, to the residual.
     EXPECT_GT(motion.state().w[0], 0.01);
     EXPECT_LT(motion.state().w.segment(100, 50).cwiseAbs().maxCoeff(), 1e-12);
 }

@@ -36,8 +36,8 @@ struct Ball {
 
 // Dropped from 0.8 m under 10 m/s^2: the first impact is at 0.4 s with 4 m/s, the flights
 // after it last 0.8 s e^n, and they end at 0.4 + 0.8 e / (1 - e) = 1.2 s for e = 1/2. All
-// impulses of the floor up to then are 12 N s, the weight over that time, so that friction,
-// while it slides, takes 0.2 of that from the velocity: as it does afterwards.
+// impulses of the floor up to then are 12 N s, the weight over that time, so that sliding friction
+// reduces the velocity by 0.2 of that, the same as afterwards.
 
 TEST(ContactMotion, ImpactsAccumulateIntoSlidingAndRest)
 {
@@ -51,7 +51,7 @@ TEST(ContactMotion, ImpactsAccumulateIntoSlidingAndRest)
     double u = 4;
     for (int n = 0; n < 20; ++n) {
         const auto& impact = run.events[static_cast<std::size_t>(n)];
-        const double speed = 4 * std::pow(0.5, n);  // before it, downward
+        const double speed = 4 * std::pow(0.5, n);  // just before it, downward
         u -= 0.2 * 1.5 * speed;
         EXPECT_NEAR(impact.t, t, 1e-14 * (n + 1)) << n;
         EXPECT_NEAR(impact.after[2], u, 1e-12) << n;
@@ -66,14 +66,15 @@ TEST(ContactMotion, ImpactsAccumulateIntoSlidingAndRest)
     EXPECT_NEAR(run.trajectory.x[2][2], 1, 1e-9);
     EXPECT_NEAR(run.x[2], 0, 1e-12);
     EXPECT_NEAR(run.x[3], 0, 1e-12);
-    EXPECT_NEAR(run.x[1], 0, 10 * h * h);  // what a step may fall before it is closed
+    EXPECT_NEAR(run.x[1], 0, 10 * h * h);  // distance that a body may fall in a step before the
+                                           // contact is closed
     EXPECT_EQ(run.t, 3);
 }
 
 TEST(ContactMotion, GoesBackToFlightWhereTheContactOpens)
 {
     // At rest until a pull of 14 m/s^2 sets in: then up with 4 m/s^2. The step in which it
-    // opens is as long as h, which is what the height is off by.
+    // opens has the length h, which determines the error of the height.
     for (const double h : {1e-3, 1e-4}) {
         const auto run = hand_over(Ball{.lift = 14, .lift_at = 1}, {0, 0}, {0, 0},
                                    {.t_end = 2, .set_valued = {.step = h}});
@@ -99,14 +100,14 @@ TEST(ContactMotion, ABlockThatFallsOnTwoCornersComesToRest)
     EXPECT_GT(run.statistics.contact_time, 1);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(run.x[3 + i], 0, 1e-8) << i;
     EXPECT_NEAR(run.x[2], 0, 1e-4);
-    // Friction of both corners stops what is left of the metre per second.
+    // Friction of both corners stops the remaining motion.
     EXPECT_GT(run.x[0], 0);
 }
 
 TEST(ContactMotion, TheWoodpeckerDescendsAsUnderTimeSteppingAlone)
 {
     // A sleeve that jams and slides is in contact most of the time; its beak strikes in
-    // between. Both are of order 1 there, so that the descents agree to some steps.
+    // between. Both methods are of order 1 there, so the descents agree to some steps.
     const Woodpecker toy;
     const double h = 1e-5;
     const auto run = hand_over(toy, Woodpecker::start(), Woodpecker::start_velocity(),
@@ -158,7 +159,7 @@ TEST(ContactMotion, ElasticImpactsKeepTheEnergyToRounding)
         return v.dot(m * v) / 2;
     };
     const double start = energy(FreeFlight<Shuttle>::state({0, 0.5}, {0.3, 1}));
-    // Some ten operations of an impact round, each by at most 1.1e-16.
+    // Some ten operations per impact are rounded, each by at most 1.1e-16.
     for (const auto& impact : run.events) {
         EXPECT_NEAR(energy(impact.after), energy(impact.before), 2e-15 * start) << impact.t;
     }

@@ -51,7 +51,7 @@ TEST(ContactSolver, WithoutFrictionItIsALinearComplementarityProblem)
         branches.setConstant(Branch::inside);
         Eigen::Vector3d expected, u;
         ASSERT_TRUE(cases.solve(expected, u, branches));
-        // The same with a tangent that has nothing to do.
+        // The same with an irrelevant tangent.
         Eigen::MatrixXd w = Eigen::MatrixXd::Identity(6, 6);
         Eigen::VectorXd q = Eigen::VectorXd::Ones(6);
         for (int i = 0; i < 3; ++i) {
@@ -70,7 +70,7 @@ TEST(ContactSolver, WithoutFrictionItIsALinearComplementarityProblem)
 
 TEST(ContactSolver, RedundantContactsShareAForceThatIsRight)
 {
-    // Four feet under one weight: the sum is determined, its parts are not.
+    // Four feet under one weight: the sum is determined, the parts are not.
     Eigen::MatrixXd h(8, 2);
     for (int i = 0; i < 4; ++i) h.row(2 * i) << 1, 0, h.row(2 * i + 1) << 0, 1;
     const Eigen::MatrixXd w = h * h.transpose();
@@ -84,7 +84,7 @@ TEST(ContactSolver, RedundantContactsShareAForceThatIsRight)
     EXPECT_NEAR(sum[1], -0.5, 1e-9);
 }
 
-// Residuals of the law itself, written out.
+// Residuals of the law itself, written explicitly.
 void expect_law_holds(const RandomContacts& problem, const Eigen::VectorXd& p, double tolerance)
 {
     const Eigen::VectorXd u = problem.w * p + problem.q;
@@ -102,7 +102,8 @@ void expect_law_holds(const RandomContacts& problem, const Eigen::VectorXd& p, d
         const double bound = problem.friction[c] * std::max(0.0, p[i]) * unit;
         EXPECT_LE(friction, bound + 3 * tolerance);
         if (sliding > 100 * tolerance) {
-            // Against the sliding and at the bound: p_t.u_t = -|p_t| |u_t|, to first order.
+            // Friction opposes the sliding and is at the bound: p_t.u_t = -|p_t| |u_t|, to first
+            // order.
             const double power = p.segment(i + 1, n - 1).dot(u.segment(i + 1, n - 1));
             EXPECT_NEAR(power, -bound * sliding, 20 * tolerance * (sliding + bound + tolerance));
         }
@@ -156,7 +157,8 @@ TEST(ContactSolver, ACornerWithoutASolutionIsReported)
     }
     for (const double friction : {1.0, 2.0}) {
         const std::array both = {friction, friction};
-        // From rest, and from where every defect of velocity is small beside the impulse.
+        // From rest, and from a start where every defect of velocity is small compared with the
+        // impulse.
         for (const double start : {0.0, 5e12, 1e300}) {
             Eigen::VectorXd p = Eigen::VectorXd::Constant(4, start);
             const ContactReport report = solver.solve(w, q, both, 2, p);

@@ -1,4 +1,4 @@
-// Step controllers: their formulas. What all of them must do is in conformance/controllers.hpp.
+// Step controllers: their formulas. Their common properties are in conformance/controllers.hpp.
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ TEST(StepControllers, TheFilterIsH211bAndForgetsAfterThreeRejections)
     EXPECT_DOUBLE_EQ(rule.judge(0.9, 1).factor,
                      std::pow(0.9, -0.125) * std::pow(0.6, -0.125) * std::pow(first, -0.25));
     EXPECT_EQ(rule.judge(1e-9, 1).factor, 1.2);
-    // Errors somewhat above 1 are let pass, as the factor stays above 0.8.
+    // Errors somewhat above 1 are accepted, as the factor stays above 0.8.
     EXPECT_TRUE(FilteredStep::h211b(4).judge(2, 1).accepted);
     FilteredStep harsh = FilteredStep::h211b(4);
     for (int i = 0; i < 3; ++i) {
@@ -66,7 +66,7 @@ TEST(StepControllers, ThePrintedPiRuleDoesNotControlTheError)
         EXPECT_EQ(a.accepted, b.accepted);
         EXPECT_NEAR(a.factor, b.factor, 1e-12);
     }
-    // And a constant error, however small, is rejected for ever: 1 < c1 = 1.8.
+    // A constant error, however small, is rejected forever: 1 < c1 = 1.8.
     PrintedPiStep rule;
     EXPECT_TRUE(rule.judge(0.1, 1).accepted);
     EXPECT_FALSE(rule.judge(0.1, 1).accepted);

@@ -1,4 +1,4 @@
-// Every convex set by the suite of all.
+// Applies the common suite to every convex set.
 #include "conformance/convex_sets.hpp"
 
 namespace ricochet::test::convex_sets_conformance_test {
@@ -8,7 +8,7 @@ using namespace sets;
 
 constexpr double inf = std::numeric_limits<double>::infinity();
 
-/// Of [lower, upper].
+/// Violation of [lower, upper].
 double interval_violation(double x, double lower, double upper)
 {
     return std::max(lower - x, x - upper);
@@ -122,7 +122,7 @@ std::vector<SetCase> all()
                               interval_violation(x[5], -1, 1)});
          },
          [](const Vector& n) {
-             // What rounding leaves of the cone's part is measured against the whole.
+             // The rounding in the cone's part is measured relative to the whole.
              const Vector in_cone = part(n, 2, 3);
              const bool cancelled = length(in_cone) <= 1e-12 * length(n);
              return length(part(n, 0, 2)) + (cancelled ? 0 : cone_support(in_cone, 0.5)) +
@@ -143,7 +143,7 @@ std::vector<SetCase> all()
 INSTANTIATE_TEST_SUITE_P(All, ConvexSetSuite, testing::ValuesIn(all()),
                          [](const auto& info) { return info.param.name; });
 
-// Sets without an interior, whose points are few.
+// Sets without an interior, which have few points.
 
 /// The nearest point to z of a set that is a point, or a half line along the first axis.
 template <class Set>

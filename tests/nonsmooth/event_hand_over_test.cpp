@@ -1,4 +1,4 @@
-// Ordinary hybrid systems that also know their motion as an inclusion.
+// Ordinary hybrid systems that also give their motion as an inclusion.
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 namespace ricochet::event_hand_over_test {
 namespace {
 
-/// A mass on a spring and on a belt, written as one would without a thought of sticking: the
-/// sign of the sliding velocity is a guard, and the flow asks for it.
+/// A mass on a spring and on a belt, written without regard to sticking: the
+/// sign of the sliding velocity is a guard, and the flow uses it.
 struct Belt {
     using State = std::array<double, 2>;
     FrictionInclusion inclusion;
@@ -34,7 +34,7 @@ struct Belt {
 
 TEST(EventHandOver, AMassThatWouldChatterSticks)
 {
-    // From 2 m against 0.3 N: turns at pi, 2 pi and 3 pi, 0.6 m less each time, and stays at
+    // From 2 m against 0.3 N: it turns at pi, 2 pi and 3 pi, 0.6 m less each time, and stays at
     // -0.2 m, where the spring is weaker than friction.
     const Belt belt{FrictionInclusion({.friction = 0.3})};
     const auto run =
@@ -58,8 +58,8 @@ TEST(EventHandOver, AMassThatWouldChatterSticks)
 
 TEST(EventHandOver, StickSlipIsGivenBackAtEverySlip)
 {
-    // Sticks on the belt while the spring is stretched to what friction bears, 1 N at 1 m,
-    // slips there, and so on: the slips are one period apart.
+    // It sticks to the belt until the spring is stretched to the largest static friction, 1 N at 1
+    // m, then slips, and so on: the slips are one period apart.
     const Belt belt{FrictionInclusion(
         {.belt_speed = 0.2, .friction = 1, .weakening = 3, .law = FrictionLaw::hyperbolic})};
     const auto run =
@@ -96,7 +96,7 @@ TEST(EventHandOver, StepsOfAllPhasesCountTowardsTheLimit)
         return run.statistics.event_driven.steps + run.statistics.set_valued.attempted;
     };
     const std::uint64_t all = taken(with(1'000'000));
-    // The last of three quarters of the steps is far behind the first hand-over.
+    // Three quarters of the steps end far after the first hand-over.
     const auto run = with(all * 3 / 4);
     EXPECT_EQ(run.outcome, Outcome::step_limit);
     EXPECT_GT(run.phases.size(), 2U);
@@ -104,7 +104,7 @@ TEST(EventHandOver, StepsOfAllPhasesCountTowardsTheLimit)
     EXPECT_EQ(with(all + 1).outcome, Outcome::reached_end);
 }
 
-/// With modes, whose reset leads from one field into the other and back: endless at one instant.
+/// A relay with modes, whose reset alternates between the fields: endless at one instant.
 struct Relay {
     using State = Eigen::Matrix<double, 1, 1>;
     SlidingMode inclusion;
@@ -142,7 +142,7 @@ TEST(EventHandOver, TwoFieldsThatPointAtEachOtherSlide)
     EXPECT_EQ(run.x[0], 0);
 }
 
-/// A mass on a spring, under two sines, on a surface that swings: w' = B w + load + friction.
+/// A mass on a spring, under two sines, on an oscillating surface: w' = B w + load + friction.
 struct LoadedInclusion {
     static constexpr int state_size = 2;
     static constexpr int reaction_size = 1;
@@ -207,7 +207,7 @@ struct LoadedBelt {
     [[nodiscard]] const LoadedInclusion& set_valued() const { return inclusion; }
 };
 
-/// The run agrees with that of the inclusion alone, and its sticking does not fill it with
+/// The run agrees with that of the inclusion alone, and its sticking does not cause many
 /// crossings: 201 to 401 at each of a few hand-overs.
 void expect_few_crossings(const LoadedBelt& belt, const LoadedBelt::State& x0, double t_end,
                           double tolerance)
@@ -217,7 +217,7 @@ void expect_few_crossings(const LoadedBelt& belt, const LoadedBelt::State& x0, d
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_LE(run.events.size(), 401 * run.phases.size());
     const auto alone = hand_over(belt.inclusion, Eigen::Vector2d(x0[0], x0[1]), {.t_end = t_end});
-    // A crossing within a step costs what a step may be off by, at each of some hundred.
+    // A crossing within a step adds up to the error of a step, at each of some hundred.
     EXPECT_NEAR(run.x[0], alone.state.w[0], 1e4 * tolerance);
     EXPECT_NEAR(run.x[1], alone.state.w[1], 1e4 * tolerance);
 }

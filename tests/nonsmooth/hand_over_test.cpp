@@ -37,7 +37,7 @@ Branch branch_after(const Event<StateOf<System>>& event)
 
 // --- modes ---
 
-/// A is full, and y is no component of the state.
+/// A is full, and y is not a component of the state.
 struct Coupled {
     static constexpr int state_size = 3;
     static constexpr int reaction_size = 1;
@@ -220,7 +220,7 @@ TEST(HandOver, BallSlidesRollsAndRestsOnThePlate)
 
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 2u);
-    // The motion is linear in time: only rounding is left.
+    // The motion is linear in time: the only error is rounding.
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
     EXPECT_EQ(run.events[0].guard, 0u);
     EXPECT_NEAR(run.events[0].t, ball.rolling_time(faster), 1e-12);
@@ -251,7 +251,7 @@ TEST(HandOver, BallIsShakenOffItsRest)
     EXPECT_NEAR(run.state.w[0], v, 1e-8);
 }
 
-/// Two relays on one force: where both let go at once, rates do not tell what follows.
+/// Two relays on one force: if both release together, the rates do not determine what follows.
 struct TwinRelays {
     static constexpr int state_size = 2;
     static constexpr int reaction_size = 2;
@@ -273,7 +273,7 @@ TEST(HandOver, ChangesThatCoincideGoThroughStepsAndBack)
     EXPECT_NEAR(run.phases[1].from, 1, 1e-12);
     EXPECT_EQ(run.phases.back().cause, PhaseCause::released);
     EXPECT_FALSE(run.phases.back().set_valued);
-    // The steps between are of 3e-3 and there are few of them.
+    // The steps between have lengths of 3e-3, and there are few of them.
     EXPECT_LE(run.statistics.set_valued.accepted, 20u);
     for (int i = 0; i < 2; ++i) EXPECT_NEAR(run.state.w[i], 2, 1e-4);
     EXPECT_EQ(run.state.reaction[0], -1.0);
@@ -319,7 +319,7 @@ TEST(HandOver, GoesOnFromASavedStateWithItsReaction)
     const Eigen::Vector4d start(1, 0.5, 0, 0);
     const auto options = [](double from, double to) {
         HandOverOptions out{.t_start = from, .t_end = to};
-        out.set_valued.step = 0x1p-9;  // so that the steps fall together
+        out.set_valued.step = 0x1p-9;  // so that the steps coincide
         return out;
     };
     const auto whole = hand_over(system, start, options(0, 1));
@@ -351,7 +351,7 @@ TEST(HandOver, EventDrivenRunsGoOnFromTheirEnd)
 
 // --- infinite bounds, sets that become empty ---
 
-/// w' = force + r with whatever set.
+/// w' = force + r with any set.
 template <class Set>
 struct Pushed {
     static constexpr int state_size = 1;
@@ -416,7 +416,7 @@ TEST(HandOver, ASetThatBecomesEmptyEndsTheRun)
     EXPECT_LE(run.state.t, 0.5);
 }
 
-/// Two relays, of which the second loses its set at t = 0.5.
+/// Two relays; the set of the second becomes empty at t = 0.5.
 struct SecondVanishes : TwinRelays {
     static void smooth(double, const Eigen::Vector2d&, Eigen::Vector2d& f) { f.setZero(); }
     static Box<2> reaction_set(double t, const Eigen::Vector2d&)
@@ -487,7 +487,7 @@ struct Loaded {
 
 TEST(HandOver, EveryExitFromRestIsFound)
 {
-    // w' = 0 between the changes, so that nothing but the reaction limits the step. In each half
+    // w' = 0 between the changes, so that only the reaction limits the step. In each half
     // of a period the load passes 1 at asin(1 / 1.05), and w is back at 0 before its end.
     const Loaded system{.fast = 1.05, .frequency = 10};
     constexpr double half = std::numbers::pi / 10;
@@ -508,7 +508,7 @@ TEST(HandOver, EveryExitFromRestIsFound)
 
 TEST(HandOver, TwoSinesAsALoadMoveARelayFromRest)
 {
-    // The motion depends on the load alone; steps of a thousandth of the run miss no change.
+    // The motion depends on the load alone; steps of 1/1000 of the run miss no change.
     for (int i = 0; i < 200; ++i) {
         const Loaded system{.slow = 0.7, .fast = 0.3 + 0.002 * i, .frequency = 3 + 0.07 * i};
         const auto run = hand_over(system, one(0), {.t_end = 20});
@@ -522,7 +522,7 @@ TEST(HandOver, TwoSinesAsALoadMoveARelayFromRest)
 
 TEST(HandOver, ALoadOfTheSizeOfTheBoundIsHeldInLongSteps)
 {
-    // The room of the reaction is a rounding, and no reason for short steps.
+    // The reaction is a rounding away from its bound, which is no reason for short steps.
     for (const double load : {1.0, std::nextafter(1.0, 0.0), -1.0}) {
         const auto system = pushed(load, [](double) { return IntervalSet::symmetric(1); });
         const auto run = hand_over(system, one(0), {.t_end = 100});

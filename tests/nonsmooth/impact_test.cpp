@@ -127,7 +127,7 @@ TEST(TimeStepping, ABlockOnTwoCornersSlidesToRestAndLeansForward)
     const double stop = 3 / (0.4 * 9.81);
     const double h = 1e-4;
     TimeStepping<TwoContactBlock> motion(block, {0, 0, 0}, {3, 0, 0}, {.t_end = 1, .step = h});
-    // The share of the front corner while it slides: 1/2 + 0.4 * 0.25 / (2 * 0.5) = 0.6.
+    // The fraction of the front corner while it slides: 1/2 + 0.4 * 0.25 / (2 * 0.5) = 0.6.
     const double weight = block.mass_of_block * block.gravity * h;
     EXPECT_EQ(motion.run([&](const auto& state) {
         if (state.t < 0.01 || state.t > stop - 0.01) return;
@@ -138,7 +138,7 @@ TEST(TimeStepping, ABlockOnTwoCornersSlidesToRestAndLeansForward)
               Outcome::reached_end);
     EXPECT_NEAR(motion.state().q[0], 3 * 3 / (2 * 0.4 * 9.81), 3 * h);
     EXPECT_NEAR(motion.state().v.norm(), 0, 1e-9);
-    // A corner that rounding has opened falls for one step: g h^2.
+    // A corner opened by rounding falls for one step: g h^2.
     EXPECT_NEAR(motion.state().q[2], 0, 2 * 9.81 * h * h);
 }
 
@@ -148,7 +148,7 @@ TEST(TimeStepping, TheWoodpeckerClimbsDownInACycle)
     TimeStepping<Woodpecker> motion(toy, Woodpecker::start(), Woodpecker::start_velocity(),
                                     {.t_end = 2, .step = 2e-5});
     std::vector<double> beak;     // times of the beak's impacts
-    std::vector<double> heights;  // there
+    std::vector<double> heights;  // heights at these times
     EXPECT_EQ(motion.run([&](const auto& state) {
         if (state.impulse[0] > 0 && (beak.empty() || state.t - beak.back() > 0.02)) {
             beak.push_back(state.t);
@@ -157,7 +157,7 @@ TEST(TimeStepping, TheWoodpeckerClimbsDownInACycle)
     }),
               Outcome::reached_end);
     ASSERT_GT(beak.size(), 8U);
-    // The last cycles are alike, and each brings it down.
+    // The last cycles are equal, and in each the bird descends.
     const std::size_t n = beak.size();
     const double period = beak[n - 1] - beak[n - 2];
     RecordProperty("period", std::to_string(period));
@@ -175,7 +175,7 @@ struct Corner {
     using V = Eigen::Vector2d;
     double mu = 1;
     double e = 1;
-    double broken_from = 10;  ///< [s], without a force from then on
+    double broken_from = 10;  ///< [s], no force from then on
     static void mass(const V&, Eigen::Matrix2d& m) { m.setIdentity(); }
     void force(double t, const V&, const V&, V& f) const
     {
@@ -215,7 +215,7 @@ TEST(TimeStepping, AForceThatIsNotFiniteEndsTheRunWithWhatWasComputed)
         TimeStepping<Corner> motion({.e = 0, .broken_from = 0.5}, {1, height}, {0, 0},
                                     {.t_end = 1, .step = 0.01});
         EXPECT_EQ(motion.run(), Outcome::not_converged);
-        // Steps are halved ten times on the way there.
+        // Steps are halved ten times before it.
         EXPECT_GT(motion.state().t, 0.48);
         EXPECT_LT(motion.state().t, 0.51);
         EXPECT_TRUE(motion.state().q.allFinite());

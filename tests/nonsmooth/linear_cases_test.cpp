@@ -34,7 +34,7 @@ void check_random_inequalities(Confines confines)
         ASSERT_TRUE(p.solve(r, y, branches));
         EXPECT_LT((p.w * r + p.y0 - y).norm(), 1e-11 * (1 + p.y0.norm()) * (1 + p.w.norm()));
         for (int i = 0; i < M; ++i) {
-            // The natural map of the law, of the confined variable.
+            // The natural map of the law, for the restricted variable.
             const double confined = confines == Confines::reaction ? r[i] : y[i];
             const double other = confines == Confines::reaction ? y[i] : r[i];
             const double image = std::clamp(confined - other, p.lower[i], p.upper[i]);

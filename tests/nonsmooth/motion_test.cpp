@@ -1,4 +1,4 @@
-// Bathe's scheme and its kin on inclusions: orders, damping, energy, switches, errors.
+// Bathe's scheme and similar ones on inclusions: orders, damping, energy, switches, errors.
 
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ struct Spiral {
     static IntervalSet reaction_set(double, const Eigen::Vector2d&) { return IntervalSet(0, 0); }
 };
 
-// What one step multiplies exp(z t / h) by.
+// The factor by which one step multiplies exp(z t / h).
 std::complex<double> amplification(Scheme scheme, std::complex<double> z)
 {
     if (scheme == Scheme::backward_euler) return 1.0 / (1.0 - z);
@@ -77,7 +77,7 @@ TEST(Composite, AmplifiesAsTheorySays)
 
 TEST(Composite, BatheHasSpectralRadiusZeroAtInfinity)
 {
-    // A(z) -> -5 / z: a component a million times too stiff for the step is gone in two.
+    // A(z) -> -5 / z: a component a million times too stiff for the step vanishes in two steps.
     for (const double z : {1e3, 1e6, 1e9}) {
         const Spiral spiral{0, z};
         CompositeStep<Spiral> step(spiral);
@@ -85,7 +85,7 @@ TEST(Composite, BatheHasSpectralRadiusZeroAtInfinity)
         SetValuedState<Spiral> to = from;
         ASSERT_TRUE(step.take(from, 1, to).converged);
         EXPECT_NEAR(to.w.norm() * z, 5, 5 * 30 / z);
-        // The trapezoidal rule keeps it.
+        // The trapezoidal rule preserves it.
         CompositeStep<Spiral> trapezoid(spiral, {.scheme = Scheme::theta});
         ASSERT_TRUE(trapezoid.take(from, 1, to).converged);
         EXPECT_NEAR(to.w.norm(), 1, 1e-14);
@@ -108,7 +108,7 @@ TEST(SlidingModeMotion, IsExactlyZeroOnceItSlides)
             system, one(0.15), {.t_end = 0.5, .step = 1e-3, .scheme = {.scheme = scheme}});
         bool zero_for_ever = true;
         const auto outcome = motion.run([&](const auto& state) {
-            // The reaction of before the switch is half used in the step after it.
+            // The step after the switch uses half of the reaction before the switch.
             if (state.t > 0.0965 && state.w[0] != 0) zero_for_ever = false;
         });
         EXPECT_EQ(outcome, Outcome::reached_end);
@@ -203,7 +203,7 @@ TEST(DiodeCircuitMotion, MeetsAllTwelveChangesInOrderWithErrorsOfOrderTwo)
         const double error = times[1][i] - exact.changes[i].t;
         EXPECT_NEAR(error, 0, 1e-5) << i;
         EXPECT_NEAR((times[0][i] - exact.changes[i].t) / error, 4, 0.2) << i;
-        // The errors of order 2 extrapolate away.
+        // The errors of order 2 are removed by extrapolation.
         EXPECT_NEAR((4 * times[1][i] - times[0][i]) / 3, exact.changes[i].t, 2e-8) << i;
     }
     EXPECT_NEAR((final[0] - exact.final).norm() / (final[1] - exact.final).norm(), 4, 0.05);
@@ -212,8 +212,8 @@ TEST(DiodeCircuitMotion, MeetsAllTwelveChangesInOrderWithErrorsOfOrderTwo)
 
 TEST(DiodeCircuitMotion, IsOfOrderOneWhereJumpsOfTheReactionAreSteppedOver)
 {
-    // The final state is chosen just after the sixth change. Where a change falls within
-    // its step varies with the step, so errors are averaged over steps of a narrow range.
+    // The final state is chosen just after the sixth change. The place of a change within
+    // its step varies with the step, so errors are averaged over a narrow range of steps.
     ExactCircuit exact;
     exact.run(DiodeCircuit::start(), 4);
     const auto mean_error = [&](Switches switches, int steps) {
@@ -422,7 +422,7 @@ double largest_growth(double step, FirstStage first_stage)
         double energy = system.energy({u, v});
         EXPECT_EQ(motion.run([&](const auto& state) {
             const double now = system.energy(state.w);
-            // Below a hundredth of what friction takes per radian growth is no matter.
+            // Below a hundredth of the dissipation by friction per radian growth is irrelevant.
             if (energy > 1e-3) growth = std::max(growth, now / energy);
             energy = now;
         }),
@@ -437,7 +437,7 @@ TEST(Energy, GrowthPerStepWithFrictionIsBoundedAndVanishesWithTheStep)
     const double fine = largest_growth(0.1, FirstStage::averaged);
     RecordProperty("growth_at_the_natural_step", std::to_string(natural));
     RecordProperty("growth_at_a_tenth", std::to_string(fine));
-    // Up to 1.07 was found over many starts; a tenth of the step shows none beyond rounding.
+    // Up to 1.07 was found over many starts; with a tenth of the step none exceeds rounding.
     EXPECT_LT(natural, 1.07);
     EXPECT_LT(fine, 1 + 1e-6);
 }
@@ -505,12 +505,12 @@ TEST(ErrorControl, TheEmbeddedEstimateIsTheLocalErrorToLeadingOrder)
         ratio[k] = (estimate + error).norm() / error.norm();
     }
     EXPECT_LT(ratio[0], 0.1);
-    EXPECT_NEAR(ratio[0] / ratio[1], 2, 0.3);  // off by one further order
+    EXPECT_NEAR(ratio[0] / ratio[1], 2, 0.3);  // the error is of the next order
 }
 
 TEST(ErrorControl, LandsExactlyOnTheEndWithoutASliver)
 {
-    // 0.1 added up does not reach 20 exactly; no step is shorter than half of it.
+    // Multiples of 0.1 do not reach 20 exactly; no step is shorter than half of it.
     for (const double step : {0.1, 0.3, 0.07, 1.0 / 3}) {
         SetValuedMotion<DiodeCircuit> motion(DiodeCircuit(), DiodeCircuit::start(),
                                              {.t_end = 21, .step = step});
@@ -527,7 +527,7 @@ TEST(ErrorControl, LandsExactlyOnTheEndWithoutASliver)
 
 TEST(ErrorControl, TheSameStateAndStepGiveTheSameBits)
 {
-    // Whatever was computed before.
+    // Independent of earlier computations.
     SetValuedMotion<SlipWeakening> a(SlipWeakening(), {0, -2, 0}, {.t_end = 2, .step = 0.02});
     (void)a.advance();
     const auto from = a.state();
@@ -657,7 +657,7 @@ TEST(Doubling, KeepsTheTwoHalfStepsWhereSwitchesAreLocated)
     EXPECT_NEAR(motion.state().w[1], exact.imag(), 1e-14);
 }
 
-/// Pushed by a constant force, with a set of two reactions that is no box.
+/// Driven by a constant force, with a set of two reactions that is no box.
 template <class Set>
 struct Pushed {
     static constexpr int state_size = 2;
@@ -686,7 +686,7 @@ TEST(Start, IsRefusedWhereNoReactionOfAConeOpposesIt)
         EXPECT_THROW((void)first_reaction(cone, push, start), std::invalid_argument) << start;
     }
     EXPECT_EQ(first_reaction(cone, push, {1, 0.5}), Eigen::Vector2d(0, 0));
-    // At the apex the rest of the push that the cone cannot take: P(-push).
+    // At the apex the remaining push that the cone cannot balance: P(-push).
     const Eigen::Vector2d apex = first_reaction(cone, {-2, 0.5}, {0, 0});
     EXPECT_NEAR((apex - Eigen::Vector2d(2, -0.5)).norm(), 0, 1e-12);
 
@@ -699,7 +699,7 @@ TEST(Start, IsRefusedWhereNoReactionOfAConeOpposesIt)
         1e-8);
 }
 
-// f escapes to infinity at t = 1 and is not a number beyond.
+// f diverges at t = 1 and is not a number beyond.
 struct Escaping {
     static constexpr int state_size = 1;
     static constexpr int reaction_size = 1;

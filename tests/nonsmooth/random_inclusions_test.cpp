@@ -1,4 +1,4 @@
-// Where several relays, contacts and diodes meet: random inclusions against backward Euler.
+// Random inclusions with several relays, contacts and diodes, against backward Euler.
 
 #include "random_inclusions.hpp"
 #include "inclusions_of_six.hpp"
@@ -26,7 +26,7 @@ template <int M>
     return hand_over(system, system.start, options);
 }
 
-/// Three step lengths: none may be wrong, and the law holds at the end.
+/// Three step lengths: none may be wrong, and the law must hold at the end.
 template <int M>
 void follow(InclusionFamily family, std::uint64_t seed, int reference_steps)
 {
@@ -87,7 +87,7 @@ TEST(RandomInclusions, ControllersAndWeakeningFriction)
 
 TEST(RandomInclusions, ARelayTwoIntegrationsAwayIsCrossedAtAnySpeed)
 {
-    // At x2 of 2 and more a reaction without influence on x1' was taken for one that holds it.
+    // For x2 of 2 and more, a reaction without influence on x1' was mistaken for one that holds it.
     auto system = random_inclusion<4>(InclusionFamily::twisting, 0);
     for (const double speed : {1.0, 3.0, 100.0, 1e6}) {
         system.start[0] = -0.1 * speed;
@@ -101,7 +101,7 @@ TEST(RandomInclusions, ARelayTwoIntegrationsAwayIsCrossedAtAnySpeed)
 
 TEST(RandomInclusions, ThreeMassesWithFiveContactsEnd)
 {
-    // More reactions than have modes: set-valued steps from the start, whose stages are singular
+    // More reactions than modes support: set-valued steps from the start, whose stages are singular
     // for Newton's method.
     for (std::uint64_t seed = 0; seed < 3; ++seed) {
         follow<5>(InclusionFamily::five_contacts, seed, 2000);

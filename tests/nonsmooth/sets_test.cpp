@@ -1,5 +1,5 @@
-// Convex sets: values of projections and derivatives, and the refusal of what is no projection.
-// What all sets must do is in conformance/convex_sets.hpp.
+// Convex sets: values of projections and derivatives, and the refusal of functions that are no
+// projections. The common properties of sets are in conformance/convex_sets.hpp.
 
 #include <gtest/gtest.h>
 

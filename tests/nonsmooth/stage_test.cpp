@@ -125,7 +125,7 @@ TEST(StageSolvers, CasesRefuseSetsThatAreNoBoxes)
     EXPECT_NO_THROW(CompositeStep<Planar>({}, {}));
 }
 
-// --- states that are sized at run time, stops, sets of one's own ---
+// --- states that are sized at run time, stops, user-defined sets ---
 
 struct ManyRelays {
     static constexpr int state_size = Eigen::Dynamic;
@@ -163,7 +163,7 @@ struct ManyRelays {
 
 TEST(SetsOfOnesOwn, SixRelaysOfDynamicSizeMatchTheSameInCases)
 {
-    // Three relays by cases against the first three of six, which do not feel the others.
+    // Three relays by cases against the first three of six, which are independent of the others.
     Eigen::VectorXd final[2];
     for (const int n : {3, 6}) {
         SetValuedMotion<ManyRelays> motion(ManyRelays{n}, Eigen::VectorXd::Constant(n, 0.4),
@@ -185,8 +185,8 @@ struct Saturated {
 
 TEST(Stops, KeepTheStateInsideAndPushOnlyInwards)
 {
-    // 3 sin t up to 2, held there until the drive turns at pi / 2; then 2 + 3 (sin t - 1)
-    // down to -1 where sin t = 0, held until 3 pi / 2.
+    // 3 sin t rises to 2 and is held there until the drive turns at pi / 2; then 2 + 3 (sin t - 1)
+    // falls to -1 where sin t = 0, and is held until 3 pi / 2.
     for (const auto method : {StageMethod::cases, StageMethod::newton, StageMethod::fixed_point}) {
         SetValuedMotion<Saturated> motion(
             Saturated(), Saturated::V::Zero(),
@@ -205,7 +205,8 @@ TEST(Stops, KeepTheStateInsideAndPushOnlyInwards)
             EXPECT_LE(s.w[0], 2);
         }),
                   Outcome::reached_end);
-        // The step that meets the stop half uses its reaction: a step times the drive.
+        // The step that meets the stop uses half of its reaction: the error is a step times the
+        // drive.
         EXPECT_LT(worst, 3e-3);
     }
 }
@@ -224,7 +225,7 @@ TEST(SuperTwistingMotion, ReachesZeroInFiniteTimeAndStays)
     }),
               Outcome::reached_end)
         << motion.state().t << " " << motion.failure().residual;
-    // Implicitly discretised there is no chattering: x1 is zero to rounding, x2 = 0 with it,
+    // With implicit discretisation there is no chattering: x1 is zero to rounding, so is x2,
     // and the reaction is minus the rate of the disturbance.
     EXPECT_LT(late, 1e-12);
     EXPECT_NEAR(motion.state().w[1], 0, 1e-9);

@@ -1,4 +1,4 @@
-// Networks that choose steps: what is refused, what is handed to the classical rule.
+// Networks that choose steps: refusals, and steps left to the classical rule.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -26,7 +26,7 @@ PolicyPointer policy(const StepLayout& layout, const std::vector<double>& weight
     return std::make_shared<const StepPolicy>(step_policy_model(layout, weights));
 }
 
-/// A network that returns `value` whatever it is asked.
+/// A network that always returns `value`.
 std::vector<double> always(double value)
 {
     std::vector<double> weights(step_policy_weights, 0.0);
@@ -204,7 +204,7 @@ TEST(StepPolicy, StepsThatAreTooWrongAreRepeatedByTheClassicalRule)
     EXPECT_TRUE(rule.judge(99, 0.1, StepView{}).accepted);
 }
 
-// Whatever the weights, the run ends, exactly at its end, and the slip is that of the fault: with
+// For any weights the run ends, exactly at its end, and the slip is that of the fault: with
 // every error at most 100 times the tolerance of 1e-3 per step, to a tenth.
 TEST(StepPolicy, AnyWeightsEndTheRun)
 {
@@ -259,7 +259,7 @@ TEST(StepPolicy, SlidingModeEndsWhereItShould)
 }
 
 // A tolerance relative to a field: the same motion in other units takes the same steps, and a
-// floor far above it makes the tolerance absolute.
+// lower limit far above the field makes the tolerance absolute.
 TEST(ErrorFields, AreMeasuredByTheirNorms)
 {
     const auto steps = [](double scale, double rtol, double floor) {
@@ -276,7 +276,7 @@ TEST(ErrorFields, AreMeasuredByTheirNorms)
         EXPECT_EQ(motion.run(), Outcome::reached_end);
         return motion.statistics().accepted;
     };
-    // A power of two changes no bit of the state's digits.
+    // A power of two changes no digit of the state.
     EXPECT_EQ(steps(1, 1e-3, 0), steps(1024, 1e-3, 0));
     EXPECT_EQ(steps(1, 1e-3, 1e4), steps(1, 1e-2, 1e3));
     EXPECT_LT(steps(1, 1e-3, 1e4), steps(1, 1e-3, 0));

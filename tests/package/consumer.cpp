@@ -1,5 +1,5 @@
-// What a user of the installed package writes: every stepper on both main state
-// types, under the user's own warnings.
+// Code of a user of the installed package: every stepper on both main state
+// types, with the user's own warnings.
 
 #include <Eigen/Core>
 #include <array>

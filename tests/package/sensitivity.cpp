@@ -1,4 +1,4 @@
-// A user of the component `sensitivity`: how far a bounce moves with the height of the drop.
+// A user of the component `sensitivity`: the change of a bounce with the height of the drop.
 #include <cmath>
 #include <cstdio>
 

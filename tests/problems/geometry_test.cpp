@@ -1,4 +1,4 @@
-// Trees against a check of everything.
+// Trees against an exhaustive check.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -164,7 +164,7 @@ TEST(Segments, PairsOfSegmentsAreTheSameFromTheTreeAndNoFurtherThanAnyTwoPoints)
             EXPECT_EQ(tree.segment, brute.segment);
             const Point2 gap = tree.point - tree.other;
             EXPECT_NEAR(std::hypot(gap.x, gap.y), tree.distance, 1e-14);
-            double least = infinity;  // over points of s; a grid of 101 is 0.007 / 2 coarse
+            double least = infinity;  // over points of s; a grid of 101 has an error of 0.007 / 2
             for (int k = 0; k <= 100; ++k) {
                 const Point2 p = s.a + (k / 100.0) * (s.b - s.a);
                 least = std::min(least, segments.nearest_brute(p).distance);
@@ -328,7 +328,7 @@ TEST(ConcaveTable, BoundsAConcaveFunctionFromBothSides)
             widest = std::max(widest, table.upper_bound(p) - table.lower_bound(p));
         }
     }
-    // Second order on the bowl, first order only in cells that the edge crosses.
+    // Second order on the bowl, first order only in cells crossed by the edge.
     EXPECT_LT(worst[1], worst[0] / 3);
     EXPECT_LT(worst[1], 0.1);
 }

@@ -1,5 +1,5 @@
-// Meshes: reading and refusing them, distances from trees against a check of everything, and
-// the scene that is made of two.
+// Meshes: reading and refusing them, distances from trees against an exhaustive check, and
+// the scene made of two meshes.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -112,7 +112,7 @@ TEST(Mesh, WindsAroundWhatIsInside)
     int inside = 0;
     for (int i = 0; i < 500; ++i) {
         const Vector3d p(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2));
-        // A ray from the origin leaves a surface that is seen whole from there once, so that a
+        // A ray from the origin leaves once a surface that is entirely visible from there, so a
         // point is inside if no face lies between.
         const double r = p.norm();
         if (r > 1 && r < 2.3) continue;  // radii of the potato
@@ -146,8 +146,8 @@ TEST(Triangles, TheTreeFindsTheNearestFaceOfAPoint)
 
 TEST(Triangles, PairsAreNearestAmongTheirPoints)
 {
-    // Against points of a fine grid on both triangles: no two of them are nearer, and some are
-    // nearly as near.
+    // Compared with points of a fine grid on both triangles: no two of them are nearer, and some
+    // are nearly as near.
     Random random(2);
     for (int i = 0; i < 200; ++i) {
         Triangle a, b;

@@ -1,4 +1,4 @@
-// Scenes with expensive guards: what they promise, along real runs.
+// Scenes with expensive guards: their promises, along real runs.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -88,8 +88,8 @@ TEST(Cavern, TheRateIsTheDerivativeOfTheGuard)
         }
         const double forward = (system.guard(t, ahead) - system.guard(t, x)) / h;
         const double backward = (system.guard(t, x) - system.guard(t, behind)) / h;
-        // Where another point becomes the nearest, the guard has a kink; they are rare. Else
-        // it bends by v² / distance to the point: 1e2 / 0.1, times h.
+        // Where another point becomes the nearest, the guard has a kink; kinks are rare. Otherwise
+        // its second derivative is v² / distance to the point: 1e2 / 0.1, times h.
         if (std::fabs(forward - backward) > 1e-2) continue;
         ++compared;
         EXPECT_NEAR(rate, (forward + backward) / 2, 1e-2);
@@ -97,7 +97,7 @@ TEST(Cavern, TheRateIsTheDerivativeOfTheGuard)
     EXPECT_GT(compared, 1900U);
 }
 
-/// Two states in a box of half-widths `h`, of which `bound` says how much the guard may differ.
+/// Two states in a box of half-widths `h`, in which `bound` limits the difference of the guard.
 template <class System>
 void expect_slack_holds(const System& system, const typename System::State& middle,
                         const typename System::State& spread, std::size_t pairs)
@@ -123,7 +123,7 @@ void expect_slack_holds(const System& system, const typename System::State& midd
         for (double& h : half) h *= 2;
         ASSERT_GE(system.guard_slack(half), slack);
     }
-    EXPECT_GT(closest, 0.5);  // it is no idle bound
+    EXPECT_GT(closest, 0.5);  // the bound is not trivial
 }
 
 TEST(Cavern, TheGuardChangesByNoMoreThanItsSlack)
@@ -157,7 +157,7 @@ TEST(Cavern, AtTheWallAndBeyondIt)
     EXPECT_EQ(system.guard(0, Cavern::State{3, 0, 0, 0}), -1.5);
     EXPECT_TRUE(std::isnan(system.guard(0, Cavern::State{nan, 0, 0, 0})));
     EXPECT_LE(system.lower_bound(0, Cavern::State{0.3, 0, 0, 0}), 1.2);
-    // Across the wall the velocity turns round, reduced; along it nothing happens.
+    // Across the wall the velocity is reversed and reduced; along it nothing changes.
     Cavern::State x{1.5, 0, 8, 3};
     system.reset(0, x);
     EXPECT_NEAR(x[2], -7.2, 1e-14);
@@ -192,7 +192,7 @@ TEST(Cavern, WrongSetUpIsRefused)
 
 // --- zones ---
 
-/// The guard as it is written in the header.
+/// The guard as given in the header.
 double flower(double r, double angle, double t, double radius, double a, int m, double turn)
 {
     const double s = 2 * r * r / (r * r + radius * radius);
@@ -431,8 +431,8 @@ TEST(PlanarArm, TheRateIsTheDerivativeOfTheGuard)
         const double h = 1e-6;
         const double forward = (moved(h) - moved(0)) / h;
         const double backward = (moved(0) - moved(-h)) / h;
-        // Kinks, where another point becomes the nearest, are rare; else the guard bends by
-        // speed² / distance, at most 1e2 / 0.02, times h.
+        // Kinks, where another point becomes the nearest, are rare; otherwise the second derivative
+        // is speed² / distance, at most 1e2 / 0.02, times h.
         if (std::fabs(forward - backward) > 1e-2) continue;
         ++compared;
         EXPECT_NEAR(system.guard_rate(0, x, dxdt), (forward + backward) / 2, 1e-2);
@@ -502,8 +502,8 @@ TEST(Opaque, ABlackBoxMeetsTheSameObstaclesAndCostsWhatItSays)
     ASSERT_EQ(run.events.size(), known.events.size());
     ASSERT_GT(run.events.size(), 1U);
     for (std::size_t i = 0; i < run.events.size(); ++i) {
-        // Bisection and Newton's method close on the same root of the step's map; what they
-        // differ by, a few units in the last place, later motion magnifies.
+        // Bisection and Newton's method converge to the same root of the step's map; later motion
+        // magnifies their difference of a few units in the last place.
         EXPECT_NEAR(run.events[i].t, known.events[i].t, 1e-9);
     }
     EXPECT_GE(spent.count(), 20e-6 * static_cast<double>(run.statistics.guard_calls) * 0.99);

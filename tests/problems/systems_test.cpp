@@ -104,8 +104,8 @@ class SystemsBackward : public testing::TestWithParam<Case> {};
 
 TEST_P(SystemsBackward, MeetTheSameEventsInReverseAndReturnToTheStart)
 {
-    // Backward the first millisecond is run by itself: some guards are zero at the start,
-    // and whether that is met once more is up to rounding.
+    // Backward the first millisecond is run separately: some guards are zero at the start,
+    // and rounding decides whether that is met once more.
     const auto& [known, how] = GetParam();
     Options options = known.options;
     options.t_end = known.turn_at;
@@ -206,7 +206,7 @@ TEST(ThreeBody, ConservesJacobisIntegral)
 
 TEST(HiddenPair, IsFoundByTheExtremumInOneStepOverAllThreeZeros)
 {
-    // The method is exact, and so is the cubic through the ends: what is left is the
+    // The method is exact, and so is the cubic through the ends: the error is the
     // rounding of sums of up to 400 over a slope of at least 4, 16 or 44.
     const auto run = integrate(HiddenPair(), HiddenPair::start,
                                {.t_start = -8, .t_end = 4, .step = 12}, FixedStep<Rk4>{});
@@ -249,7 +249,7 @@ TEST(NearTangent, PassagesAreFoundAtEveryDepthAndPhase)
 
 TEST(NearTangent, ATouchIsRecordedAsATouch)
 {
-    // A touch is settled as soon as what is left of the way to the crest is below a
+    // A touch is settled as soon as the remaining height to the crest is below a
     // sixty-fourth of the tolerance: (t - crest)² / 2 <= touch / 64.
     const double touch = 1e-9;
     for (const double phase : {0.5, 1.0, 2.2, 3.7, 5.5}) {
@@ -282,9 +282,9 @@ TEST(NearTangent, ANearMissIsNothing)
 
 TEST(ImpactOscillator, ThousandPeriodsHaveTheExactImpacts)
 {
-    // The impacts settle on stable periodic motions, so that what is added to the error in
-    // a flight has decayed a few flights later: the times do not grow less certain, except
-    // that a time is only known to its own rounding, and w t to another.
+    // The impacts settle on stable periodic motions, so that an error added in a flight
+    // decays within a few flights: the times do not become less certain, except
+    // for their own rounding, and that of w t.
     const std::pair<double, std::size_t> counts[] = {
         {0.7, 2000}, {0.8, 1001}, {1.0, 999}, {1.2, 999}};
     for (const auto& [frequency, count] : counts) {
@@ -370,8 +370,8 @@ TEST(CoulombOscillator, ModeOfAStateIsDecidedBySpeedThenBySpring)
     EXPECT_EQ(oscillator.mode_at(0.1, 1), CoulombOscillator::slip_right);
     EXPECT_EQ(oscillator.mode_at(0.1, -1), CoulombOscillator::slip_left);
     const StickSlip belt;
-    EXPECT_EQ(belt.mode_at(1, 0.2), StickSlip::slip_left);  // the belt carries it on
-    EXPECT_EQ(belt.mode_at(-1, 0.2), StickSlip::stick);     // the belt carries it back
+    EXPECT_EQ(belt.mode_at(1, 0.2), StickSlip::slip_left);  // the belt moves it on
+    EXPECT_EQ(belt.mode_at(-1, 0.2), StickSlip::stick);     // the belt moves it back
 }
 
 TEST(StickSlip, SticksAtTheKnownPlaceAndSlipsFromTheExactLimit)
@@ -391,7 +391,7 @@ TEST(StickSlip, SticksAtTheKnownPlaceAndSlipsFromTheExactLimit)
 
 TEST(StickSlip, ArmsTheDoubleZeroInLongSteps)
 {
-    // The sliding speed leaves zero as t². Whatever the accuracy, the first event is the
+    // The sliding speed leaves zero as t². For any accuracy the first event is the
     // stick and not the start; the error of rk4 in steps of up to a second is below a
     // tenth of the step.
     for (const double step : {0.01, 0.1, 0.5, 1.0}) {
@@ -429,8 +429,8 @@ TEST(Pendulum, LargeSwingsHaveTheirOwnPeriod)
                                    {.t_end = 3.5 * half_period, .rtol = 1e-13, .atol = 1e-13});
         ASSERT_EQ(run.events.size(), 3U) << amplitude;
         for (std::size_t i = 0; i < 3; ++i) {
-            // At an amplitude of 3 half a period changes by 8 s for every radian, of which
-            // 2500 steps may each have added a part of 1e-13.
+            // At an amplitude of 3 half a period changes by 8 s for every radian, and each of
+            // 2500 steps may have added a part of 1e-13.
             EXPECT_NEAR(run.events[i].t, static_cast<double>(i + 1) * half_period, 1e-10);
         }
     }
@@ -451,7 +451,7 @@ TEST(Thermostat, OtherTemperaturesHaveTheirOwnTimes)
 
 // --- order of convergence ---
 
-/// Largest error of the event times, which must be those known.
+/// Largest error of the event times, which must be the known ones.
 template <class System, class Stepping>
 double largest_error(const System& system, const typename System::State& start,
                      const std::vector<double>& known, const Options& options, Stepping stepping)
@@ -500,7 +500,7 @@ Problem<Pendulum> pendulum_problem()
 }
 
 /// Halving the step twice must divide the error by 16 each time: the leading term
-/// dominates in these steps, and what is left of the next moves the observed order by a
+/// dominates in these steps, and the next term changes the observed order by a
 /// tenth. Errors are above 1e-9, far from rounding.
 template <class System>
 void expect_order_four(const Problem<System>& problem, double h)
@@ -532,9 +532,9 @@ TEST(Convergence, Rk4KeepsOrderFourInNotifications)
     expect_order_four(pendulum_problem(), 0.05);
 }
 
-/// A decade of tolerance must buy half a decade of error at least, and the error stay
+/// A decade of tolerance must give at least half a decade of error, and the error stay
 /// below 100 times the tolerance; both hold per step, and a run has a few hundred steps
-/// whose errors add up in part.
+/// whose errors partly add up.
 template <class System>
 void expect_error_to_follow_tolerance(const Problem<System>& problem, double factor)
 {

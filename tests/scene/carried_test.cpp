@@ -14,9 +14,9 @@ constexpr double g = 9.81;
 
 TEST(SceneCarried, ABallThatSticksToATableIsThrownWhereTheTableFallsFaster)
 {
-    // With e = 0.3 bounces end while the table pushes; the ball is thrown where the table's
-    // acceleration, -a w^2 sin(w t), is that of gravity: sin(w t) = g / (a w^2). Groups are set
-    // free at the end of a step, and are of order 1: two steps.
+    // With e = 0.3 bounces end while the table pushes; the ball is thrown when the table's
+    // acceleration, -a w^2 sin(w t), is that of gravity: sin(w t) = g / (a w^2). Groups are
+    // released at the end of a step, and are of order 1: two steps.
     const Oscillation table{.amplitude = {0, 0.05}, .frequency = 3};
     const double w = 2 * std::numbers::pi * table.frequency;
     const double phase = std::asin(g / (table.amplitude[1] * w * w));
@@ -77,7 +77,7 @@ TEST(SceneCarried, APileOnAShakenFloorStaysAboveIt)
     const SceneRun run =
         simulate(scene, {.t_end = 1.5, .contacts = scene_contacts(), .sample_times = times});
     ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
-    // Within a step of h = 1e-3 the floor goes straight: a w^2 h^2 / 8 = 2.5e-6 m off its motion.
+    // Within a step of h = 1e-3 the floor moves straight: a w^2 h^2 / 8 = 2.5e-6 m off its motion.
     for (std::size_t k = 0; k < times.size(); ++k) {
         for (const BodyState& body : run.samples[k]) {
             EXPECT_GE(body.at[1] - 0.1 - displacement(shaken, times[k])[1], -2.6e-6);

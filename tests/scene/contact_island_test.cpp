@@ -77,7 +77,7 @@ TEST(ContactIsland, DiscOnSteepInclineTurnsAndSlidesDown)
         EXPECT_EQ(island.advance(1), IslandOutcome::reached);
         const IslandBody disc = island.body(7);
         const double speed = disc.velocity[0] * c + disc.velocity[1] * s;
-        // The step in which it stops is lost to the friction of the other direction.
+        // The step in which it stops is lost to the friction of the opposite direction.
         EXPECT_NEAR(speed, -down * (1 - stops), 2 * g * h);
         errors[k] = std::abs(disc.at[0] * c + disc.at[1] * s -
                              (stops / 2 - down * (1 - stops) * (1 - stops) / 2));
@@ -115,12 +115,13 @@ TEST(ContactIsland, StackInBinComesToRestAndStaysForTenThousandSeconds)
     for (const double friction : {0.0, 0.5}) {
         ContactIsland island(in_bin(12, 0.7, friction, 3), {.step = 1e-3}, 0);
         double energy = island.energy();
-        // A free fall is handed back at once by patience 1; here the discs wait in the island.
+        // With patience 1 a free fall is handed back immediately; here the discs wait in the
+        // island.
         for (int i = 1; i <= 5000 && !island.asleep(); ++i) {
             const IslandOutcome outcome = island.advance(i * 1e-3);
             ASSERT_NE(outcome, IslandOutcome::not_converged);
             if (outcome == IslandOutcome::released) GTEST_FAIL() << "released at " << island.t();
-            // Never more than what rounding adds: 1e-12 of the energy at the start.
+            // Never more than the growth by rounding: 1e-12 of the energy at the start.
             EXPECT_LE(island.energy(), energy + 1e-12 * 60);
             energy = island.energy();
         }
@@ -136,7 +137,7 @@ TEST(ContactIsland, StackInBinComesToRestAndStaysForTenThousandSeconds)
             EXPECT_EQ(after.velocity, (std::array{0.0, 0.0}));
             weight += b.mass * g;
         }
-        // What holds the stack is its weight.
+        // The impulses that hold the stack are its weight.
         double held = 0;
         for (const IslandContact& c : island.contacts()) {
             if (c.with_wall) held += c.normal[1] * c.impulse[0] + c.normal[0] * c.impulse[1];
@@ -148,8 +149,8 @@ TEST(ContactIsland, StackInBinComesToRestAndStaysForTenThousandSeconds)
 
 TEST(ContactIsland, PressedPairMovesAsOneAndKeepsItsMomentum)
 {
-    // A spring of rest length 0.1 presses two discs of radius 0.1 together: k (0.2 - 0.1). Nothing
-    // else acts, so that the sum of momenta stays to rounding: 1000 steps of some ulp of 3.
+    // A spring of rest length 0.1 presses two discs of radius 0.1 together: k (0.2 - 0.1). No other
+    // force acts, so the sum of momenta is constant to rounding: 1000 steps of some ulp of 3.
     IslandSetup setup{
         .bodies = {{.id = 4, .at = {0, 0}, .velocity = {1, 0.3}, .mass = 2, .radius = 0.1},
                    {.id = 9, .at = {0.2, 0}, .velocity = {1, 0.3}, .mass = 1, .radius = 0.1}},
@@ -170,8 +171,8 @@ TEST(ContactIsland, PressedPairMovesAsOneAndKeepsItsMomentum)
 
 TEST(ContactIsland, DiscIsPushedAlongByAnother)
 {
-    // On a floor with friction 0.2 the first slides at 1 into the chain, which goes on at a common
-    // speed and stops after v^2 / (2 mu g), v = 1/4: 0.016 m, late by no more than h v.
+    // On a floor with friction 0.2 the first slides at 1 into the chain, which continues at a
+    // common speed and stops after v^2 / (2 mu g), v = 1/4: 0.016 m, late by no more than h v.
     IslandSetup setup{
         .walls = {floor_wall()}, .gravity = {0, -g}, .coefficients = coefficients(0, 0.2)};
     for (std::uint32_t i = 0; i < 4; ++i) {
@@ -202,8 +203,9 @@ IslandSetup wedge(double friction)
 
 TEST(ContactIsland, WedgeOfThreeStandsOnEnoughFriction)
 {
-    // Forces at their cones' rims, at 60 degrees and the angle f of friction from the ground: it
-    // stands where tan f tan(60 deg + f) >= 1/3, mu = tan f >= (sqrt(60) - sqrt(48)) / 6 = 0.1363.
+    // Forces at the boundaries of their cones, at 60 degrees and the angle f of friction from the
+    // ground: it stands if tan f tan(60 deg + f) >= 1/3, mu = tan f >= (sqrt(60) - sqrt(48)) / 6 =
+    // 0.1363.
     ContactIsland stands(wedge(0.14), {.step = 1e-3}, 0);
     EXPECT_EQ(stands.advance(1), IslandOutcome::asleep);
     EXPECT_EQ(stands.statistics().steps, 1U);
@@ -215,8 +217,8 @@ TEST(ContactIsland, WedgeOfThreeStandsOnEnoughFriction)
 
 TEST(ContactIsland, DiscLeavesARoundTopWhereItsForceEnds)
 {
-    // Sliding without friction from the top of a disc that is too heavy to move, it leaves at
-    // cos(angle) = 2/3, by force: there its gap is still of the order of rounding.
+    // A disc that slides without friction from the top of an immovable one leaves it at
+    // cos(angle) = 2/3, by the balance of forces: there its gap is still of the order of rounding.
     double errors[2];
     for (int k = 0; k < 2; ++k) {
         const double h = k == 0 ? 2e-3 : 2e-4;
@@ -245,7 +247,7 @@ TEST(ContactIsland, DiscLeavesARoundTopWhereItsForceEnds)
 
 TEST(ContactIsland, IsHandedBackWhereContactHasEnded)
 {
-    // A disc slides at 3 m/s off the end of a table: 9 > g r, so that it flies on at once.
+    // A disc slides at 3 m/s off the end of a table: 9 > g r, so it flies on immediately.
     IslandSetup setup{
         .bodies = {{.id = 3, .at = {-0.3001, 0.1}, .velocity = {3, 0}, .radius = 0.1}},
         .walls = {{.id = 8, .is_segment = true, .point = {-1, 0}, .end = {0, 0}}},
@@ -257,7 +259,7 @@ TEST(ContactIsland, IsHandedBackWhereContactHasEnded)
     const IslandBody disc = island.body(3);
     EXPECT_NEAR(disc.velocity[0], 3, 1e-12);
     EXPECT_NEAR(disc.velocity[1], 0, 2e-3 * g);
-    // With patience it stays so many steps longer.
+    // With patience it stays that many steps longer.
     setup.bodies[0].patience = 5;
     ContactIsland patient(setup, {.step = 1e-3}, 0);
     EXPECT_EQ(patient.advance(1), IslandOutcome::released);
@@ -378,7 +380,7 @@ TEST(ContactIsland, CutStepsDoNotRaiseTheEnergy)
 TEST(ContactIsland, RefusesAnImpactThatWouldRaiseTheEnergy)
 {
     // At restitution 0.9 and friction 1, a fifth of random velocities and masses of three discs
-    // that touch would gain energy, up to 13 times what there was.
+    // that touch would gain energy, up to 13 times the initial one.
     int refused = 0;
     std::mt19937 random(2);
     std::uniform_real_distribution<double> uniform(-1, 1);
@@ -412,7 +414,7 @@ TEST(ContactIsland, ErrorsAreEstimatedByHalves)
 
 TEST(ContactIsland, SleepSpeedIsReported)
 {
-    // Without friction it slides for ever, at less than the speed below which it may sleep.
+    // Without friction it slides forever, at less than the speed below which it may sleep.
     IslandSetup setup{.bodies = {{.id = 0, .at = {0, 0.1}, .velocity = {1e-3, 0}, .radius = 0.1}},
                       .walls = {floor_wall()},
                       .gravity = {0, -g},
@@ -449,8 +451,8 @@ TEST(ContactIsland, SixtyDiscsComeToRest)
 TEST(ContactIsland, StiffSpringsAndDampersAreStableInLongSteps)
 {
     // A chain of 8 discs on springs with periods of 2 ms falls onto a floor in steps of 10 ms.
-    // Springs are implicit along their lengths and their turning is not: energy may grow by what a
-    // step turns them, of second order, and stays below that of the start.
+    // Springs are implicit along their lengths but not in their rotation: energy may grow by the
+    // rotation in a step, to second order, and stays below that of the start.
     IslandSetup setup{
         .walls = {floor_wall()}, .gravity = {0, -g}, .coefficients = coefficients(0, 0.3)};
     for (std::uint32_t i = 0; i < 8; ++i) {

@@ -1,4 +1,4 @@
-// The contact law solved for velocities: random problems against the law itself and, where the
+// The contact law solved for velocities: random problems against the law itself and, if the
 // solution is unique, against the dense solver.
 
 #include "scene/contact_law.hpp"
@@ -17,8 +17,8 @@ class RandomLaw {
 public:
     explicit RandomLaw(unsigned seed) : random_(seed) {}
 
-    /// Bodies at random velocities, contacts between random ones or with walls, three to a body:
-    /// two more components than there are coordinates, so that impulses are not determined.
+    /// Bodies at random velocities, contacts between random ones or with walls, three per body:
+    /// two more components than coordinates, so that impulses are not determined.
     LawProblem draw(int bodies, double friction, bool springs)
     {
         LawProblem problem;
@@ -57,7 +57,7 @@ struct Defect {
     double law = 0, momentum = 0;
 };
 
-/// By how much p and v violate the law, in units of velocity, and the equation of momenta.
+/// Violation of the law by p and v, in units of velocity, and of the equation of momenta.
 Defect defect_of(const LawProblem& problem, const Eigen::VectorXd& p, const Eigen::VectorXd& v)
 {
     Defect worst;
@@ -89,7 +89,7 @@ Defect defect_of(const LawProblem& problem, const Eigen::VectorXd& p, const Eige
         EXPECT_GE(p[i], 0);
         EXPECT_LE(std::abs(p[i + 1]), bound * (1 + 1e-15) + 1e-300);
         const double normal = std::min(n.dot(u), p[i] / mass);
-        // Sliding against the friction, or none where it is below its bound.
+        // Sliding against the friction, or no sliding where it is below its bound.
         const double room = (bound - std::copysign(1.0, -t.dot(u)) * p[i + 1]) / mass;
         worst.law = std::max({worst.law, std::abs(normal), std::min(std::abs(t.dot(u)), room)});
     }
@@ -151,7 +151,8 @@ TEST(ContactLaw, RandomProblemsAreSolvedOrReported)
     int solved = 0;
     int problems = 0;
     for (const int bodies : {1, 2, 5, 12, 20, 40}) {
-        // Those of 120 contacts jam in all directions, and half of them are reported as not solved.
+        // Problems with 120 contacts jam in all directions; half of them are reported as not
+        // solved.
         for (int trial = 0; trial < (bodies == 40 ? 4 : 20); ++trial) {
             const LawProblem problem = random.draw(bodies, 1, trial % 4 == 0);
             Eigen::VectorXd p;
@@ -172,7 +173,8 @@ TEST(ContactLaw, RandomProblemsAreSolvedOrReported)
 
 TEST(ContactLaw, WithoutFrictionVelocitiesAreThoseOfTheDenseSolver)
 {
-    // They are unique, impulses are not. Rounding times the factor 1e5 of the impulses.
+    // Velocities are unique, impulses are not. The error is rounding times the factor 1e5 of the
+    // impulses.
     RandomLaw random(2);
     ContactLaw law;
     for (const int bodies : {1, 3, 10, 16, 30}) {

@@ -1,4 +1,4 @@
-// Discs in a box: against brute force, what is conserved, labels, reversal; bodies on their own.
+// Discs in a box: against brute force, conservation, labels, reversal; single bodies.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -38,7 +38,8 @@ TEST(Discs, TheFirstSixtyCollisionsAreThoseOfBruteForceInLongDouble)
 
 TEST(Discs, EnergyStaysAndNothingOverlaps)
 {
-    // Samples fall at any time: what overlaps there has overlapped at its last collision.
+    // Samples are at arbitrary times: discs that overlap there have overlapped at their last
+    // collision.
     const Scene scene = gas({.count = 30, .spread = 0.4});
     SceneOptions options{.t_end = 600, .record_events = false};
     for (int k = 1; k <= 100; ++k) options.sample_times.push_back(6.0 * k);
@@ -117,8 +118,8 @@ TEST(Discs, ReversedVelocitiesLeadBack)
 
 TEST(Discs, InelasticCollapseComesToAnEnd)
 {
-    // Three discs on a line, restitution 0.05: below 7 - 4 sqrt(3) = 0.0718 the outer ones shut the
-    // one between them in, and infinitely many collisions take a finite time.
+    // Three discs on a line, restitution 0.05: below 7 - 4 sqrt(3) = 0.0718 the outer ones trap the
+    // middle one, and infinitely many collisions take a finite time.
     Scene scene;
     const MaterialId putty = scene.material({.restitution = 0.05});
     for (const double x : {0.0, 2.0, 3.0}) {
@@ -133,7 +134,7 @@ TEST(Discs, InelasticCollapseComesToAnEnd)
 
 TEST(Discs, ADenseGasOfLittleRestitutionComesToAnEnd)
 {
-    // Taken one collision after another this gas stands still at a time near 1.
+    // With collisions taken one after another this gas stops at a time near 1.
     const Scene scene = gas({.count = 30, .fraction = 0.5, .restitution = 0.3});
     const SceneRun run = simulate(scene, {.t_end = 1.5, .record_events = false});
     ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
@@ -157,7 +158,7 @@ TEST(Discs, RecentImpactsAreElasticWhereThatIsAskedFor)
 TEST(Discs, BallsThatMeetNoneBounceAsEachDoesByItself)
 {
     // Impact k of a drop from h: t0 (1 + 2 (e + ... + e^k)), t0 = sqrt(2 h / g). `integrate` finds
-    // the same to its own errors.
+    // the same up to its own errors.
     const double g = 9.81;
     Scene scene({.gravity = {0, -g}});
     const MaterialId steel = scene.material({.restitution = 0.9});
@@ -189,7 +190,7 @@ TEST(Discs, BallsThatMeetNoneBounceAsEachDoesByItself)
 
 TEST(Discs, SleepersAreStruckAndHaveNoEventsBefore)
 {
-    // One after the other along a row of equal discs: the velocity is handed on.
+    // One after the other along a row of equal discs: the velocity is passed on.
     Scene scene;
     for (int i = 0; i < 100; ++i) scene.disc({.at = {3.0 * i, 0}});
     scene.disc({.at = {-5, 0}, .velocity = {1, 0}});

@@ -13,14 +13,14 @@ namespace ricochet::test {
 
 struct Gas {
     std::size_t count = 10;
-    double fraction = 0.3;  ///< of the unit square that they cover
+    double fraction = 0.3;  ///< fraction of the unit square that they cover
     double restitution = 1;
     Vector2 gravity{};
     double spread = 0;  ///< of radii and masses about their mean, as a fraction
     unsigned seed = 1;
 };
 
-/// The same discs whatever `order` they are added in: `order[k]` is the one that comes k-th.
+/// The same discs for any `order` in which they are added: `order[k]` is the k-th.
 inline Scene gas(const Gas& wanted, const std::vector<std::size_t>& order = {})
 {
     const std::size_t columns =

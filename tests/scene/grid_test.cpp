@@ -1,4 +1,4 @@
-// What is asked and in which order entries wait changes no bit: cells, rings, the second grid, both
+// The choice of tests and the order of entries change no bit: cells, rings, the second grid, both
 // calendars; and a gas of unequal discs against brute force.
 #include "scene/grid.hpp"
 
@@ -127,7 +127,7 @@ TEST(Rings, CoverEveryPlaceFromWhichABodyCanTouchOnceAndLeaveNothing)
                 rings.each_on(b, [&](std::uint32_t) { ADD_FAILURE() << b; });
             }
         }
-        // None that is in the middle of a large one.
+        // No cell in the middle of a large one.
         rings.lay(cells, ring, 7, {0.25, 0.25});
         int asked = 0;
         rings.each_on(cells.bucket_of(0, 0), [&](std::uint32_t) { ++asked; });
@@ -150,7 +150,7 @@ TEST(Grid, MakesThoseBigThatCostMoreInTheCellsOfAll)
     EXPECT_EQ(big_of(mixed(2000, 30, 5, 0.3)), 30);
     EXPECT_EQ(big_of(test::gas({.count = 1000})), 0);
     EXPECT_EQ(big_of(test::gas({.count = 1000, .fraction = 0.3, .spread = 0.3})), 0);
-    EXPECT_EQ(big_of(mixed(10, 1, 5, 0.05)), 0);  // so few are all asked
+    EXPECT_EQ(big_of(mixed(10, 1, 5, 0.05)), 0);  // so few are all tested
 }
 
 TEST(Grid, ChangesNoBitOfAMixedGas)
@@ -212,7 +212,7 @@ TEST(Grid, ChangesNoBitOfStepsTerrainSleepersAndPoints)
 
 TEST(Grid, WakesABigSleeperAndASmallOne)
 {
-    // Without gravity what does not move sleeps: the small disc strikes the big one, which drifts
+    // Without gravity a body at rest sleeps: the small disc strikes the big one, which drifts
     // into a small sleeper behind it.
     Scene scene;
     scene.disc({.at = {0, 0}, .radius = 5, .mass = 2});
@@ -263,7 +263,7 @@ TEST(Calendars, HaveTheOrderOfASortedSet)
 {
     constexpr std::uint32_t count = 500;
     for (const bool ring : {false, true}) {
-        // Times of every size ahead, some equal, some at once, some never.
+        // Times ahead of every size, some equal, some immediate, some infinite.
         std::mt19937 generator(11);
         std::uniform_real_distribution<double> uniform(0, 1);
         Calendar calendar(count);
@@ -290,7 +290,7 @@ TEST(Calendars, HaveTheOrderOfASortedSet)
                 now = t;
                 set(body);
                 set(static_cast<std::uint32_t>(count * uniform(generator)));
-                // Some come back that had no entry.
+                // Some return that had no entry.
                 if (k % 100 == 0) set(static_cast<std::uint32_t>(count * uniform(generator)));
             }
             for (std::uint32_t i = 0; i < count; ++i) calendar.set(i, no_instant);

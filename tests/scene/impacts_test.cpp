@@ -13,7 +13,7 @@
 namespace ricochet::impacts_test {
 namespace {
 
-/// Balls in contact on a line; the first comes at speed 1.
+/// Balls in contact on a line; the first arrives at speed 1.
 Scene cradle(int balls, double restitution = 1)
 {
     Scene scene;
@@ -41,8 +41,8 @@ TEST(Impacts, ACradleHandsTheVelocityToTheLastBall)
 
 TEST(Impacts, RestitutionAndFrictionTogetherGainNoEnergy)
 {
-    // Three discs that touch, with any velocities: Newton's law with Coulomb's gains energy in a
-    // fifth of such impacts.
+    // Three discs that touch, with any velocities: Newton's law with Coulomb's law gains energy in
+    // a fifth of such impacts.
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> velocity(-1, 1), mass(0.2, 5);
     for (int k = 0; k < 2000; ++k) {
@@ -99,8 +99,8 @@ Scene wedge(bool swapped)
 TEST(Impacts, ASymmetricStrikeIsSymmetricWhateverTheLabels)
 {
     // Impulses p along +-30 degrees: the striker keeps 1 - 2 p cos 30, and each contact separates
-    // as it approached: p - (1 - 2 p cos 30) cos 30 = cos 30, so p = 2 cos 30 / (1 + 2 cos^2 30) =
-    // 0.4 sqrt(3).
+    // as fast as it approached: p - (1 - 2 p cos 30) cos 30 = cos 30, so
+    // p = 2 cos 30 / (1 + 2 cos^2 30) = 0.4 sqrt(3).
     for (const ImpactLaw law : {ImpactLaw::waves, ImpactLaw::together}) {
         const SceneRun one = simulate(wedge(false), {.t_end = 2, .impacts = law});
         const SceneRun two = simulate(wedge(true), {.t_end = 2, .impacts = law});

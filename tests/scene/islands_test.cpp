@@ -141,7 +141,7 @@ TEST(Islands, DragThatIsTooStiffEndsTheRunInASentence)
             "the steps of the island of feather are shorter than 1e-8 of the run: its drag or "
             "a spring is too stiff for the method");
     }
-    // Ten thousand times as stiff as an ordinary one, and no more expensive than its steps.
+    // A spring ten thousand times as stiff as usual does not cost more than its steps.
     Scene scene({.gravity = {0, -9.81}});
     scene.disc({.at = {0, 0}, .drag = 1e4});
     const SceneRun run = simulate(scene, {.t_end = 10});

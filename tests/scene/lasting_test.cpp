@@ -73,7 +73,7 @@ TEST(LastingContact, AStackDroppedIntoABinComesToRestAndKeepsEveryBitForTenThous
                 EXPECT_EQ(run.bodies[i].at, run.samples.back()[i].at);
                 EXPECT_EQ(run.bodies[i].velocity, (Vector2{0, 0}));
             }
-            // Rounding of some thousand impacts, and of gaps that steps leave: 1e-12 of 60 J.
+            // Rounding of some thousand impacts, and of gaps left by steps: 1e-12 of 60 J.
             double before = energy(scene, test::start_of(scene));
             for (const auto& sample : run.samples) {
                 const double now = energy(scene, sample);
@@ -104,7 +104,7 @@ TEST(LastingContact, LabelsDoNotChangeABit)
 
 TEST(LastingContact, AStruckSleeperWakesAndSleepsAgain)
 {
-    // Two on a floor and one between and above them, asleep; a fourth one falls onto it.
+    // Two discs on a floor and one between and above them, asleep; a fourth one falls onto it.
     Scene scene({.gravity = {0, -g}});
     const MaterialId clay = scene.material({.restitution = 0.2, .friction = 0.8});
     scene.wall({.normal = {0, 1}, .material = clay});
@@ -192,7 +192,7 @@ TEST(LastingContact, AChainOfSpringsSlidesOverAnEdge)
     EXPECT_LT(run.bodies[0].at[1], -0.2);
     double before = energy(scene, test::start_of(scene));
     for (const auto& sample : run.samples) {
-        // Steps turn springs to second order, h |v| / length of their energy each: see
+        // In a step springs turn by h |v| / length, which changes their energy to second order: see
         // contact_island_test.
         EXPECT_LE(energy(scene, sample), before + 1e-3);
         before = energy(scene, sample);
@@ -224,7 +224,7 @@ TEST(LastingContact, SamplesChangeNoBit)
 
 TEST(LastingContact, ADumbbellOnTheFloorComesToAnyEnd)
 {
-    // The last step is what rounding has left over of the run.
+    // The last step is the rounding left at the end of the run.
     for (const double t_end : {9.0, 10.0, 20.0}) {
         for (const double damping : {0.0, 0.1, 1.0, 5.0}) {
             for (const double lift : {0.0, 0.5}) {

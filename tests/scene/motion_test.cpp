@@ -101,7 +101,7 @@ TEST(SceneMotion, AFunctionWithBoundsIsTheOscillationThatItIs)
 
 TEST(SceneMotion, AFastTableIsNeverPassed)
 {
-    // A tenth of a millimetre at 500 Hz: a fall of 1 m takes 225 periods. Every impact lies on the
+    // A tenth of a millimetre at 500 Hz: a fall of 1 m takes 225 periods. Every impact is on the
     // table, and no ball is ever below it.
     const Oscillation table{.amplitude = {0, 1e-4}, .frequency = 500};
     std::vector<double> times(4001);
@@ -145,7 +145,8 @@ TEST(SceneMotion, ASleeperWakesWhenAWallComes)
 
 TEST(SceneMotion, WhatTouchesAWallIsStruckWhenTheWallJumps)
 {
-    // At rest beside a wall without gravity, until the wall goes at 2 m/s: elastic, it leaves at 4.
+    // At rest beside a wall without gravity, until the wall moves at 2 m/s: elastic, it leaves at
+    // 4.
     Scene scene;
     scene.wall({.normal = {1, 0}, .motion = PiecewiseLinear{{1, 2}, {{0, 0}, {2, 0}}}});
     scene.disc({.at = {0.5, 0}, .radius = 0.5});
@@ -157,8 +158,8 @@ TEST(SceneMotion, WhatTouchesAWallIsStruckWhenTheWallJumps)
 
 TEST(SceneMotion, ABoxThatMovesKeepsItsDiscs)
 {
-    // Closed terrain that is shaken in both directions, with its corners; the pictures of the box
-    // turned by its labels have the same bits.
+    // Closed terrain that is shaken in both directions, with its corners; runs of the box with
+    // permuted labels have the same bits.
     const Oscillation shaken{.amplitude = {0.2, 0.1}, .frequency = 1.5};
     const auto box = [&](const std::vector<std::size_t>& order) {
         Scene scene({.gravity = {0, -g}});
@@ -296,7 +297,7 @@ TEST(SceneMotion, WhatIsNoMotionIsRefusedInASentence)
     EXPECT_EQ(refusal([&] { scene.check(); }),
               "Scene: slide is terrain that moves, which discs alone can meet, and there is a "
               "point");
-    // Where it is at the start counts.
+    // The position at the start matters.
     EXPECT_NE(refusal([&] {
                   ball_above(ConstantVelocity{{0, 1}}).check(2);
               }).find("lies behind"),

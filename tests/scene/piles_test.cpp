@@ -113,13 +113,13 @@ TEST(Piles, RandomOnesComeThroughWithoutOverlapOrEnergyGained)
 
 TEST(Piles, ADiscMeetsTheChordOfAGroupNotItsVelocity)
 {
-    // A disc on a spring that touched a group was led through it, once for the length of a step.
+    // A disc on a spring that touched a group used to be moved through it, once for a whole step.
     for (const std::uint64_t seed : {63, 65, 140}) comes_through(seed);
 }
 
 TEST(Piles, ImpactsCloserThanPlacesTellBecomeLastingContact)
 {
-    // A heavy disc wedges a light one, whose impacts were spaced by 1e-14 s for ever.
+    // A heavy disc wedges a light one, whose impacts used to be spaced by 1e-14 s forever.
     comes_through(116);
 }
 

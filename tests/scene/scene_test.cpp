@@ -1,4 +1,4 @@
-// Two discs in a box, in C++ and as JSON; rest and sliding; what is refused.
+// Two discs in a box, in C++ and as JSON; rest and sliding; refusals.
 #include "ricochet/scene/scene.hpp"
 
 #include <gtest/gtest.h>
@@ -77,7 +77,7 @@ TEST(Scene, AFileIsTheSceneThatItDescribes)
     EXPECT_EQ(file.options.sample_times.size(), 2u);
 }
 
-/// What `text` is refused with.
+/// The message with which `text` is refused.
 std::string trouble(const std::string& text)
 {
     try {

@@ -1,4 +1,4 @@
-// Systems as bodies: what discs that strike them do, against runs of both as one state.
+// Systems as bodies: effects of discs that strike them, against runs of both as one state.
 #include "ricochet/scene/system.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ struct Bob {
     using State = std::array<double, 2>;
     std::size_t shape_count = 1;
     double bound = 1;  ///< factor of the true bound
-    double sign = 1;   ///< of what a push does
+    double sign = 1;   ///< of the effect of a push
 
     void flow(double, const State& x, State& dxdt) const
     {
@@ -239,7 +239,7 @@ TEST(SceneSystems, BothEndsOfARotorAreStruckTogether)
 
 TEST(SceneSystems, ACrowdMissesNoPendulum)
 {
-    // Forty discs through cells, and no overlap with the bob at any of 2000 times.
+    // Forty discs through cells, without an overlap with the bob at any of 2000 times.
     const auto crowd = [](bool reversed) {
         Scene scene;
         for (const auto& [at, normal] : std::vector<std::pair<Vector2, Vector2>>{

@@ -1,4 +1,4 @@
-// Points and small discs among segments: what is inside stays inside.
+// Points and small discs among segments: bodies inside stay inside.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -57,7 +57,7 @@ struct Trial {
 };
 
 /// Bodies of this radius in a polygon, made of one chain or of separate segments, of which every
-/// second one may be given from its other end.
+/// second one may start at its other end.
 Trial trial(std::uint64_t seed, double radius, bool turned = false)
 {
     std::mt19937_64 random(seed);
@@ -136,7 +136,7 @@ void stays_inside(std::uint64_t seed, double radius, bool turned = false)
     }
 }
 
-/// Whether gravity keeps a disc of this radius on a corner of the polygon over which it goes: its
+/// Whether gravity keeps a disc of this radius on a corner of the polygon that it passes: its
 /// centre is on a circle, and gravity pulls it towards the corner by more than v^2 / radius.
 bool held_by_corner(const Trial& made, const BodyState& body, double radius)
 {
@@ -158,14 +158,14 @@ TEST(Terrain, PointsInPolygonsStayInside)
 
 TEST(Terrain, APointThatSlidesOverAnAlmostFlatCornerStaysInside)
 {
-    // Its angle of 1.2e-3 rad makes of the rounding across the segments 800 times as much along
+    // Its angle of 1.2e-3 rad turns the rounding across the segments into 800 times as much along
     // them.
     stays_inside(26927, 0);
 }
 
 TEST(Terrain, APointPassesAlmostFlatCornersOfSeparateSegmentsAsThoseOfOneChain)
 {
-    // Seed 122656 has an angle of 2e-6 rad between two segments, whatever end each begins at.
+    // Seed 122656 has an angle of 2e-6 rad between two segments, for either start of each.
     for (const bool turned : {false, true}) {
         stays_inside(122656, 0, turned);
         for (std::uint64_t seed = 0; seed < 1000; ++seed) stays_inside(seed, 0, turned);
@@ -174,8 +174,8 @@ TEST(Terrain, APointPassesAlmostFlatCornersOfSeparateSegmentsAsThoseOfOneChain)
 
 TEST(Terrain, ElasticPointsWithFrictionComeToRestInACorner)
 {
-    // Friction leads them into hops that strike both sides at a right angle, lower than what
-    // rounding makes of their place.
+    // Friction leads them into hops that strike both sides at a right angle, lower than the
+    // rounding of their place.
     for (const std::uint64_t seed : {20506, 31829, 50995, 66179, 115630}) {
         stays_inside(seed, 0);
         const Trial made = trial(seed, 0);

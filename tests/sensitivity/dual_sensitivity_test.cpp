@@ -1,4 +1,4 @@
-// Sensitivities of systems that take any scalar, beside those of systems that write their
+// Sensitivities of systems that take any scalar, beside those of systems that give their
 // derivatives, and of systems that have neither.
 #include <gtest/gtest.h>
 
@@ -20,8 +20,8 @@ namespace {
 
 using X = std::array<double, 2>;
 
-/// x'' = -sin x - x'/10 + cos(2 t), with a moving wall and a reset that bends; by one text, and by
-/// hand.
+/// x'' = -sin x - x'/10 + cos(2 t), with a moving wall and a nonlinear reset; with derivatives by
+/// duals, and by hand.
 struct ByText {
     using State = X;
     template <class S>
@@ -97,7 +97,7 @@ void expect_near(const Sensitivities<A>& a, const Sensitivities<B>& b, double re
     near(a.state, b.state);
 }
 
-// Both follow one motion in the same steps; what differs is the rounding of each derivative, a few
+// Both follow one motion in the same steps; they differ by the rounding of each derivative, a few
 // units in the last place at each of 300 steps.
 TEST(DualSensitivity, IsThatOfDerivativesByHand)
 {
@@ -105,7 +105,7 @@ TEST(DualSensitivity, IsThatOfDerivativesByHand)
     const auto text = sensitivities(ByText{}, {0.5, 1.0}, {}, options);
     ASSERT_GE(text.events.size(), 3u);
     expect_near(text, sensitivities(ByHand{}, {0.5, 1.0}, {}, options), 1e-13);
-    // Differences err by some 1e-13 of each derivative, but may change a step.
+    // Differences have errors of some 1e-13 of each derivative, but may change a step.
     expect_near(text, sensitivities(ByDifferences{}, {0.5, 1.0}, {}, options), 1e-8);
 }
 
@@ -116,7 +116,7 @@ TEST(DualSensitivity, OfABallIsThatOfTheExactOne)
                 sensitivities(test::ExactBall{}, {10.0, 0.0}, {}, options), 1e-13);
 }
 
-/// A system with its functions of doubles alone.
+/// A system that only has its functions of doubles.
 template <class System>
 struct OfDoubles {
     using State = typename System::State;
@@ -141,8 +141,8 @@ struct OfDoubles {
     }
 };
 
-// Differences of the five-point formula are exact on a linear flow but for the rounding of numbers
-// of size 20 over a step of 0.02, 2e-13, in each of some ten derivatives along the way that add up.
+// Differences by the five-point formula are exact on a linear flow except for the rounding of
+// numbers of size 20 over a step of 0.02, 2e-13, which adds up over some ten derivatives.
 TEST(DualSensitivity, OfAThermostatIsThatOfDifferences)
 {
     const Options options{.t_end = 20, .rtol = 1e-10, .atol = 1e-12};

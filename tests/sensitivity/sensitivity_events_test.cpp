@@ -1,4 +1,4 @@
-// Derivatives through events that are not simply crossed, one at a time.
+// Derivatives through events that are not simple crossings, one at a time.
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ using namespace test;
 
 // --- notifications ---
 
-/// An oscillator that is told when it passes `level`, upwards.
+/// An oscillator with a guard that records upward passages of `level`.
 struct Section {
     using State = X2;
     double level = 0.5;
@@ -51,7 +51,7 @@ TEST(SensitivityThroughEvents, NotificationsMoveButLeaveTheDerivativesAlone)
     ASSERT_EQ(s.events.size(), 2u);
     const double c = std::sqrt(1 - 0.25);
     for (const EventSensitivity& event : s.events) {
-        // Located on the polynomial of the step, a little less exact than the method.
+        // Located on the polynomial of the step, slightly less accurate than the method.
         EXPECT_NEAR(event.dt[1], -0.5 / c, 1e-9);
         EXPECT_NEAR(event.dt[2], 1 / c, 1e-9);
         EXPECT_EQ(event.before, event.after);
@@ -163,7 +163,7 @@ TEST(SensitivityThroughEvents, AGlancingImpactStillHasDerivatives)
 
 // --- events at one time ---
 
-/// Two balls that do not know of each other.
+/// Two independent balls.
 struct TwoBalls {
     using State = std::array<double, 4>;
     static constexpr std::size_t guard_count = 2;
@@ -269,7 +269,7 @@ TEST(SensitivityThroughEvents, ConflictingResetsEndTheRunAsTheyDoWithoutDerivati
     EXPECT_EQ(s.run.t, plain.t);
 }
 
-/// One ball whose floor is named twice.
+/// One ball with two guards for the same floor.
 struct TwoFloors : ExactBall {
     static constexpr std::size_t guard_count = 2;
     [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
@@ -295,7 +295,7 @@ TEST(SensitivityThroughEvents, AGuardThatIsThereTwiceChangesNothing)
     EXPECT_LE((s.state - expected.leftCols<2>()).cwiseAbs().maxCoeff(), 1e-10);
 }
 
-/// A clock c; when it has run down, y loses `loss`, and where that makes y negative it
+/// A clock c; when it has run down, y loses `loss`, and if that makes y negative it
 /// is turned around.
 struct Cascade {
     using State = X2;
@@ -343,7 +343,7 @@ TEST(SensitivityThroughEvents, AGuardThatIsPushedOverMovesWithWhatPushedIt)
 
 // With keep = loss = 0 every neighbour is put on the second surface, so both events
 // happen together: y = 0.3 - (t - c0) / 2. A loss of 3/2 puts the run itself there, but
-// some of its neighbours in front of it and some behind.
+// some of its neighbours before it and some beyond.
 TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceFollowsIfAllNeighboursAre)
 {
     const auto all =
@@ -361,7 +361,7 @@ TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceFollowsIfAllNeighbours
     EXPECT_EQ(some.undefined_at->reason, Undefined::simultaneous);
 }
 
-/// A ball whose floor is known by its sign only.
+/// A ball whose floor is known only by its sign.
 struct BlindBall : ExactBall {
     static constexpr bool unilateral = false;
     template <class X>

@@ -24,7 +24,7 @@ using namespace test;
 
 // --- the bouncing ball: t_n = t_1 + 2 t_1 (r + ... + r^n), t_1 = sqrt(2 u0 / g) ---
 
-// Every flight is a parabola, on which the method is exact; what is left is rounding in
+// Every flight is a parabola, on which the method is exact; the error is rounding in
 // differences, 1e-13 of the derivative, 13 times, amplified at each impact by less than
 // 19 (see integrate_test.cpp): below 3e-11.
 TEST(Sensitivity, ImpactTimesOfTheBallFollowTheClosedFormInEveryDirection)
@@ -44,7 +44,7 @@ TEST(Sensitivity, ImpactTimesOfTheBallFollowTheClosedFormInEveryDirection)
                             "impact " + std::to_string(n) + ", direction " + std::to_string(j));
         }
     }
-    EXPECT_EQ(s.events[0].dt[2], 0);  // the first impact knows nothing of the restitution
+    EXPECT_EQ(s.events[0].dt[2], 0);  // the first impact does not depend on the restitution
 }
 
 TEST(Sensitivity, TheStateOfTheBallFollowsTheClosedForm)
@@ -54,7 +54,7 @@ TEST(Sensitivity, TheStateOfTheBallFollowsTheClosedForm)
                       {.t_end = 20.5, .rtol = 1e-12, .atol = 1e-12});
     const auto expected = BallClosedForm().state(12, 20.5);
     for (int j = 0; j < 4; ++j) {
-        // Height and velocity hang together through the flight time: the larger of
+        // Height and velocity are coupled through the flight time: the larger of
         // the two sets the scale.
         const double scale = expected.col(j).cwiseAbs().maxCoeff();
         EXPECT_LE((s.state.col(j) - expected.col(j)).cwiseAbs().maxCoeff(), 1e-10 * scale) << j;
@@ -180,7 +180,7 @@ TEST(Sensitivity, SamplesOfTheTrajectoryHaveDerivatives)
     }
 }
 
-/// x' = -L sin(x / L), which bends over the length L.
+/// x' = -L sin(x / L), whose length scale is L.
 struct Small {
     using State = X1;
     double length = 1e-6;
@@ -215,7 +215,7 @@ TEST(Sensitivity, DeclaredDerivativesGiveTheClosedForm)
     ASSERT_EQ(s.events.size(), 13u);
     for (int n = 0; n < 13; ++n) {
         const auto expected = BallClosedForm().impact(n);
-        // No differences but for the guard's rate; rounding alone.
+        // No differences except for the guard's rate; only rounding.
         expect_relative(s.events[static_cast<std::size_t>(n)].dt[0], expected[1], 1e-11, "u0");
         expect_relative(s.events[static_cast<std::size_t>(n)].dt[1], expected[2], 1e-11, "v0");
     }
@@ -475,8 +475,8 @@ TEST(Sensitivity, TimeEventsDoNotMoveWithTheStateButWithTheirInterval)
     EXPECT_NEAR(s.state(0, 1), by_interval, 1e-10);
 }
 
-// Two thousandths of the interval 130 times are more than a quarter of it: the dose can
-// no longer be told from its neighbour, and a smaller scale helps.
+// Two thousandths of the interval 130 times are more than a quarter of it: the dose is
+// no longer distinguished from its neighbour, and a smaller scale helps.
 TEST(Sensitivity, ATimeEventThatMovesTooFarIsSaidToBeLost)
 {
     Parameter<Doses> interval{.with = [](double i) { return Doses{i}; }, .nominal = 0.5};
@@ -494,7 +494,7 @@ TEST(Sensitivity, ATimeEventThatMovesTooFarIsSaidToBeLost)
     EXPECT_NEAR(followed.events.back().dt[1], static_cast<double>(followed.events.size()), 1e-8);
 }
 
-// --- what is asked for ---
+// --- requests ---
 
 TEST(Sensitivity, WithoutDirectionsItIsTheRunBitForBit)
 {
@@ -581,7 +581,7 @@ TEST(Sensitivity, MonodromyIsTheDerivativeOverAPeriodAndNanWhereThereIsNone)
     const auto m = monodromy(Oscillator{}, {1.0, 0.0}, 1.0, {.rtol = 1e-12, .atol = 1e-12});
     EXPECT_NEAR(m(0, 1), std::sin(1.0), 1e-11);
     EXPECT_NEAR(m(1, 1), std::cos(1.0), 1e-11);
-    // A ball that does not say how it rests gets no further than 27.1 s.
+    // A ball without a rest rule gets no further than 27.1 s.
     const auto none = monodromy(ExactBall{}, {10.0, 0.0}, 30.0, {});
     EXPECT_TRUE(none.array().isNaN().all());
 }

@@ -19,8 +19,8 @@ using X = std::array<double, 2>;
 using ByTaylor = ErrorControlled<Taylor>;
 using ByFehlberg = ErrorControlled<Fehlberg78>;
 
-/// Steps of both are within 1e-13 of what is integrated, so that the derivatives agree to that
-/// times their growth; differences by parameters are good to some 1e-12 of them.
+/// Steps of both have errors within 1e-13, so the derivatives agree to that
+/// times their growth; differences by parameters have errors of some 1e-12 of them.
 template <class State>
 void expect_near(const Sensitivities<State>& a, const Sensitivities<State>& b, double relative)
 {
@@ -133,7 +133,7 @@ TEST(SeriesSensitivity, FollowsModes)
                 sensitivities(Thermostat(), {20.0}, {}, options, ByFehlberg{}), 1e-11);
 }
 
-/// A guard that is touched: derivatives end there, the motion goes on.
+/// A guard that is touched: derivatives end there, and the motion continues.
 struct Touching {
     using State = X;
     template <class S>

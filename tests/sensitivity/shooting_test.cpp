@@ -203,7 +203,7 @@ void expect_stick_slip(const PeriodicOrbit<X2>& orbit)
     // 1e-12 is of this size.
     EXPECT_NEAR(orbit.period, 12.001031294830578647, 2e-11);
     EXPECT_EQ(orbit.run.events.size(), 2u);
-    // Sticking forgets how the belt's speed was reached.
+    // Sticking makes the motion independent of how the belt's speed was reached.
     EXPECT_NEAR(std::abs(orbit.multipliers[0] - 1.0), 0, 1e-8);
     EXPECT_NEAR(std::abs(orbit.multipliers[1]), 0, 1e-10);
 }
@@ -248,7 +248,7 @@ struct TwoModes {
     }
 };
 
-// Down in 2 log 2, up in 3 log(2 / 1). In one dimension there is only the direction
+// Down in 2 log 2, up in 3 log(2 / 1). In one dimension the only direction is
 // along the orbit.
 TEST(Shooting, TheOrbitOfATwoModeSwitchHasTheClosedFormPeriod)
 {
@@ -259,7 +259,7 @@ TEST(Shooting, TheOrbitOfATwoModeSwitchHasTheClosedFormPeriod)
     EXPECT_NEAR(std::abs(orbit.multipliers[0] - 1.0), 0, 1e-9);
 }
 
-// --- when there is no orbit, or no way to it ---
+// --- cases without an orbit, or without a way to find it ---
 
 /// x'' + x' + x = 0.
 struct Damped {
@@ -311,7 +311,7 @@ TEST(Shooting, TheNumberOfCorrectionsIsBounded)
     EXPECT_TRUE(std::isfinite(orbit.residual));
 }
 
-/// A ball that does not say how it comes to rest.
+/// A ball without a rest rule.
 struct RestlessBall {
     using State = X2;
     double force = 0;  // a lift that follows cos(t)
@@ -386,7 +386,7 @@ TEST(Shooting, WithoutADerivativeThereIsNoCorrection)
     EXPECT_FALSE(orbit.converged);
     EXPECT_EQ(orbit.end, ShootingEnd::undefined_derivative);
     EXPECT_TRUE(orbit.monodromy.array().isNaN().all());
-    // The orbit of period 2 pi closes all the same: only its multipliers are unknown.
+    // The orbit of period 2 pi closes nevertheless: only its multipliers are unknown.
     const auto closed = find_periodic_orbit(Grazing{}, {0.0, 1.0}, {.period = 2 * pi}, fine);
     EXPECT_TRUE(closed.converged);
     EXPECT_TRUE(std::isnan(closed.multipliers[0].real()));
@@ -406,7 +406,7 @@ TEST(Shooting, SetUpsThatMakeNoSenseAreRefused)
     refuses({.period = -1}, "period must be positive and finite");
     refuses({.period = 1, .tolerance = 0}, "tolerance must be positive");
     refuses({.period = 1, .max_iterations = -1}, "max_iterations must be zero or positive");
-    // A guess behind the floor is no guess.
+    // A guess behind the floor is refused.
     EXPECT_THROW((void)find_periodic_orbit(RestlessBall{}, {-1.0, 0.0}, {.period = 1}, fine),
                  std::invalid_argument);
 }

@@ -41,7 +41,7 @@ void bounce(Tally& tally, const LawfulBall& ball, std::uint64_t wanted)
 {
     // A flight takes 2 v / g and ends with the velocity that it began with: the times are summed
     // in long double. Each flight is a step or two, and adds a few units in the last place of the
-    // velocity; under a constant law an error of one flight is carried to all that follow, so that
+    // velocity; under a constant law an error of one flight is carried to all later ones, so
     // the errors grow at most as the number of bounces.
     const Options options{.t_end = 1e300, .rtol = 1e-10, .atol = 1e-14, .record_events = false};
     Simulation<LawfulBall, Two> simulation(ball, Two{0.5, 0}, options);
@@ -52,7 +52,7 @@ void bounce(Tally& tally, const LawfulBall& ball, std::uint64_t wanted)
     for (; n < wanted && simulation.advance(); ++n) {
         above = above && simulation.x()[0] >= 0;
         if (n > 0) t += 2 * static_cast<long double>(-v) / ball.gravity;
-        // The law is followed from the exact velocity, not from the computed one.
+        // The law is evaluated at the exact velocity, not the computed one.
         if (n + 1 < wanted) v = -ball.rebound(v);
     }
     const double growth = 8 * 2.3e-16 * static_cast<double>(wanted);
@@ -77,7 +77,7 @@ void scaled_ball(Tally& tally, double length, double time, bool fixed)
     if (!std::isfinite(gravity) || gravity < 1e-290) return;
     const BouncingBall ball({.gravity = gravity, .restitution = 0.9});
     Options options{.t_end = 20.5 * time, .rtol = 1e-10, .atol = 0};
-    // Errors are weighed in the units of the problem.
+    // Errors are measured in the units of the problem.
     options.component_atol = {1e-10 * length, 1e-10 * length / time};
     if (fixed) options.step = 0.01 * time;
     const auto run = fixed ? integrate(ball, Two{10 * length, 0}, options, FixedStep<Rk4>{})
@@ -95,7 +95,7 @@ void scaled_ball(Tally& tally, double length, double time, bool fixed)
                  });
 }
 
-/// Mass, stiffness and friction by the same factor: the same motion.
+/// Mass, stiffness and friction scaled by the same factor: the same motion.
 void scaled_mass(Tally& tally, double mass)
 {
     const StickSlip system({.mass = mass, .stiffness = mass, .friction = mass});
@@ -114,7 +114,7 @@ void scaled_mass(Tally& tally, double mass)
     });
 }
 
-/// An impact in the middle of a hundred steps that are tiny, or one step that is huge.
+/// An impact in the middle of a hundred tiny steps, or of one huge step.
 template <class Detector>
 void scaled_step(Tally& tally, double step, const Detector& detector, std::string_view detected)
 {
@@ -154,7 +154,7 @@ Tally bounces(const Size& size)
     const std::uint64_t wanted = size.cases(20'000, 100'000'000);
     bounce(tally, {.e = 1}, wanted);
     bounce(tally, {.gravity = 9.81, .e = 1}, wanted);
-    // What is left after all of them is above the least speed of a rebound.
+    // The remaining speed after all of them is above the least speed of a rebound.
     bounce(tally, {.e = 1 - 2.0 / static_cast<double>(wanted)}, wanted);
     bounce(tally, {.e = 1, .loss = 1e-9}, std::min<std::uint64_t>(wanted, 10'000'000));
     return tally;

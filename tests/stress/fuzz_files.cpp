@@ -1,5 +1,6 @@
 // libFuzzer on the format that the environment names: RICOCHET_FUZZ_FORMAT=safetensors fuzz_files
-// corpus/. Half of the mutations are those of file_fuzz, which mends checksums and keeps structure.
+// corpus/. Half of the mutations are those of file_fuzz, which repairs checksums and keeps
+// structure.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -35,7 +36,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     try {
         format().load_and_use({reinterpret_cast<const char*>(data), size}, mutator);
     } catch (const Refused&) {
-        // As the format promises.
+        // The exception is the one that the format promises.
     }
     return 0;
 }

@@ -1,4 +1,4 @@
-// libFuzzer on the command line: one word a line, up to the point where a run would begin. A
+// libFuzzer on the command line: one word per line, up to the point where a run would begin. A
 // request is resolved, with all its values and models, and nothing is run or written.
 #include <cstdint>
 #include <string>
@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (std::size_t i = 0; i < size; ++i) {
         if (data[i] == '\n') {
             words.emplace_back();
-        } else if (data[i] != 0) {  // no word of a command line has it
+        } else if (data[i] != 0) {  // no word of a command line contains it
             words.back() += static_cast<char>(data[i]);
         }
     }
@@ -48,7 +48,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
     const int status = run_program(add_commands, static_cast<int>(words.size()), arguments.data());
-    // Fine, or bad input; nothing else can happen before a run.
+    // Success, or bad input; nothing else is possible before a run.
     if (status != 0 && status != 2) __builtin_trap();
     return 0;
 }

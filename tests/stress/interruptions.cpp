@@ -1,4 +1,4 @@
-// Runs that are interrupted: by a lack of memory, by being saved and restored, by their end.
+// Runs that are interrupted: by a lack of memory, by saving and restoring, by their end.
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -11,7 +11,7 @@
 
 namespace {
 
-/// Allocations until one fails; 0: none will.
+/// Allocations until one fails; 0: none fails.
 thread_local std::uint64_t left = 0;
 
 void* allocate(std::size_t size)
@@ -110,7 +110,7 @@ Tally memory(const Size& size)
             failed = true;
         }
         left = 0;
-        // What failed has left nothing behind: the next run is as ever.
+        // The failure has left no trace: the next run is unchanged.
         const bool again = size.long_form || n % 16 == 0;
         if (!failed || again) {
             if (failed) run = integrate(system, start, recorded());
@@ -135,7 +135,7 @@ Tally saves(const Size& size)
         Random3 whole(problem.system, problem.x0, options);
         while (whole.advance()) {
         }
-        // A new simulation for every stretch, from the text of the last one's snapshot.
+        // A new simulation for every part, from the text of the last one's snapshot.
         Snapshot snapshot = Random3(problem.system, problem.x0, options).save();
         std::vector<double> times;
         Run<RandomSystem::State> end;

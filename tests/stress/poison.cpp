@@ -1,4 +1,4 @@
-// Numbers that are none, at any call of a system's functions, and bounds that are none.
+// NaN and infinity at any call of a system's functions, and bounds that are not valid.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ using Two = std::array<double, 2>;
 enum Place : std::uint8_t { flow_at, guard_at, rate_at, reset_at, places };
 constexpr std::string_view place_names[] = {"flow", "guard", "guard_rate", "reset"};
 
-/// A forced oscillator on a wall, one call of which returns `value` in the place of its own.
+/// A forced oscillator on a wall, one call of which returns `value` in place of its own value.
 struct Poisoned {
     using State = Two;
     static constexpr bool unilateral = true;
@@ -72,8 +72,8 @@ bool same_events(const Run<Two>& a, const Run<Two>& b)
     return true;
 }
 
-/// What a NaN or an infinity did: the run says so, or it is as if it had not been. A number that is
-/// finite, however strange, may change the motion, and then no more is asked than that the run ends
+/// Checks the effect of a NaN or an infinity: the run reports it, or is unaffected. A finite
+/// number, however strange, may change the motion; then the run is only required to end
 /// with numbers.
 template <class Stepping>
 void poison_all(Tally& tally, Outcomes& outcomes, const Size& size, const Stepping& stepping,
@@ -124,7 +124,7 @@ void poison_all(Tally& tally, Outcomes& outcomes, const Size& size, const Steppi
     }
 }
 
-/// A ball above a floor that declares how fast its guard can change, and lies by a factor.
+/// A ball above a floor that declares how fast its guard can change, wrong by a factor.
 struct Liar {
     using State = Two;
     static constexpr bool unilateral = true;
@@ -249,7 +249,7 @@ struct BadRates {
     }
 };
 
-/// What a run, of the library or of a host, says of its events.
+/// Events as reported by a run, of the library or of a host.
 struct Told {
     Outcome outcome = Outcome::reached_end;
     std::size_t guard = no_guard;
@@ -268,7 +268,7 @@ struct Told {
     return true;
 }
 
-/// A rate that is none leaves the events as they are, or the run names its guard.
+/// An invalid rate leaves the events unchanged, or the run names its guard.
 void spoil_rates(Tally& tally, std::uint64_t& named, const Size& size, std::string_view what,
                  const auto& run_with)
 {

@@ -14,7 +14,7 @@ namespace ricochet::stress {
 
 namespace {
 
-/// Balls of restitutions of their own above floors of their own.
+/// Balls with different restitutions above different floors.
 struct Crowd {
     using State = std::vector<double>;
     std::vector<BouncingBall> balls;
@@ -60,8 +60,8 @@ Tally oscillators(const Size& size)
         const std::vector<double> exact = system.impacts(t_end);
         p.wall *= 1 + 1e-9;
         const std::vector<double> moved = ImpactOscillator(p).impacts(t_end);
-        // How much a disturbance of 1e-9 does; that of the steps is a hundredth of it. Where it
-        // changes the number of impacts, or flights end in a rest, there is not one answer.
+        // The effect of a disturbance of 1e-9; that of the steps is a hundredth of it. If it
+        // changes the number of impacts, or flights end in a rest, the answer is not unique.
         double doubt = 0;
         for (std::size_t i = 0; i < std::min(exact.size(), moved.size()); ++i) {
             doubt = std::max(doubt, std::fabs(exact[i] - moved[i]));

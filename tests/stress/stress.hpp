@@ -1,6 +1,6 @@
-// Stress: what must hold whatever is done to a run, in classes with an oracle each.
+// Stress: properties that must hold whatever is done to a run, in classes with an oracle each.
 //
-// A class counts its cases and says of each that went wrong how to repeat it. The short form of
+// A class counts its cases and reports for each that failed how to repeat it. The short form of
 // all of them takes seconds and is a quick test; the long form is for scripts/stress.
 #pragma once
 
@@ -31,8 +31,8 @@ struct Size {
 struct Tally {
     std::uint64_t cases = 0;
     std::uint64_t wrong = 0;
-    std::vector<std::string> first_wrong;  ///< what the first of them were
-    std::string said;                      ///< counts that are of interest
+    std::vector<std::string> first_wrong;  ///< descriptions of the first of them
+    std::string said;                      ///< counts of interest
 
     void expect(bool holds, const auto& describe)
     {
@@ -58,7 +58,7 @@ template <class X>
     return true;
 }
 
-/// Whether two runs say the same of the motion, to the last bit.
+/// Whether two runs have the same motion, to the last bit.
 template <class X>
 [[nodiscard]] bool same(const Run<X>& a, const Run<X>& b)
 {
@@ -88,9 +88,9 @@ template <class X>
 
 Tally bounces(const Size& size);      ///< balls that bounce for very long, under several laws
 Tally scales(const Size& size);       ///< times, lengths, masses, steps of every size
-Tally poison(const Size& size);       ///< numbers that are none, at any call
-Tally rates(const Size& size);        ///< rates of guards that are none, at any call
-Tally bounds(const Size& size);       ///< bounds that are none
+Tally poison(const Size& size);       ///< NaN and infinity, at any call
+Tally rates(const Size& size);        ///< invalid rates of guards, at any call
+Tally bounds(const Size& size);       ///< invalid bounds
 Tally memory(const Size& size);       ///< no memory at the n-th allocation
 Tally saves(const Size& size);        ///< saved and restored at every event
 Tally cancels(const Size& size);      ///< ended at every step

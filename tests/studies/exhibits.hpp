@@ -1,4 +1,4 @@
-// Commands of ricochet-studies that repeat a table or a figure of a paper, and what holds of each.
+// Commands of ricochet-studies that repeat a table or a figure of a paper, and their properties.
 #pragma once
 
 #include <cstddef>
@@ -56,7 +56,7 @@ inline std::size_t count_of(const std::string& text, const std::string& piece)
     return count;
 }
 
-/// As XML has it.
+/// Escaped as in XML.
 inline std::string escaped(const std::string& text)
 {
     std::string out;
@@ -73,7 +73,7 @@ inline std::string escaped(const std::string& text)
 
 class Exhibits : public App {
 protected:
-    /// Every number of ours is as near the paper's as the command says.
+    /// Expects every number of ours to be as near the paper's as the command states.
     static void expect_agreement(const nlohmann::json& exhibit)
     {
         for (const auto& each : exhibit.at("agreements")) {
@@ -93,7 +93,7 @@ protected:
         expect_agreement(table);
     }
 
-    /// The picture is well formed and has a drawn thing, with its name, for each curve, and a cell
+    /// Expects the picture to be well formed and to have a named shape for each curve, and a cell
     /// for each value of a grid.
     void expect_figure(const std::string& paper, int number) const
     {

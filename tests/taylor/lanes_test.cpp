@@ -208,7 +208,7 @@ void expect_same(const Run<X>& lane, const Run<X>& alone, const std::string& wha
     EXPECT_EQ(lane.solution.size(), alone.solution.size());
 }
 
-/// Compares the runs of all systems in lanes with the same alone; returns their events.
+/// Compares the runs of all systems in lanes with the same runs alone; returns their events.
 template <class System>
 std::size_t expect_bits_of_runs_alone(const std::vector<System>& systems,
                                       const std::vector<typename System::State>& starts,
@@ -319,8 +319,8 @@ TEST(Lanes, OptionsThatEndOrObserveRunsAreHeeded)
     const auto starts = starts_around(Two{0, 0}, 0.5, 6);
     std::vector<double> samples;
     for (int k = 1; k < 40; ++k) samples.push_back(0.7 * k);
-    // Runs end at their first impacts, at times of their own; after as many steps; are sampled
-    // and recorded on a part of their way; have a tolerance for each component.
+    // Runs end at their first impacts, at different times; after the same number of steps; are
+    // sampled and recorded on a part of their way; have a tolerance for each component.
     expect_bits_of_runs_alone(Impact{}, starts, {.t_end = 80, .stop_at_event = true});
     expect_bits_of_runs_alone(Impact{}, starts, {.t_end = 80, .max_steps = 30});
     expect_bits_of_runs_alone(Impact{}, starts, {.t_end = 60, .sample_times = samples});
@@ -333,7 +333,7 @@ TEST(Lanes, OptionsThatEndOrObserveRunsAreHeeded)
 
 TEST(Lanes, ExceptionsStayWithTheirRuns)
 {
-    // One guard throws in the middle of its run, which was in a lane with others; one start is not
+    // One guard throws in the middle of its run, which is in a lane beside others; one start is not
     // finite, which is refused before the first step.
     auto starts = starts_around(Two{0, 0}, 0.5, 10);
     std::vector<Impact> systems(starts.size());
@@ -380,8 +380,8 @@ TEST(Lanes, FourRunsTakeTheirStepsInTurns)
     GTEST_SKIP() << "without optimisation runs are alone";
 #endif
     if (detail::fuses_products()) GTEST_SKIP() << "where products are fused runs are alone";
-    // The guards of four runs are called in turns, of a fifth one once a lane is free: alone, the
-    // next run would begin where one has ended, five blocks of calls.
+    // The guards of four runs are called in turns, those of a fifth one once a lane is free: alone,
+    // the next run would begin where one has ended, in five blocks of calls.
     std::vector<const Pendulum*> calls;
     std::vector<Pendulum> systems(5);
     for (auto& system : systems) system.calls = &calls;

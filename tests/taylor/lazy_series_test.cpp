@@ -59,7 +59,7 @@ TEST(LazySeries, RunsAreThoseOfTheUnrolledSeriesToTheRoundingOfTheTime)
                        1e-13);
 }
 
-/// A pendulum whose damping is left out where it is zero, with a function that is not constexpr.
+/// A pendulum whose damping is omitted where it is zero, with a function that is not constexpr.
 struct Damped {
     using State = Two;
     double damping = 0;
@@ -78,7 +78,7 @@ struct Damped {
         return x[0];
     }
 };
-/// The same operations whatever the damping is.
+/// The same operations for any damping.
 struct AlwaysDamped : Damped {
     template <class S>
     constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
@@ -258,7 +258,7 @@ TEST(LazySeries, EachModeIsRecordedByItself)
     EXPECT_NEAR(run.x[1], 1.5 * 1.5 * 1.5, 1e-14 * 4);
 }
 
-/// A motion of degree 2, of which a step ends at events alone.
+/// A motion of degree 2, whose steps end only at events.
 struct Thrown {
     using State = Vector;
     double gravity = 9.81;
@@ -293,7 +293,7 @@ TEST(LazySeries, PolynomialsInTimeAreKnownAsSuch)
     }
 }
 
-/// As many guards as there are walls.
+/// As many guards as walls.
 struct Walled {
     using State = Vector;
     Vector walls;
@@ -324,7 +324,7 @@ TEST(LazySeries, GuardsMayBeAsManyAsARunHasOrNone)
     }
 }
 
-/// Gives a rate of another size.
+/// Gives a rate of the wrong size.
 struct Misshapen {
     using State = Vector;
     template <class S>

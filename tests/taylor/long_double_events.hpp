@@ -75,7 +75,7 @@ public:
         return {value(0), (value(delta) - value(-delta)) / (2 * delta)};
     }
 
-    /// Goes on by s, and to another state.
+    /// Advances by s, to another state.
     void advance(Real s)
     {
         x_ = after(s);
@@ -98,8 +98,8 @@ private:
     State x_;
 };
 
-/// Crossings of the guard up to `t_end`; `doubtful` where a turn or a start so near to the surface
-/// was met that the events are a matter of rounding.
+/// Crossings of the guard up to `t_end`; `doubtful` where a turn or a start was so near to the
+/// surface that rounding decides the events.
 struct ExpectedEvents {
     std::vector<Real> t;
     std::vector<Real> slope;
@@ -132,8 +132,8 @@ template <class Motion, class Part>
     return std::fabs(at_lo) < std::fabs(at_hi) ? lo : hi;
 }
 
-/// @param reset  makes of the state before what comes after, where the guard falls; or nothing,
-/// where both directions are recorded
+/// @param reset  maps the state before to the state after, where the guard falls; or nothing,
+/// if both directions are recorded
 template <class Motion, class Reset>
 [[nodiscard]] ExpectedEvents expected_events(Motion motion, Real t_end, bool resets,
                                              const Reset& reset)
@@ -142,7 +142,7 @@ template <class Motion, class Reset>
     ExpectedEvents out;
     const auto value = [](const auto& point) { return point.value; };
     const auto rate = [](const auto& point) { return point.rate; };
-    Real from = 0;  // what is left of the step begins here
+    Real from = 0;  // the remaining part of the step begins here
     auto lo = motion.guard(0);
     bool leaves = false;  // the step begins on the surface, after a reset
     while (motion.t() < t_end) {
@@ -152,7 +152,7 @@ template <class Motion, class Reset>
         Real root = -1;
         if ((side > 0) != (hi.value > 0)) {
             root = from;
-            if (leaves) root += (h - from) * 1e-6L;  // behind the root at the start
+            if (leaves) root += (h - from) * 1e-6L;  // beyond the root at the start
             if (leaves && (motion.guard(root).value > 0) != (side > 0)) out.doubtful = true;
             root = root_of(motion, root, h, value);
         } else if ((lo.rate > 0) != (hi.rate > 0) && (side > 0) != (lo.rate > 0) && !leaves) {

@@ -1,5 +1,5 @@
-// Families of systems whose constants are drawn: polynomial, trigonometric and rational flows with
-// guards that are not linear, and motions that a wall sends back.
+// Families of systems with random constants: polynomial, trigonometric and rational flows with
+// nonlinear guards, and motions that are reflected by a wall.
 #pragma once
 
 #include <array>
@@ -168,19 +168,20 @@ struct RoundWall {
     }
 };
 
-/// What runs of random systems of one family have come to.
+/// Results of runs of random systems of one family.
 struct RandomRuns {
     std::size_t runs = 0, doubtful = 0, events = 0;
     std::size_t missed = 0, spurious = 0, misplaced = 0;
     double worst = 0;     ///< error of a time, times the slope of the guard there
-    std::string first{};  ///< what went wrong first
+    std::string first{};  ///< the first error
 };
 
 template <class System>
 void compare_random_run(Draw& from, RandomRuns& out)
 {
     constexpr double t_end = 5;
-    constexpr double tolerance = 1e-9;  // what errors of 1e-13 a step may grow to in that time
+    constexpr double tolerance = 1e-9;  // bound to which errors of 1e-13 per step may grow in that
+                                        // time
     System system;
     system.draw(from);
     const typename System::State x0 = System::start(from);

@@ -1,4 +1,4 @@
-// Random systems against motions in long double; `ricochet_measure taylor` takes many more.
+// Random systems against motions in long double; `ricochet_measure taylor` runs many more.
 #include "taylor/random_flows.hpp"
 
 #include <gtest/gtest.h>

@@ -42,7 +42,7 @@ using Kind = SeriesStretch::Kind;
     return {c.data(), 12, 1};
 }
 
-/// What the polynomial does first in a step of length 1.
+/// The first event of the polynomial in a step of length 1.
 [[nodiscard]] SeriesStretch first_of(const std::vector<double>& c, double sign, bool from_surface)
 {
     double end = 0;
@@ -53,7 +53,7 @@ using Kind = SeriesStretch::Kind;
 
 TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
 {
-    // Random roots, one or two of them in the step: whatever is said to be clear has none there.
+    // Random roots, one or two of them in the step: an interval reported as clear has none.
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> within(0.001, 0.999), outside(1.05, 6);
     int cleared = 0;
@@ -95,7 +95,7 @@ TEST(SeriesGuard, ARootAtTheStartIsDividedOut)
     EXPECT_GE(first.hi, 0.75);
 }
 
-/// A rotation, and a wall that its first component reaches beyond by `depth`.
+/// A rotation, and a wall that its first component exceeds by `depth`.
 struct Grazing {
     using State = std::array<double, 2>;
     static constexpr Crossing crossing = Crossing::either;
@@ -131,7 +131,7 @@ TYPED_TEST_SUITE(NearlyTangent, Walls);
 TYPED_TEST(NearlyTangent, PairsOfCrossingsAreFoundDownToRoundingAndNoneIsInvented)
 {
     // cos(t - phase) is beyond 1 - depth for 2 sqrt(2 depth) around the phase. Steps of this motion
-    // are right to some 1e-16.
+    // have errors of some 1e-16.
     std::mt19937_64 random(2);
     std::uniform_real_distribution<double> phases(1, 1.9);
     for (const double depth : {1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13, 1e-14}) {
@@ -156,8 +156,8 @@ TYPED_TEST(NearlyTangent, PairsOfCrossingsAreFoundDownToRoundingAndNoneIsInvente
 
 TEST(SeriesGuard, RootsAreLocatedAndAreTheFirst)
 {
-    // One root in the step, or three: Newton's method may land on any of three, and only the first
-    // may be said to be the first.
+    // One root in the step, or three: Newton's method may converge to any of three, and only the
+    // first may be reported as the first.
     std::mt19937_64 random(5);
     std::uniform_real_distribution<double> within(0.001, 0.999), outside(1.5, 6);
     int found = 0;
@@ -187,7 +187,7 @@ TEST(SeriesGuard, RootsAreLocatedAndAreTheFirst)
     EXPECT_GT(found, 9'000);
 }
 
-/// Harmonic motion; what varies is the guard, many times in a step of the motion.
+/// Harmonic motion with a guard that varies many times in a step of the motion.
 struct Harmonic {
     using State = std::array<double, 2>;
     template <class S>
@@ -237,7 +237,7 @@ TEST(SeriesGuard, StepsThatTheSeriesClearsAreProved)
     const auto run = integrate(Grazing{-1}, Grazing::State{1, 0}, {.t_end = 100, .rtol = 1e-12},
                                ErrorControlled<Taylor>{});
     EXPECT_EQ(run.statistics.evidence.proved, run.statistics.steps);
-    // A value at each end, and a difference for its rate where it is armed.
+    // One value at each end, and a difference for its rate where it is armed.
     EXPECT_LE(run.statistics.guard_calls, run.statistics.steps + 12);
 }
 

@@ -1,4 +1,4 @@
-// Truncated power series in long double, by other formulas than those under test.
+// Truncated power series in long double, by formulas different from those under test.
 //
 // Functions are composed: with a = a0 + d, where d has no constant term, f(a) is the finite sum of
 // f^(j)(a0) d^j / j!. Inverse functions are integrals of their derivatives.
@@ -91,7 +91,7 @@ public:
     }
     friend SeriesReference atan2(const SeriesReference& y, const SeriesReference& x)
     {
-        // Turned to where the angle is small: the series of the quotient there, and the turn.
+        // Turned to where the angle is small: the series of the quotient there, plus the turn.
         const Number angle = std::atan2(y[0], x[0]), c = std::cos(angle), s = std::sin(angle);
         SeriesReference out = atan((SeriesReference(c) * y - SeriesReference(s) * x) /
                                    (SeriesReference(c) * x + SeriesReference(s) * y));

@@ -21,7 +21,7 @@ using Two = std::array<double, 2>;
 
 constexpr int order = 20;
 
-/// Coefficients by the tape, [k][i].
+/// Coefficients from the tape, [k][i].
 template <bool unrolled, class System, std::size_t n>
 [[nodiscard]] std::array<std::array<double, n>, order + 1> series_of(const System& system, double t,
                                                                      const std::array<double, n>& x)
@@ -53,8 +53,8 @@ template <class System, std::size_t n>
 }
 
 /// Each coefficient is a sum of some k products of earlier ones, so that errors may grow a little
-/// with k; 2e-14 of the largest coefficient of its order, or of what a unit radius of convergence
-/// would give it, is 100 roundings.
+/// with k; 2e-14 of the largest coefficient of its order, or of its value for a unit radius of
+/// convergence, is 100 roundings.
 template <class System, std::size_t n>
 void expect_reference_series(const System& system, double t, const std::array<double, n>& x)
 {

@@ -47,9 +47,9 @@ struct Ball {
 
 TEST(Taylor, ImpactsOfABallAreThoseOfTheGeometricSeries)
 {
-    // Between impacts the polynomial of degree 2 is the motion; what is left are the roundings of
+    // Between impacts the polynomial of degree 2 is the motion; the errors are the roundings of
     // times and of the velocity at each of 13 impacts, of half a unit in the last place each: times
-    // up to 19 s, 3.6e-15, velocities up to 14 m/s that shift all that follows by 2 v eps / g.
+    // up to 19 s, 3.6e-15, velocities up to 14 m/s that shift all later impacts by 2 v eps / g.
     const Ball ball;
     const auto run =
         integrate(ball, Two{10, 0}, {.t_end = 20.5, .rtol = 1e-12}, ErrorControlled<Taylor>{});
@@ -129,8 +129,8 @@ TEST(Taylor, EveryImpactOfAForcedOscillatorIsFoundToTheRoundingOfItsTime)
                 integrate(system, Two{0, 0}, {.t_end = t_end, .rtol = rtol, .atol = rtol},
                           ErrorControlled<Taylor>{});
             ASSERT_EQ(run.events.size(), impacts.size());
-            // The motion is stable, so that errors of steps do not add up; where an impact comes
-            // slowly, an error of the position is divided by its velocity, 0.2 at least. A unit in
+            // The motion is stable, so that errors of steps do not add up; at a slow
+            // impact, an error of the position is divided by its velocity, 0.2 at least. A unit in
             // the last place of times up to 785 is 1.1e-13.
             const double tolerance = std::max(10 * rtol, 2.3e-13);
             for (std::size_t i = 0; i < impacts.size(); ++i) {
@@ -187,7 +187,7 @@ TEST(Taylor, ParametersAreThoseOfTheObject)
 
 TEST(Taylor, FixedStepsConvergeWithTheOrder)
 {
-    // The error of a step is the first term left out, of order 1 / (p + 1)!, in h^(p+1). Half the
+    // The error of a step is the first omitted term, of order 1 / (p + 1)!, in h^(p+1). Half the
     // step has 2^-p of the error. Steps of a quarter and an eighth of the radius of convergence
     // still show the next terms, so that the slope is found to one half.
     const double t_end = 4;
@@ -333,7 +333,7 @@ struct Kicked {
 
 TEST(Taylor, TimeEventsInterruptTheSteps)
 {
-    // A rotation by 1 and a kick, ten times; the last kick, at the end of the run, included.
+    // A rotation by 1 and a kick, ten times, including the last kick, at the end of the run.
     Two x{1, 0};
     for (int k = 0; k < 10; ++k) {
         x = {std::cos(1.0) * x[0] + std::sin(1.0) * x[1],
@@ -344,7 +344,7 @@ TEST(Taylor, TimeEventsInterruptTheSteps)
     EXPECT_EQ(run.events.size(), 10U);
     EXPECT_NEAR(run.x[0], std::cos(0.25) * x[0] + std::sin(0.25) * x[1], 1e-13);
     EXPECT_NEAR(run.x[1], std::cos(0.25) * x[1] - std::sin(0.25) * x[0], 1e-13);
-    // Backward in time kicks are applied as they are: (rotate back by 1, kick) from 0.5 to -0.5.
+    // Backward in time kicks are applied unchanged: (rotate back by 1, kick) from 0.5 to -0.5.
     run = integrate(Kicked{}, Two{1, 0},
                     {.t_start = 0.5, .t_end = -0.5, .rtol = 1e-14, .atol = 1e-14},
                     ErrorControlled<Taylor>{});
@@ -354,7 +354,7 @@ TEST(Taylor, TimeEventsInterruptTheSteps)
     EXPECT_NEAR(run.x[1], c * kicked[1] + s * kicked[0], 1e-13);
 }
 
-/// Six oscillators of different frequencies: more components than the loop has in registers.
+/// Six oscillators of different frequencies: more components than the loop keeps in registers.
 struct Six {
     static constexpr std::size_t n = 12;
     using State = std::array<double, n>;

@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Activation functions after a hidden layer, in registers.
 //
-// No function of the mathematical library is called: their bits differ between
-// libraries, and g++ would call them lane by lane.
+// No function of the mathematical library is called: libraries differ in the last bits
+// of their results, and g++ would call them lane by lane.
 #pragma once
 
 #include "ricochet/detail/simd.hpp"
@@ -15,7 +15,7 @@ struct Relu {
     template <class T>
     RICOCHET_INLINE static Vector<T> of(Vector<T> x) noexcept
     {
-        // Not known to be zero, or g++ prefers a comparison and a mask.
+        // Opaque to g++, which for a known zero prefers a comparison and a mask.
         const auto zero = opaque(Vector<T>{});
         return zero > x ? zero : x;
     }
@@ -55,9 +55,9 @@ struct Tanh {
     ///     exp(2x) = s (R + r) / (R - r)
     ///     tanh(x) = ((s - 1) R + (s + 1) r) / ((s + 1) R + (s - 1) r)
     ///
-    /// one division, and no cancellation: n = 0 leaves r / R. R is even,
-    /// 2 + r^2/6 - r^4/360 + ..., and converges for |r| < 2 pi, so that each term is
-    /// at most 0.003 times the one before and the first left out 1e-17.
+    /// with one division and no cancellation: for n = 0 it reduces to r / R. R is even,
+    /// 2 + r^2/6 - r^4/360 + ..., and its series converges for |r| < 2 pi: each term is at
+    /// most 0.003 times the one before, and the first that is omitted is 1e-17.
     RICOCHET_INLINE static Vector<double> inside(Vector<double> x) noexcept
     {
         using V = Vector<double>;

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Adam: stochastic gradient descent with a step per parameter.
 //
@@ -41,7 +41,7 @@ public:
     [[nodiscard]] const State& state() const noexcept { return state_; }
 
     /// Continues from a stored state.
-    /// @throws std::invalid_argument if it is of another number of parameters.
+    /// @throws std::invalid_argument if it holds another number of parameters.
     void restore(State state);
 
 private:

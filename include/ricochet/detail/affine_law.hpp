@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The exact potentials of any law that is affine in the slip rate.
 //
@@ -20,7 +20,7 @@ namespace ricochet {
 
 /// Definition of a law that is affine in the slip rate, for theta in [theta_min, theta_max].
 struct AffineLaw {
-    std::function<double(double)> direct;        ///< A(V), of which only the integral may diverge
+    std::function<double(double)> direct;        ///< A(V); only its integral may diverge
     std::function<double(double)> direct_slope;  ///< dA/dV
     std::function<double(double)> state;         ///< B(theta)
     std::function<double(double)> state_slope;   ///< dB/dtheta, positive

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Classes with Eigen's small matrices as members, which are laid out by the instruction set.
 //
 // The library is compiled for SSE2, where Eigen aligns to 16 bytes. A file that is compiled for
-// AVX or AVX-512 has classes of another layout, under names of their own, and compiles what it
-// uses of them itself.
+// AVX or AVX-512 has classes of another layout, under names of their own, and compiles the
+// functions that it uses of these classes itself.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Friction of any law or learned pair along a history of slip rate.
 #pragma once
@@ -13,8 +13,8 @@
 
 namespace ricochet {
 
-/// Friction from the state xi at the start, the state by the L-stable method of order 4 in
-/// `steps` equal steps between samples.
+/// Friction along a history that starts in the state xi. The state is integrated by the
+/// L-stable method of order 4, in `steps` equal steps between samples.
 /// @throws std::invalid_argument for a history that `validate` refuses, or steps < 1.
 template <EliminableLaw Law>
 [[nodiscard]] std::vector<double> friction_along(const Law& law, const FrictionHistory& history,

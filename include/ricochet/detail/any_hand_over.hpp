@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The loop of a hand-over for N components and M reactions, for systems of any type.
 #pragma once
@@ -24,7 +24,7 @@ namespace ricochet::detail {
 void add(Statistics& sum, const Statistics& more) noexcept;
 void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
 
-/// For an inclusion without branches: nothing.
+/// Stands for the modes of an inclusion without branches.
 struct NoModes {
     template <class Inclusion>
     explicit NoModes(const Inclusion& /*inclusion*/)
@@ -173,8 +173,8 @@ private:
         place.samples = simulation.run().trajectory.t.size();
     }
 
-    /// Whether a step was short enough for the reactions that hold; if not, steps are as short
-    /// as that takes from now on.
+    /// Whether a step was short enough for the held reactions. If it was not, later steps are
+    /// limited to a length that is.
     template <class Loop>
     [[nodiscard]] bool follows_held(const Place& before, const Loop& simulation)
     {
@@ -308,8 +308,8 @@ private:
         if (run_.events.empty()) run_.events.reserve(done.events.size());
         std::uint64_t idle = 0;
         for (const Event<X>& event : done.events) {
-            // A load that hardly passes the bound lets y rest on zero by rounding, and its guard
-            // find it there again and again: the reaction stays at its bound.
+            // Where a load hardly passes the bound, rounding leaves y on zero and its guard fires
+            // again and again, while the reaction stays at its bound.
             const bool stays =
                 event.mode_after == event.mode_before && same_state(event.after, event.before);
             idle += stays;
@@ -407,7 +407,7 @@ private:
             } else if (steps_taken() >= options_.max_steps) {
                 end_with(Outcome::step_limit);
             }
-            // Over switches that are not located: as many steps without any as patience asks for.
+            // Switches that are not located restart the count: `patience_` steps must have none.
             if (chatters_ && motion_.branches() != branches) {
                 branches = motion_.branches();
                 steps = 0;
@@ -427,7 +427,7 @@ private:
         if (set_valued_) run_.state = motion_.state();
     }
 
-    /// Solvers leave a millionth of a millionth.
+    /// Whether the reaction violates its law by far more than the 1e-12 that solvers leave.
     [[nodiscard]] bool breaks_law() const
     {
         const State& now = motion_.state();
@@ -441,7 +441,7 @@ private:
     {
         auto branches = motion_.branches();
         if (!modes_.flows(Modes::mode_of(branches))) return false;
-        // Of the y that has just been left the branch says which way it goes.
+        // The branch of a y that has just left zero tells its direction, so its size is not tested.
         if (switched) {
             branches[static_cast<Eigen::Index>(motion_.last_switch().reaction)] = Branch::inside;
         }
@@ -518,7 +518,7 @@ private:
 
     // --- samples ---
 
-    /// Within the last step, or at its start: by steps of their own.
+    /// Emits the samples up to now; one inside the last step is computed by a shorter step.
     void emit_samples(bool at_start)
     {
         const State& now = motion_.state();
@@ -545,7 +545,7 @@ private:
     double longest_step_ = std::numeric_limits<double>::infinity();  // of the event-driven kind
     int easy_steps_ = 0;
     std::uint64_t patience_ = 1;
-    std::uint64_t chatter_patience_ = 10;  // by trial; 1 hands back amid the chattering
+    std::uint64_t chatter_patience_ = 10;  // found by trial; 1 hands back during the chattering
     bool chatters_ = false;
     bool set_valued_ = false;
     bool keeps_reaction_ = false;

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // An inclusion of which only the sizes are known.
 //
-// What solves inclusions is compiled for N components and M reactions, once for all systems of
-// these sizes: it sees a system through `AnyInclusion`, which `TypedInclusion` makes of the
-// user's. Vectors and matrices are the same on both sides, so nothing is converted.
+// The solvers of inclusions are compiled for N components and M reactions, once for all systems
+// of these sizes: they see a system through `AnyInclusion`, which `TypedInclusion` implements for
+// the user's system. Vectors and matrices are the same on both sides, so nothing is converted.
 #pragma once
 
 #include <Eigen/LU>
@@ -26,23 +26,23 @@ namespace ricochet {
 
 namespace detail {
 
-/// Declarations of a system beside its functions.
+/// What a system declares besides its functions.
 struct InclusionTraits {
     Confines confines = Confines::reaction;
     bool affine = false;
     bool box = false;             ///< its sets are boxes
-    bool gives_jacobian = false;  ///< the functions of these names
-    bool moves = false;           ///< `offset`
+    bool gives_jacobian = false;  ///< has `smooth_jacobian`
+    bool moves = false;           ///< has `offset`
     bool gives_offset_rate = false;
-    bool continues_bounds = false;  ///< `branch_bound`
+    bool continues_bounds = false;  ///< has `branch_bound`
     bool gives_bound_gradient = false;
     const StepLayout* layout = nullptr;  ///< of its inputs for policies, if it has any
 
     [[nodiscard]] bool of_reactions() const noexcept { return confines == Confines::reaction; }
 };
 
-/// The functions of inclusion.hpp. Those of a set are asked of the set at (t, w). What a system
-/// does not have does nothing, or is as the default.
+/// The functions of inclusion.hpp. The functions of a set are those of the set at (t, w). A
+/// function that the system does not have does nothing, or has its default.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyInclusion {
 public:
@@ -76,22 +76,22 @@ public:
     virtual void offset(double t, Reaction& s) const = 0;
     virtual void offset_rate(double t, Reaction& s) const = 0;
 
-    // False where the set is at fault.
+    // False where the set is faulty.
     virtual bool project(double t, const State& w, const Reaction& z, Reaction& p) const = 0;
     virtual bool derivative(double t, const State& w, const Reaction& z, double* d) const = 0;
     /// Bounds of a box.
     virtual bool bounds(double t, const State& w, Reaction& lower, Reaction& upper) const = 0;
-    /// Those, or one of them, smooth beyond y = 0 where the system gives such.
+    /// The same bounds, smooth beyond y = 0 where the system gives such an extension.
     virtual void branch_bounds(double t, const State& w, Reaction& lower,
                                Reaction& upper) const = 0;
     [[nodiscard]] virtual double bound(double t, const State& w, Eigen::Index i,
                                        Branch side) const = 0;
-    // Of the modes of branches (branch_terms.hpp), each in one call: nothing goes through memory
-    // between the functions of a system and the arithmetic around them.
+    // Functions of the modes of branches (branch_terms.hpp). Each is one call, so that nothing goes
+    // through memory between the functions of a system and the arithmetic around them.
     /// The flow, in which every held y that is a component is at rest to the last bit; null for
-    /// systems without such modes. `diagonal`: A is.
+    /// systems without such modes. `diagonal`: A is diagonal.
     [[nodiscard]] virtual typename Flow::Function branch_flow(bool diagonal) const = 0;
-    /// The rate of the motion, what acts, and `branch_bounds`.
+    /// The rate of the motion, the reactions, and `branch_bounds`.
     virtual void branch_state(const Terms& terms, Mode mode, double t, const State& w, State& rate,
                               Reaction& r, Reaction& lower, Reaction& upper) const = 0;
     virtual void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const = 0;
@@ -332,8 +332,8 @@ public:
     }
 
 private:
-    /// A state as it was written, a component at a time: see components.hpp. Volatile, since
-    /// compilers that are left the choice read pairs.
+    /// Reads a state one component at a time, as it was written: see components.hpp. Volatile,
+    /// since compilers otherwise read pairs.
     [[nodiscard, gnu::always_inline]] static State by_components(const double* x)
     {
         State w;
@@ -341,7 +341,7 @@ private:
         return w;
     }
 
-    /// For Eigen's products, whose operands are in memory; the original stays in registers.
+    /// A copy for Eigen's products, whose operands are in memory; the original stays in registers.
     [[nodiscard, gnu::always_inline]] static State copied(const State& from)
     {
         State to;
@@ -381,7 +381,7 @@ private:
         return rate;
     }
 
-    /// A^-1 f, and what acts in a mode.
+    /// Writes A^-1 f and the reactions in a mode.
     [[gnu::always_inline]] void reactions(const Terms& terms, const Mode mode, double t,
                                           const State& w, State& free, Reaction& r,
                                           bool diagonal) const
@@ -472,8 +472,8 @@ public:
 
     void smooth(double t, const State& w, State& f) const { inclusion_->smooth(t, w, f); }
 
-    /// Without the system's own by central differences of relative step 6e-6, the cube root of
-    /// the rounding unit.
+    /// The Jacobian of f; where the system does not give it, by central differences of relative
+    /// step 6e-6, the cube root of the rounding unit.
     void jacobian(double t, const State& w, Square& j) const
     {
         if (traits().gives_jacobian) return inclusion_->smooth_jacobian(t, w, j);

@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A mechanical system with contacts of which only the number of coordinates is known.
 //
-// What integrates such systems is compiled for N coordinates, and sees a system through
-// `AnyMechanism`, which `TypedMechanism` makes of the user's.
+// Integrators of such systems are compiled for N coordinates, and see a system through
+// `AnyMechanism`, which `TypedMechanism` implements for the user's system.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -31,12 +31,12 @@ public:
     virtual ~AnyMechanism() = default;
 
     const int contacts;
-    const int components;  ///< of a contact: its normal and its tangents
+    const int components;  ///< per contact: one normal and its tangents
 
     [[nodiscard]] virtual std::unique_ptr<const AnyMechanism> clone() const = 0;
     virtual void mass(const Vector& q, Square& m) const = 0;
     virtual void force(double t, const Vector& q, const Vector& v, Vector& f) const = 0;
-    /// M^-1 F, where the compiler sees both.
+    /// M^-1 F in one call, so that the compiler sees both.
     virtual void acceleration(double t, const Vector& q, const Vector& v, Vector& a) const = 0;
     virtual void gaps(const Vector& q, Gaps& g) const = 0;
     virtual void directions(const Vector& q, Directions& h) const = 0;

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Systems of any type as the scene sees them.
 #pragma once
@@ -14,7 +14,7 @@
 
 namespace ricochet {
 
-/// A disc of a system, as a state puts it.
+/// A disc of a system, as its state places it.
 struct SystemDisc {
     Vector2 at{};        ///< [m] centre
     Vector2 velocity{};  ///< [m/s]
@@ -22,10 +22,10 @@ struct SystemDisc {
 
 namespace detail {
 
-/// What a monitor says of a step; see `Verdict`.
+/// A monitor's verdict on a step; see `Verdict`.
 enum class StepVerdict { stands, cut, rests, ended };
 
-/// A step of the scene's, shown to a monitor.
+/// A step of the scene, shown to a monitor.
 class SceneStep {
 public:
     SceneStep() = default;
@@ -81,7 +81,7 @@ public:
                                               const State& x) const = 0;
     virtual void push(std::size_t k, Mode mode, double t, State& x,
                       const Vector2& impulse) const = 0;
-    /// Null where it has none.
+    /// Null if the system has none.
     [[nodiscard]] virtual std::unique_ptr<SystemEvents> events() const = 0;
 };
 

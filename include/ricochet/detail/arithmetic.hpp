@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The arithmetic that the library stands on: IEEE 754, with NaN and infinity.
+// The arithmetic that the library relies on: IEEE 754, with NaN and infinity.
 //
 // A guard or a step that is not finite ends a run, carried remainders depend on the order
-// of two additions, and "never" is an infinite time. Under -ffinite-math-only the compiler takes
-// every such test for true or false without looking.
+// of two additions, and "never" is an infinite time. Under -ffinite-math-only the compiler
+// decides every such test without evaluating it.
 #pragma once
 
 #if ((defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || defined(__FAST_MATH__)) && \

@@ -1,20 +1,20 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What every gate leaves to the exact detector inside it.
+// The part of every gate that it delegates to the exact detector inside it.
 #pragma once
 
 #include "ricochet/detail/finding.hpp"
 
 namespace ricochet::detail {
 
-/// Answers as `Exact` does.
+/// Forwards every question to `Exact`.
 template <class Exact>
 class Around {
 public:
     static constexpr bool uses_rates = Exact::uses_rates;
     static constexpr Screening screening = screening_of<Exact>;
     static constexpr bool looks_inside = LooksInside<Exact>;
-    static constexpr Evidence evidence = Exact::evidence;  ///< of a step it has examined
+    static constexpr Evidence evidence = Exact::evidence;  ///< about a step it has examined
 
     explicit Around(const Exact& exact) : exact_(exact) {}
 
@@ -30,7 +30,7 @@ public:
         return Exact::leaves_plainly(sign, start, end, touch);
     }
 
-    /// `path` is a `GuardPath`, or what a detector of the user's takes.
+    /// `path` is a `GuardPath`, or the path that a user-defined detector takes.
     template <class Path>
     [[nodiscard]] Finding examine(Path& path, Watch& watch) const
     {

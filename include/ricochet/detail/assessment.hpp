@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// How good a trained classifier of steps is, in numbers.
+// Measures of the quality of a trained classifier of steps.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace ricochet::learn {
 
-/// Answers of a classifier, by truth and answer.
+/// Counts of a classifier's answers, by truth and answer.
 struct Confusion {
     std::size_t detected = 0;      ///< events called events
     std::size_t missed = 0;        ///< events called clear
@@ -23,27 +23,27 @@ struct Confusion {
 /// A classifier on one data set.
 struct Assessment {
     Confusion confusion;
-    double miss_bound = 1;        ///< 95 % upper bound of the share of events missed
-    double false_alarm_rate = 0;  ///< share of all clear states called events
+    double miss_bound = 1;        ///< 95 % upper bound of the fraction of events missed
+    double false_alarm_rate = 0;  ///< fraction of all clear states called events
     double margin = 0.1;          ///< what "well clear" means below
     std::size_t well_clear = 0;   ///< clear states of at least that margin
-    double cleared_share = 0;     ///< share of those called clear; 0 if there are none
+    double cleared_share = 0;     ///< fraction of those called clear; 0 if there are none
     double lowest_event = 0;      ///< smallest logit of an event; compare with the threshold
 };
 
 /// Upper bound, at 95 % confidence, of a rate of which `misses` were seen in
-/// `events` independent trials: 3 / events if none was, else the bound of
-/// Clopper and Pearson (one-sided). 1 if there were no trials.
+/// `events` independent trials: 3 / events if there were none, else the one-sided
+/// bound of Clopper and Pearson. 1 if there were no trials.
 [[nodiscard]] double miss_bound(std::size_t misses, std::size_t events);
 
 /// Logits of the states of `data`, as `Classifier` gives them.
-/// @throws std::invalid_argument if `data` has another number of features, or as
-///         `Classifier`.
+/// @throws std::invalid_argument if `data` has another number of features, or if
+///         `Classifier` throws it.
 [[nodiscard]] std::vector<double> logits(const Model& model, const DataSet& data);
 
 /// Compares the answers of `model` with the labels of `data`. A logit that is
 /// not a number announces an event, as in `Classifier`.
-/// @throws as `logits`
+/// @throws what `logits` throws
 [[nodiscard]] Assessment assess(const Model& model, const DataSet& data, double margin = 0.1);
 
 }  // namespace ricochet::learn

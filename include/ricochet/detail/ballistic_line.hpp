@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The exact rival of a network: where the guard is a parabola in time, whether a
 // step meets the event surface is one inequality.
@@ -9,7 +9,7 @@
 
 namespace ricochet {
 
-/// Predicts as `Network` does, with the same answers to its mistakes, from
+/// Predicts as `Network` does, with the same remedies for its mistakes, from
 ///
 ///     g + g' h + g'' h^2 / 2 <= 0   iff the guard is on or below its surface after h,
 ///
@@ -46,7 +46,7 @@ struct BallisticLine {
         return Ends::suspects(sign, g0, rate0, g1, rate1, h);
     }
 
-    /// A prediction may have been late, so that every event is examined with care.
+    /// A prediction may be late, so every event is examined with care.
     [[nodiscard]] static bool leaves_plainly(double, const GuardSample&, const GuardSample&,
                                              double) noexcept
     {

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Ordinary solvers for the slider with rate-and-state friction, kept for comparison.
 //
-// They integrate the ageing law with the log form as it is usually written, or its
-// potential form, and are as unguarded as they are found in general packages: a slip rate
-// that turns negative makes the logarithm NaN, which ends the run as unstable.
+// They integrate the ageing law in its usual log form, or in its potential form, with no more
+// safeguards than general packages have: a slip rate that turns negative makes the logarithm
+// NaN, which ends the run as unstable.
 #pragma once
 
 #include <vector>
@@ -19,7 +19,7 @@ enum class Baseline {
     backward_euler,  ///< plain Newton in (V, state)
 };
 
-/// Variable that stands for the state.
+/// Variable that represents the state.
 enum class StateForm {
     theta,      ///< theta' = 1 - V theta / D_RS
     potential,  ///< xi' = dD*/dd at d = -dDdag/dxi, f = dDdag/dV
@@ -30,8 +30,8 @@ struct BaselineOptions {
     StateForm form = StateForm::theta;
     double step = 0;       ///< [s], positive
     double t_end = 2;      ///< [s]
-    int adams_order = 12;  ///< 4 to 12; as many steps are taken by RK4 before it is reached
-    /// Iterations of the corrector and its tolerances, as torchdiffeq's implicit_adams.
+    int adams_order = 12;  ///< 4 to 12; RK4 takes as many steps before it is reached
+    /// Iterations of the corrector and its tolerances, as in torchdiffeq's implicit_adams.
     int corrections = 4;
     double rtol = 1e-7, atol = 1e-9;
 };

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Proved bounds on the logit of a ReLU network over a box of features.
 //
@@ -21,8 +21,8 @@
 //
 //     e_k+1 <= |W| e_k + gamma'_n (|W| (|x| + e_k) + |b|),
 //
-// from the rounding of the normalised features on, and subtracted. Weights are those
-// that are evaluated: rounded to float in a model of that precision.
+// from the rounding of the normalised features on, and subtracted. The weights are those
+// of the evaluation: rounded to float in a model of that precision.
 #pragma once
 
 #include <cstddef>
@@ -60,19 +60,19 @@ public:
 
     [[nodiscard]] std::size_t inputs() const noexcept { return inputs_; }
 
-    /// The largest difference, over the domain, between the logit as computed and in real
-    /// arithmetic.
+    /// The largest difference, over the domain, between the logit as computed and the logit in
+    /// real arithmetic.
     [[nodiscard]] double evaluation_error() const noexcept { return evaluation_error_; }
 
-    /// Whether the network depends on feature i at all: a weight of it is not zero.
+    /// Whether the network depends on feature i at all: one of its weights is not zero.
     [[nodiscard]] bool depends_on(std::size_t i) const noexcept;
 
     /// A range that holds the computed logit of every raw feature vector with
-    /// lower <= features <= upper, the box being within the domain. The backward pass is
-    /// left out if the forward one shows a logit of at least `enough`. A bound may be
+    /// lower <= features <= upper, where the box lies within the domain. The backward pass is
+    /// omitted if the forward one shows a logit of at least `enough`. A bound may be
     /// -inf, inf or NaN if the arithmetic of the bound overflows; NaN is no bound.
-    /// @param influence  one per input, written: how much the logit can change along this
-    ///                   edge of the box, roughly. For choosing where to cut, no bound.
+    /// @param influence  written, one per input: a rough measure of how much the logit can
+    ///                   change along this edge of the box, for choosing where to cut; no bound
     [[nodiscard]] Interval over(const double* lower, const double* upper, double enough,
                                 Scratch& scratch, double* influence) const noexcept;
 

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The guards of `AnyModes`, and its reset; a part of branch_modes.hpp.
 #pragma once
@@ -109,7 +109,7 @@ Mode AnyModes<N, M>::reset(const FiredGuards& fired, Mode mode, double t, State&
     int arrived = 0;
     Branches held = branches;
     Vector w = vector(x);
-    // Reactions at a bound whose y is zero as well, as of contacts that depend on one another.
+    // Reactions at a bound whose y is zero too, as for contacts that depend on one another.
     const Branches zero = zero_branches(t, w);
     int undecided = 0;
     for (Eigen::Index i = 0; i < M; ++i) {

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The branches of an inclusion as the modes of a hybrid system.
 //
@@ -6,10 +6,10 @@
 //
 //     A w' = f(t, w) + G reaction,    -y in the normal cone of K at the reaction
 //
-// is an ordinary differential equation: a reaction at a bound is known, and those that
+// is an ordinary differential equation: a reaction at a bound is known, and the reactions that
 // hold their y at zero follow from y' = 0, a linear system whose matrix is constant. A mode
-// says for every reaction which of the three it is. Between changes of mode the motion is
-// as smooth as f, for any stepper; a change is a guard's event, located like any other.
+// states the branch of every reaction. Between changes of mode the motion is as smooth as f,
+// for any stepper; a change of mode is the event of a guard, located like any other.
 //
 //     y > 0     reaction at its lower bound    until y falls to zero
 //     y < 0     reaction at its upper bound    until -y does
@@ -39,17 +39,17 @@ concept Branching = Inclusion<System> &&
 namespace detail {
 
 /// The hybrid system. Digit i to base 3 of a mode is the branch of reaction i: 0 lower (y > 0),
-/// 1 inside (held), 2 upper. Three more modes say that the motion cannot continue by itself:
-/// `several`, where changes coincide and rates do not tell what follows, `no_flow`, where
+/// 1 inside (held), 2 upper. Three more modes mean that the motion cannot continue by itself:
+/// `several`, where changes coincide and the rates do not determine what follows, `no_flow`, where
 /// the held reactions are not determined by y' = 0, and `empty`, where a lower bound lies above
-/// the upper one. There nothing moves.
+/// the upper one. In these modes nothing moves.
 ///
-/// There are four guards per reaction, 4 i + kind: y, -y, reaction - lower, upper - reaction, an
-/// infinite bound being far away always; and 4 M + i, 1 where the bounds of reaction i make an
-/// interval and -1 where they do not.
+/// There are four guards per reaction, 4 i + kind: y, -y, reaction - lower, upper - reaction, where
+/// an infinite bound is always far away; and guard 4 M + i, which is 1 where the bounds of reaction
+/// i form an interval and -1 where they do not.
 ///
-/// A bound that depends on y must be smooth a little beyond y = 0 on its side. Where
-/// that of `reaction_set` is not, as with F(|y|), the system declares
+/// A bound that depends on y must be smooth a little beyond y = 0 on its side. Where the bound
+/// of `reaction_set` is not, as with F(|y|), the system declares
 ///
 ///     double branch_bound(t, w, i, branch) const
 template <int N, int M>
@@ -101,7 +101,7 @@ public:
         }
         return branches;
     }
-    /// Whether the reactions that a mode holds are determined.
+    /// Whether the reactions that a mode holds are uniquely determined.
     [[nodiscard]] bool flows(Mode mode) const noexcept
     {
         return mode < branch_modes && terms_.holds[mask_of(mode)].determined;
@@ -153,7 +153,7 @@ public:
     /// reactions that are not held. Writes the rate of the motion and the reactions, too.
     void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const;
 
-    /// Change of the held reactions that rounding of the terms may cause.
+    /// Change of the held reactions that the rounding of the terms may cause.
     [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
     {
         const double free = (rate - terms_.lever.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
@@ -163,30 +163,30 @@ public:
 
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const;
 
-    /// All of them, from one evaluation of the reactions.
+    /// Evaluates all guards from one evaluation of the reactions.
     void guards(Mode mode, double t, const State& x, std::span<double> g) const;
 
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const State& x,
                                     const State& dxdt) const;
 
-    /// Those that the mode enables; the others are 0.
+    /// Rates of the guards that the mode enables; the others are 0.
     void guard_rates(Mode mode, double t, const State& x, const State& dxdt,
                      std::span<double> rates) const;
 
-    /// All that happened at one instant, together.
+    /// Applies all transitions of one instant together.
     [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, State& x) const;
 
     // --- entering ---
 
-    /// The mode of the motion from (t, w), whose observed components that are zero up to
-    /// rounding are made so; `several` where rates do not tell.
+    /// The mode of the motion from (t, w). Observed components that are zero up to rounding are
+    /// set to zero; `several` where the rates do not decide.
     /// @throws std::invalid_argument for what `minimal_selection` refuses.
     [[nodiscard]] Mode mode_at(double t, Vector& w) const;
 
-    /// The branches that the signs of y ask for; inside where y is zero up to rounding.
+    /// The branches that follow from the signs of y; inside where y is zero up to rounding.
     [[nodiscard]] Branches zero_branches(double t, const Vector& w) const;
 
-    /// Puts every held y at zero, along the reactions that hold it.
+    /// Moves every held y to zero, along the reactions that hold it.
     void hold(const Branches& branches, double t, Vector& w) const;
 
     /// y = E w - s(t).
@@ -202,7 +202,7 @@ public:
         return y;
     }
 
-    /// The first reaction whose bounds make no interval; -1 if all do.
+    /// The first reaction whose bounds form no interval; -1 if all do.
     [[nodiscard]] int faulty(double t, const Vector& w) const
     {
         LinearInequality<M> inequality;
@@ -210,7 +210,7 @@ public:
         return inequality.faulty();
     }
 
-    /// A component at a time, as steps have written it: see components.hpp.
+    /// Reads one component at a time, as steps write it: see components.hpp.
     [[nodiscard]] static Vector vector(const State& x)
     {
         Vector w;
@@ -305,7 +305,7 @@ private:
                 std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
     }
 
-    /// Same as `motion` without the rate: a mode that holds nothing asks for the bounds alone.
+    /// Same as `motion` without the rate: a mode that holds nothing needs only the bounds.
     [[nodiscard]] Motion bounded_motion(Mode mode, double t, const Vector& w) const
     {
         if (holds(mode)) return motion(mode, t, w);
@@ -323,8 +323,8 @@ private:
         return slacks(here.lower[i], here.upper[i], here.reaction[i]);
     }
 
-    /// 1 where the bounds of reaction i make an interval, else -1. Beyond y = 0, where the
-    /// branch ends, bounds that depend on y need not make one.
+    /// 1 where the bounds of reaction i form an interval, else -1. Beyond y = 0, where the
+    /// branch ends, bounds that depend on y need not form one.
     [[nodiscard]] static double is_set(Mode mode, Eigen::Index i, double lower, double upper,
                                        double y) noexcept
     {
@@ -333,8 +333,8 @@ private:
         return (side == Branch::lower && y < 0) || (side == Branch::upper && y > 0) ? 1 : -1;
     }
 
-    /// y', and zero where rounding decides its sign: the bending of a motion that is tangent
-    /// to y = 0 then tells where it goes.
+    /// y', or zero where rounding decides its sign: the curvature of a motion that is tangent
+    /// to y = 0 then determines its direction.
     [[nodiscard]] double observed_rate(Eigen::Index i, Mode mode, double t, const Vector& w,
                                        const Vector& dwdt) const
     {
@@ -373,8 +373,8 @@ private:
 
     [[nodiscard]] Mode checked(Mode mode) const noexcept { return flows(mode) ? mode : no_flow; }
 
-    /// The branches that follow where those marked inside are at y = 0: the rates decide, as a
-    /// linear inequality; where the reaction is at a bound and y does not move, the bending.
+    /// The branches that follow where the y of those marked inside are zero. The rates decide, by a
+    /// linear inequality; where the reaction is at a bound and y does not move, the curvature does.
     [[nodiscard]] Mode settle(const Branches& at, double t, const Vector& w) const
     {
         const Mode mode = mode_of(at);
@@ -389,7 +389,7 @@ private:
         for (Eigen::Index i = 0; i < M; ++i) {
             if (at[i] == Branch::lower) inequality.upper[i] = inequality.lower[i];
             if (at[i] == Branch::upper) inequality.lower[i] = inequality.upper[i];
-            // A reaction without influence on y' is all or nothing.
+            // A reaction without influence on y' is at one bound or the other.
             if (terms_.delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
         }
         Branches next = at;
@@ -421,8 +421,8 @@ private:
         return bend(next, which, up, size, t, w);
     }
 
-    /// Reaction i is at its upper or lower bound and y_i does not move. It leaves if the motion
-    /// bends away from y_i = 0 by more than the rounding of its `terms`.
+    /// The mode when reaction i is at its upper or lower bound and y_i does not move. It leaves if
+    /// the motion curves away from y_i = 0 by more than the rounding of its `terms`.
     [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double terms, double t,
                             const Vector& w) const
     {

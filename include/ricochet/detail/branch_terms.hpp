@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Constants of the modes of an inclusion.
 //
@@ -6,12 +6,12 @@
 //
 //     A w' = f(t, w) + G r,    y = E w - s(t)
 //
-// the reactions at a bound are known, and those that are held follow from y' = 0,
+// the reactions at a bound are known, and the held ones follow from y' = 0,
 //
 //     r_held = -D^-1 (E A^-1 (f + G r_known) - s'),    D = E A^-1 G of the held reactions,
 //
-// with matrices that are constant. They are plain data, filled once: `AnyModes` does, and
-// `TypedInclusion`, which knows f and the bounds, evaluates the modes by them.
+// with constant matrices. They are plain data, filled once, by `AnyModes`; `TypedInclusion`,
+// which knows f and the bounds, evaluates the modes from them.
 #pragma once
 
 #include <algorithm>
@@ -46,7 +46,7 @@ struct RICOCHET_ALIGNED BranchTerms {
     using Observation =
         Eigen::Matrix<double, M, N, M == 1 && N != 1 ? Eigen::RowMajor : Eigen::ColMajor>;
 
-    Eigen::Matrix<double, N, 1> inverse_diagonal;  ///< of A^-1, most often all there is
+    Eigen::Matrix<double, N, 1> inverse_diagonal;  ///< of A^-1, most often its only entries
     bool diagonal = false;
     Eigen::Matrix<Eigen::Index, M, 1> selected;   ///< component of every y, -1 if it is not one
     Action lever;                                 ///< A^-1 G
@@ -56,7 +56,7 @@ struct RICOCHET_ALIGNED BranchTerms {
     Eigen::Matrix<double, N, N> inverse_mass;     ///< A^-1
 
     /// Whether Eigen adds the products of a row of E in their order. Then a loop over components
-    /// gives the same bits, and reads them one at a time, as they have been written.
+    /// gives the same bits, and reads the components one at a time, as they were written.
     static constexpr bool in_order = M == 1 && N <= 3;
 
     /// Row i of E times v.
@@ -74,13 +74,13 @@ struct RICOCHET_ALIGNED BranchTerms {
 };
 
 /// The first two components of a rate: as many as a function returns in registers. A struct of
-/// two, which compilers write as a pair, would go through memory.
+/// two members, which compilers write as a pair, would go through memory.
 __extension__ using FirstRates = __complex__ double;
 
-/// The flow of a mode at (t, x_1, ..., x_N), whose components but the first two are written to
-/// `more`. Every stage of a Runge-Kutta step waits for the flow of the stage before, and a state
-/// that goes to it and back through memory makes it wait longer: with three components the run of
-/// the diode circuit takes 72 us so, and 59 us with components in registers.
+/// The flow of a mode at (t, x_1, ..., x_N), whose components after the second are written to
+/// `more`. Every stage of a Runge-Kutta step depends on the flow of the stage before, and passing
+/// the state through memory lengthens this chain: with three components the run of the diode
+/// circuit takes 72 us through memory, and 59 us with components in registers.
 template <class Inclusion, class Terms, class Components>
 struct BranchFlow;
 

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A training that was interrupted, as it is kept on disk.
+// The state of an interrupted training, as it is kept on disk.
 #pragma once
 
 #include <cstddef>
@@ -37,7 +37,7 @@ struct Checkpoint {
     Score best_score;
 };
 
-/// The same of the training of a gate, whose states are drawn again from its seed.
+/// Everything the training of a gate needs, whose states are drawn again from its seed.
 struct GateCheckpoint {
     std::uint64_t fingerprint = 0;  ///< of the options and the states of the first round
     std::uint64_t round = 0;

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A model ready to be asked whether a step will meet an event.
+// A model that is ready to predict whether a step meets an event.
 #pragma once
 
 #include "ricochet/nn/mlp.hpp"
@@ -21,7 +21,7 @@ namespace ricochet {
 class Classifier {
 public:
     /// @throws std::invalid_argument if offset, scale or domain do not have one
-    /// entry per input (an empty domain is unbounded), or as `Mlp`.
+    /// entry per input (an empty domain is unbounded), or if `Mlp` throws it.
     explicit Classifier(Model model, const MlpOptions& options = {});
 
     [[nodiscard]] const Model& model() const noexcept { return model_; }
@@ -35,7 +35,7 @@ public:
     [[nodiscard]] double logit(const double* features) const noexcept;
 
     /// Whether `logit` announces an event: it is not below the threshold. NaN
-    /// announces one.
+    /// announces an event.
     [[nodiscard]] bool alarm(double logit) const noexcept { return !(logit < threshold_); }
 
     /// Whether the features lie in the box that the model was trained for. NaN does not.
@@ -49,7 +49,7 @@ private:
     std::size_t inputs_;
     std::size_t outputs_;
     double threshold_;
-    std::optional<Mlp<float>> single_;  ///< one of the two
+    std::optional<Mlp<float>> single_;  ///< exactly one of the two is set
     std::optional<Mlp<double>> double_;
 };
 

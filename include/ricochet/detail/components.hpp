@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Loops over the components of a state.
 //
@@ -14,8 +14,8 @@
 
 #include "ricochet/detail/arithmetic.hpp"
 
-/// Before a loop of which no pass depends on another one. (To clang, the same would be an order,
-/// whose failure is a warning in the user's code.)
+/// Precedes a loop whose iterations do not depend on one another. (For clang the equivalent is a
+/// command, whose failure would be a warning in the user's code.)
 #ifdef __clang__
 #define RICOCHET_NO_DEPENDENCE
 #else
@@ -54,7 +54,7 @@ template <class X, class Function>
         (std::make_index_sequence<fixed_size<X>()>{});
     } else {
         const Index n = x.size();
-        // No component depends on another one: what is written to does not overlap by a shift.
+        // No component depends on another: the output does not overlap the input with a shift.
         RICOCHET_NO_DEPENDENCE
         for (Index i = 0; i < n; ++i) {
             function(i);

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Implicit steps of an inclusion: Bathe's composite step, backward Euler, theta.
 #pragma once
@@ -42,9 +42,9 @@ enum class Scheme {
 /// Treatment of the reaction in a stage that averages f over its ends.
 enum class FirstStage {
     averaged,  ///< averaged like f: order 2 also where the reaction varies
-    at_end,    ///< that of the stage's end, as in the source's code: order 1 there
-    /// averaged, but where the branch at the stage's end is another than at the start,
-    /// whose reaction says nothing of the motion after a switch, solved again with at_end
+    at_end,    ///< that of the stage's end, as in the code of the source: order 1 there
+    /// averaged; solved again with at_end where the branch at the stage's end differs from
+    /// the one at its start, whose reaction says nothing about the motion after a switch
     switch_aware,
 };
 
@@ -69,8 +69,8 @@ template <int N, int M>
     return invert(w, w) < w.rows();
 }
 
-/// Steps from any state to the next. Nothing is carried from one step to another but
-/// factors of constant matrices, so that the same state and step give the same bits.
+/// Steps from any state to the next. Only factors of constant matrices are carried from one
+/// step to another, so the same state and step give the same bits.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyStep {
 public:
@@ -89,8 +89,8 @@ public:
     [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
     [[nodiscard]] const SchemeOptions& options() const noexcept { return options_; }
 
-    /// The state after a step of h from `from`. If it has not converged, `to` means nothing.
-    /// `frozen`: with these branches, whether the solution lies on them or not.
+    /// The state after a step of h from `from`. If it has not converged, `to` is meaningless.
+    /// `frozen`: the branches to assume, whether the solution lies on them or not.
     [[nodiscard]] StageReport take(const State& from, double h, State& to,
                                    const Branches* frozen = nullptr);
 
@@ -98,15 +98,15 @@ public:
     [[nodiscard]] const State& middle() const noexcept { return middle_; }
 
     /// Simpson's rule over the three states of the last step minus the step: the local
-    /// error of Bathe's step with the averaged reaction, to leading order, for the price of
+    /// error of Bathe's step with the averaged reaction, to leading order, at the cost of
     /// a sum,
     ///
     ///     (w_{n+1} - 4 w_g + 3 w_n + h A^-1 (f_n + G reaction_n)) / 2.
     void embedded_error(const State& from, double h, const State& to, Vector& error) const;
 
-    /// Branch of the pair of reaction and y on its graph: for a set of reactions the sign of
-    /// y tells, and where that is zero up to rounding the place of the reaction in the
-    /// set; for a set of states the place of y. Boxes only.
+    /// The branch of each pair of reaction and y on its graph. For a set of reactions it is
+    /// given by the sign of y, and where y is zero up to rounding by the place of the reaction
+    /// in the set; for a set of states by the place of y. Boxes only.
     void branches_of(const State& state, Branches& branches);
 
     /// How far a state is inside its branches, as `LinearInequality::slack`. Boxes only.
@@ -194,7 +194,7 @@ private:
         return solve_again(to, report);
     }
 
-    /// Where Newton's method fails: pivots for a box, else the projected fixed point.
+    /// Solves again where Newton's method fails: by pivots for a box, else by the fixed point.
     [[nodiscard]] StageReport solve_again(State& to, const StageReport& before)
     {
         StageReport report;
@@ -213,7 +213,7 @@ private:
     Matrices matrices_;
     SchemeOptions options_;
     StageMethod method_ = StageMethod::cases;
-    bool falls_back_ = false;  // from Newton's method, where it was not asked for
+    bool falls_back_ = false;  // from Newton's method, where the user did not choose it
     StageScratch<N, M> scratch_;
     StageNewton<N, M> newton_;
     Stage<N, M> stage_;
@@ -233,7 +233,7 @@ AnyStep<N, M>::AnyStep(const AnyInclusion<N, M>& inclusion, const SchemeOptions&
     const bool few = box && matrices_.reactions() <= most_cases;
     falls_back_ = method_ == StageMethod::automatic;
     if (method_ == StageMethod::automatic) {
-        // Where reactions depend on one another Newton's equations are singular.
+        // Where reactions depend on one another, Newton's equations are singular.
         const bool by_cases = few || (box && has_dependent_reactions(matrices_));
         method_ = by_cases ? StageMethod::cases : StageMethod::newton;
         falls_back_ = !by_cases;

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Several contacts with friction together, at one instant or over one step.
 //
@@ -25,11 +25,11 @@ struct ContactReport {
     bool converged = false;
     /// The largest defect over the contacts, of velocity or impulse, in units in which W has a
     /// unit diagonal in each contact, as a fraction of the largest component of q in these
-    /// units. It is not relative to p: without a solution p grows without bound, and every defect
-    /// would be small compared with it.
+    /// units. It is not relative to p, which grows without bound where there is no solution, so
+    /// that every defect would be small compared with it.
     double residual = 0;
     int iterations = 0;  ///< of Newton's method, in all its attempts
-    int sweeps = 0;      ///< over the contacts, one by one
+    int sweeps = 0;      ///< over the contacts, one at a time
     int contact = -1;    ///< the contact of the largest defect
 };
 
@@ -42,21 +42,21 @@ struct ContactOptions {
 /// Solves contact problems of up to a number of components without allocating, once its
 /// memory has grown to their size.
 ///
-/// A single contact is solved in closed form, if its solution is unique and needs no iteration.
-/// first by a semismooth Newton method on the projections
+/// A single contact is solved in closed form if its solution is unique and needs no iteration.
+/// Other problems are solved first by a semismooth Newton method on the projections
 ///
 ///     p_n = max(0, p_n - rho u_n),   p_t = P(|.| <= friction p_n)(p_t - rho u_t)
 ///
 /// with a line search (P. Alart and A. Curnier, A mixed formulation for frictional contact
 /// problems prone to Newton like solution methods, Computer Methods in Applied Mechanics
-/// and Engineering 92, 1991); where that stalls by sweeps that solve one contact after
-/// another (nonsmooth Gauss-Seidel), from which Newton's method starts again from time to
-/// time. The work is bounded; a problem that is not solved by then is reported as such.
+/// and Engineering 92, 1991); where that stalls, by sweeps that solve one contact after
+/// another (nonsmooth Gauss-Seidel), from which Newton's method is restarted from time to
+/// time. The work is bounded; a problem that is not solved by then is reported as unsolved.
 class ContactSolver {
 public:
     explicit ContactSolver(const ContactOptions& options = {});
 
-    /// Improves `p`, the start of the iteration: the impulses of the step before, or zero.
+    /// Improves `p`, the start of the iteration: the impulses of the previous step, or zero.
     ///
     /// @throws std::invalid_argument if the sizes do not fit, `components` is neither 2 nor
     /// 3, a coefficient of friction is negative or infinite, or a number is not finite.

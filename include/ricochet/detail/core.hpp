@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The loop, as it is compiled in the library.
+// The event loop, as it is compiled in the library.
 #pragma once
 
 #include <array>
@@ -57,7 +57,7 @@ public:
     virtual void show_all() noexcept = 0;
     /// Takes one step, which may belong to an interval that is closed later if it looks ahead.
     virtual void advance_once(bool look_ahead) = 0;
-    /// The fastest way to the end, which `step` and `advance` do not take.
+    /// Takes the fastest way to the end, which `step` and `advance` do not take.
     virtual void run_to_end() = 0;
     [[nodiscard]] virtual Run<X> take() = 0;
     [[nodiscard]] virtual Run<X> finish() = 0;
@@ -69,7 +69,7 @@ public:
     virtual void restore(const Snapshot& snapshot) = 0;
 };
 
-/// Keeps a copy of `setup`. @throws std::invalid_argument, as `Simulation`
+/// Keeps a copy of `setup`. @throws std::invalid_argument as `Simulation` does
 template <class X>
 [[nodiscard]] std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
                                                     const Options& options);

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// How many guards and modes a system says it has, and which of its guards are watched in a mode.
+// The numbers of guards and modes that a system declares, and the guards watched in a mode.
 #pragma once
 
 #include <concepts>
@@ -60,7 +60,7 @@ template <class System>
 concept CountsGuards =
     CountsGuardsFixed<System> || CountsGuardsByMember<System> || CountsGuardsByCall<System>;
 
-/// Whether a guard is looked at in a mode.
+/// Whether a guard is evaluated in a mode.
 template <class System>
 [[nodiscard]] constexpr bool call_enabled_in(const System& system,
                                              [[maybe_unused]] std::size_t which, Mode mode)

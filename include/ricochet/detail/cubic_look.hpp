@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Does a cubic through the ends of an interval tell what a guard does inside?
+// Tests whether the cubic through the ends of an interval describes a guard inside it.
 //
 // Error control resolves the state, not the guard: where the state stands still or moves
 // slowly, steps grow without regard to a guard that depends on time. One evaluation at an
@@ -19,23 +19,24 @@ namespace ricochet::detail {
 
 /// The guard at the ends of an interval, as a cubic over u in [0, 1].
 struct CubicLook {
-    /// Part of an interval at which the guard is evaluated: the golden section, which no period of
-    /// a guard with a simple ratio to the step hides behind, and a second place for cases of doubt.
+    /// Fraction of an interval at which the guard is evaluated: the golden section, so that no
+    /// guard whose period has a simple ratio to the step escapes it, and a second one for cases of
+    /// doubt.
     static constexpr double inside = 0.381966;
     static constexpr double further = 0.723607;
-    /// Further parts of a step at which the guard is evaluated if the state stands still in it, so
-    /// that nothing has limited its length: no more than an eighth of it goes unseen.
+    /// Further fractions of a step at which the guard is evaluated if the state stands still in it,
+    /// so that nothing has limited its length: no gap between evaluations exceeds an eighth of it.
     static constexpr std::array<double, 8> places = {0.0902, 0.2016,  0.3069, 0.4934,
                                                      0.6123, further, 0.8278, 0.9271};
 
-    /// A deviation of e inside stands for one of 64 e at most anywhere: that of a quartic
-    /// term is 1.1 e, that of a quintic one 1.4 e, and higher terms cancel at `inside` only
-    /// by coincidence.
+    /// The largest deviation inside the interval is assumed to be at most 64 e where it is e at
+    /// `inside`: a quartic term deviates by 1.1 e, a quintic one by 1.4 e, and higher terms cancel
+    /// at `inside` only by coincidence.
     static constexpr double most = 64;
 
     /// Where one evaluation deviates by so little that the guard stays clear by this factor,
-    /// a second is not needed: one time in a thousand a guard that does not follow its cubic
-    /// crosses it at `inside`.
+    /// a second is not needed: a guard that does not follow its cubic crosses it at `inside`
+    /// one time in a thousand.
     static constexpr double doubt = 1024;
 
     double v0, b1, b2, v1;  ///< control points
@@ -52,21 +53,21 @@ struct CubicLook {
         return std::fabs(value - (w * w * (w * v0 + 3 * u * b1) + u * u * (3 * w * b2 + u * v1)));
     }
 
-    /// The lowest control point of the cubic times `sign`, but for the start, which may be
+    /// The lowest control point of the cubic times `sign`, excluding the start, which may be
     /// on the surface.
     [[nodiscard]] double lowest(double sign) const noexcept
     {
         return std::min(std::min(sign * b1, sign * b2), sign * v1);
     }
 
-    /// Whether a guard that deviates by `e` inside keeps the sign of its end all along, as
-    /// its start decides on its own.
+    /// Whether a guard that deviates by `e` inside keeps the sign of its end throughout, apart
+    /// from its start, which is decided separately.
     [[nodiscard]] bool stays_clear(double e) const noexcept
     {
         return lowest(v1 < 0 ? -1 : 1) > most * e;
     }
 
-    /// Whether its shape is that of the cubic, for a detector to go by.
+    /// Whether its shape is close enough to the cubic for a detector to rely on.
     [[nodiscard]] bool keeps_shape(double e) const noexcept { return most * most * e <= size(); }
 
     /// The largest control point.
@@ -76,7 +77,7 @@ struct CubicLook {
     }
 };
 
-/// `CubicLook::inside` as a constant of the program.
+/// `CubicLook::inside` as a compile-time constant.
 struct InsideOf {
     static constexpr double u = CubicLook::inside;
 };

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Labelled states from which a classifier of steps is trained.
+// Labelled states on which a classifier of steps is trained.
 #pragma once
 
 #include <cstddef>
@@ -48,7 +48,7 @@ struct DataSet {
 /// The states with these indices, in this order.
 [[nodiscard]] DataSet select(const DataSet& data, std::span<const std::size_t> rows);
 
-/// All states of both.
+/// All states of both data sets.
 /// @throws std::invalid_argument if they differ in the number of columns.
 [[nodiscard]] DataSet join(const DataSet& a, const DataSet& b);
 
@@ -58,7 +58,7 @@ struct Split {
     DataSet held_out;
 };
 
-/// Holds out `share` of the events and `share` of the clear states, each rounded
+/// Holds out the fraction `share` of the events and of the clear states, each rounded
 /// to a whole number, drawn at random from `seed`. The order within each part is
 /// that of `data`.
 /// @throws std::invalid_argument unless 0 <= share <= 1.

@@ -1,18 +1,18 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Declarations that are there but do not fit.
+// Declarations that exist but do not fit.
 //
-// A system is asked what it can do by concepts, and a member that answers to none of
-// them would be passed over in silence: a guard that is not const, a reset that returns
-// no mode, a function that counts its guards but is not told which. Here every such
+// Concepts detect what a system can do, and a member that satisfies none of them would be
+// ignored in silence: a guard that is not const, a reset that returns no mode, a function
+// that counts its guards but takes no number of a guard. Here every such
 // member is examined once per system, templates and overloads too, and is refused with
 // a sentence. So is a member that cannot be called at all, because it is private or its own
 // requires-clause does not hold, and one whose name is a slip away from a known one. A
-// system that means all its names as they are says so:
+// system whose names are all intended declares so:
 //
 //     static constexpr bool unchecked_names = true
 //
-// A class that is final cannot be asked for names.
+// A class that is final cannot be examined for names.
 #pragma once
 
 #include <concepts>
@@ -30,8 +30,8 @@ enum class Declaration : std::uint8_t {
     absent,
     fits,
     not_const,            ///< fits no call on a const system, perhaps one on another
-    does_not_fit,         ///< parameters or result are others
-    mode_for_which,       ///< counts its guards, has modes, and takes a Mode where `which` belongs
+    does_not_fit,         ///< has other parameters or another result
+    mode_for_which,       ///< has `guard_count` and modes, and takes a Mode in place of `which`
     which_without_count,  ///< takes `which`, but there is no guard_count
     by_value,             ///< changes a copy
 };
@@ -51,12 +51,12 @@ struct Only {
     operator U() const;
 };
 
-/// Every name that is searched for. Together with these a class that has the name itself
-/// has it twice, and a pointer to it is ambiguous.
+/// Every name that is searched for. A class that has a name itself and also inherits it from
+/// here has it twice, and a pointer to it is ambiguous.
 struct Names {
     int flow, guard, guards, guard_rate, guard_rates, guard_info, guard_count, reset, rest, enabled;
     int next_time_event, previous_time_event, time_reset, mode_count, crossing, unilateral;
-    // Those of inclusions, see inclusion_declarations.hpp.
+    // The names of inclusions, see inclusion_declarations.hpp.
     int smooth, smooth_jacobian, mass, observe, act, offset, offset_rate, branch_bound, bound_gradient;
     int confines, affine;
 };
@@ -67,7 +67,7 @@ struct NamesTwice : System, Names {};
 template <class System>
 struct NamesTwice<System, true> : Names {};
 
-/// The same of names that are likely misspellings.
+/// The same for names that are likely misspellings.
 struct NearNames {
 #define RICOCHET_FUNCTION(wrong, right) int wrong;
 #define RICOCHET_VALUE(wrong, right) int wrong;
@@ -146,7 +146,7 @@ RICOCHET_NAME(confines)
 RICOCHET_NAME(affine)
 #undef RICOCHET_NAME
 
-/// Callable with these, after up to four and before up to one of whatever it likes.
+/// Callable with these, after up to four and before up to one argument of any type.
 template <class Name, class System, class... Middle>
 concept CallableAround =
     Name::template takes<System, Middle...> ||
@@ -166,14 +166,14 @@ concept CallableWithTime =
     Name::template takes<System, Anything, double, States...> ||
     Name::template takes<System, Anything, Anything, double, States...>;
 
-/// Callable somehow. States are given as such, and last nothing but arguments of any
-/// type, so that templates of a state are not tried with something that is none.
+/// Callable in some way. States are passed as such, and arguments of any type only as a last
+/// resort, so that templates of a state are not tried with something that is no state.
 template <class Name, class System, class X>
 concept CallableSomehow =
     CallableAround<Name, System, X&, X&> || CallableAround<Name, System, X&> || CallableAround<Name, System> ||
     CallableWithTime<Name, System, X&, X&> || CallableWithTime<Name, System, X&>;
 
-/// Reason why a function fits no form.
+/// The reason why a function fits no form.
 template <class Name, class System, class X>
 [[nodiscard]] constexpr Declaration unfit() noexcept
 {
@@ -190,7 +190,7 @@ template <class Name, class System, class X>
     }
 }
 
-/// A member of this name is there, but nothing outside can use it.
+/// A member of this name exists, but is not accessible or callable.
 template <class Name, class System, class X>
 [[nodiscard]] constexpr bool is_hidden() noexcept
 {
@@ -202,18 +202,18 @@ template <class Name, class System, class X>
     }
 }
 
-/// Takes a Mode, and only that, in place of a number of a guard.
+/// Takes a Mode, and only a Mode, in place of the number of a guard.
 template <class Name, class System, class... Rest>
 concept TakesOnlyMode = Name::template takes<const System, Only<Mode>, Rest...> &&
     !Name::template takes<const System, Only<std::size_t>, Rest...>;
 
-/// The other way round.
+/// Takes the number of a guard, and only that, in place of a Mode.
 template <class Name, class System, class... Rest>
 concept TakesOnlyWhich = !Name::template takes<const System, Only<Mode>, Rest...> &&
     Name::template takes<const System, Only<std::size_t>, Rest...>;
 
-/// A mode and the number of a guard convert into each other, so that one of them can be
-/// taken for the other. `counted` and `moded` say in which form the function is used.
+/// A mode and the number of a guard convert into each other, so either can be taken for the
+/// other. `counted` and `moded` state the form in which the function is used.
 template <class Name, class System, class X, bool counted, bool moded, class... Rest>
 [[nodiscard]] constexpr Declaration told_apart() noexcept
 {
@@ -336,7 +336,7 @@ template <class System, class X>
 [[nodiscard]] constexpr Declaration enabled_declaration() noexcept
 {
     if constexpr (!Guarded<System, X>) {
-        return Declaration::absent;  // of nothing
+        return Declaration::absent;  // there are no guards
     } else if constexpr (!EnabledIn<System> && !EnabledAt<System, X>) {
         if constexpr (Name_enabled::number<System>) return Declaration::does_not_fit;
         return unfit<Name_enabled, System, X>();
@@ -368,7 +368,7 @@ template <class System, class X>
     }
 }
 
-/// Without next_time_event it would never be called, and does not fit.
+/// Without next_time_event the function would never be called, and does not fit.
 template <class System, class X>
 [[nodiscard]] constexpr Declaration time_reset_declaration() noexcept
 {
@@ -383,8 +383,8 @@ template <class System, class X>
     }
 }
 
-/// A value, or a function without parameters; a function with parameters of the same name
-/// is of another purpose.
+/// A value, or a function without parameters; a function of the same name with parameters
+/// has another purpose.
 template <class Name, class System, bool fits>
 [[nodiscard]] constexpr Declaration value_declaration() noexcept
 {
@@ -420,7 +420,7 @@ template <class System, class X>
     return value_declaration<Name_crossing, System, fits>();
 }
 
-/// A function would convert to true by its address.
+/// A function is excluded, since its address would convert to true.
 template <class System, class X>
 [[nodiscard]] constexpr Declaration unilateral_declaration() noexcept
 {
@@ -431,8 +431,8 @@ template <class System, class X>
     return value_declaration<Name_unilateral, System, fits>();
 }
 
-/// Refuses names that are likely misspellings, with a sentence for each. A data member with a
-/// name near to that of a function has its own purpose, as a nested type has.
+/// Refuses names that are likely misspellings, with a sentence for each. A data member or a
+/// nested type whose name is near to that of a function has its own purpose.
 template <class System>
 struct NearNamesOf {
 #define RICOCHET_FUNCTION(wrong, right)                                                              \
@@ -450,8 +450,8 @@ struct NearNamesOf {
     static constexpr bool checked = true;
 };
 
-/// Refuses what does not fit, with a sentence for each. True, so that a static_assert makes
-/// the compiler look here before it looks elsewhere.
+/// Refuses what does not fit, with a sentence for each. Returns true, so that a static_assert
+/// makes the compiler evaluate this check before any other.
 template <class System, class X>
 constexpr bool check_declarations()
 {

@@ -1,9 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The degree of a guard as a polynomial in time and state together, from its text.
+// The degree of a guard as a polynomial in time and state together, found from its code.
 //
-// A guard that takes any scalar is called with degrees in the place of numbers: 1 for the time and
-// every component, 0 for constants. A guard that divides by a variable, bends or branches is none.
+// A guard that takes any scalar is called with degrees in place of numbers: 1 for the time and
+// every component, 0 for constants. A guard that divides by a variable, calls a non-polynomial
+// function of one or branches on it is no polynomial.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@ public:
     template <class U>
     requires std::is_arithmetic_v<U>
     constexpr Degree(const U&) noexcept {}  // NOLINT(google-explicit-constructor): a constant
-    /// A variable. @param branched  set where its value decides what is computed
+    /// A variable. @param branched  set if its value decides what is computed
     constexpr explicit Degree(bool& branched) noexcept : degree_(1), branched_(&branched) {}
 
     /// The degree; 0 for constants and non-polynomials.
@@ -200,7 +201,7 @@ concept DegreeKnown = GuardOfScalarArrays < System,
         fixed_size<X>()
 > || GuardOfScalarViews<System>;
 
-/// The degree of a guard in one mode; 0: constant, or no polynomial.
+/// The degree of a guard in one mode; 0: constant, or not a polynomial.
 template <class X, class System>
 [[nodiscard]] constexpr int degree_in_mode(const System& system, std::size_t which, Mode mode)
 {

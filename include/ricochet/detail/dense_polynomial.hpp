@@ -1,16 +1,16 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The solution inside a step as a polynomial, one component at a time.
 //
-// A step is known by its departure w from the tangent at its start (see
+// A step is given by its departure w from the tangent at its start (see
 // detail/kernels.hpp), which is zero with zero slope there, by the departure
-// and its slope at the end, and where the method is of higher order by further nodes
+// and its slope at the end, and for methods of higher order by further nodes
 // inside. With u = s / h,
 //
 //     x(s) = x0 + s f0 + sum_k ( H_k(u) w_k + h K_k(u) w'_k )
 //
 // where H_k and K_k are the Hermite basis of those nodes (Hairer, Norsett and Wanner I,
-// section II.6). The basis depends on the time alone, so that asking for one component
+// section II.6). The basis depends on the time alone, so evaluating one component
 // of a large state costs a few multiplications.
 #pragma once
 
@@ -111,8 +111,8 @@ template <std::size_t n>
 
 }  // namespace detail
 
-/// Coefficients of power series in the offset from the start of a step: that of s^k in component i
-/// is `coefficients[k stride + i]`.
+/// Coefficients of power series in the offset s from the start of a step: the coefficient of s^k in
+/// component i is `coefficients[k stride + i]`.
 struct SeriesTerms {
     const double* coefficients = nullptr;
     int order = 0;
@@ -137,7 +137,7 @@ struct DenseParts {
     DenseNodes nodes = DenseNodes::end;
     double h = 0;
     const X* x0 = nullptr;
-    const X* remainder = nullptr;  ///< what rounding left out of x0
+    const X* remainder = nullptr;  ///< rounding error of x0, not contained in it
     const X* rate0 = nullptr;
     std::array<const X*, 3> w{};      ///< departures at the nodes
     std::array<const X*, 3> slope{};  ///< their slopes per second; null where not used

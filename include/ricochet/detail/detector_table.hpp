@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A detector and a locator as the loop knows them: values with functions.
+// A detector and a locator as the loop sees them: values with functions.
 #pragma once
 
 #include <cstddef>
@@ -36,12 +36,12 @@ struct DetectorTable {
     Evidence evidence = Evidence::assumed;  ///< of a step not suspected
     bool (*suspects)(double sign, double g0, double rate0, double g1, double rate1,
                      double h) = nullptr;
-    /// Samples of the guard are handed over as numbers, which stay in registers.
+    /// Samples of the guard are passed as numbers, which stay in registers.
     bool (*leaves_plainly)(double sign, double s0, double g0, double rate0, double s1, double g1,
                            double rate1, double touch) = nullptr;
     Finding (*examine)(Self, GuardPath& path, Watch& watch) = nullptr;
-    /// Whether it fits the system, in steps between `smallest` and `largest` [s].
-    /// @throws std::invalid_argument
+    /// Checks whether it fits the system, in steps between `smallest` and `largest` [s].
+    /// @throws std::invalid_argument if it does not
     void (*check)(Self, void* door, const X& x, double smallest, double largest) = nullptr;
 
     // --- predictions of one guard ---
@@ -71,7 +71,7 @@ struct LocatorTable {
     Location (*locate)(const void* self, GuardPath& path, double lo, double lo_value,
                        double lo_rate, double hi, double hi_value, double hi_rate,
                        double tolerance) = nullptr;
-    /// Where the guard's series tells a root, it need not be asked.
+    /// Where the series of the guard gives a root, the locator is not called.
     bool yields_to_series = false;
 };
 

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Derivatives along a direction by differences, for functions without a closed form.
 //
@@ -22,24 +22,24 @@
 
 namespace ricochet {
 
-/// How far differences reach. The scale of a component is the change over which the
-/// functions of the system bend; its default suits states of size one or more in their
-/// units, so a system in micrometres should say so.
+/// Step sizes of differences. The scale of a component is the change over which the
+/// functions of the system become nonlinear; its default suits states of size one or more in
+/// their units, so a system in micrometres should set it.
 struct Differences {
     double step = 1e-3;           ///< of the scale, positive
     std::vector<double> scale{};  ///< of each component, positive; empty: max(1, |x_i|)
     double time_scale = 1;        ///< [s] the same for resets that depend on time
 };
 
-/// @throws std::invalid_argument unless step and scales are positive and finite, and the
-/// scales as many as the state has components, or none.
+/// @throws std::invalid_argument unless step and scales are positive and finite, and there are
+/// as many scales as components of the state, or none.
 void validate(const Differences& differences, std::size_t components);
 
 namespace detail {
 
 /// Weights of a difference formula for the first derivative, of fourth order. They sum
-/// to zero, so only differences to the first value are added up: a function that does
-/// not change has the derivative zero, exactly.
+/// to zero, so only differences to the first value are added up, and a function that does
+/// not change has exactly the derivative zero.
 struct Stencil {
     std::size_t points;
     std::array<double, 5> offset;
@@ -49,7 +49,7 @@ struct Stencil {
 inline constexpr Stencil central_stencil{
     4, {-2, -1, 1, 2, 0}, {1.0 / 12, -8.0 / 12, 8.0 / 12, -1.0 / 12, 0}};
 
-/// For the edge of a range: all points on one side, `direction` 1 or -1.
+/// A formula for the edge of a range: all points on one side, `direction` 1 or -1.
 [[nodiscard]] constexpr Stencil one_sided_stencil(double direction) noexcept
 {
     const double d = direction;
@@ -81,7 +81,7 @@ void add_difference(X& sum, double factor, const X& a, const X& b)
     for_each_component(sum, [&](auto i) { sum[i] += factor * (a[i] - b[i]); });
 }
 
-/// The derivative of a function known as `at(k)`, its value at `stencil.offset[k] * h`:
+/// The derivative of a function given as `at(k)`, its value at `stencil.offset[k] * h`:
 /// a double or a vector.
 template <class At>
 [[nodiscard]] auto differentiate(const Stencil& stencil, double h, const At& at)
@@ -95,7 +95,7 @@ template <class At>
 }
 
 /// The same for a function `at(k, value)` that fills a vector, without allocating:
-/// `first` and `value` are room for it.
+/// `first` and `value` are scratch memory.
 template <class X, class At>
 void differentiate_into(X& sum, const Stencil& stencil, double h, const At& at, X& first, X& value)
 {
@@ -107,7 +107,7 @@ void differentiate_into(X& sum, const Stencil& stencil, double h, const At& at, 
     }
 }
 
-/// The factor h with which h s is a step of the wanted size at x; infinite for s = 0.
+/// The factor h for which h s is a step of the wanted size at x; infinite for s = 0.
 template <class X>
 [[nodiscard]] double step_along(const Differences& differences, const X& x, const X& s)
 {

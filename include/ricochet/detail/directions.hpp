@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What to differentiate with respect to.
+// The quantities with respect to which a run is differentiated.
 #pragma once
 
 #include <cmath>
@@ -37,14 +37,14 @@ struct ParameterDerivatives {
 
 }  // namespace detail
 
-/// A parameter of a system, given as the way to a system with another value of it:
+/// A parameter of a system, given by a function that makes the system with another value of it:
 ///
 ///     {.with = [](double r) { return BouncingBall({.restitution = r}); }, .nominal = 0.9}
 template <class System>
 struct Parameter {
     std::function<System(double)> with{};                       ///< the system with that value
     double nominal = std::numeric_limits<double>::quiet_NaN();  ///< its value in the system at hand
-    double scale = 0;  ///< over which the system bends with it; 0: |nominal|, or 1 where that is 0
+    double scale = 0;  ///< over which the system becomes nonlinear; 0: |nominal|, or 1 if that is 0
     std::vector<double> start{};           ///< derivative of the initial state by it; empty: zero
     detail::ParameterDerivatives exact{};  ///< set by `parameter(make, nominal)`
 };
@@ -55,7 +55,7 @@ template <class System>
 struct Directions {
     bool initial_state = true;
     std::vector<Parameter<System>> parameters{};
-    Differences differences{};  ///< for what the system gives no derivative of
+    Differences differences{};  ///< used where the system gives no derivative
 };
 
 namespace detail {
@@ -72,8 +72,8 @@ struct Neighbours {
     std::vector<System> systems;
 };
 
-/// Central differences, or one-sided ones at the edge of the parameter's range, where
-/// some system is refused with std::invalid_argument.
+/// Central differences, or one-sided ones at the edge of the parameter's range, where the
+/// system for some value is refused with std::invalid_argument.
 template <class System>
 [[nodiscard]] Neighbours<System> neighbours_of(const Parameter<System>& parameter, double step)
 {

@@ -1,7 +1,7 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// From a system of the user's, with whatever spellings it has and states of whatever type, to the
-// table that the loop knows (detail/system_table.hpp).
+// Converts a user's system, whatever its spellings and its type of state, to the table that the
+// loop uses (detail/system_table.hpp).
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@
 
 namespace ricochet::detail {
 
-/// Arrays that lie in a vector as they are.
+/// Arrays, which lie in a vector unchanged.
 template <class X>
 inline constexpr bool is_array = false;
 template <std::size_t n>
@@ -39,7 +39,7 @@ void copy_state(const From& from, To& to)
     }
 }
 
-/// The caller's state as one of the loop's.
+/// Converts the caller's state to one of the loop's.
 template <class X>
 [[nodiscard]] CoreState<X> core_state(const X& x)
 {
@@ -72,7 +72,7 @@ public:
 
     [[nodiscard]] const System& system() const noexcept { return *system_; }
 
-    /// A state of the loop's as one of the system's.
+    /// Converts a state of the loop to one of the system's.
     [[nodiscard]] const X& read(const Core& x, [[maybe_unused]] std::size_t room)
     {
         if constexpr (same) {
@@ -85,7 +85,7 @@ public:
         }
     }
 
-    /// Calls `change` with the same to be changed, also in its dimension.
+    /// Calls `change` with the converted state, which it may change, also in its dimension.
     template <class Change>
     auto edit(Core& x, const Change& change)
     {

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Derivatives of flow and resets along a direction of state and time, by dual numbers, of functions
+// Derivatives of flow and resets along a direction of state and time by dual numbers, for functions
 // that take any scalar (hybrid/scalar.hpp).
 #pragma once
 
@@ -95,7 +95,7 @@ void flow_along_by_duals(const System& system, Mode mode, const S& t, const Xs& 
     for (std::size_t i = 0; i < x.size(); ++i) ds[i] = rate[i].slope[0];
 }
 
-/// The state x, which moves with s.
+/// The state x as dual numbers whose slopes are s.
 template <class X>
 [[nodiscard]] WithScalar<X, Dual<1>> dual_state(const X& x, const X& s)
 {
@@ -105,7 +105,7 @@ template <class X>
     return state;
 }
 
-/// What the state moves with, into s.
+/// Writes the slopes of the state into s.
 template <class X>
 void put_slopes(const WithScalar<X, Dual<1>>& state, X& s)
 {
@@ -113,7 +113,7 @@ void put_slopes(const WithScalar<X, Dual<1>>& state, X& s)
     for_each_component(s, [&](auto i) { s[i] = state[static_cast<std::size_t>(i)].slope[0]; });
 }
 
-/// s becomes (dR/dx) s + (dR/dt) dt, of the reset R of a guard or of a set.
+/// s becomes (dR/dx) s + (dR/dt) dt, where R is the reset of a guard or of a set of guards.
 template <class System, class X, class... Which>
 void reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, double dt,
                     const X& x, X& s, const Which&... which)
@@ -128,7 +128,7 @@ void reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, 
     put_slopes(state, s);
 }
 
-/// The same of the reset at a time event.
+/// The same for the reset at a time event.
 template <class System, class X>
 void time_reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, double dt,
                          const X& x, X& s)
@@ -143,7 +143,7 @@ void time_reset_by_duals(const System& system, [[maybe_unused]] Mode mode, doubl
     put_slopes(state, s);
 }
 
-/// The curvature of the one guard of a system without modes can be had from duals of duals.
+/// Whether the curvature of the only guard of a system without modes follows from nested duals.
 template <class System, class X>
 inline constexpr bool curvature_takes_duals = [] {
     if constexpr (fixed_size<X>() > 0 && requires(const System& s, double t, const X& x, X& f) {

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The rate of a guard along the flow, by dual numbers.
 #pragma once
@@ -13,7 +13,7 @@
 
 namespace ricochet::detail {
 
-/// A state and its rate as dual numbers, a component at a time.
+/// A state and its rate as dual numbers, one component at a time.
 template <class V, class D>
 class DualView {
 public:
@@ -31,7 +31,7 @@ private:
     const D* dxdt_;
 };
 
-/// Whether dual numbers through the guard have its rate at states, or views, like V.
+/// Whether the guard accepts dual numbers of states, or views, like V, and so gives its rate.
 template <class System, class V>
 concept RateByDuals = GuardOfScalarViews<System> || GuardOfScalarArrays < System,
         fixed_size<V>()

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The event-driven phases of a hand-over: a simulation of the branches, whatever its stepper.
 #pragma once
@@ -15,12 +15,12 @@
 
 namespace ricochet::detail {
 
-/// Of the event-driven phase that begins at t, after so many samples and steps.
+/// Options of the event-driven phase that begins at t, after so many samples and steps.
 [[nodiscard]] Options event_options(const HandOverOptions& options, double t, std::size_t samples,
                                     std::uint64_t steps);
 
-/// What an event-driven phase ended with, as a reason for a set-valued one; nothing if the
-/// run is over.
+/// Converts the outcome of an event-driven phase to the cause of a set-valued one; nothing if
+/// the run is over.
 [[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
 
 /// A simulation with N components, whatever its system and stepper.
@@ -33,7 +33,7 @@ public:
     virtual bool step() = 0;
     [[nodiscard]] virtual Run<X> finish() = 0;
 
-    // After the last step, at hand.
+    // Values after the last step.
     [[nodiscard]] double t() const noexcept { return t_; }
     [[nodiscard]] const X& x() const noexcept { return *x_; }
     [[nodiscard]] Mode mode() const noexcept { return mode_; }

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // One implicit stage of a fault whose elements have rate-and-state friction.
 //
@@ -6,18 +6,19 @@
 //
 //     M v + N f(V, xi) = F,    xi = xi^ + g xi'(V, xi),    M = A / g = 1/g + H + g K
 //
-// nondimensional but for V = v times the unit of velocity. The states are eliminated element by
+// nondimensional except for V = v times the unit of velocity. The states are eliminated element by
 // element (friction_stage.hpp). V spans twelve decades, so that neither v nor log V is a good
-// unknown: the friction of an element at rest hardly depends on v, that of a fast one not on log V.
-// The unknown is z = c v + N f, the force on an element that its own stage balances, c the
-// diagonal of M. Its stage is one scalar equation v = P(z) that always has a solution; coupled,
+// unknown: the friction of an element at rest hardly depends on v, that of a fast one hardly on
+// log V. The unknown is z = c v + N f, the force on an element that its own stage balances, where
+// c is the diagonal of M. The stage of one element is a scalar equation v = P(z) that always has a
+// solution; coupled,
 //
 //     z + (M - c) P(z) = F.
 //
 // P is near zero below the strength and near a line of slope 1/c above it: a smoothed law of
-// Coulomb, and Newton's method finds the slipping elements as it does there. Its matrix is that of
-// the equation in v, M + diag(N df/dv), scaled from both sides by the root of P': an element at
-// rest drops out.
+// Coulomb, whose slipping elements Newton's method finds as it does for that law. Its matrix is
+// that of the equation in v, M + diag(N df/dv), scaled from both sides by the square root of P',
+// so that an element at rest drops out.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,7 +31,7 @@
 
 namespace ricochet {
 
-/// M of stages of any length.
+/// The operator M of stages of any length.
 class StageStiffness {
 public:
     /// @param bound  relative error of the polynomial for sqrt(K)
@@ -43,13 +44,13 @@ public:
 
     /// y = M x.
     void apply(const Eigen::VectorXd& x, Eigen::VectorXd& y);
-    /// y = M x with a sqrt(K) that is off by up to `rough`, in a few products.
+    /// y = M x with an approximate sqrt(K), off by up to `rough`, in a few products.
     void approximate(const Eigen::VectorXd& x, Eigen::VectorXd& y);
     static constexpr double rough = 0.05;
 
     /// M_jj of the middle element.
     [[nodiscard]] double diagonal() const noexcept;
-    /// (H + g K) of a field of ones.
+    /// Component i of (H + g K) 1.
     [[nodiscard]] double on_ones(Eigen::Index i) const { return h_ones_[i] + g_ * k_ones_[i]; }
 
     [[nodiscard]] StiffnessProduct& product() noexcept { return product_; }
@@ -88,17 +89,17 @@ struct FaultStageReport {
     bool solved = false;
     int iterations = 0;  ///< of Newton's method
     int inner = 0;       ///< of conjugate gradients
-    /// Largest over the elements of |M v + N f - F| over the sum of their sizes.
+    /// Largest over the elements of |M v + N f - F| relative to the sum of the terms' sizes.
     double residual = 0;
 };
 
 struct FaultStageOptions {
     double tolerance = 1e-11;  ///< of the residual
     int max_iterations = 40;   ///< of Newton's method
-    int max_inner = 200;       ///< of conjugate gradients, in one of them
+    int max_inner = 200;       ///< of conjugate gradients, in one iteration of Newton's method
 };
 
-/// Solves stages of one fault with one law. The fault and the stiffness outlive it.
+/// Solves stages of one fault with one law. The fault and the stiffness must outlive it.
 template <EliminableLaw Law>
 class FaultFrictionStage {
 public:
@@ -118,8 +119,8 @@ public:
         }
     }
 
-    /// `at.v`: a guess, then the solution, with all else there. What is not solved is left where
-    /// the search ended.
+    /// `at.v` is a guess, replaced by the solution; the rest of `at` is written. If the stage is
+    /// not solved, `at` is the point where the search ended.
     FaultStageReport solve(const FaultStageEquation& e, FaultStagePoint& at)
     {
         const double c = stiffness_.diagonal();
@@ -128,7 +129,7 @@ public:
         z_ = e.force - mv_ + c * at.v;
         FaultStageReport out;
         double norm_before = std::numeric_limits<double>::infinity();
-        double share = 1;  // of Newton's step
+        double share = 1;  // fraction of Newton's step
         while (out.iterations < options_.max_iterations) {
             const bool found = at_forces(e, at);
             out.residual = found ? evaluate(e, at) : std::numeric_limits<double>::infinity();
@@ -151,7 +152,8 @@ public:
         return out;
     }
 
-    /// v, xi, f and dv/dz of every element on its own under the forces z. Whether all are found.
+    /// Finds v, xi, f and dv/dz of every element separately under the forces z; true if all are
+    /// found.
     bool at_forces(const FaultStageEquation& e, const Eigen::VectorXd& z, FaultStagePoint& at) const
     {
         const StateElimination<Law> eliminate(law_, stiffness_.length() * time_unit_);
@@ -192,7 +194,7 @@ private:
             residual_[i] = mv_[i] + grip - e.force[i];
             const double size = std::abs(mv_[i]) + std::abs(grip) + std::abs(e.force[i]);
             const double share = std::abs(residual_[i]) / size;
-            if (residual_[i] != 0 && !(share <= worst)) worst = share;  // also if not a number
+            if (residual_[i] != 0 && !(share <= worst)) worst = share;  // also if it is NaN
         }
         return worst;
     }
@@ -203,12 +205,12 @@ private:
     {
         const double c = stiffness_.diagonal();
         root_ease_ = at.ease.cwiseSqrt();
-        step_ = -residual_;  // the rest of it is -(M - c) dv
+        step_ = -residual_;  // the rest of the step is -(M - c) dv
         cg_x_.setZero();
         cg_r_ = -root_ease_.cwiseProduct(residual_);
         cg_p_ = cg_r_;
         double rr = cg_r_.squaredNorm();
-        // An error r of the scaled equation is one of r / root_ease <= r sqrt(c) or less.
+        // An error r of the scaled equation is an error r / root_ease <= r sqrt(c) or less.
         const double limit = enough * enough / c;
         for (int i = 0; i < options_.max_inner && rr > limit; ++i) {
             ++report.inner;

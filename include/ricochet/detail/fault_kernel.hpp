@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Stress that the slip of one rectangle of a vertical fault causes on another.
+// Stress on one rectangle of a vertical fault caused by the slip of another.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The stiffness K of a fault of n x n elements: products, bounds of its spectrum, solutions.
 //
-// Elements are numbered along x first, by depth second. K is symmetric and positive definite,
-// and where its entries depend on distances only it is not stored, but for the smallest meshes: a
-// product is taken by transforms of twice the fault's size, in O(N log N) for N = n^2 elements.
+// Elements are numbered along x first, then along depth. K is symmetric and positive definite.
+// Where its entries depend on distances only it is not stored, except for the smallest meshes: a
+// product is computed by transforms of twice the fault's size, in O(N log N) for N = n^2 elements.
 #pragma once
 
 #include <Eigen/Core>
@@ -52,9 +52,10 @@ public:
     /// K times `factor`, positive.
     [[nodiscard]] FaultStiffness scaled(double factor) const;
 
-    /// Bounds of the eigenvalues. Above, that of a matrix of which K is a part, or of all its
-    /// parts; below, 0.97 of what 80 steps of Lanczos find, which converge from above.
-    /// @throws std::invalid_argument where that is not positive.
+    /// Bounds of the eigenvalues. The upper one is that of a larger matrix of which K is a part, or
+    /// of all its parts; the lower one is 0.97 times the result of 80 steps of Lanczos, which
+    /// converge from above.
+    /// @throws std::invalid_argument where the lower bound is not positive.
     [[nodiscard]] Spectrum spectrum() const;
 
     /// The solution of K x = b by conjugate gradients, to 1e-13 of |b|.
@@ -67,7 +68,7 @@ private:
     double factor_ = 1;
 };
 
-/// Products with K, in memory of their own. One for each thread.
+/// Products with K, with scratch memory of their own. Each thread needs one.
 class StiffnessProduct {
 public:
     explicit StiffnessProduct(const FaultStiffness& stiffness);
@@ -88,7 +89,7 @@ private:
     std::uint64_t count_ = 0;
 };
 
-/// Memory [bytes] that a mesh of `elements` per side takes with a run of it.
+/// Memory [bytes] of a mesh of `elements` per side together with a run on it.
 [[nodiscard]] double toeplitz_memory(double elements) noexcept;
 [[nodiscard]] double layered_memory(double elements) noexcept;
 [[nodiscard]] double dense_memory(double elements) noexcept;

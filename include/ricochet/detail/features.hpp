@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What a network sees of a state: features computed from (t, x, h) by a recipe
+// The inputs of a network for a state: features computed from (t, x, h) by a recipe
 // that a model names.
 #pragma once
 
@@ -68,7 +68,7 @@ template <class System, class X>
 }
 }  // namespace detail
 
-/// The curvature d2g/dt2 of a guard along the flow is written by the system, or dual numbers have
+/// The system gives the curvature d2g/dt2 of its guard along the flow, or dual numbers can compute
 /// it.
 template <class System, class X>
 concept CurvedGuard = RatedGuard<System, X> &&
@@ -98,11 +98,11 @@ namespace detail {
 ///
 /// Linear for |a| <= a0 and a logarithm further out, so that equal ratios are
 /// nearly equal distances over all decades. A network learns from it as well as
-/// from the smooth one, and it is read off the bits of 1 + |a| / a0, in a tenth of
-/// the time and alike on every machine. Odd, continuous, never decreasing; at most
-/// 1024, also for infinite a; NaN stays NaN.
+/// from the smooth logarithm, and it is read off the bits of 1 + |a| / a0, in a tenth
+/// of the time and with the same result on every machine. Odd, continuous, never
+/// decreasing; at most 1024, also for infinite a; NaN stays NaN.
 ///
-/// a0 is where the boundary of a ballistic step passes, see `features`.
+/// a0 is the place of the boundary of a ballistic step, see `features`.
 [[nodiscard]] inline double slog(double a) noexcept
 {
     constexpr double a0 = 0.5;
@@ -126,7 +126,7 @@ namespace detail {
 ///
 /// @param h    [s], positive
 /// @param out  `dimension(recipe, x.size())` numbers, written. Finite for finite
-///             arguments: quotients saturate, that by a curvature of zero too.
+///             arguments: quotients saturate, even where the curvature is zero.
 ///             NaN for a recipe that the system does not offer.
 template <class System, class X>
 void features(Recipe recipe, const System& system, double t, const X& x, const X& dxdt, double h,

@@ -1,7 +1,7 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Where a motion goes that has met switching surfaces, or may leave those on which it
-// slides. The rules are stated at `Filippov::reset`.
+// Decides where a motion goes that has met switching surfaces, or may leave the surfaces on which
+// it slides. The rules are stated at `Filippov::reset`.
 #pragma once
 
 #include <algorithm>
@@ -28,8 +28,8 @@ public:
 
     using Motion::Motion;
 
-    /// Rounding, and what location leaves of a rate that it made zero, relative to the
-    /// largest rate: 2e-13.
+    /// The part of a rate that is rounding, or that remains after location made the rate zero,
+    /// relative to the largest rate: 2e-13.
     static constexpr double negligible = 0x1p-42;
 
     /// Exits that have fired, a bit each, numbered as in `Exits`.
@@ -103,9 +103,9 @@ public:
         return leads_away(way.margin, way.to, t, x, later) ? way.to : slides;
     }
 
-    /// The same after an exit: with the rates and shares of a moment later, when there is
-    /// no doubt about it. Where the combination has ceased to exist the shares linger at
-    /// its place for a time that goes with 1 / sqrt(-apart).
+    /// The same after an exit, with the rates and shares a short time later, as soon as they are
+    /// beyond doubt. Where the combination has ceased to exist the shares stay near the place where
+    /// it did for a time proportional to 1 / sqrt(-apart).
     template <class X>
     [[nodiscard]] Places decide_after_exit(double t, const X& x) const
     {
@@ -124,9 +124,9 @@ public:
         return next;
     }
 
-    /// Whether a way out leads away from the surface, given its scaled rate. In doubt its
-    /// motion is followed until the rate, `later(t, x)`, is clear. A rate that turns
-    /// within the resolution of time is left over from a state not quite on a surface.
+    /// Whether an exit leads away from the surface, given its scaled rate. In doubt its motion
+    /// is followed until the rate, `later(t, x)`, is clear. A rate whose sign changes within the
+    /// resolution of time comes from a state not quite on a surface.
     template <class X, class Later>
     [[nodiscard]] bool leads_away(double rate, const Places& to, double t, const X& x,
                                   const Later& later) const
@@ -178,8 +178,8 @@ public:
         return leaves_down ? Meeting::crossing_down : Meeting::attractive;
     }
 
-    /// Follows a motion along its tangent, over times that grow from nothing to a sixtieth
-    /// of the longest, until it is seen clearly: `clear(t, x)`.
+    /// Follows a motion along its tangent, over times that grow from almost zero to 1/64
+    /// of the longest, until `clear(t, x)` is true.
     template <class X, class Clear>
     bool follow(const Places& at, double t, const X& x, X& v, X& moved, Clear&& clear) const
     {
@@ -203,8 +203,8 @@ public:
         return std::fabs(surface(which, t, x)) <= 1e-3 * times.longest * rate;
     }
 
-    /// Takes the decision `decide(x)` exactly on the surfaces in `on`, and moves x to where
-    /// it belongs then.
+    /// Takes the decision `decide(x)` exactly on the surfaces in `on`, and then moves x to the
+    /// place that was decided.
     template <class X, class Decide>
     [[nodiscard]] Places meet(Surfaces on, const Places& from, double t, X& x,
                               const Decide& decide) const
@@ -224,8 +224,8 @@ public:
         return next;
     }
 
-    /// Whether the motion from one surface meets the other one so soon that it has met
-    /// both: before the time is over by which the first meeting is uncertain.
+    /// Whether the motion from one surface meets the other one so soon that it counts as having
+    /// met both: within the uncertainty of the time of the first meeting.
     template <class X>
     [[nodiscard]] bool meets_other(Surfaces on, const Places& next, double t, const X& x) const
     {
@@ -236,9 +236,9 @@ public:
         return h * rate < 0 && std::fabs(h) <= soon * std::fabs(rate);
     }
 
-    /// [s] By how much it is uncertain when a motion has met a surface: 8 units in the last
-    /// place of the time, and where it is on the wrong side, twice the time in which it
-    /// comes from there to its own.
+    /// [s] Uncertainty of the time at which a motion has met a surface: 8 units in the last
+    /// place of the time, or for a motion on the wrong side twice the time in which it returns
+    /// to its own side, if that is longer.
     template <class X>
     [[nodiscard]] double uncertainty(std::size_t which, const Places& next, double t,
                                      const X& x) const
@@ -250,9 +250,9 @@ public:
         return h * rate < 0 ? std::max(clock, 2 * std::fabs(h / rate)) : clock;
     }
 
-    /// Moves x along its motion by the least that there is, or onto its own side of the
-    /// surfaces in `on`. Where a surface was met but the motion stays on its side, that
-    /// makes the loop judge it again from here.
+    /// Moves x along its motion by the smallest possible amount, or onto its own side of the
+    /// surfaces in `on`. Where a surface was met but the motion stays on its side, this makes
+    /// the loop evaluate the surface again from here.
     template <class X>
     void go_on(Surfaces on, const Places& at, double t, X& x) const
     {

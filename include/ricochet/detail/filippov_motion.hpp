@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Motion across and along switching surfaces: the fields that meet at a point, and the
 // combinations of them that slide. The base of `Filippov`; it makes no decisions.
@@ -21,8 +21,8 @@ namespace ricochet {
 
 /// Options of `Filippov`.
 struct FilippovOptions {
-    /// [1/s] Sliding follows h' = -restoring_rate h, which corrects the drift from a curved
-    /// surface by the error of the steps; there is none from a plane. It must be slow
+    /// [1/s] Sliding follows h' = -restoring_rate h, which corrects the drift that the errors of
+    /// the steps cause on a curved surface; a plane has no such drift. The rate must be slow
     /// compared with the motion, or it makes the motion stiff.
     double restoring_rate = 0;
 };
@@ -46,9 +46,9 @@ template <class X>
     return largest;
 }
 
-/// Times [s] over which a motion may change, as far as can be told from where it is: that
-/// in which its state would change by as much as it is, and the time of day. Neither is
-/// there for a motion that starts at 0; then 1 s. First guesses, for searches.
+/// Times [s] over which a motion may change, as far as its present state tells: the time in
+/// which the state would change by its own size, and |t|. A motion that starts at 0 has
+/// neither, and gets 1 s. They are first guesses, for searches.
 struct TimeScales {
     double shortest;
     double longest;
@@ -68,9 +68,9 @@ struct TimeScales {
 using Exits = std::array<double, 4>;
 
 /// Rates [1/s] at s = 0 of functions of time, the size of whose values is `size`, by a
-/// central difference. The displacement is fitted to a largest change by 1e-6 to 1e-3 of
-/// that size, which loses about 1e-10 to truncation and to rounding each. It is sought
-/// from a hundred-thousandth of the shortest time upward, to a hundredth of the longest.
+/// central difference. The displacement is fitted so that the largest change is 1e-6 to 1e-3
+/// of that size, which loses about 1e-10 to truncation and to rounding each. It is searched
+/// for from 1e-5 of the shortest time upward, to 1/100 of the longest.
 template <class Function, std::size_t count>
 [[nodiscard]] std::array<double, count> fitted_rates(const Function& g,
                                                      const std::array<double, count>& here,
@@ -186,8 +186,8 @@ public:
         }
     }
 
-    /// The same, and 0 where it is no more than the rounding of its terms, those of the
-    /// single components of v. Only a rate that is small by any measure is worth the check.
+    /// The same, and 0 where it is no more than the rounding of its terms, which are the rates
+    /// for single components of v. Only a rate that is small by any measure is worth this check.
     template <class X>
     [[nodiscard]] double resolved_rate(std::size_t which, double t, const X& x, const X& v) const
     {
@@ -279,8 +279,8 @@ public:
 
     // --- onto the surface ---
 
-    /// The surfaces to whose other side a motion beside them has come, or which it is on:
-    /// rounding may hide from the loop that they were met.
+    /// The surfaces that a motion beside them has reached or crossed: rounding may hide from the
+    /// loop that they were met.
     template <class X>
     [[nodiscard]] Surfaces reached_in(const Places& at, double t, const X& x) const
     {
@@ -301,13 +301,13 @@ public:
     }
 
     /// Moves x along the jumps of the field: onto the surfaces on which the motion is to
-    /// slide, and off those on which it has slid to the side to which it leaves, by no
+    /// slide, and off the surfaces that it leaves, to the side to which it leaves, by no
     /// more than rounding makes necessary.
     template <class X>
     void settle(Surfaces on, const Places& from, const Places& next, double t, X& x) const
     {
         Surfaces held = on & (sliding_in(from) | sliding_in(next));
-        // What moves x onto one of two surfaces moves it with respect to the other.
+        // A motion of x onto one of two surfaces also moves it with respect to the other.
         if (on == both && (held | misplaced_in(next, t, x))) held = both;
         if (!held) return;
         Scratch<X, 4> f(x);
@@ -320,7 +320,8 @@ public:
                 if (held & bit(i)) rates[i][region] = resolved_rate(i, t, x, f[region]);
             }
         }
-        // Where sliding on both ends the jumps at its own shares may be parallel.
+        // Where the motion ceases to slide on both, the jumps at its sliding shares may be
+        // parallel.
         const bool slides = sliding_in(next) == both;
         const Shares shares = slides ? sliding_shares(rates).shares : middle_of(next);
         auto normal = normals(shares, rates);
@@ -357,13 +358,13 @@ private:
         fields_.field(region_of(put(at, which, Place::above)), t, x, f[0]);
         const double rate_below = surface_rate(which, t, x, dxdt);
         const double normal = surface_rate(which, t, x, f[0]) - rate_below;
-        // A share of 0 to 1 keeps the excess within the jump. Beyond the exit of a step that is
-        // going to be cut there, and where both fields become tangent, nothing else would.
+        // A share of 0 to 1 keeps the excess within the jump. This clamp alone does so beyond the
+        // exit of a step that will be cut there, and where both fields become tangent.
         const double most = 2 * std::fabs(normal);
         const double excess = std::clamp(rate_below + restoring(which, t, x), -most, most);
         for_each_component(x, [&](auto i) {
             const double jump = f[0][i] - dxdt[i];
-            // Fields that agree on the surface's rate leave the share open.
+            // Fields with the same rate of the surface do not determine the share.
             dxdt[i] -= normal != 0 ? excess * (jump / normal) : -0.5 * jump;
         });
     }
@@ -374,8 +375,8 @@ private:
         return c > 0 ? c * fields_.surface(which, t, x) : 0;
     }
 
-    /// The bilinear combination, and the rounding that it leaves in the rates of the
-    /// surfaces taken away.
+    /// The bilinear combination, minus the rounding that it leaves in the rates of the
+    /// surfaces.
     template <class X>
     [[gnu::noinline]] void slide_on_both(double t, const X& x, X& dxdt) const
     {
@@ -424,7 +425,7 @@ private:
         return normal;
     }
 
-    /// How far h is from where it ought to be.
+    /// Distance of h from its intended value.
     template <class X>
     [[nodiscard]] double misplaced(std::size_t which, Place place, int round, double t,
                                    const X& x) const
@@ -436,7 +437,7 @@ private:
         return right_side ? 0 : std::ldexp(h, round);
     }
 
-    /// The surfaces on whose wrong side x is.
+    /// The surfaces for which x is on the wrong side.
     template <class X>
     [[nodiscard]] Surfaces misplaced_in(const Places& at, double t, const X& x) const
     {

@@ -1,10 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Fields that meet at switching surfaces: the continuation that the rates of the surfaces decide.
+// Fields that meet at switching surfaces, and the continuation that the rates of the surfaces
+// determine.
 //
-// Region r of four has h_i > 0 for every bit i of r. At a point on some surfaces the
+// Region r of four has h_i > 0 for every bit i of r. From a point on some surfaces the
 // motion may depart into a region, or along one surface away from another, or stay on
-// all of them. Only the rates dh_i/dt along the fields of the adjoining regions enter.
+// all of them. The decision uses only the rates dh_i/dt along the fields of adjoining regions.
 #pragma once
 
 #include <array>
@@ -49,7 +50,7 @@ using RegionRates = std::array<std::array<double, 4>, 2>;
 /// The rates of each surface in units of the largest of them.
 [[nodiscard]] RegionRates normalised(const RegionRates& rates) noexcept;
 
-/// Shares of the fields above in sliding on both surfaces.
+/// Shares of the fields on the sides above, in sliding on both surfaces.
 struct Shares {
     double first = 0.5;
     double second = 0.5;
@@ -62,7 +63,7 @@ struct Shares {
     }
 };
 
-/// The shares of a motion beside a surface, and the middle of those along it.
+/// The shares of a motion: 0 or 1 beside a surface, 1/2 along it.
 [[nodiscard]] constexpr Shares middle_of(const Places& at) noexcept
 {
     const auto share = [](Place place) {
@@ -82,21 +83,21 @@ struct Shares {
 /// The shares at which the rates of both surfaces vanish.
 struct SlidingShares {
     Shares shares;
-    /// Margin until they cease to exist, because they merge with another such pair:
-    /// the discriminant of the quadratic that they solve over the sum of its terms.
+    /// Distance from the point where they cease to exist by merging with another such pair:
+    /// the discriminant of the quadratic that they solve, divided by the sum of its terms.
     double apart = 1;
 };
 
 /// The zero of two bilinear functions of two unknowns that is in the unit square or
-/// nearest to it. If a pair of zeros has just vanished, the place where it did. Where
-/// the rates leave a share open (a rate that all fields have in common is zero), the
+/// nearest to it. If a pair of zeros has just vanished, the place where it vanished. Where
+/// the rates do not determine a share (a rate that all fields have in common is zero), the
 /// zero nearest to (1/2, 1/2).
 [[nodiscard]] SlidingShares sliding_shares(const RegionRates& rates) noexcept;
 
 /// Places of a motion that starts on the intersection of two surfaces.
 struct Continuation {
     Places to{Place::sliding, Place::sliding};
-    double margin = 0;  ///< least rate, of normalised rates, at which it leaves a surface
+    double margin = 0;  ///< least of the normalised rates with which it leaves a surface
 };
 
 /// Follows steep but continuous switching: across an intersection the shares change
@@ -104,10 +105,10 @@ struct Continuation {
 ///
 ///     a' = rate of h_0,  b' = rate of h_1,   (a, b) in the unit square,
 ///
-/// (Alexander and Seidman, Houston J. Math. 24, 1998, blend the fields so.) They come to
-/// a corner and the motion departs into a region; or to the middle of an edge, and it
-/// departs along one surface; or they stay inside and it slides on both. From a balance
-/// that is not stable both shares are pushed up a little.
+/// (Alexander and Seidman, Houston J. Math. 24, 1998, use this blend of fields.) If they reach
+/// a corner, the motion departs into a region; if they reach the middle of an edge, it
+/// departs along one surface; if they stay inside, it slides on both. From an unstable
+/// balance both shares are moved up a little.
 [[nodiscard]] Continuation follow_shares(const RegionRates& normalised, Shares from) noexcept;
 
 /// Two directions in which the state can be moved, and the rates of both surfaces
@@ -115,10 +116,10 @@ struct Continuation {
 ///
 ///     x -= residue_0 d_0 + residue_1 d_1,   with rates of d_m: 1 for surface m, else 0
 ///
-/// takes residues away. The combination is formed by elimination with the largest
-/// rate as pivot, a component at a time. Where a surface is one component of the
+/// removes the residues. The combination is formed by elimination with the largest
+/// rate as pivot, one component at a time. Where a surface is one component of the
 /// state, minus a constant, that component ends exactly on the surface: quotients that
-/// are 1 and differences that are 0 in real numbers are so in floating point too.
+/// are 1 and differences that are 0 in real arithmetic are so in floating point too.
 class Elimination {
 public:
     Elimination(const std::array<std::array<double, 2>, 2>& normal,
@@ -143,11 +144,11 @@ private:
     double pivot_;
     double residue_;
     double other_on_pivot_;
-    double pivot_rest_;  ///< 0: the directions are parallel, one residue stays
+    double pivot_rest_;  ///< 0: the directions are parallel, and one residue remains
     double residue_rest_;
 };
 
-/// Names of modes by their number, and of guards.
+/// Names of modes and of guards by their numbers.
 [[nodiscard]] const char* filippov_mode_name(std::size_t surfaces, std::uint32_t mode) noexcept;
 [[nodiscard]] const char* filippov_guard_name(std::size_t which) noexcept;
 

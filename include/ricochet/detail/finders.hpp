@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A detector and a locator of whatever type as the tables that the loop knows.
+// Converts a detector and a locator of any type to the tables that the loop uses.
 #pragma once
 
 #include <cstdint>

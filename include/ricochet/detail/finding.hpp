@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What a detector says of a step.
+// The result of a detector for a step.
 #pragma once
 
 #include "ricochet/detail/guard_view.hpp"
@@ -9,16 +9,16 @@
 
 namespace ricochet {
 
-/// A detector that asks for one evaluation of every guard inside each step, so that a guard
-/// that the step does not resolve is found out.
+/// A detector that requests one evaluation of every guard inside each step, so that a guard
+/// that the step does not resolve is discovered.
 template <class Detector>
 concept LooksInside = requires
 {
     requires Detector::looks_inside;
 };
 
-/// How steps are screened for guards that need a check, as a detector declares it; without a
-/// word, by a function of its own.
+/// How steps are screened for guards that need a check, as a detector declares it; by default
+/// with the detector's own function.
 enum class Screening : std::uint8_t {
     ends,      ///< as `Ends`
     extremum,  ///< as `Extremum`
@@ -38,14 +38,14 @@ struct Watch {
     Side side = Side::plateau;
     GuardSample start;
     GuardSample end;
-    double touch = 0;      ///< |g| at an extremum that counts as being on the surface, at least
+    double touch = 0;      ///< an extremum with |g| up to this, at least, counts as a touch
     double scale = 0;      ///< the largest |g| that the ends of the step suggest
-    bool departs = false;  ///< an event of the guard, or what enabled it, is at the start
+    bool departs = false;  ///< the start is an event of the guard, or has just enabled it
     Side side_after = Side::plateau;  ///< at the end, if the interval is clear
 };
 
-/// Either "clear", with its evidence; or an interval in which the guard leaves `side`:
-/// still on it at `lo`, across or on the surface at `hi`; or a touch at `hi`.
+/// Either "clear", with its evidence; or an interval in which the guard leaves `side`: it is
+/// still on it at `lo`, and across or on the surface at `hi`; or a touch at `hi`.
 struct Finding {
     bool hit = false;
     bool touch = false;

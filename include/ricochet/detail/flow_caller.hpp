@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // How a step calls the flow: by pointer, or inlined.
 #pragma once

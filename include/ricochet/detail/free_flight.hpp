@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A mechanical system with contacts, between its impacts, as a hybrid system.
 //
@@ -7,8 +7,8 @@
 //     reset   v⁺ = v⁻ + M⁻¹ H' p  with the impulses p of Newton's law of impact and Coulomb's
 //             of friction, for all contacts that closed at that instant, together
 //
-// The system is a value as `TimeStepping` takes it. Nothing holds a contact that stays
-// closed: there the run ends (`Outcome::zeno`), and `contact_motion.hpp` continues.
+// The system is a value as for `TimeStepping`. No reaction holds a contact that stays closed:
+// the run ends there (`Outcome::zeno`), and `contact_motion.hpp` continues.
 #pragma once
 
 #include <array>
@@ -124,9 +124,9 @@ private:
 
 }  // namespace detail
 
-/// State x = (q, v). An impact allocates memory; flight does not. That of one contact without
-/// friction, or with one tangent, is a closed form: at restitution 1 it keeps the energy to
-/// rounding.
+/// State x = (q, v). An impact allocates memory; flight does not. The impact of one contact
+/// without friction, or with one tangent, is computed in closed form: at restitution 1 it keeps
+/// the energy to rounding.
 template <class System>
 class FreeFlight : public detail::AnyFlight<System::coordinates> {
 public:

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A mass on a spring that rubs on a belt: slipping and sticking as modes.
+// A mass on a spring that rubs on a belt, with slipping and sticking as modes.
 #pragma once
 
 #include <algorithm>
@@ -26,15 +26,15 @@ namespace ricochet {
 ///             pulled-left, while sticking: static_friction - stiffness u; falling
 ///             pulled-right, while sticking: static_friction + stiffness u; falling
 ///     reset   stop: v⁺ = b; on to stick where the static friction holds the spring,
-///             else to slip where the spring pulls
+/// else to slip in the direction of the spring's pull
 ///             pulled-*: u⁺ = +-static_friction / stiffness, v⁺ = b; on to slip-*
 ///
-/// The stages of a step may lie beyond s = 0: R is taken on there, smoothly, until it has
-/// doubled, and stays at that.
+/// The stages of a step may lie beyond s = 0: there R is continued smoothly until it has
+/// doubled, and is constant beyond.
 ///
 /// At the onset of slip with static_friction = friction the guard `stop` has a double zero:
 /// its rate is zero too, and the second derivative, stiffness |b| / mass, is positive
-/// since the guard is signed by the direction of slip. The exact u⁺ keeps rounding from
+/// since the sign of the guard follows the direction of slip. The exact u⁺ keeps rounding from
 /// giving the rate a sign of its own. Functions are generic in the state and
 /// its scalar.
 class FrictionOscillator {
@@ -49,14 +49,14 @@ public:
         double stiffness = 1;        ///< [N/m], positive
         double belt_speed = 0;       ///< [m/s]
         double friction = 1;         ///< [N] at sliding speed 0, zero or positive
-        double static_friction = 1;  ///< [N] that sticking bears, at least `friction`
+        double static_friction = 1;  ///< [N] largest force while sticking, at least `friction`
         double weakening = 0;        ///< [s/m], zero or positive
     };
 
     constexpr FrictionOscillator() = default;
 
     /// @throws std::invalid_argument if a parameter is outside its range.
-    /// `self` is what the sentence calls the system.
+    /// `self` is the name of the system in the message.
     explicit FrictionOscillator(const Parameters& parameters,
                                 std::string_view self = "FrictionOscillator");
 
@@ -104,7 +104,7 @@ public:
     }
 
     /// The mode of the motion at (u, v): at the speed of the belt, stick where the static
-    /// friction holds the spring, else slip where the spring pulls.
+    /// friction holds the spring, else slip in the direction of the spring's pull.
     [[nodiscard]] Mode mode_at(double u, double v) const noexcept;
 
     template <class X>
@@ -138,7 +138,7 @@ private:
     [[nodiscard]] constexpr S kinetic(const S& sliding) const noexcept
     {
         const S softening = 1 + p_.weakening * sliding;
-        // Stages are numbers; derivatives and power series are those at states of the motion.
+        // Stages use numbers; derivatives and power series are taken at states of the motion.
         if constexpr (std::is_same_v<S, double>) return p_.friction / std::max(softening, 0.5);
         return p_.friction / softening;
     }

@@ -1,17 +1,17 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// One implicit stage of rate-and-state friction: the state eliminated, the slip rate
-// found.
+// One implicit stage of rate-and-state friction: the state is eliminated, then the slip rate
+// is found.
 //
 // A stage of length h from slip rate and state before it has the equations
 //
 //     c V + N f(V, xi) = F,      xi = xi^ + h xi'(V, xi),
 //
 // with c > 0 and F from inertia and springs. The second is solved for xi for every V, in
-// closed form for the ageing law; what is left is one equation in y = log(|V| / V*), whose
-// two ends have opposite signs, so that there is a solution for every h. It is the
+// closed form for the ageing law; one equation in y = log(|V| / V*) remains, whose residual
+// has opposite signs at the two ends, so that there is a solution for every h. It is the
 // stationary point of an incremental potential (incremental.hpp), and the only one where
-// that is convex. Where f is odd in V, V has the sign of F.
+// the potential is convex. Where f is odd in V, V has the sign of F.
 #pragma once
 
 #include <algorithm>
@@ -30,9 +30,9 @@ struct StageResponse {
     double xi = 0, xi_y = 0;
 };
 
-/// Requirements of the elimination on a law: friction and rate with gradients, the rate falling
-/// with xi, and V*. (With the asinh form that of the slip law rises where V is below w and
-/// V theta / D_RS below 1e-16; what is found there is one of several states.)
+/// Requirements of the elimination on a law: friction and rate with gradients, a rate that falls
+/// with xi, and V*. (With the asinh form the rate of the slip law rises where V is below w and
+/// V theta / D_RS below 1e-16; the state found there is one of several.)
 template <class Law>
 concept EliminableLaw = requires(const Law& law, double v, double xi)
 {
@@ -50,7 +50,7 @@ concept EliminableLaw = requires(const Law& law, double v, double xi)
 namespace detail {
 
 /// The root of xi - before - h rate(v, xi), which lies between `before` and before +
-/// h rate(v, before), since the rate falls with xi. Newton's method, kept in between.
+/// h rate(v, before), since the rate falls with xi. Newton's method is kept in this interval.
 template <class Law>
 [[nodiscard]] double implicit_state(const Law& law, double h, double v, double before, double start)
 {
@@ -76,7 +76,7 @@ template <class Law>
                                               double start)
 {
     if constexpr (Law::effect == DirectEffect::log) {
-        // Below the smallest double the log form has no value.
+        // Below the smallest double the log form is not defined.
         constexpr double none = std::numeric_limits<double>::quiet_NaN();
         if (!(v > 0)) return {none, none, none, none};
     }
@@ -102,7 +102,7 @@ public:
     {
         return detail::implicit_response(*law_, h_, v, before, before);
     }
-    /// The state after a stage of rest, of a law that is odd in V.
+    /// The state after a stage at rest, for a law that is odd in V.
     [[nodiscard]] double at_rest(double before) const
     {
         return detail::implicit_state(*law_, h_, 0, before, before);
@@ -146,7 +146,7 @@ public:
         const double strength = f_star_ + b_ * xi;
         const double friction = strength + a_ * y;
         if constexpr (effect == DirectEffect::asinh) {
-            // Otherwise w, by which the two forms differ, would matter: h w / D_RS > 1e-17.
+            // Otherwise w, in which the two forms differ, would matter: h w / D_RS > 1e-17.
             if (!(friction > 40 * a_ && strength > a_ * (40 + log_a_))) {
                 return detail::implicit_response(*law_, h_, v, before, xi);
             }
@@ -187,8 +187,8 @@ struct StageSolution {
 
 namespace detail {
 
-/// Newton's method in y, kept between points of opposite signs and bisecting where it leaves
-/// them or the slope is not positive.
+/// Newton's method in y, kept between points of opposite signs; it bisects where Newton's step
+/// leaves them or the slope is not positive.
 class StageSearch {
 public:
     StageSearch(double c, double y) noexcept : c_(c), y_(y) {}
@@ -206,7 +206,7 @@ public:
             step = std::log1p(-std::min(-step, 1 - 1e-12));  // Newton's step in V, not in y
         }
         if (newton && step > 1) {
-            // Friction that rises with V leaves the solution below v - gap / c.
+            // Friction that rises with V keeps the solution below v - gap / c.
             step = std::min(step, std::max(std::log((v - gap / c_) / v_star) - y_, 1.0));
         }
         if (newton && y_ + step > lower_ && y_ + step < upper_) return step;
@@ -235,11 +235,11 @@ private:
 
 }  // namespace detail
 
-/// The longest search: bisection alone would close 2000 units of y to 1e-14 in 60.
+/// Limit of the search: bisection alone closes 2000 units of y to 1e-14 in 60 iterations.
 inline constexpr int most_stage_iterations = 300;
 
 /// Solves the equation of a stage for a force F > 0 (with the log form for any F), from
-/// the guess y of log(V / V*). To 1e-13 in log V, or to the rounding of the equation.
+/// the guess y of log(V / V*), to 1e-13 in log V or to the rounding of the equation.
 template <class Elimination>
 [[nodiscard]] StageSolution solve_forward(const Elimination& eliminate, const StageEquation& e,
                                           double guess)
@@ -257,9 +257,9 @@ template <class Elimination>
         const double slope = inertia + e.normal_force * r.friction_y;
         const double size = inertia + std::abs(grip) + std::abs(e.force);
         const double step = search.step(gap, slope, v, v_star);
-        // A root where the residual falls is a saddle of the potential: it is passed.
+        // A root at which the residual falls is a saddle of the potential, and is skipped.
         const bool flat = (slope > 0 && std::abs(gap) <= 4e-16 * size) || search.closed();
-        // A Newton step this small leaves its square; it is added to first order.
+        // After a Newton step this small the error is its square; it is added to first order.
         if (flat || (search.newton() && std::abs(step) <= 3e-8)) {
             const double last = flat ? 0 : step;
             out.v = v * (1 + last * (1 + last / 2));
@@ -292,7 +292,7 @@ template <class Law>
         const double sign = e.force < 0 ? -1 : 1;
         StageEquation forward = e;
         forward.force = std::abs(e.force);
-        // Friction that opposes V leaves no more than F / c of it.
+        // Friction opposes V, which is therefore at most F / c.
         const double most = forward.force / e.c;
         const double guess = sign * v_guess > 0 ? std::min(sign * v_guess, most) : most;
         StageSolution out = solve_forward(eliminate, forward, std::log(guess / v_star));

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The published study of learned friction, repeated: its tables 1 to 4.
 //
 // S. Liu, K. Bhattacharya and N. Lapusta, Learning a potential formulation for
-// rate-and-state friction, arXiv 2507.09796, 2025. What it leaves open (ranges, seeds,
-// initial states) is fixed as `make_histories` and `slider_cases` say.
+// rate-and-state friction, arXiv 2507.09796, 2025. What the paper leaves open (ranges, seeds,
+// initial states) is fixed as described at `make_histories` and `slider_cases`.
 #pragma once
 
 #include <atomic>
@@ -34,19 +34,19 @@ struct SliderErrors {
     double beyond = 0;  ///< of f - f*
 };
 struct Transfer {
-    SliderErrors as_trained{};       ///< by a pair that has seen histories only
+    SliderErrors as_trained{};       ///< by a pair that was trained on histories only
     SliderErrors further_trained{};  ///< after training on slip rates of other sliders
 };
 /// Sliders at 1.5 to 4 times the critical stiffness whose load changes its velocity twice.
 /// @throws std::invalid_argument unless the fit is an additive pair with one internal
 /// variable.
-/// @param cancelled  true ends it within moments; what it returns then means nothing
+/// @param cancelled  true ends it within moments; the result is then meaningless
 [[nodiscard]] Transfer transfer_to_sliders(const LearnedFriction& fit, std::uint64_t seed,
                                            double seconds,
                                            const std::atomic<bool>* cancelled = nullptr);
 
 /// Tables 3 and 4: the fixed steps, as the number of them in 1/64 s, so that all of them
-/// meet at common times: 2^-13.5, 2^-13, ..., 2^-11 s, but for less than one in a hundred.
+/// meet at common times: 2^-13.5, 2^-13, ..., 2^-11 s to within one in a hundred.
 inline constexpr int study_steps[] = {181, 128, 91, 64, 45, 32};
 
 /// Velocities at the common times, and whether the run was stable.
@@ -55,10 +55,10 @@ struct SliderVelocities {
     std::size_t unsolved = 0;
     std::vector<double> velocity{};
 };
-/// By variational steps of an order.
+/// Computes them by variational steps of an order.
 [[nodiscard]] SliderVelocities slider_velocities(const SliderCase& slider, int order,
                                                  int steps_in_64th);
-/// By a baseline.
+/// Computes them by a baseline.
 [[nodiscard]] SliderVelocities slider_velocities(const SliderCase& slider, BaselineOptions options,
                                                  int steps_in_64th);
 

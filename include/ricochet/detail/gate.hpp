@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A trained gate: what a network says of the guards of a system, for more than one step.
+// A trained gate: the predictions of a network about the guards of a system, for several steps.
 //
 //     horizon gate   one output for each horizon: no guard has its event within so many seconds
 //     level gate     one output, lower bounds of one guard in its own units
 //
-// Nothing is proved by it. How it is used, and how often it was wrong, see `Calibrated` and
+// A gate proves nothing. Its use is described at `Calibrated`, and the frequency of its errors at
 // `Calibration`.
 #pragma once
 
@@ -29,7 +29,7 @@ void check_gate_system(const Model& model, std::string_view name);
 /// @throws std::invalid_argument: the model was trained for another value.
 void check_gate_parameter(const Model& model, std::string_view name, double trained,
                           std::optional<double> value);
-/// @throws std::invalid_argument: the model takes other features, or tells other modes apart.
+/// @throws std::invalid_argument: the model takes other features, or distinguishes other modes.
 void check_gate_layout(const Model& model, const GateRecipe& recipe, std::size_t features,
                        std::size_t modes);
 /// @throws std::invalid_argument: the model has no box, or more features than a gate may.
@@ -53,7 +53,7 @@ void check_gate_model(const Model& model, const System& system)
 
 namespace gates {
 
-/// Immutable, shared by threads and copies; asking it allocates nothing.
+/// Immutable, shared by threads and copies; evaluating it allocates nothing.
 class Gate {
 public:
     /// @throws std::invalid_argument if the model is no gate, its levels do not fit its outputs or
@@ -64,8 +64,8 @@ public:
     [[nodiscard]] const GateRecipe& recipe() const noexcept { return recipe_; }
     [[nodiscard]] bool is_horizon() const noexcept { return horizon_; }
 
-    /// The largest value that is cleared: a horizon [s], all shorter ones being cleared as well,
-    /// or a level. 0: none. NaN is never cleared.
+    /// The largest value that is cleared: a horizon [s], with which all shorter ones are cleared
+    /// too, or a level. 0: none. NaN is never cleared.
     [[nodiscard]] double cleared(const double* features) const noexcept;
 
     [[nodiscard]] bool in_domain(const double* features) const noexcept
@@ -88,11 +88,11 @@ public:
         return {.cleared = cleared(features.data())};
     }
 
-    /// Whether the gate can be asked about `system`, in steps between `smallest` and `largest`
-    /// [s], at least in some of them. A system without a name is taken as the right one;
-    /// parameters are compared where it declares them.
+    /// Checks whether the gate applies to `system`, in steps between `smallest` and `largest`
+    /// [s], at least in some of them. A system without a name is accepted as the right one;
+    /// parameters are compared where the system declares them.
     ///
-    /// @throws std::invalid_argument naming what the model is for and what it would have to be.
+    /// @throws std::invalid_argument naming the value of the model and the one expected.
     template <class System, class X>
     void check(const System& system, const X& x, double smallest, double largest) const
     {

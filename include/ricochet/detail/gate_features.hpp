@@ -1,16 +1,16 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What a gate sees of a state, by a recipe that its model names.
+// The features of a state for a gate, by a recipe that its model names.
 //
 //     state            x
 //     state-rate       x, x'
 //     state-phase(w)   x, sin(w t), cos(w t): for a force of the frequency w [rad/s]
 //     angles           sin and cos of the first half of x, then the other half
-//     chain            the same of the sums q_1 + ... + q_i of the first half: the directions
+//     chain            the same for the sums q_1 + ... + q_i of the first half: the directions
 //                      of the links of a chain whose joints turn relative to each other
-//     own              whatever the system computes: features(t, x, out), feature_count
+//     own              computed by the system: features(t, x, out), feature_count
 //
-// With " mode(n)" behind it, n further features say which of n modes it is: 1 for the mode, 0
+// With the suffix " mode(n)", n further features encode which of n modes it is: 1 for the mode, 0
 // for the others.
 #pragma once
 
@@ -55,7 +55,7 @@ concept FeaturesOwned = requires(const System& system, double t, const X& x, dou
     system.features(t, x, out);
 };
 
-/// How many features a recipe makes of a state; 0 where it cannot.
+/// The number of features that a recipe makes of a state; 0 where it cannot be computed.
 template <class System, class X>
 [[nodiscard]] std::size_t feature_count(const GateRecipe& recipe,
                                         [[maybe_unused]] const System& system, const X& x)

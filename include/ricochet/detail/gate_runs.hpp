@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The runs of a system that a gate is trained on, and measured on.
+// The runs of a system on which a gate is trained and measured.
 #pragma once
 
 #include <algorithm>
@@ -46,7 +46,7 @@ struct FlowOnly {
 [[noreturn]] void throw_no_start(const std::string& why);
 /// @throws std::invalid_argument: the recipe makes nothing of these states.
 [[noreturn]] void throw_no_features(const std::string& recipe, std::size_t components);
-/// @throws std::invalid_argument: the runs hold fewer events than were asked for.
+/// @throws std::invalid_argument: the runs hold fewer events than requested.
 [[noreturn]] void throw_no_events(std::uint64_t steps);
 
 /// @throws std::invalid_argument: a level gate of a system without bounds.
@@ -57,7 +57,7 @@ struct FlowOnly {
 
 }  // namespace detail
 
-/// Runs of a system, and what is sampled from them.
+/// Runs of a system, and the samples taken from them.
 template <class System, class X, class Stepping>
 class GateRuns {
     using Exact = Simulation<System, X, Stepping>;
@@ -83,10 +83,10 @@ public:
         options_.stop_at_event = false;
     }
 
-    /// Stopped by the callback: what was asked for is not complete.
+    /// Whether the callback stopped the runs; the result is then not complete.
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
-    /// Tells the callback what the runs will cost. Those that are tested are run twice, and again
+    /// Tells the callback what the runs will cost. Runs for tests are computed twice, and once more
     /// for each rival.
     void announce()
     {
@@ -106,8 +106,8 @@ public:
                                .estimate = estimate});
     }
 
-    /// States of runs with so many events in all. Of states without an event within reach about
-    /// as many are kept as make `states` in all, each with its weight.
+    /// States of runs with so many events in all. Of the states without an event within reach, a
+    /// fraction is kept that gives about `states` in all, each with its weight.
     [[nodiscard]] GateSamples sample(std::size_t events, std::size_t states, std::uint64_t seed)
     {
         Random random(seed);
@@ -163,7 +163,7 @@ public:
     }
 
     /// Compares the declared bounds with the guard along runs of so many steps in all.
-    /// @throws std::invalid_argument naming one that is broken.
+    /// @throws std::invalid_argument naming a bound that is broken.
     void check_bounds(std::size_t steps, std::uint64_t seed)
     {
         Random random(seed);
@@ -184,7 +184,7 @@ public:
         }
     }
 
-    /// Runs the exact detector and the gated one side by side, until `events` events.
+    /// Runs the exact detector and the gated one side by side, until `events` events are found.
     template <class Detector>
     [[nodiscard]] GateTrial compare(const Detector& detector, std::size_t events,
                                     std::uint64_t seed)
@@ -220,7 +220,7 @@ public:
         return trial;
     }
 
-    /// So many events in all ways of looking, the detector last.
+    /// Finds so many events with every rival way of detection, the detector last.
     template <class Detector>
     [[nodiscard]] std::vector<Rival> rivals(const Detector& detector, std::size_t events,
                                             std::uint64_t seed)
@@ -239,7 +239,7 @@ public:
     }
 
 private:
-    /// A state on the way, until its future is known.
+    /// A state of a run, until its future is known.
     struct Pending {
         double t;
         X x;
@@ -249,14 +249,14 @@ private:
         double weight;
     };
 
-    /// What the callback is told of the runs to come.
+    /// Sets what is reported to the callback about the runs to come.
     void begin_stage(std::string_view stage, std::size_t events)
     {
         stage_ = stage;
         wanted_ = events;
     }
 
-    /// Asks the callback, at every 64th call. False: the runs are to stop.
+    /// Asks the callback, at every 64th call. False: the runs must stop.
     [[nodiscard]] bool goes_on(std::uint64_t events)
     {
         if (!progress_ || stopped_ || ++asked_ % 64 != 1) return !stopped_;
@@ -344,7 +344,7 @@ private:
         pending_.push_back(std::move(state));
     }
 
-    /// What led to an event is labelled with it.
+    /// Labels the states that led to an event with it.
     template <class E>
     void settle(const E& event, GateSamples& out, double share, Random& random)
     {
@@ -374,8 +374,9 @@ private:
         out.append({state.features.data(), width_}, event, back, state.value, fatal ? 1 : 1 / kept);
     }
 
-    /// When [s] a guard that has had its event is seen on its side again, at the end of a step,
-    /// if the flow goes on without the reset. Infinite: not within the longest horizon.
+    /// The time [s] at which a guard that has had its event is seen on its side again, at the end
+    /// of a step, if the flow continues without the reset. Infinite: not within the longest
+    /// horizon.
     template <class E>
     [[nodiscard]] double time_of_return(const E& event)
     {
@@ -402,8 +403,8 @@ private:
         return infinity;
     }
 
-    /// Short runs from states that differ a little from those in `out`: the gate is to be right
-    /// beyond what the runs happen to meet.
+    /// Adds short runs from states that differ a little from those in `out`: the gate must be right
+    /// beyond the states that the runs happen to meet.
     void add_neighbours(GateSamples& out, Random& random)
     {
         if (near_.empty() || training_.neighbours == 0) return;
@@ -442,7 +443,7 @@ private:
             out.append({state.features.data(), width_}, event.t - state.t, back - state.t,
                        state.value, 0);
         } catch (const std::invalid_argument&) {
-            // It starts where it may not.
+            // A system may refuse the start.
         }
     }
 
@@ -454,11 +455,11 @@ private:
 
     enum class Agreement {
         to_the_bit,
-        to_the_error,  ///< of locating it, from other brackets
+        to_the_error,  ///< up to the error of locating it, from other brackets
         none,
     };
 
-    /// Takes both to their next event, after `seen` of them in earlier runs.
+    /// Advances both to their next event, after `seen` of them in earlier runs.
     template <class Gated>
     [[nodiscard]] Agreement take_next_event(Exact& exact, Gated& gated, std::uint64_t seen)
     {
@@ -493,7 +494,7 @@ private:
         trial.repeated += b.repeated_steps;
     }
 
-    /// After a miss both go on from the exact run's state. False: they cannot.
+    /// After a miss both continue from the exact run's state. False: they cannot.
     template <class Gated, class Detector>
     [[nodiscard]] bool restart(std::optional<Exact>& exact, std::optional<Gated>& gated, const X& x,
                                const Options& options, const Detector& detector) const

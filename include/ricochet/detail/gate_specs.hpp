@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The runs from which the gates are trained that come with the library.
+// The runs on which the gates of the library are trained.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@
 
 namespace ricochet::learn {
 
-/// Any of the systems with such a gate, with vectors for states, so that runs are compiled once
+/// Any of the systems with such a gate, with vectors as states, so that runs are compiled once
 /// for all of them.
 class GateSystem {
 public:
@@ -68,12 +68,12 @@ enum class GateStepping {
     adaptive,  ///< DOPRI5 under error control with the default tolerances
 };
 
-/// The training from which the shipped gate follows, horizons included: 100 000 states, seed 1.
+/// The training of the shipped gate, horizons included: 100 000 states, seed 1.
 [[nodiscard]] GateTraining gate_training(const GateSpec& spec, GateStepping stepping);
 
-/// The states that the training begins with and those that choose weights and thresholds, as
+/// The states with which the training begins, and those that choose weights and thresholds, as
 /// `train_gate` draws them. Between its rounds it adds states on which the network of the round is
-/// wrong; those follow from the network.
+/// wrong; they follow from the network.
 struct GateSets {
     GateSamples training;
     GateSamples validation;

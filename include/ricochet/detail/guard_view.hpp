@@ -1,7 +1,7 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // One guard of a system as detectors and locators use it: evaluations are counted,
-// and the rate is there whether or not the system has one in closed form.
+// and the rate is available whether or not the system has one in closed form.
 #pragma once
 
 #include <array>
@@ -26,14 +26,14 @@ struct GuardSample {
 
 namespace detail {
 
-/// The index in the type that x counts with.
+/// The index in the type that x uses for its indices.
 template <class Index, class X>
 [[nodiscard]] constexpr auto own(Index i, const X& x) noexcept
 {
     return static_cast<decltype(x.size())>(i);
 }
 
-/// x + factor * direction, a component at a time.
+/// x + factor * direction, one component at a time.
 template <class X, class D>
 class MovedView {
 public:
@@ -54,7 +54,7 @@ private:
     double factor_;
 };
 
-/// -x, a component at a time.
+/// -x, one component at a time.
 template <class X>
 class NegatedView {
 public:
@@ -70,8 +70,8 @@ private:
     const X* x_;
 };
 
-/// The difference quotient of a guard, g here and `ahead` and `behind` at `delta` [s] to either
-/// side, to the side on which it is finite; NaN if there is none.
+/// The difference quotient of a guard on the side where it is finite, from g here and `ahead` and
+/// `behind` at `delta` [s] to either side; NaN if it is finite on neither.
 [[nodiscard, gnu::cold, gnu::noinline]] inline double one_sided(double g, double ahead,
                                                                 double behind,
                                                                 double delta) noexcept
@@ -116,11 +116,11 @@ public:
     {
     }
 
-    /// Whether the guard can be had from a view of the state.
+    /// Whether the guard can be evaluated on a view of the state.
     template <class V>
     static constexpr bool sees = detail::GuardAlone<System, V>;
 
-    /// Whether its rate can be had from views of the state and of its rate.
+    /// Whether its rate can be evaluated on views of the state and of its rate.
     template <class V, class D>
     static constexpr bool sees_rate =
         detail::RateAlone<System, V, D>&& detail::RateAlone<System, V, detail::NegatedView<D>>;
@@ -136,7 +136,7 @@ public:
     /// Degree of the guard as a polynomial in time and state; 0: not declared.
     [[nodiscard]] int degree() const { return guard_info_of<X>(*system_, which_).degree; }
 
-    /// Counts an evaluation that somebody else makes.
+    /// Counts an evaluation that other code makes.
     void count() const noexcept { ++*calls_; }
 
     /// g(t, x); x is a state, or a view of one where the guard `sees` it.
@@ -165,7 +165,7 @@ public:
         return rate;
     }
 
-    /// As `rate`, but a closed form that is not finite stays so.
+    /// As `rate`, but a closed form that is not finite is not replaced.
     template <class V, class D>
     [[nodiscard, gnu::always_inline]] double raw_rate(double t, const V& x, const D& dxdt,
                                                       double scale) const
@@ -207,7 +207,8 @@ private:
 
     /// The central difference along the flow over 1e-5 of the time `scale` [s] to either side: its
     /// truncation error is 1e-10 scale^2 / 6 times the third derivative, and it magnifies rounding
-    /// in g by 1e5 / scale. Where the guard exists on one side only, the difference to that side.
+    /// in g by 1e5 / scale. Where the guard exists on one side only, it is the difference to that
+    /// side.
     template <class V, class D>
     [[nodiscard]] double difference(double t, const V& x, const D& dxdt, double scale) const
     {
@@ -219,7 +220,7 @@ private:
                                       : detail::one_sided(value(t, x), ahead, behind, delta);
     }
 
-    /// The guard a time `s` later along a straight line.
+    /// The guard after a time `s` along a straight line.
     template <class V, class D>
     [[nodiscard]] double moved(double t, const V& x, const D& dxdt, double s) const
     {
@@ -234,7 +235,7 @@ private:
         }
     }
 
-    /// From a system whose guards come only all together.
+    /// One guard of a system that evaluates its guards only all together.
     template <class V>
     [[nodiscard]] double one_of_all(double t, const V& x) const
     {

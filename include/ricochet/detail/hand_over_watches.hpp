@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// When following events does not pay any longer.
+// Detects when following events no longer pays.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ class ChatterWatch {
 public:
     ChatterWatch(double t, double span) noexcept : marked_(t), span_(span) {}
 
-    /// At time t, after so many events of the phase.
+    /// Called at time t, after so many events of the phase.
     [[nodiscard]] bool operator()(double t, std::uint64_t events) noexcept
     {
         if (events < mark_ + most_events) return false;
@@ -31,18 +31,18 @@ private:
 };
 
 /// Whether a y that switches stays within the error of the steps: more than 400 events in a row
-/// between which it goes no farther from zero. Their times are then accidents of rounding, and the
-/// events of an accumulation need not become denser.
+/// between which it goes no farther from zero. Their times are then accidents of rounding, and
+/// unlike the events of an accumulation they need not become denser.
 class FlutterWatch {
 public:
-    /// After so many events, the last of them at t; `speed()` is then that of the y concerned, and
-    /// `resolved` what a step resolves of it.
+    /// Called after so many events, the last of them at t; `speed()` is then the speed of the y
+    /// concerned, and `resolved` the part of it that a step resolves.
     template <class Speed>
     [[nodiscard]] bool operator()(std::uint64_t events, double t, double resolved,
                                   const Speed& speed)
     {
         if (events == seen_) return false;
-        // A parabola between two zeros.
+        // The maximum of |y| is that of a parabola between two zeros.
         const bool flutters = events == seen_ + 1 && speed() * (t - t_) / 4 <= resolved;
         in_a_row_ = flutters ? in_a_row_ + 1 : 0;
         seen_ = events;

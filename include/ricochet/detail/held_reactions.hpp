@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Whether a step followed the reactions that hold.
+// Checks whether a step followed the held reactions.
 //
-// While everything is held the state stands still, error control takes any step, and a reaction
+// While everything is held the state stands still, error control accepts any step, and a reaction
 // that moves with its load may pass its bound and come back unseen. Hence after each step in
-// which a reaction is held its room to either bound is evaluated inside the step, and compared
-// with the cubic through the values and rates of the ends, on which the exit is searched for.
+// which a reaction is held its distance to either bound is evaluated inside the step, and compared
+// with the cubic through the values and rates at the ends, on which the exit is searched for.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ public:
         if (!goes_on) evaluate(modes, mode, t0, w0, h, end_);
         start_ = end_;
         evaluate(modes, mode, t1, w1, -h, end_);
-        // A step that is longer than the one before could agree by accident.
+        // A step that is much longer than the one before could agree by accident.
         const double growth = goes_on ? h / length_ : std::numeric_limits<double>::infinity();
         if (growth > 2) {
             // The deviation grows with the fourth power of the step.
@@ -53,7 +53,7 @@ public:
         return worst_ <= 1 ? 1 : std::clamp(0.8 / std::sqrt(std::sqrt(worst_)), 0.1, 0.5);
     }
 
-    /// Whether a step of twice the last one's length would have done.
+    /// Whether a step of twice the last one's length would have sufficed.
     [[nodiscard]] bool is_easy() const noexcept { return worst_ <= 1.0 / 32; }
 
     /// Whether a reaction was beyond its bound at the start of the last step already.
@@ -73,7 +73,7 @@ private:
         Rooms rooms{}, change{};
     };
 
-    /// `ahead`: the step, with its sign as seen from there.
+    /// `ahead`: the step, with its sign as seen from this end.
     void evaluate(const Modes& modes, Mode mode, double t, const Vector& w, double ahead, End& end)
     {
         end.t = t;
@@ -88,12 +88,12 @@ private:
         }
     }
 
-    /// The rooms at s within the step against their cubics.
+    /// Compares the distances to the bounds at s within the step with their cubics.
     void compare(const Modes& modes, Mode mode, double t0, const Vector& w0, double h,
                  const Vector& w1, double s, double event_tolerance)
     {
         const std::array<double, 4> at = hermite(s);
-        // A component at a time, as they were written: see components.hpp.
+        // One component at a time, as they were written: see components.hpp.
         for_each_component(inside_, [&](auto i) {
             inside_[i] =
                 at[0] * w0[i] + at[1] * w1[i] + h * (at[2] * start_.rate[i] + at[3] * end_.rate[i]);
@@ -109,11 +109,11 @@ private:
             const double least = std::min({ends[0], ends[1], rooms_[k]});
             if (off <= 1e-9 * size && least > 0) continue;
             if (rounding < 0) {
-                // A difference over `nudge` of the step magnifies rounding by so much.
+                // A difference over `nudge` of the step magnifies rounding by this factor.
                 rounding = modes.rounding_of_held(mode, rate_, reaction_) * (0.01 / nudge);
             }
             const double negligible = std::max(1e-9 * size, rounding);
-            // An exit that is an event is as far beyond the bound as the event's tolerance.
+            // An exit that is an event lies beyond the bound by up to the event's tolerance.
             const double beyond = 1e-6 * size + rounding;
             const double at_end = 2 * event_tolerance * std::abs(end_.change[k]) + beyond;
             starts_beyond_ = starts_beyond_ || ends[0] < -beyond;
@@ -142,8 +142,8 @@ private:
         return a * ends[0] + b * ends[1] + c * ends[2] + d * ends[3];
     }
 
-    /// The cubic's error is `off` s^2 (1 - s)^2; four times of it, as a fraction of the room that
-    /// the cubic leaves.
+    /// The cubic's error is `off` s^2 (1 - s)^2. Returns four times this error, as a fraction of
+    /// the distance to the bound that the cubic leaves.
     [[nodiscard]] static double doubt(const std::array<double, 4>& ends, double off,
                                       double negligible) noexcept
     {

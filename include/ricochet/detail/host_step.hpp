@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A step of a host, as the engine knows it.
+// A step of a host program, as the engine sees it.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@ namespace ricochet::detail {
 
 /// Arrays have as many elements as the state. Rates are with respect to the offset s in [0, h].
 ///
-/// Time and remainder lie apart: a compiler that copies both together, right after they have been
-/// written one by one, has the processor wait for them.
+/// Time and remainder are not adjacent: a compiler would copy both together, right after they were
+/// written one by one, and the processor would stall.
 struct HostStepTable {
     double t = 0;  ///< [s] at the start
     double h = 0;  ///< [s]
@@ -21,11 +21,11 @@ struct HostStepTable {
     const double* rate0 = nullptr;
     const double* rate1 = nullptr;
 
-    const void* host = nullptr;  ///< what the functions are called with
+    const void* host = nullptr;  ///< first argument of the functions
     void (*interpolate)(const void* host, double s, double* x, std::size_t n) = nullptr;
-    /// The derivative of `interpolate`. Null: it is a difference.
+    /// The derivative of `interpolate`. Null: a difference is used.
     void (*rate)(const void* host, double s, double* dxdt, std::size_t n) = nullptr;
-    /// The host's own map from the start of the step. Null: `interpolate` is as good.
+    /// The host's own map from the start of the step. Null: `interpolate` is used.
     void (*restep)(const void* host, double s, double* x, std::size_t n) = nullptr;
     double t_remainder = 0;  ///< [s] of the start
     bool is_cubic = false;   ///< the path is the cubic through the states and rates at both ends

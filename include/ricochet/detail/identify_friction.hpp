@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The parameters of the ageing law from measured friction.
 #pragma once
@@ -22,13 +22,13 @@ struct IdentifiedFriction {
 
 /// Fits (a, b, f*, D_RS) of the ageing law and the state at the start, which all histories
 /// share, to friction by least squares: for a given D_RS the state is exact and the law is
-/// linear in the rest, so that the best D_RS of a logarithmic grid is a start from which
-/// Levenberg and Marquardt's method needs a few steps. V* is a convention: another one
+/// linear in the other parameters, so that the best D_RS of a logarithmic grid is a start from
+/// which Levenberg and Marquardt's method needs a few steps. V* is a convention: another value
 /// gives another f*.
 ///
 /// @throws std::invalid_argument for no history, one that `validate` refuses or without
 /// friction, or for friction that does not rise with rate and state.
-/// @param cancelled  true ends it with what was fitted so far
+/// @param cancelled  true ends the fit, with the parameters found so far
 [[nodiscard]] IdentifiedFriction identify_ageing_law(const std::vector<FrictionHistory>& histories,
                                                      double v_star = 1e-4,
                                                      const std::atomic<bool>* cancelled = nullptr);

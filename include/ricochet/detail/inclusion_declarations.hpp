@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Members of an inclusion that are there but do not fit.
+// Members of an inclusion that exist but do not fit.
 //
 // Without these checks a member with other parameters, one that is not const, or one whose name
-// is a slip away from a known one would be passed over and the default used. The names and the
-// way to say that they are meant are those of declarations.hpp.
+// is a slip away from a known one would be ignored and the default used. The names and the
+// way to declare that they are intended are those of declarations.hpp.
 #pragma once
 
 #include <concepts>
@@ -16,7 +16,7 @@
 
 namespace ricochet::detail {
 
-/// Names that are likely misspellings of those of inclusions.
+/// Names that are likely misspellings of the names of inclusions.
 struct NearInclusionNames {
 #define RICOCHET_FUNCTION(wrong, right) int wrong;
 #define RICOCHET_VALUE(wrong, right) int wrong;
@@ -41,7 +41,7 @@ concept InclusionSpeltWell = requires
 #undef RICOCHET_VALUE
 };
 
-/// A sentence for each; data members and types may have a name near to that of a function.
+/// Refuses each with a sentence; data members and types may have a name near to a function's.
 template <class System>
 struct NearInclusionNamesOf {
 #define RICOCHET_FUNCTION(wrong, right)                                                              \
@@ -60,7 +60,7 @@ struct NearInclusionNamesOf {
 };
 
 /// A function that is called with `Arguments`, the last of which it writes if `writes`. A data
-/// member or a type of its name has a purpose of its own.
+/// member or a type of this name has a purpose of its own.
 template <class Name, class System, bool writes, class... Arguments>
 [[nodiscard]] constexpr Declaration member_declaration() noexcept
 {
@@ -96,8 +96,8 @@ template <class System>
     return found == Declaration::fits && !returns ? Declaration::does_not_fit : found;
 }
 
-/// Refuses what does not fit, with a sentence for each. True, so that a static_assert makes the
-/// compiler look here before it looks elsewhere.
+/// Refuses what does not fit, with a sentence for each. Returns true, so that a static_assert
+/// makes the compiler evaluate this check before any other.
 template <class System>
 constexpr bool check_inclusion()
 {
@@ -149,7 +149,7 @@ constexpr bool check_inclusion()
     return true;
 }
 
-/// Says what a system lacks that is no inclusion.
+/// States what a system lacks that is no inclusion.
 template <class System>
 constexpr void refuse_no_inclusion()
 {

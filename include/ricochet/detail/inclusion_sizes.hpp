@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Which sizes of inclusions the library has compiled.
+// The sizes of inclusions that the library has compiled.
 //
-// What solves inclusions of N components and M reactions is the same for all systems of these
-// sizes. Of the sizes here it is in the library; of others it is compiled where it is used, in
-// half a minute. Another size that several files use is compiled once by one of the macros below,
-// with `extern` in a header and without in one file.
+// The solvers of inclusions of N components and M reactions are the same for all systems of these
+// sizes. Those of the sizes below are compiled in the library; others are compiled where they are
+// used, in half a minute. Another size that several files use is compiled once by one of the macros
+// below, with `extern` in a header and without it in one file.
 #pragma once
 
 /// declare(N, M, ...) for every size.
@@ -21,7 +21,7 @@
     how template Eigen::Matrix<double, M, 1> ricochet::minimal_selection<N, M>( \
         const ricochet::detail::AnyMatrices<N, M>&, double, const Eigen::Matrix<double, N, 1>&);
 
-/// The hand-over, but for its event-driven phases.
+/// The hand-over, without its event-driven phases.
 #define RICOCHET_HAND_OVER_OF(N, M, how)                                                           \
     how template double ricochet::law_violation<N, M>(const ricochet::detail::AnyMatrices<N, M>&,  \
                                                       double, const Eigen::Matrix<double, N, 1>&,  \
@@ -36,7 +36,7 @@
         const ricochet::detail::AnyModes<N, M>&, const ricochet::detail::EventLoop<N>::X&, \
         const ricochet::Options&);
 
-/// All of it, by Dormand and Prince's method.
+/// All of these, with Dormand and Prince's method.
 #define RICOCHET_INCLUSIONS_OF(N, M, how) \
     RICOCHET_SET_VALUED_OF(N, M, how)     \
     RICOCHET_HAND_OVER_OF(N, M, how)      \

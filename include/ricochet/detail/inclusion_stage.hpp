@@ -1,16 +1,16 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // One implicit stage with a reaction.
 //
 //     c A w = kappa f(t, w) + sigma G reaction + q,     law(E w - s(t), reaction)
 //
-// is solved in the stages of every implicit method. Its residual is a fraction of
+// is solved in the stages of every implicit method. Its residual is relative to
 // the forces involved: the largest defect of the equation, and of the law
 //
 //     sigma G (reaction - P(reaction - rho y)),   rho_i = 1 / W_ii,  W = sigma E S^-1 G,
 //
 // over the largest term of the equation, with S = c A - kappa df/dw. It is nondimensional
-// and does not depend on anything that a solver carries along.
+// and does not depend on any quantity that a solver carries along.
 #pragma once
 
 #include <limits>
@@ -44,7 +44,7 @@ enum class StageMethod {
     automatic,    ///< cases for boxes of up to four reactions, else Newton's method
     cases,        ///< Newton's method on f alone, the inequality solved exactly by cases
     newton,       ///< semismooth Newton on equation and law together
-    fixed_point,  ///< projected fixed point with an adapted step, as the source's
+    fixed_point,  ///< projected fixed point with an adapted step, as in the source
 };
 
 struct StageOptions {
@@ -124,11 +124,11 @@ struct RICOCHET_ALIGNED StageScratch {
     State f, f_trial, w0, trial, defect, base;
     Reaction s, y, reaction, argument, image, rho, lower, upper;
     LinearInequality<M> inequality;
-    // Steps of constant length have two stages, and halved ones as many again.
+    // Steps of constant length have two stages, and halved steps as many again.
     std::array<StageFactor<N, M>, 4> factors;
     std::size_t next_factor = 0;
 
-    /// The factor of S at (t, w): an earlier one if f is affine and the weights are
+    /// The factor of S at (t, w), which is reused if f is affine and the weights are
     /// the same.
     StageFactor<N, M>& factor(const Stage<N, M>& stage, const State& w)
     {
@@ -147,7 +147,7 @@ struct RICOCHET_ALIGNED StageScratch {
         return fresh;
     }
 
-    /// rho, from the diagonal of W. Sets that are not boxes need one value for all.
+    /// Sets rho from the diagonal of W. Sets that are not boxes need one value for all components.
     void set_rho(const StageFactor<N, M>& by)
     {
         double sum = 0;
@@ -185,7 +185,7 @@ struct RICOCHET_ALIGNED StageScratch {
         }
     }
 
-    /// The residual of (w, r), with f = f(t, w) given; finds which law is worst.
+    /// The residual of (w, r), with f = f(t, w) given; finds the component whose law is worst.
     StageReport residual(const Stage<N, M>& stage, const State& w, const State& f_at,
                          const Reaction& r)
     {

@@ -1,14 +1,14 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The incremental potential of one implicit step of a slider on a spring, and where it
-// is convex.
+// The incremental potential of one implicit step of a slider on a spring, and the condition
+// for its convexity.
 //
 //     J(x, xi) = k/2 (x - x_p)^2 + m/2 ((x - 2 x_n + x_{n-1}) / h)^2
 //                + N [h Ddag((x - x_n) / h, xi) + h^2 D((xi - xi_n) / h)]
 //
 // Its stationary points are the steps of backward Euler (Liu, Bhattacharya and Lapusta,
 // arXiv 2507.09796, eqs. 16 to 18, with the k, m and N = m g that (18) and (19) leave
-// out), and the only one is the step where J is convex.
+// out); where J is convex the step is its only stationary point.
 #pragma once
 
 #include <algorithm>

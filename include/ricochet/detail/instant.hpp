@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Compensated sums: time and state are carried together with their rounding errors.
 //
-// A million additions of a step to a time lose a million roundings; keeping what
-// each addition rounded off, and adding it to the next, loses one. The sum of two
+// A million additions of a step to a time accumulate a million roundings; if the rounding
+// error of each addition is kept and added to the next, only one remains. The sum of two
 // doubles and its exact rounding error are computed by Knuth's two-sum (The Art of
 // Computer Programming 2, section 4.2.2, theorem B), which compilers keep intact
 // unless told to reassociate floating point.

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The arithmetic of a small multilayer perceptron, written once.
 //
@@ -14,9 +14,9 @@
 //
 // Products are rounded before they are added: `opaque` hides each from the
 // compiler, which would otherwise contract the two to one operation on some
-// machines (g++ does by default). A register holds 16 or 32 bytes as the target has
-// it, and neither the lane in which an output is computed nor how many are computed
-// together can show in it.
+// machines (g++ does by default). A register holds 16 or 32 bytes, depending on the
+// target; the result depends neither on the lane in which an output is computed nor on
+// the number that are computed together.
 #pragma once
 
 #include "ricochet/detail/activation.hpp"
@@ -27,7 +27,7 @@
 
 namespace ricochet::detail::RICOCHET_KERNEL_NAMESPACE {
 
-/// The widest layer that the buffers on the stack hold.
+/// The widest layer that fits in the buffers on the stack.
 inline constexpr std::size_t max_width = 256;
 
 /// `width` rounded up to whole blocks.
@@ -37,7 +37,7 @@ template <class T>
     return (width + block<T> - 1) / block<T> * block<T>;
 }
 
-/// Partial sums per output: few outputs have too few independent additions to
+/// Partial sums per output: with few outputs there are too few independent additions to
 /// hide the latency of one.
 template <class T>
 [[nodiscard]] constexpr std::size_t chains(std::size_t outputs) noexcept
@@ -56,8 +56,8 @@ template <class T>
     return last && outputs == 1 ? padded<T>(inputs) + block<T> : padded<T>(outputs) * (1 + inputs);
 }
 
-/// Registers used for sums; half of those that a machine of any of our
-/// instruction sets has, the rest are for weights and inputs.
+/// Registers used for sums: half of the registers of any of our instruction sets; the rest
+/// are for weights and inputs.
 inline constexpr std::size_t accumulators = 8;
 
 /// Sums of `Chains` partial sums in pairs.
@@ -75,7 +75,7 @@ RICOCHET_INLINE V sum_of(const V (&a)[Chains]) noexcept
 }
 
 /// `Registers` registers of outputs of one layer. `parameters` and `y` begin at
-/// the first of them, `row` is the distance between rows of weights.
+/// the first of them; `row` is the distance between rows of weights.
 template <class T, class Activation, std::size_t Registers, std::size_t Chains>
 RICOCHET_INLINE void outputs_together(const T* parameters, std::size_t row, const T* x,
                                       std::size_t inputs, T* y) noexcept
@@ -120,7 +120,7 @@ RICOCHET_INLINE void outputs_together(const T* parameters, std::size_t row, cons
     }
 }
 
-/// Outputs `first` ... `row` - 1, as many together as there are registers.
+/// Outputs `first` ... `row` - 1, as many together as fit in the registers.
 template <class T, class Activation, std::size_t Registers, std::size_t Chains>
 RICOCHET_INLINE void outputs_from(std::size_t first, const T* parameters, std::size_t row,
                                   const T* x, std::size_t inputs, T* y) noexcept
@@ -182,7 +182,7 @@ RICOCHET_INLINE void known_dense(const T* parameters, const T* x, std::size_t in
         parameters, x, inputs, y);
 }
 
-/// Zeroes what a layer left in the padding of y: infinite inputs make NaN of it.
+/// Zeroes the padding of y: with infinite inputs a layer leaves NaN there.
 template <class T>
 RICOCHET_INLINE void clear_padding(T* y, std::size_t outputs) noexcept
 {
@@ -238,7 +238,7 @@ RICOCHET_INLINE T dot(const T* parameters, const T* x, std::size_t inputs) noexc
     return dot_by<T, 1>(parameters, x, inputs);
 }
 
-/// The last layer: no activation, and `outputs` values, not a block more.
+/// The last layer: no activation, and exactly `outputs` values instead of whole blocks.
 template <class T>
 RICOCHET_INLINE void last(const T* parameters, const T* x, std::size_t inputs, std::size_t outputs,
                           T* y) noexcept
@@ -269,8 +269,8 @@ RICOCHET_INLINE void layers(const T* parameters, const T* x, std::size_t inputs,
     }
 }
 
-/// A network of which only the input is read where it lies: a single layer with
-/// one output needs it padded.
+/// A network of which only the input is read in place; a single layer with one output
+/// needs the input padded.
 template <class T, class Activation, std::size_t... Widths>
 RICOCHET_INLINE void network(const T* parameters, const T* in, std::size_t inputs, T* out) noexcept
 {
@@ -284,7 +284,7 @@ RICOCHET_INLINE void network(const T* parameters, const T* in, std::size_t input
     }
 }
 
-/// The same for widths known only now: `widths` has `layers + 1` of them.
+/// The same for widths that are known only at run time: `widths` has `layers + 1` of them.
 template <class T, class Activation>
 RICOCHET_INLINE void network(const T* parameters, const std::uint16_t* widths, std::size_t layers,
                              const T* in, T* out) noexcept
@@ -317,7 +317,7 @@ struct HiddenActivation<false> {
     using Type = Tanh;
 };
 
-/// All of a network whose shape is known: `Widths` are those after the input.
+/// A whole network whose shape is known: `Widths` are those after the input.
 template <class T, bool relu, std::size_t Inputs, std::size_t... Widths>
 inline void evaluate(const T* parameters, const T* in, T* out) noexcept
 {

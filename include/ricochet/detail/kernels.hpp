@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Whole steps of a method with the flow of a system inlined.
 //
@@ -8,9 +8,9 @@
 //
 // which is the same Runge-Kutta step, since the rows of a tableau sum to its nodes,
 // but w is of second order in the step: the tableau's coefficients, which are
-// rounded and reach 11.6 in Dormand and Prince's, multiply only what departs from
+// rounded and reach 11.6 in Dormand and Prince's, multiply only the departure from
 // the tangent. The state is carried as x0 + remainder, so that the rounding of the
-// final addition is not lost but joins the next increment, and errors of rounding
+// final addition is not lost but enters the next increment, and errors of rounding
 // do not grow with the number of steps.
 #pragma once
 
@@ -28,16 +28,16 @@
 #include "ricochet/detail/stepper_door.hpp"
 #include "ricochet/integrate/methods.hpp"
 
-// Components of a small state are computed one by one: as pairs, which g++ makes of them, they take
-// 1.3 times as long (rk4 on the ball), for the shuffles between flow and sums.
+// Components of a small state are computed one by one: as pairs, which g++ would form, they take
+// 1.3 times as long (rk4 on the ball), because of the shuffles between flow and sums.
 #if defined(__GNUC__) && !defined(__clang__)
 #define RICOCHET_BY_ONES [[gnu::optimize("no-tree-slp-vectorize")]]
 #else
 #define RICOCHET_BY_ONES
 #endif
 
-// A program of many small systems that seldom step compiles in half the time with flows called by
-// pointer: it defines RICOCHET_CALLS_FLOWS_BY_POINTER. The bits of a run are the same.
+// A program of many small systems that take few steps compiles in half the time with flows called
+// by pointer: it defines RICOCHET_CALLS_FLOWS_BY_POINTER. The bits of a run are the same.
 #if defined(__OPTIMIZE__) && !defined(RICOCHET_CALLS_FLOWS_BY_POINTER)
 #define RICOCHET_INLINES_FLOWS 1
 #else
@@ -61,11 +61,11 @@ class KernelOf {
                   "use a one-step method");
 
     static constexpr bool ours = Departing<Stepper>;
-    /// On states that nothing else refers to the compiler keeps a small one in registers from
-    /// stage to stage.
+    /// The compiler keeps a small state that nothing else refers to in registers from stage to
+    /// stage.
     static constexpr bool in_registers = fits_registers<X>;
     static_assert(in_registers || !ours, "the library has the kernels of large states");
-    using Y = X;  ///< what a step is computed with
+    using Y = X;  ///< the type with which a step is computed
 
     [[nodiscard]] static auto& at(void* door) noexcept
     {
@@ -93,7 +93,7 @@ class KernelOf {
     };
 
     /// The departure w after a step of length s, with its rate there and the error estimate where
-    /// the method has them. `kept` are the stages, or a stepper of the user's; `room` is scratch.
+    /// the method has them. `kept` holds the stages, or a user-defined stepper; `room` is scratch.
     template <bool with_error, class Kept>
     [[gnu::always_inline]] static void depart(Caller& caller, Kept&& kept, const Origin& from,
                                               double s, Y& room, Y& w, Y& rate, Y& error)
@@ -150,7 +150,7 @@ class KernelOf {
         return to;
     }
 
-    /// The current step, from the registers.
+    /// Stores the current step from the registers.
     template <class Stages>
     [[gnu::always_inline]] static void store(State& step, [[maybe_unused]] const Stages& k,
                                              const X& w, [[maybe_unused]] const X& w_rate,
@@ -174,7 +174,7 @@ class KernelOf {
         return std::size_t{0};
     }();
 
-    /// The end of a step from `w`; false if it is not finite.
+    /// Computes the end of a step from `w`; false if it is not finite.
     [[gnu::always_inline]] static bool end([[maybe_unused]] Caller& caller, double h, const Y& x0,
                                            const Y& rate0, const Y& remainder, const Y& w,
                                            [[maybe_unused]] const Y& w_rate, Y& x1, Y& rate1)
@@ -224,7 +224,8 @@ class KernelOf {
         return worst_ratio(x0, x1, errors, rtol, [&](auto) { return atol; });
     }
 
-    /// Takes a step. The largest ratio of error, 0 without an estimate; NaN if it is not finite.
+    /// Takes a step. Returns the largest ratio of error to tolerance, 0 without an estimate; NaN if
+    /// the step is not finite.
     template <bool with_error>
     [[gnu::always_inline]] static double go(void* door, State& step, double h, double rtol,
                                             double atol)
@@ -339,7 +340,7 @@ class KernelOf {
 
     // --- quiet runs ---
 
-    /// The state at the part `InsideOf::u` of the step, as `Step::peek` has it.
+    /// The state at the fraction `InsideOf::u` of the step, as `Step::peek` computes it.
     template <class Stages>
     [[gnu::always_inline]] static X peeked(double h, const X& x0, const X& rate0,
                                            const X& remainder, [[maybe_unused]] const Stages& k,
@@ -464,7 +465,7 @@ class KernelOf {
                 g1 = guard.value(t1, x1);
                 if constexpr (rates) g_rate1 = guard.raw_rate(t1, x1, rate1, h);
                 QuietEnd why = QuietEnd::due;
-                // A rate that is not finite is replaced by the loop.
+                // The loop replaces a rate that is not finite.
                 if (Screen::suspects(sign, g0, g_rate0, g1, g_rate1, h) ||
                     !std::isfinite(g1 + g_rate1)) {
                     why = QuietEnd::doubt;
@@ -518,7 +519,7 @@ class KernelOf {
         put(remainder, step.remainder);
     }
 
-    /// Leaves the current step where the loop searches for it.
+    /// Leaves the current step where the loop expects it.
     template <class Stages>
     [[gnu::always_inline]] static void leave(State& step, const Caller& caller, double h,
                                              const X& x0, const X& rate0, const X& remainder,
@@ -566,7 +567,7 @@ public:
     }
 };
 
-/// The kernel of one of our methods that calls the flow by pointer, compiled in the library.
+/// The kernel of a built-in method that calls the flow by pointer, compiled in the library.
 template <class X>
 [[nodiscard]] const StepKernel<X>& kernel_by_name(MethodName name) noexcept;
 
@@ -577,8 +578,8 @@ requires(
     NameOf<Method>::known) inline constexpr StepKernel<CoreState<X>> kernel_of<System, X, Method> =
     KernelOf<System, X, Method>::make();
 
-/// The kernel of a method for a system: the library's own where the flow is no small part of a
-/// step, or nothing is inlined.
+/// The kernel of a method for a system: the library's own where the flow takes a large part of
+/// a step, or nothing is inlined.
 template <class System, class X, class Method>
 [[nodiscard]] const StepKernel<CoreState<X>>& kernel_for([[maybe_unused]] const Method& method)
 {

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Four doubles side by side, one for each of four motions, with the operations of one.
+// Four doubles side by side, one for each of four motions, with the operations of one double.
 //
 // Every lane has the bits of the same operation on a double: sums, products and quotients are the
-// processor's, functions are those of the standard library, lane by lane. A function that is
-// compiled for another machine than its file has them inlined.
+// processor's, and other functions are those of the standard library, called for each lane. A
+// function that is compiled for another machine than its file has them inlined.
 #pragma once
 
 #include <cmath>
@@ -40,7 +40,7 @@ struct LaneParts<T, false> {
     }
 };
 
-// An expression of a and b, the parts of x and y, for each part.
+// Evaluates an expression of a and b, the parts of x and y, for each part.
 #define RICOCHET_BOTH(Result, expression)                \
     Result out;                                          \
     {                                                    \
@@ -58,7 +58,7 @@ struct LaneParts<T, false> {
         RICOCHET_BOTH(Result, a op b);                                                           \
     }
 
-/// A truth for each lane.
+/// A truth value for each lane.
 template <bool wide>
 struct LaneMask {
     LaneParts<std::int64_t, wide> parts;  ///< 0 or -1
@@ -143,7 +143,7 @@ struct LanePack {
         if constexpr (!wide) out.parts.high = which.parts.high ? x.parts.high : y.parts.high;
         return out;
     }
-    /// As std::max and std::min, where one of both is NaN, too.
+    /// As std::max and std::min, also where one of them is NaN.
     [[nodiscard, gnu::always_inline]] friend LanePack larger_of(const LanePack& x,
                                                                 const LanePack& y) noexcept
     {
@@ -155,7 +155,7 @@ struct LanePack {
         RICOCHET_BOTH(LanePack, b < a ? b : a);
     }
 
-    /// The numbers whose bits `change` makes of those of x.
+    /// The numbers whose bits `change` computes from the bits of x.
     template <class Change>
     [[nodiscard, gnu::always_inline]] static LanePack change_bits(const LanePack& x,
                                                                   const Change& change)
@@ -220,12 +220,12 @@ template <bool wide>
     return LanePack<wide>::change_bits(x, drop_sign);
 }
 
-/// As `rough_log2`.
+/// As `rough_log2` for doubles.
 template <bool wide>
 [[nodiscard, gnu::always_inline]] inline LanePack<wide> rough_log2(const LanePack<wide>& x) noexcept
 {
     using Pack = LanePack<wide>;
-    // A whole number below 2^52 is in the last bits of 2^52 plus it.
+    // The last bits of 2^52 + n are the whole number n, if it is below 2^52.
     const auto to_exponent = [](auto& bits) __attribute__((always_inline))
     {
         bits = (bits >> 52) | 0x4330000000000000;
@@ -240,7 +240,7 @@ template <bool wide>
            m * ((3.0111621508367876 - 1.0268049073983060 * m) + 0.1527002847975194 * (m * m));
 }
 
-/// As `rough_exp2`.
+/// As `rough_exp2` for doubles.
 template <bool wide>
 [[nodiscard, gnu::always_inline]] inline LanePack<wide> rough_exp2(const LanePack<wide>& x) noexcept
 {

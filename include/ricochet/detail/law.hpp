@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Whether a state and its reaction satisfy the law of an inclusion.
+// Measures how well a state and its reaction satisfy the law of an inclusion.
 #pragma once
 
 #include <algorithm>
@@ -14,10 +14,10 @@ namespace ricochet {
 
 /// The largest violation of "reaction in K and -y in the normal cone of K at the reaction" at
 /// (t, w), as a fraction of the forces: 0 where the law holds, and of the order of 1 where a
-/// reaction acts at the wrong bound. A y counts as zero below 1e-9 of its terms and of what the
-/// forces make of it in `span` [s], such as a step. For boxes each component by itself;
-/// infinite where a set is empty. For a set of states 0, since the law is then the solver's
-/// residual.
+/// reaction acts at the wrong bound. A y counts as zero below 1e-9 of its terms and of the change
+/// that the forces cause in `span` [s], such as a step. For boxes each component is taken by
+/// itself; infinite where a set is empty. For a set of states it is 0, since the law is then the
+/// solver's residual.
 template <int N, int M>
 [[nodiscard]] double law_violation(
     const detail::AnyMatrices<N, M>& m, double t,

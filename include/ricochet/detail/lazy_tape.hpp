@@ -1,7 +1,7 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The operations of a flow that were recorded while the program runs, and their power series,
-// computed operation by operation: where the compiler cannot know the operations.
+// The operations of a flow that were recorded at run time, and their power series, computed
+// operation by operation, for flows whose operations the compiler cannot know.
 #pragma once
 
 #include <cstddef>
@@ -34,13 +34,13 @@ public:
     [[nodiscard]] bool is_polynomial() const noexcept { return degree_ <= least_taylor_order; }
 
     /// The coefficients as by `TaylorSeries::compute`, up to `order`, or all of them where the
-    /// motion is a polynomial. Returns how many.
+    /// motion is a polynomial. Returns their number.
     int compute(double t, const double* x, int order, double* out, double* guards);
 
 private:
     static constexpr std::size_t width = most_taylor_order + 1;
 
-    /// As `TaylorTape`.
+    /// As in `TaylorTape`.
     struct Tape {
         std::size_t states = 0;
         std::size_t guards = 0;

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A loop whose quiet steps are taken elsewhere, beside those of other runs.
+// A loop whose quiet steps are taken elsewhere, together with those of other runs.
 #pragma once
 
 #include <memory>
@@ -13,17 +13,17 @@ namespace ricochet::detail {
 template <class X>
 class LendingLoop : public AnyLoop<X> {
 public:
-    /// Goes on to a step that may be quiet. `beyond`: to one after the current step. False: the run
-    /// has ended.
+    /// Advances to a step that may be quiet; if `beyond`, to one after the current step. False: the
+    /// run has ended.
     virtual bool go_to_quiet_steps(QuietRun& quiet, bool beyond) = 0;
-    /// Takes over what was done in quiet steps elsewhere, from where they began; the current step
-    /// is the next one.
+    /// Takes over the result of quiet steps taken elsewhere, from the point where they began; the
+    /// current step is the next one.
     virtual void take_back(const QuietRun& quiet) = 0;
     [[nodiscard]] virtual StepState<X>& lend() noexcept = 0;
 };
 
 /// Keeps a copy of `setup`, which has a quiet kernel on series. After an exception the run is over.
-/// @throws std::invalid_argument, as `Simulation`
+/// @throws std::invalid_argument as `Simulation` does
 template <class X>
 [[nodiscard]] std::unique_ptr<LendingLoop<X>> make_lending_loop(const RunSetup<X>& setup,
                                                                 const X& x0,

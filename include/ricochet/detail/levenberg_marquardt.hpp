@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Nonlinear least squares.
 #pragma once
@@ -9,7 +9,7 @@
 
 namespace ricochet::learn {
 
-/// A sum of squares: returns |r(p)|^2 and, where they are asked for, J^T J and J^T r.
+/// A sum of squares: returns |r(p)|^2 and, where they are requested, J^T J and J^T r.
 using SumOfSquares = std::function<double(const Eigen::VectorXd& p, Eigen::MatrixXd* normal,
                                           Eigen::VectorXd* gradient)>;
 
@@ -24,7 +24,7 @@ struct LevenbergMarquardtOptions {
 
 struct LevenbergMarquardtReport {
     int iterations = 0;      ///< accepted steps
-    int trials = 0;          ///< sums of squares examined
+    int trials = 0;          ///< sums of squares evaluated
     double sum = 0;          ///< of squares, at the end
     bool converged = false;  ///< no parameter moves, or the target is met
 };

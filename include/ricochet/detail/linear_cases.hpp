@@ -1,13 +1,13 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Linear variational inequalities of a few unknowns, solved case by case.
 //
 //     y = W reaction + y0,   each pair (reaction_i, y_i) on its own monotone graph
 //
-// Each graph has three branches: lower bound, inside, upper bound. On a given choice of
+// Each graph has three branches: lower bound, inside, upper bound. For a given choice of
 // branches the problem is a linear system, whose solution is that of the inequality if
-// it lies on those branches. One unknown is a formula. More unknowns than can be tried case by
-// case are solved by principal pivots.
+// it lies on those branches. One unknown is solved by a formula. With too many unknowns for all
+// cases to be tried, the solution is found by principal pivots.
 #pragma once
 
 #include <Eigen/Dense>
@@ -21,8 +21,8 @@
 
 namespace ricochet {
 
-/// Branch of its graph on which a pair lies. For a set of reactions `inside` is sticking and a
-/// bound is sliding; for a set of states `inside` is free and a bound is contact.
+/// Branch of its graph on which a pair lies. For a set of reactions `inside` means sticking and a
+/// bound means sliding; for a set of states `inside` means free and a bound means contact.
 enum class Branch : signed char { lower = -1, inside = 0, upper = 1 };
 
 /// The most unknowns that are solved by cases: 3^4 linear systems at worst.
@@ -34,8 +34,8 @@ struct RICOCHET_ALIGNED LinearInequality {
     using Matrix = Eigen::Matrix<double, M, M>;
     using Branches = Eigen::Matrix<Branch, M, 1>;
 
-    /// Stands for W_ii where a reaction has no influence on its y, so that one that is asked for
-    /// is all or nothing; the smallest double would overflow in y / W_ii.
+    /// Stands for W_ii where a reaction has no influence on its y, so that a required reaction goes
+    /// to one bound or the other; the smallest double would overflow in y / W_ii.
     static constexpr double no_influence = 1e-100;
 
     Confines confines = Confines::reaction;
@@ -44,7 +44,7 @@ struct RICOCHET_ALIGNED LinearInequality {
     Vector lower, upper;  ///< of K
 
     /// The first component whose interval is empty or has a bound that is not a number; -1 if
-    /// none has.
+    /// there is none.
     [[nodiscard]] int faulty() const noexcept
     {
         for (Eigen::Index i = 0; i < lower.size(); ++i) {
@@ -53,8 +53,8 @@ struct RICOCHET_ALIGNED LinearInequality {
         return -1;
     }
 
-    /// The solution on the branch where the search meets it first, `branches` before any
-    /// other; these are overwritten. False if none was found.
+    /// The solution on the first branches that fit, `branches` being tried before any others;
+    /// these are overwritten. False if none was found.
     [[nodiscard]] bool solve(Vector& reaction, Vector& y, Branches& branches) const
     {
         if constexpr (M == 1) {
@@ -65,15 +65,15 @@ struct RICOCHET_ALIGNED LinearInequality {
 
     [[nodiscard]] bool search(Vector& reaction, Vector& y, Branches& branches) const;
 
-    /// For any number of unknowns and a positive semidefinite W, reactions that depend on one
-    /// another included: proximal steps from reaction = 0,
+    /// For any number of unknowns and a positive semidefinite W, even if reactions depend on one
+    /// another: proximal steps from reaction = 0,
     ///
     ///     y = W reaction + y0 + eps (reaction - reaction before),
     ///
     /// each solved by principal pivots (J. J. Judice and F. M. Pires, A block principal pivoting
     /// algorithm for large-scale strictly monotone linear complementarity problems, Computers and
-    /// Operations Research 21, 1994). False where pivots or proximal steps do not end, as they
-    /// need not where W is indefinite.
+    /// Operations Research 21, 1994). False where pivots or proximal steps do not terminate, which
+    /// can happen where W is indefinite.
     [[nodiscard]] bool solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const;
 
     /// The solution of the equations of the given branches, whether it lies on them or
@@ -85,8 +85,8 @@ struct RICOCHET_ALIGNED LinearInequality {
         return confines == Confines::reaction ? branch == Branch::inside : branch != Branch::inside;
     }
 
-    /// The smallest of the amounts by which the pairs stay on their branches, in units of
-    /// y or of the reaction; negative where one has left it.
+    /// The smallest of the margins by which the pairs stay on their branches, in units of
+    /// y or of the reaction; negative where a pair has left its branch.
     [[nodiscard]] double slack(const Branches& branches, const Vector& reaction,
                                const Vector& y) const
     {
@@ -99,7 +99,7 @@ struct RICOCHET_ALIGNED LinearInequality {
 
     [[nodiscard]] double slack(Eigen::Index i, Branch branch, double reaction, double y) const
     {
-        // The two kinds of set differ in which of the pair is confined.
+        // The two kinds of set differ in which member of the pair is restricted.
         const bool of_reactions = confines == Confines::reaction;
         const double confined = of_reactions ? reaction : y;
         const double conjugate = of_reactions ? y : reaction;
@@ -124,7 +124,7 @@ private:
         return branch == Branch::lower ? lower[i] : upper[i];
     }
 
-    /// The terms of y_i.
+    /// Sum of the sizes of the terms of y_i.
     [[nodiscard]] double terms(Eigen::Index i, const Vector& reaction) const
     {
         return std::abs(y0[i]) + w.row(i).cwiseAbs().dot(reaction.cwiseAbs());
@@ -140,8 +140,8 @@ private:
         return slack(i, branch, reaction[i], y[i]) < -1e-13 * size;
     }
 
-    /// For a W whose principal minors are positive. Whatever is off its branch changes it, all at
-    /// once while their number falls, and one at a time, the last, where it does not.
+    /// For a W whose principal minors are positive. Pairs that are off their branches change
+    /// branch, all together while their number falls, and otherwise only the last of them.
     [[nodiscard]] bool pivot(Vector& reaction, Vector& y, Branches& branches) const
     {
         const Eigen::Index m = y0.size();
@@ -177,7 +177,7 @@ private:
         return false;
     }
 
-    /// On their branches up to the rounding of the products.
+    /// Whether all pairs are on their branches up to the rounding of the products.
     [[nodiscard]] bool fits(const Branches& branches, const Vector& reaction, const Vector& y) const
     {
         for (Eigen::Index i = 0; i < y.size(); ++i) {

@@ -1,7 +1,7 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A system and its derivatives: those that it declares, else by dual numbers where its functions
-// take any scalar (hybrid/scalar.hpp), else by differences.
+// A system and its derivatives: the derivatives that it declares, else dual numbers where its
+// functions take any scalar (hybrid/scalar.hpp), else differences.
 //
 //     flow_derivative([mode,] t, x, s, ds)              ds = (df/dx) s
 //     guard_derivative([which,] [mode,] t, x, s)        (dg/dx) s
@@ -102,7 +102,7 @@ template <class System, class X, class... Which>
     }
 }
 
-// --- the kinds of reset, as one kind of function ---
+// --- the kinds of reset, with a common interface ---
 
 /// The reset of one guard, as the run applies it to a set of one.
 struct ResetOf {
@@ -133,16 +133,16 @@ struct ResetOf {
     }
 };
 
-/// Two resets of one set that write one number differently; a time event counts as
-/// the guard before `no_guard`.
+/// Two resets of one set that write different values to the same number; a time event counts
+/// as the guard before `no_guard`.
 struct Conflict {
     std::size_t first = no_guard;
     std::size_t second = no_guard;
     [[nodiscard]] bool any() const noexcept { return first != no_guard; }
 };
 
-/// The resets of all that fired, at once, as a run applies them: by the system's own
-/// reset for sets, or else each reads the state before and writes what it changes.
+/// The resets of a fired set together, as a run applies them: by the system's own reset for
+/// sets, or else each reads the state before and writes the components that it changes.
 struct ResetSet {
     FiredGuards fired;
 
@@ -242,7 +242,7 @@ private:
     };
 };
 
-/// Where accumulating events of a guard end.
+/// The state at the limit of accumulating events of a guard.
 struct RestOf {
     std::size_t which;
 
@@ -281,12 +281,13 @@ struct TimeReset {
 
 /// Flow, guards and resets of a system, and their derivatives along directions (f_x s)
 /// and by its parameters (f_p), the latter by differences unless the parameter has them. The fields
-/// on both sides of a surface are taken to be smooth across it, since differences look beyond it.
+/// on both sides of a surface are assumed to be smooth across it, since differences evaluate them
+/// beyond it.
 template <class System, class X>
 class Linearization {
 public:
-    /// @throws std::invalid_argument for parameters or differences that make no sense, and
-    /// whatever `Parameter::with` throws.
+    /// @throws std::invalid_argument for parameters or differences that are not meaningful, and
+    /// any exception of `Parameter::with`.
     Linearization(const System& system, const std::vector<Parameter<System>>& parameters,
                   const Differences& differences, std::size_t components)
         : system_(system), differences_(differences)
@@ -459,7 +460,7 @@ public:
             j, [&](const System& system) { return reset_of(system, reset, mode, t, x); });
     }
 
-    /// Derivative by parameter j of the value that `function` has for a system.
+    /// Derivative by parameter j of the value of `function` for a system.
     template <class Function>
     [[nodiscard]] auto by_parameter(std::size_t j, const Function& function) const
     {

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Whether asking a network pays, found out during a run.
+// Measures during a run whether evaluating a network pays.
 //
-// A run is cut into pieces of some hundred steps, and each is gone through in one of three ways:
-// every step is checked, checks are planned under bounds, or planned with the network. What a
-// step costs is compared:
+// A run is divided into pieces of some hundred steps, and each is computed in one of three ways:
+// every step is checked, checks are planned under bounds, or planned with the network. The costs
+// of a step are compared:
 //
 //     cost = (guard calls x their cost + answers x their cost + steps x their cost) / steps
 //
@@ -12,7 +12,7 @@
 // steps with and without planning, which has a cost, too. The alternatives are tried in turn
 // until the best one is clear beyond its noise. Then the others are tried again from time to time,
 // but their excess cost over the best one is kept below a fraction of the run (1 %), so that
-// a useless network, however large or hostile, costs no more. Checking every step is not tried
+// a useless network, however large or wrong, costs no more. Checking every step is not tried
 // if the evaluations that planning saves cost more than planning can.
 //
 // Used through `Metered`; the state lives in the run, not in the detector.
@@ -33,10 +33,10 @@ namespace ricochet {
 struct MeterOptions {
     enum class Decision : std::uint8_t {
         measured,  ///< by costs sampled with a clock
-        counted,   ///< by the costs given here, so that the same run asks the same
-        always,    ///< asked whenever there is something to ask
+        counted,   ///< by the costs given here, so that the same run always makes the same choices
+        always,    ///< the network is evaluated whenever possible
         never,
-        every_step,  ///< every step is checked: nothing is planned either
+        every_step,  ///< every step is checked, and nothing is planned
     };
     Decision decision = Decision::measured;
     /// [s] Cost of a check of the guard, of an inference and of a step, if `counted`; not
@@ -101,13 +101,13 @@ private:
 
 class Meter {
 public:
-    /// `planned_guards`: how many there are, if their checks are planned; 0: without the network
+    /// `planned_guards`: the number of guards, if their checks are planned; 0: without the network
     /// every step is checked.
     explicit Meter(const MeterOptions& options, std::size_t planned_guards = 0);
 
-    /// Whether the network is to be asked now.
+    /// Whether the network should be evaluated now.
     [[nodiscard]] bool asks() const noexcept { return way_ == ask && asked_ < most_asked_; }
-    /// Whether every step is to be checked now.
+    /// Whether every step should be checked now.
     [[nodiscard]] bool checks() const noexcept { return way_ == check; }
     /// Records that the inference has cleared something.
     void note_cleared() noexcept { ++cleared_; }
@@ -137,7 +137,7 @@ public:
     [[nodiscard]] MeterReading reading() const noexcept;
 
 private:
-    static constexpr std::uint64_t every = 32;  ///< of which one is timed, later of 512
+    static constexpr std::uint64_t every = 32;  ///< one in so many is timed, later one in 512
 
     enum Way : std::uint8_t { check, plan, ask };
     static constexpr std::array<Way, 3> all_ways{check, plan, ask};
@@ -146,7 +146,7 @@ private:
     struct Account {
         double steps = 0;
         double cost = 0;     ///< [s]
-        double squares = 0;  ///< [s²] of what pieces cost beside their mean
+        double squares = 0;  ///< [s²] of the deviations of pieces from their mean
         std::uint64_t pieces = 0;
         std::uint64_t wait = 1;  ///< pieces between trials
         std::uint64_t waited = 0;
@@ -156,7 +156,7 @@ private:
         void add(double more_steps, double more_cost) noexcept;
     };
     struct Counts {
-        double steps = 0;  ///< number of steps that stand
+        double steps = 0;  ///< number of accepted steps
         double work = 0;   ///< including steps taken back
         double looks = 0;
         double asked = 0;
@@ -173,7 +173,7 @@ private:
         return answer;
     }
 
-    [[nodiscard]] static double seconds() noexcept;  ///< [s] of a steady clock
+    [[nodiscard]] static double seconds() noexcept;  ///< [s] of a monotonic clock
     void consider(const Statistics& counts);
     void sample_step(const Counts& piece);
     void close_piece(const Counts& piece, double cost);

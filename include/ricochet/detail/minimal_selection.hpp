@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Which of the reactions allowed at a state does the motion take?
+// The reaction that the motion selects among those allowed at a state.
 #pragma once
 
 #include <limits>
@@ -43,9 +43,9 @@ struct RICOCHET_ALIGNED SelectionProblem {
     }
 };
 
-/// Whether -y is in the normal cone of the set at r, to a millionth: r = P(r - rho y), with
-/// rho y of the size of r. Where no reaction opposes y, inside an obstacle, the r of an
-/// approximate problem is finite all the same, and off by its own size.
+/// Whether -y is in the normal cone of the set at r, to 1e-6: r = P(r - rho y), with
+/// rho y of the size of r. Where no reaction has -y in its normal cone, inside an obstacle, the r
+/// of an approximate problem is finite nevertheless, and wrong by its own size.
 template <int N, int M, class State, class Reaction>
 [[nodiscard]] bool opposes(const AnyInclusion<N, M>& inclusion, double t, const State& w,
                            const Reaction& r, const Reaction& y, const Reaction& rate, double mean)
@@ -62,8 +62,8 @@ template <int N, int M, class State, class Reaction>
 
 }  // namespace detail
 
-/// The reaction that the motion takes from (t, w): where y is not zero the one point of
-/// the set that opposes it most, and where it is zero the reaction with which y
+/// The reaction that the motion takes from (t, w): where y is not zero, the one point of
+/// the set at which -y is in the normal cone; where y is zero, the reaction with which y
 /// leaves or stays, from y' = E A^-1 (f + G reaction) - s'. Where A is the unit matrix
 /// and G = E' that is the reaction for which |A w'| is least (and in general for which it
 /// is least in the metric of A^-1): the slow solution of the inclusion, whose rate is the
@@ -144,7 +144,7 @@ template <int N, int M>
                 }
                 inequality.lower[i] = lower;
                 inequality.upper[i] = upper;
-                // Without influence on y' a reaction that is asked for is all or nothing.
+                // A required reaction without influence on y' is at one bound or the other.
                 if (delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
             }
             typename LinearInequality<M>::Branches branches;

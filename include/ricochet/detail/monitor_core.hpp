@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// The events in the steps of a host, as they are compiled in the library.
+// The events in the steps of a host program, as they are compiled in the library.
 #pragma once
 
 #include <cstddef>
@@ -25,17 +25,18 @@ enum class Verdict {
 /// A set of events that ends a step, at the same instant for the whole set.
 template <class X>
 struct Cut {
-    double s = 0;  ///< [s] offset in the step shown last; 0 where the set follows another at the
+    double s = 0;  ///< [s] offset in the last step shown; 0 where the set follows another at the
                    ///< same instant
     Instant t;     ///< [s]
     X before{};    ///< x⁻
     X after{};     ///< x⁺
     Mode mode_before = 0;
     Mode mode_after = 0;
-    /// The guards that fired, in ascending order; of an accumulation the guard that came to rest.
+    /// The guards that fired, in ascending order; for an accumulation the guard that came to rest.
     std::vector<std::size_t> fired;
     bool on_time = false;        ///< the set includes a time event
-    bool accumulation = false;   ///< `after` is what `rest` makes of the limit, `t` its time
+    bool accumulation = false;   ///< `after` is the state that `rest` gives for the limit, `t` its
+                                 ///< time
     bool state_changed = false;  ///< false: the host need not restart
 };
 
@@ -76,9 +77,9 @@ public:
     virtual void restore(const Snapshot& snapshot) = 0;
 };
 
-/// Keeps a copy of `setup`, of which it needs no method.
+/// Keeps a copy of `setup`, whose method is not needed.
 /// @param cuts_at_all  guards without a reset cut the step, too
-/// @throws std::invalid_argument, as `EventMonitor`
+/// @throws std::invalid_argument as `EventMonitor` does
 template <class X>
 [[nodiscard]] std::unique_ptr<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
                                                           const Options& options, bool cuts_at_all);

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A value of a class that is known by its base only.
+// A value of a class that is known only by its base.
 #pragma once
 
 #include <memory>

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// From a Model to the padded parameters that the kernels read.
+// Converts a Model to the padded parameters that the kernels read.
 #pragma once
 
 #include "ricochet/detail/kernel.hpp"
@@ -12,8 +12,8 @@
 namespace ricochet::detail {
 
 /// @throws std::invalid_argument in the name of `who` if the model has no layer or
-/// more than 64, if a width is zero or above 256, if a layer does not take what the
-/// one before it gives, or if weights or biases are not as many as its shape says.
+/// more than 64, if a width is zero or above 256, if the inputs of a layer are not the
+/// outputs of the one before it, or if the number of weights or biases does not match its shape.
 void check_layers(const Model& model, std::string_view who);
 
 namespace RICOCHET_KERNEL_NAMESPACE {

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Rate-and-state friction: its parameters, and which laws there are.
+// Rate-and-state friction: its parameters and its laws.
 //
 //     f = f* + a log(V / V*) + b xi,      xi = log(V* theta / D_RS)
 //
@@ -37,7 +37,7 @@ enum class StateEvolution {
     prz,     ///< theta' = 1 - (V theta / 2 D_RS)^2 (Perrin, Rice and Zheng)
 };
 
-/// Pair of potentials that gives a law exactly.
+/// Pair of potentials that represents a law exactly.
 enum class PotentialKind {
     quadratic,               ///< D*(d) = d^2 / (2 b D_RS), of d alone and convex
     state_dependent_convex,  ///< D*(d; xi), convex in d for every state
@@ -52,7 +52,7 @@ inline constexpr PotentialKind potential_kind =
 
 namespace detail {
 
-/// @throws std::invalid_argument: a slip rate that the log form has no friction for.
+/// @throws std::invalid_argument: a slip rate for which the log form has no friction.
 [[noreturn]] void refuse_slip_rate(double v);
 /// @throws std::invalid_argument: theta is not positive.
 [[noreturn]] void refuse_theta(double theta);

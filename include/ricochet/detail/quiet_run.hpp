@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Quiet runs: consecutive steps without events.
 //
-// For a small state with at most one guard the loop enters a function of the system's own, with
-// flow and guard inlined, or one of the library's that calls them by pointer, which continues until
+// For a small state with at most one guard the loop enters a function specific to the system, with
+// flow and guard inlined, or one of the library that calls them by pointer, which continues until
 // a step needs a check, or the end is near. Bits and counts are those of the loop.
 #pragma once
 
@@ -14,10 +14,11 @@
 
 namespace ricochet::detail {
 
-/// Reason for which the loop is to continue.
+/// Reason for which the loop must continue.
 enum class QuietEnd : std::uint8_t {
     due,     ///< the next step is not a quiet one
-    failed,  ///< the current step can neither be accepted nor be repeated by its error alone
+    failed,  ///< the current step can neither be accepted nor repeated on account of its error
+             ///< alone
     moving,  ///< the state hardly changes in the current step, which has to be examined closely
     doubt,   ///< the guard may have an event in the current step
 };
@@ -29,7 +30,7 @@ struct QuietRun {
     double atol = 0;
     double h_min = 0;      ///< [s]
     double h_max = 0;      ///< [s]
-    bool looks = false;    ///< guards are evaluated inside each step, once
+    bool looks = false;    ///< guards are evaluated once inside each step
     bool departs = false;  ///< the guard starts on its surface
     std::uint64_t most_steps = 0;
     const std::atomic<bool>* cancelled = nullptr;

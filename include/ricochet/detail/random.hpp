@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Random numbers that are the same everywhere.
 //
-// The distributions of <random> are left to each standard library; a training
-// that shall be repeated to the bit needs its own. The generator is
+// The distributions of <random> differ between standard libraries; a training
+// that must be repeatable to the bit needs its own. The generator is
 // xoshiro256** (Blackman and Vigna, 2021), seeded through splitmix64.
 #pragma once
 
@@ -31,7 +31,7 @@ public:
         for (std::uint64_t& word : state_) word = words.bits();
     }
 
-    /// Continues a stream where `state()` was taken.
+    /// Continues a stream from a `state()`.
     explicit constexpr Random(const State& state) noexcept : state_(state) {}
 
     [[nodiscard]] constexpr const State& state() const noexcept { return state_; }

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Set-ups that `integrate` rejects, each with a sentence.
 #pragma once
@@ -12,7 +12,7 @@ namespace ricochet::detail {
 [[noreturn]] void throw_start_empty();
 /// @throws std::invalid_argument: the start is not finite.
 [[noreturn]] void throw_start_not_finite(std::size_t component, double value);
-/// @throws std::invalid_argument: not as many absolute tolerances as components.
+/// @throws std::invalid_argument: the number of absolute tolerances is not that of components.
 [[noreturn]] void throw_wrong_tolerances(std::size_t components, std::size_t tolerances);
 /// @throws std::invalid_argument: the start is behind a unilateral guard.
 [[noreturn]] void throw_start_outside_mode(std::size_t which, std::string_view name, double t,
@@ -32,7 +32,7 @@ namespace ricochet::detail {
 [[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
 /// @throws std::invalid_argument: error control by a method without an estimate.
 [[noreturn]] void throw_no_error_estimate();
-/// @throws std::invalid_argument: a run backward in time of a system that has none.
+/// @throws std::invalid_argument: a run backward in time of a system that allows only forward runs.
 [[noreturn]] void throw_forward_only();
 /// @throws std::invalid_argument: no previous_time_event for a run backward in time.
 [[noreturn]] void throw_no_previous_time_event();

@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Calls of `integrate` that are slips: each is refused with a sentence where the compiler would
-// list what it has tried.
+// Mistaken calls of `integrate`, each refused with a sentence where the compiler would list the
+// candidates that it has tried.
 //
-// These overloads are never called. They take what is written in braces, which tells the
-// compiler nothing of its type, and are worse matches than the right ones wherever those fit.
+// These overloads are never called. They accept arguments written in braces, which have no
+// type, and are worse matches than the right ones wherever those fit.
 #pragma once
 
 #include <cstddef>
@@ -40,7 +40,7 @@ struct AnyValueGiven {
     AnyValueGiven(std::initializer_list<T>);
 };
 
-/// The members of `Options`, in their order, each followed by what else it may be called.
+/// The members of `Options`, in their order, each followed by other names that it may be given.
 struct MisspeltOptions {
     using V = AnyValueGiven;
     V t_start{}, t_strat{}, tstart{}, start{}, start_time{}, t0{}, t_begin{}, begin{};
@@ -78,7 +78,7 @@ struct MisspeltOptions {
 
 }  // namespace detail
 
-/// An option that there is not.
+/// An option that does not exist.
 template <class... Choices>
 auto integrate(detail::AnySystemGiven, detail::AnyStartGiven, const detail::MisspeltOptions&,
                const Choices&...)
@@ -89,7 +89,7 @@ auto integrate(detail::AnySystemGiven, detail::AnyStartGiven, const detail::Miss
     return Run<std::vector<double>>{};
 }
 
-/// Without options.
+/// A call without options.
 template <class Unused = void>
 auto integrate(detail::AnySystemGiven, detail::AnyStartGiven)
 {
@@ -98,7 +98,7 @@ auto integrate(detail::AnySystemGiven, detail::AnyStartGiven)
     return Run<std::vector<double>>{};
 }
 
-/// {10, 0, 1} for two components, or {10}, where the others would be zero without a word.
+/// {10, 0, 1} for two components, or {10}, where the others would silently be zero.
 template <class System, std::size_t given, class... Choices>
 requires(detail::fixed_size<typename System::State>() > 0 &&
          detail::fixed_size<typename System::State>() != given)  //

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A step divided until a cubic through the ends of each part tells what the guard does.
+// A step divided until a cubic through the ends of each part describes the guard.
 #pragma once
 
 #include <algorithm>
@@ -14,15 +14,15 @@
 
 namespace ricochet::detail {
 
-/// The inner nodes of one guard's parts in the current step. The step stands: its polynomial
-/// is evaluated, at the price of guard calls alone.
+/// The inner nodes of one guard's parts in the current step. The step is not repeated: its
+/// polynomial is evaluated, at the cost of guard calls alone.
 class ResolvedParts {
 public:
-    /// Forgets the nodes: another step.
+    /// Forgets the nodes, for another step.
     void clear() noexcept { guard_ = nobody; }
 
-    /// Divides the interval that guard i is watched in, unless it is divided already.
-    /// `everywhere`: at all places of `CubicLook::places` to begin with.
+    /// Divides the interval in which guard i is watched, unless it is divided already.
+    /// `everywhere`: starts with all fractions of `CubicLook::places`.
     void resolve(GuardPath& path, std::size_t i, const Watch& watch, double declared_touch,
                  bool everywhere);
 
@@ -37,7 +37,7 @@ public:
     }
 
     [[nodiscard]] bool divided() const noexcept { return divided_; }
-    /// Whether the guard is a cubic in the whole interval but for a 64th of its size.
+    /// Whether the guard is a cubic in the whole interval up to 1/64 of its size.
     [[nodiscard]] bool nearly_cubic() const noexcept { return nearly_cubic_; }
     [[nodiscard]] const Watch& whole() const noexcept { return whole_; }
     [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
@@ -45,9 +45,9 @@ public:
 private:
     static constexpr std::size_t nobody = static_cast<std::size_t>(-1);
     static constexpr double smallest_part = 0x1p-12;  ///< of the step
-    /// Part at which an interval is divided: none that a symmetry of the guard could single out.
+    /// Fraction at which an interval is divided, which no symmetry of the guard singles out.
     static constexpr double cut = 0.4142135;
-    static constexpr int shallow = 3;  ///< divisions before rounding is thought of
+    static constexpr int shallow = 3;  ///< divisions before rounding is considered
 
     void divide(GuardPath& path, const GuardSample& start, const GuardSample& end, double smallest,
                 int depth);
@@ -56,10 +56,10 @@ private:
     std::size_t guard_ = nobody;
     Watch whole_;                      ///< the interval that is divided
     std::size_t count_ = 0;            ///< of nodes
-    std::array<GuardSample, 32> few_;  ///< the first of them: seldom more, and no allocation
+    std::array<GuardSample, 32> few_;  ///< the first of them, without allocation
     std::vector<GuardSample> many_;    ///< the others
     double declared_touch_ = 0;
-    double noise_ = -1;  ///< of the guard by rounding of the state; below 0: not asked for
+    double noise_ = -1;  ///< of the guard by rounding of the state; below 0: not yet computed
     bool divided_ = false;
     bool nearly_cubic_ = false;
     bool unresolved_ = false;

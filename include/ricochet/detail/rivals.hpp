@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A trained network compared with other methods of finding events, on the same runs.
+// Comparison of a trained network with other methods of finding events, on the same runs.
 #pragma once
 
 #include <cstddef>
@@ -28,13 +28,13 @@ struct RunCost {
     std::uint64_t guard_calls = 0;
     double seconds = 0;  ///< of processor time
 
-    /// So many runs' worth of it: until `wanted` events, or `most` steps in all.
+    /// Extrapolates to longer runs: until `wanted` events, or `most` steps in all.
     [[nodiscard]] TrainingEstimate for_events(std::uint64_t wanted,
                                               std::uint64_t most) const noexcept;
 };
 
-/// The cost of the runs that `start` deals out: 20 events of them, or a fifth of a second; at most
-/// 100 000 steps and two seconds where there is no event.
+/// The cost of the runs that `start` produces, measured over 20 events or a fifth of a second; at
+/// most 100 000 steps and two seconds where there is no event.
 template <class Start>
 [[nodiscard]] RunCost cost_of_runs(const Start& start)
 {

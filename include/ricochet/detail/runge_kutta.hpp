@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Explicit Runge-Kutta methods, as departures from the tangent.
 //
 // With x(t0 + s) = x0 + s f0 + w(s) the first stage of w vanishes, and so does its start:
 // a tableau reduces to its stages from the second on. The sums are formed in the
-// order of Boost.Odeint's steppers and have their bits; terms whose coefficient is zero are
-// left out.
+// order of Boost.Odeint's steppers and have the same bits; terms whose coefficient is zero are
+// omitted.
 //
 // Tableaus: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; Cash and Karp, ACM
 // Trans. Math. Softw. 16 (1990) 201-222; Fehlberg, NASA TR R-287 (1968).
@@ -34,7 +34,7 @@ struct Rk4Tableau {
     static constexpr Row c = {0, 0.5, 0.5, 1};
     static constexpr std::array<Row, 4> a = {{{}, {0.5}, {0, 0.5}, {0, 0, 1}}};
     static constexpr Row b = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
-    /// h / 3 is not h * (1 / 3): the weights divide, as odeint's do.
+    /// h / 3 is not h * (1 / 3): the weights divide, as in odeint.
     static constexpr Row b_divisors = {6, 3, 3, 6};
 };
 
@@ -134,8 +134,8 @@ struct Fehlberg78Tableau {
                                   0,           0, 0, -41.0 / 840, 41.0 / 840, 41.0 / 840};
 };
 
-/// One explicit method for states of type X. The rates of its stages from the second on lie with
-/// the caller, `k[0]` to `k[kept_stages - 1]`.
+/// One explicit method for states of type X. The caller stores the rates of its stages from the
+/// second on, `k[0]` to `k[kept_stages - 1]`.
 template <class Tableau, class X>
 class RungeKutta {
 public:
@@ -157,8 +157,8 @@ public:
     }();
     static constexpr bool has_dense_output = requires { Tableau::dense(0.5); };
 
-    /// w(h) from the departures' own flow, `flow(w, w_rate, offset)`. If the method is
-    /// FSAL, also the rate at the end; `with_error`, also the error estimate. `like` gives the
+    /// w(h) from the flow of the departures, `flow(w, w_rate, offset)`. If the method is FSAL, the
+    /// rate at the end is computed too; `with_error`: so is the error estimate. `like` gives the
     /// size of a state that is sized at run time.
     template <bool with_error, class Flow>
     [[gnu::always_inline]] static void depart(const Flow& flow, const X& like, double h, X* k, X& w,
@@ -179,8 +179,8 @@ public:
     static constexpr std::size_t dense_weights_count = Tableau::stages + 1;
     using DenseArray = std::array<double, dense_weights_count>;
 
-    /// w(s) on the dense output of the step of length h; `rate` is its departures' rate at the
-    /// end.
+    /// w(s) on the dense output of the step of length h; `rate` is the rate of the departures at
+    /// the end.
     static void dense(double s, double h, const X* k, const X& rate, X& w) requires has_dense_output
     {
         auto weights = Tableau::dense(s / h);
@@ -256,7 +256,7 @@ public:
         return weights;
     }
 
-    /// The sum of a row; `rate(j)` is that of stage j, as an integral constant.
+    /// The sum of a row; `rate(j)` is the rate of stage j, with j an integral constant.
     template <class Row, class Array, class Rate>
     [[nodiscard, gnu::always_inline]] static auto sum_of(const Array& weights, const Rate& rate)
     {
@@ -268,7 +268,7 @@ public:
         (std::make_index_sequence<used<Row>.count>{});
     }
 
-    /// The same of the rates in `k`, and of `rate` at the end, for one component; 0 of no rates.
+    /// The same for the rates in `k`, and `rate` at the end, for one component; 0 without rates.
     template <class Row, class Array, class Index>
     [[nodiscard, gnu::always_inline]] static double sum(const Array& weights,
                                                         [[maybe_unused]] const X* k,
@@ -284,7 +284,7 @@ public:
     }
 
 private:
-    /// The departure of a stage, a component at a time.
+    /// The departure of a stage, one component at a time.
     template <std::size_t i>
     class StageView {
     public:
@@ -332,7 +332,7 @@ private:
     }
 };
 
-/// Number of stages of the largest of the methods.
+/// Number of stages of the method that has the most.
 inline constexpr std::size_t most_kept_stages = Fehlberg78Tableau::stages - 1;
 
 }  // namespace ricochet::detail

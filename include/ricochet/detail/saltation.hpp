@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// How derivatives pass through events.
+// Passing of derivatives through events.
 //
 // With S the derivatives of the state at a fixed time, g the guard, R the reset, f⁻ and
 // f⁺ the flow before and after, an event moves by
@@ -20,8 +20,8 @@
 // another, in an order that depends on the neighbour. The derivative exists if every
 // order leads to the same state and the same derivatives (S. A. Burden, S. S. Sastry,
 // D. E. Koditschek and S. Revzen, Event-selected vector field discontinuities yield
-// piecewise-differentiable flows, SIAM Journal on Applied Dynamical Systems 15, 2016), and
-// that is what is tried.
+// piecewise-differentiable flows, SIAM Journal on Applied Dynamical Systems 15, 2016);
+// all orders are therefore tried.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,7 +40,7 @@
 
 namespace ricochet::detail {
 
-/// A state at time t [s] and its derivatives there, a column for each direction.
+/// A state at time t [s] and its derivatives there, one column for each direction.
 template <class X>
 struct Motion {
     Mode mode;
@@ -49,11 +49,11 @@ struct Motion {
     Eigen::MatrixXd derivatives;
 };
 
-/// What is known of the events before.
+/// Data of the last event.
 struct LastEvent {
     double t;             ///< [s] of the last event
     Eigen::VectorXd dt;   ///< its derivatives
-    bool any;             ///< whether there has been one
+    bool any;             ///< whether there has been an event
     double flight_start;  ///< [s] of the last event of a guard, or of the start
 };
 
@@ -103,20 +103,20 @@ public:
         return initial_ + linearization_.parameters();
     }
 
-    /// Index of the parameter of a column, or nothing for one of the initial state.
+    /// Index of the parameter of a column, or nothing for a column of the initial state.
     [[nodiscard]] std::optional<std::size_t> parameter_of(std::size_t column) const noexcept
     {
         if (column < initial_) return std::nullopt;
         return column - initial_;
     }
 
-    /// Whether events at these times [s] cannot be told apart.
+    /// Whether events at these times [s] are indistinguishable.
     [[nodiscard]] bool at_one_time(double earlier, double t) const noexcept
     {
         return std::fabs(t - earlier) <= window(t);
     }
 
-    /// How the crossing of a guard at `motion` moves.
+    /// Derivatives of the time at which a guard crosses, at `motion`.
     [[nodiscard]] EventTime crossing(std::size_t which, const Motion<X>& motion,
                                      const LastEvent& last) const
     {
@@ -127,7 +127,7 @@ public:
         }
     }
 
-    /// How a time event moves: not at all, but with parameters that it depends on.
+    /// Derivatives of the time of a time event: zero, except by parameters on which it depends.
     [[nodiscard]] EventTime time_event(double t) const
     {
         EventTime time{Undefined::no, Eigen::VectorXd::Zero(index(columns()))};
@@ -147,7 +147,7 @@ public:
         return time;
     }
 
-    /// Takes the motion through a reset at an event that moves by dt; `held` if it
+    /// Takes the motion through a reset at an event that moves by dt; `held` if the motion
     /// stands still from there on.
     template <class Reset>
     void pass(const Reset& reset, const Eigen::VectorXd& dt, Motion<X>& motion,
@@ -173,8 +173,8 @@ public:
         }
     }
 
-    /// Takes the motion through all that fired together, to the state `after` that
-    /// the run has; `last` becomes this event.
+    /// Takes the motion through all transitions that fired together, to the state `after` of
+    /// the run; `last` becomes this event.
     [[nodiscard]] Undefined pass_set(const FiredGuards& fired, const X& after, Motion<X>& motion,
                                      LastEvent& last) const
     {
@@ -198,7 +198,7 @@ public:
     }
 
 private:
-    // Orders of events are compared by numbers that come from differences.
+    // Orders of events are compared by numbers that are computed with differences.
     static constexpr double same_state = 1e-9;
     static constexpr double same_derivative = 1e-6;
     static constexpr std::size_t most_orders = 5;  // 120 orders
@@ -206,7 +206,7 @@ private:
     struct Slope {
         double guard;
         double rate;
-        double blur;  // by which the run does not know the guard
+        double blur;  // uncertainty of the guard in the run
         X flow;
     };
 
@@ -231,7 +231,7 @@ private:
         const bool on_surface = std::fabs(slope.guard) <= slope.blur;
         const bool follows = coincides(last, motion.t);
         if (!on_surface) {
-            // A guard that an event at this time has pushed beyond its surface fires
+            // A guard that an event at this time has moved beyond its surface fires together
             // with that event.
             return follows ? EventTime{Undefined::no, last.dt}
                            : EventTime{Undefined::off_surface, {}};
@@ -241,15 +241,15 @@ private:
         }
         EventTime time{Undefined::no, moves(which, motion, slope.rate)};
         if (!time.dt.allFinite()) return {Undefined::non_finite, {}};
-        // Put on the surface by an event at this time: its neighbours are put on it
-        // too, or some of them beyond it and some not.
+        // An event at this time has put the guard on its surface: that puts its neighbours on the
+        // surface too, or some of them beyond it and some not.
         if (follows && !agree(time.dt, last.dt, same_derivative)) {
             return {Undefined::simultaneous, {}};
         }
         return time;
     }
 
-    /// How far apart two times [s] must be to be told apart.
+    /// The difference above which two times [s] are distinguishable.
     [[nodiscard]] double window(double t) const noexcept
     {
         return event_tolerance_ + (event_rtol_ + 16 * epsilon) * std::fabs(t);
@@ -286,10 +286,10 @@ private:
     }
 
     /// Whether the guard turns back before it is beyond its surface by more than its
-    /// blur: its rate changes as much as it is worth within the time in which the guard
-    /// moves by the blur. Of a guard that turns often, as of a ball on its last bounces,
-    /// nothing else can be expected: that time is at most a hundredth of the time
-    /// since the last event.
+    /// blur: its rate changes by its own size within the time in which the guard
+    /// moves by the blur. A guard that turns often, like that of a ball on its last bounces,
+    /// would always do so within a long time, which is therefore limited to a hundredth of the
+    /// time since the last event.
     [[nodiscard]] bool grazes(std::size_t which, const Motion<X>& m, const Slope& slope,
                               double flight) const
     {
@@ -319,7 +319,7 @@ private:
         return dt;
     }
 
-    /// How far around t no other time event lies [s].
+    /// Distance in time [s] around t without another time event.
     [[nodiscard]] double reach_of_time_event(double t) const
     {
         double reach = std::min(system().next_time_event(t) - t, 1 + std::fabs(t)) / 4;
@@ -355,7 +355,7 @@ private:
         return pass_in_all_orders(acting, after, motion, last);
     }
 
-    /// Those that reset something, with `no_guard` for a time event.
+    /// The guards of the set that have a reset, with `no_guard` for a time event.
     [[nodiscard]] std::vector<std::size_t> acting_of(const FiredGuards& fired) const
     {
         std::vector<std::size_t> acting;
@@ -391,7 +391,7 @@ private:
         return Undefined::no;
     }
 
-    /// Whether one event at this time has pushed all of them beyond their surfaces.
+    /// Whether one event at this time has moved all of them beyond their surfaces.
     [[nodiscard]] bool all_pushed(const std::vector<std::size_t>& acting, const Motion<X>& m,
                                   const LastEvent& last) const
     {
@@ -403,7 +403,7 @@ private:
         });
     }
 
-    /// One after the other, each from the state that those before have left.
+    /// Applies the resets one after the other, each to the state that the previous ones have left.
     [[nodiscard]] Undefined pass_in_order(const std::vector<std::size_t>& order, Motion<X>& way,
                                           LastEvent& last) const
     {
@@ -430,15 +430,15 @@ private:
                 last.flight_start = way.t;
             }
         }
-        // Events that move apart are no common cause for the next at this time.
+        // Events that move differently are no common cause for the next event at this time.
         last.any = together;
         last.t = way.t;
         last.dt = dt;
         return Undefined::no;
     }
 
-    /// Whether a guard that fired at `start` still does at `way`, where another one has
-    /// had its reset: it may be disabled by then, or have been turned back.
+    /// Whether a guard that fired at `start` still does at `way`, after the reset of another one,
+    /// which may have disabled it or turned it back.
     [[nodiscard]] bool still_fires(std::size_t which, const Motion<X>& start,
                                    const Motion<X>& way) const
     {

@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Which functions of a system take any scalar.
+// Detects which functions of a system take any scalar.
 //
-// A function is asked with a scalar that is used nowhere else, and once more with another one for
-// the state than for the time: what takes both is no template over one scalar, but takes the time
-// as a number, or anything at all. Nothing is computed, and bodies are compiled only where a
-// result is deduced from them.
+// A function is tested with a scalar that is used nowhere else, and once more with different
+// scalars for the state and the time: a function that accepts both is no template over one scalar,
+// but takes the time as a number, or arguments of any type. Nothing is computed, and bodies are
+// compiled only where a result is deduced from them.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@
 
 namespace ricochet::detail {
 
-/// A scalar that can do whatever a number can, and is told from one.
+/// A scalar with all operations of a number, but of a distinct type.
 template <int>
 struct ScalarProbe {
     constexpr ScalarProbe() = default;
@@ -167,7 +167,7 @@ concept GuardTakesMode = requires(const System& s, std::size_t which, Mode mode,
     s.guard(mode, t, x);
 };
 
-/// The same in views of a state.
+/// The same for views of a state.
 template <class System>
 concept GuardOfScalarViews = GuardOfScalars<System, ViewProbe>;
 
@@ -176,7 +176,7 @@ struct ArraysOf {
     template <class S>
     using Of = std::array<S, n>;
 };
-/// The same in arrays of n.
+/// The same for arrays of n.
 template <class System, std::size_t n>
 concept GuardOfScalarArrays = n >
 0 && GuardOfScalars<System, ArraysOf<n>::template Of>;
@@ -197,7 +197,7 @@ template <class System, template <class> class X>
 concept FlowOfScalars =
     FlowTakes<System, TimeProbe, X<TimeProbe>> && !FlowTakes<System, TimeProbe, X<OtherProbe>>;
 
-/// A reset with time T and states X, that takes what `Which` says first.
+/// A reset with time T and states X, preceded by arguments of the types `Which`.
 template <class System, class T, class X, class... Which>
 concept ResetTakes = requires(const System& s, Mode mode, const T& t, X& x, const Which&... which)
 {
@@ -223,7 +223,7 @@ template <class System, template <class> class X>
 concept TimeResetOfScalars = TimeResetTakes<System, TimeProbe, X<TimeProbe>> &&
     !TimeResetTakes<System, TimeProbe, X<OtherProbe>>;
 
-/// The guard of any scalar S.
+/// The guard with any scalar S.
 template <class S, class System, class X>
 [[gnu::always_inline]] [[nodiscard]] constexpr S guard_of_scalar(const System& system,
                                                                  [[maybe_unused]] std::size_t which,

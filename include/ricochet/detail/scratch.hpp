@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Room for a few states in the middle of a function that must not allocate.
+// Scratch states for a function that must not allocate.
 //
 // A state of fixed size lives on the stack. One that is sized at run time would
-// allocate at every call; its room belongs to the thread instead, is taken on loan
+// allocate at every call; its memory belongs to the thread instead, is borrowed
 // and kept for the next call. Loans nest, so that a field may itself be a system that
-// borrows. What is in the room on arrival is arbitrary but for its size.
+// borrows. The contents are arbitrary at first, except for the size.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ private:
 template <class X, std::size_t n>
 class Scratch<X, n, false> {
 public:
-    /// Room for n states of the size of `like`.
+    /// Memory for n states of the size of `like`.
     template <class Like>
     explicit Scratch(const Like& like)
     {

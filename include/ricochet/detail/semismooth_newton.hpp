@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Newton's method for equations that are only piecewise smooth.
 //
-// The problem knows its own linear algebra: `residual(x, F)` writes F(x), and
+// The problem provides its own linear algebra: `residual(x, F)` writes F(x), and
 // `direction(x, F, d)` solves V d = -F for an element V of the generalised Jacobian at
 // x, dense, sparse or by products alone, and returns false if it cannot. `dense_direction`
-// does so from a matrix, as does `sparse_direction` of a header of its own.
+// does so from a matrix, as does `sparse_direction` in a header of its own.
 //
 // (L. Qi and J. Sun, A nonsmooth version of Newton's method, Mathematical Programming 58,
 // 1993.)
@@ -36,7 +36,7 @@ struct NewtonOptions {
 
 struct NewtonReport {
     bool converged = false;
-    double residual = 0;  ///< the largest component of F where it ended
+    double residual = 0;  ///< the largest component of F at the end
     int iterations = 0;
 };
 
@@ -47,8 +47,8 @@ struct NewtonScratch {
 };
 
 /// Improves x until F(x) vanishes. A direction that does not exist, a value that is not
-/// finite, or a search that finds no decrease end it without convergence; x is then the
-/// best that was reached.
+/// finite, or a search that finds no decrease ends it without convergence; x is then the
+/// best point that was reached.
 template <class Vector, NewtonProblem<Vector> Problem>
 [[nodiscard]] NewtonReport semismooth_newton(Problem& problem, Vector& x,
                                              const NewtonOptions& options,

@@ -1,12 +1,12 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A guard whose power series over a step is known.
 //
-// In the part u = s / h of the step p(u) = sum_k q_k u^k, positive on the armed side. The first
-// four terms in Bernstein form, less the sizes of all others and a bound of the rounding, are below
-// p everywhere: mostly that settles a step. Else the whole polynomial is brought into Bernstein
-// form and halved until each part has no change of sign, or one (Farouki 2012, section 5.3); what
-// rounding leaves in doubt is said to be in doubt.
+// In the fraction u = s / h of the step let p(u) = sum_k q_k u^k, positive on the armed side. The
+// first four terms in Bernstein form, minus the sizes of all others and a bound of the rounding,
+// are below p everywhere, which usually decides a step. Otherwise the whole polynomial is brought
+// into Bernstein form and halved until each part has no change of sign, or one (Farouki 2012,
+// section 5.3). Cases that rounding leaves open are reported as such.
 #pragma once
 
 #include <algorithm>
@@ -32,8 +32,8 @@ struct SeriesStretch {
     double hi = 0;  ///< [s]
 };
 
-/// Sizes of the last two terms of guard i at h together: what its series leaves out is judged by
-/// them.
+/// Sizes of the last two terms of guard i at h together, which measure the terms that its series
+/// omits.
 [[nodiscard, gnu::always_inline]] inline double last_terms(const SeriesTerms& terms, std::size_t i,
                                                            double h) noexcept
 {
@@ -47,7 +47,7 @@ struct SeriesStretch {
 }
 
 /// Whether the series of guard i, with the values g0 and g1 at its ends, has converged at h. One
-/// that has not is no evidence: the step is that of the flow, and a guard may vary faster.
+/// that has not is no evidence: the step suits the flow, and a guard may vary faster.
 [[nodiscard, gnu::always_inline]] inline bool series_converges(const SeriesTerms& terms,
                                                                std::size_t i, double h, double g0,
                                                                double g1) noexcept
@@ -55,8 +55,8 @@ struct SeriesStretch {
     return last_terms(terms, i, h) <= 0x1p-20 * std::max(std::fabs(g0), std::fabs(g1));
 }
 
-/// Whether guard i, times `sign`, stays above `touch` in (0, h], proved but for what its series
-/// leaves out. `from_surface`: it starts on its surface, and this root is divided out.
+/// Whether guard i, times `sign`, stays above `touch` in (0, h], proved except for the terms that
+/// its series omits. `from_surface`: it starts on its surface, and this root is divided out.
 [[nodiscard, gnu::always_inline]] inline bool series_clears(const SeriesTerms& terms, std::size_t i,
                                                             double sign, double h, double touch,
                                                             bool from_surface) noexcept
@@ -96,8 +96,8 @@ struct SeriesStretch {
                                          double h, double touch, bool from_surface) noexcept;
 
 /// First event of guard i, times `sign`, between the samples `start` and `end` in a step of length
-/// h. Where these differ from the series, which leaves out its last terms, nothing smaller than
-/// that is sure.
+/// h. Where the samples differ from the series, which omits its last terms, nothing smaller than
+/// the difference is certain.
 [[nodiscard]] SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign,
                                           double h, const GuardSample& start,
                                           const GuardSample& end, double touch,

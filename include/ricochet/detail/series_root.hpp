@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The first root of a guard whose power series over a step is known.
 //
@@ -23,7 +23,7 @@ struct SeriesRoot {
     double slope = 0;  ///< of the guard there
 };
 
-/// The polynomial of one guard, times a sign; without its root at 0 where it has one.
+/// The polynomial of one guard, times a sign; a root at 0 is divided out.
 class GuardPolynomial {
 public:
     GuardPolynomial(const SeriesTerms& terms, std::size_t i, double sign,
@@ -107,8 +107,8 @@ private:
 };
 
 /// The first root of guard i in (0, h), where the guard, times `sign`, falls through it and ends at
-/// `end` < 0; false where that is not sure. `from_surface`: there is one at 0, which does not
-/// count. Terms come in fours, after the constant.
+/// `end` < 0; false where that is not certain. `from_surface`: there is a root at 0, which does not
+/// count. Terms come in groups of four, after the constant.
 [[nodiscard]] inline bool find_first_root(const SeriesTerms& terms, std::size_t i, double sign,
                                           double h, double end, bool from_surface,
                                           SeriesRoot& root) noexcept
@@ -131,7 +131,7 @@ private:
         const double correction = -at.value / at.slope;
         (at.value > 0 ? lo : hi) = s;
         s += correction;
-        // The last correction comes from the guard itself: convergence is quadratic.
+        // The last correction is computed from the guard itself: convergence is quadratic.
         if (std::fabs(correction) <= 0x1p-13 * s) break;
         if (k == most_steps) return false;
     }

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Detection of accumulating events of a guard.
 #pragma once
@@ -15,13 +15,13 @@ namespace ricochet::detail {
 
 /// Recognises accumulating events: three consecutive intervals that shrink, with a
 /// geometric remainder d q / (1 - q) that is no longer worth resolving, or with excursions of
-/// the guard between two events that are lost in its rounding. Also events that do not advance
-/// time at all. Legal event trains, however fast, keep a remainder that is worth resolving
-/// and excursions that can be distinguished from rounding.
+/// the guard between two events that are lost in its rounding; also events that do not advance
+/// time at all. Sequences of regular events, however fast, keep a remainder that is worth
+/// resolving and excursions that can be distinguished from rounding.
 class ShrinkingIntervals {
 public:
     /// Records an event at `t`, where a step would be of length `step` [s]; true
-    /// after a hundred in a row that time cannot distinguish.
+    /// after a hundred in a row that the time does not distinguish.
     [[nodiscard]] bool stalls(const Instant& t, double step) noexcept
     {
         step_ = step;
@@ -47,16 +47,16 @@ public:
         return false;
     }
 
-    /// Whether a guard that leaves its surface at `rate` [1/s] after the event just recorded is
-    /// going to rise so little, or so briefly, compared with earlier excursions, that its
+    /// Whether a guard that leaves its surface at `rate` [1/s] after the event just recorded
+    /// will rise so little, or so briefly, compared with earlier excursions, that its
     /// rounding may matter.
     [[nodiscard]] bool is_low_at(double rate) const noexcept
     {
         return seen_ >= 2 && (rise(rate) <= 1e-3 * peak_ || interval_ <= 0.03 * longest_);
     }
 
-    /// Records that the guard turns back from its surface at `rate` [1/s] after that event, which
-    /// is `low` or not; infinity: it does not turn back.
+    /// Records that the guard turns back from its surface at `rate` [1/s] after that event, and
+    /// whether that is `low`; infinity: it does not turn back.
     void depart(double rate, bool low) noexcept
     {
         excursion_ = seen_ >= 2 ? rise(rate) : std::numeric_limits<double>::infinity();
@@ -76,8 +76,8 @@ public:
 
     /// Whether excursions are lost in the guard's `rounding`: at the end of a shrinking series,
     /// or three in a row. The error that a reset leaves in the guard adds to every excursion: with
-    /// restitution e they stay at 1 / (1 - e^2) of it, and decay less than half as fast from
-    /// twice that on.
+    /// restitution e they stay at 1 / (1 - e^2) times the error, and from twice that size on they
+    /// decay less than half as fast.
     [[nodiscard]] bool fades(double rounding) noexcept
     {
         const bool sunk = excursion_ <= rounding;
@@ -91,8 +91,8 @@ public:
     /// suggest is the gap between two events, not the end of a series.
     ///
     /// An event that is located late by d, and whose reset puts the motion back on the surface,
-    /// gains speed: intervals with the ratio q then stay at 2 q d / (1 - q), and shrink less than
-    /// half as fast from twice that on.
+    /// gains speed: intervals with the ratio q then stay at 2 q d / (1 - q), and from twice that
+    /// length on they shrink less than half as fast.
     [[nodiscard]] bool accumulate(double tolerance) noexcept
     {
         if (shrinking_ >= 3 && geometric_ && remainder() < std::max(tolerance, resolution())) {

@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Registers of several floats or doubles, and sums whose bits do not depend on them.
+// Registers of several floats or doubles, and sums whose bits do not depend on their width.
 //
 // The functions live in a namespace named after the target, so that translation
-// units built for different machines can be linked together. Nothing of the
+// units built for different machines can be linked together. No function of the
 // standard library is called here: its inline functions carry no such name, and
 // the linker could choose a copy that an older machine cannot run.
 #pragma once
@@ -23,9 +23,9 @@
 #endif
 #endif
 
-// Loops over registers must disappear, also at -O2, for the registers to be
-// registers. Loops over inputs are better kept by g++, which spills when it has
-// unrolled them (2 x 16 float: 33 ns against 26).
+// Loops over registers must be unrolled completely, also at -O2, for the arrays to be kept in
+// registers. Loops over inputs must not be: g++ spills when it unrolls them
+// (2 x 16 float: 33 ns against 26).
 #if defined(__clang__)
 #define RICOCHET_UNROLL _Pragma("clang loop unroll(full)")
 #define RICOCHET_KEEP_LOOP

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Random numbers for scenes and seeds, the same everywhere: splitmix64 (Steele, Lea and Flood,
 // 2014).

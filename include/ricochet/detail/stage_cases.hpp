@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Stages whose reactions lie in a box: the smooth part by Newton's method, the
+// Stages whose reactions lie in a box: the smooth part is solved by Newton's method, the
 // inequality of every iterate exactly, by cases.
 #pragma once
 
@@ -40,8 +40,8 @@ template <int N, int M>
 /// Newton on f with the inequality solved exactly (Josephy, Newton's method for
 /// generalized equations, 1979); an affine f with a constant set takes one iteration.
 ///
-/// Starts from (w, reaction) and overwrites them; on failure they are what was reached.
-/// `frozen`: stay on these branches, whether the solution lies on them or not.
+/// Starts from (w, reaction) and overwrites them; on failure they are the last iterate.
+/// `frozen`: stays on these branches, whether the solution lies on them or not.
 template <int N, int M>
 [[nodiscard]] StageReport solve_cases(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
                                       const StageOptions& options,

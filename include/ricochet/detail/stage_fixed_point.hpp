@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Stages by a projected fixed point with an adapted step.
 #pragma once
@@ -12,9 +12,9 @@ namespace ricochet::detail {
 ///     z = w - rho F(w),   reaction = P(-(E z - s) / (rho sigma)),
 ///     w = z + rho sigma G reaction
 ///
-/// where F is the stage's defect without the reaction. After each iteration rho is cut to
-/// 0.66 of itself where rho |dF| / |dw| > 0.9, and raised by as much where it is < 0.3.
-/// Unlike the source's it starts from 1 / max |S_ii| in every solve, so that no solve
+/// where F is the stage's defect without the reaction. After each iteration rho is multiplied by
+/// 0.66 where rho |dF| / |dw| > 0.9, and divided by it where that is < 0.3.
+/// Unlike in the source it starts from 1 / max |S_ii| in every solve, so that no solve
 /// depends on the one before, and its residual does not depend on rho.
 ///
 /// (The Bathe / variational-inequality solver of D. M. Riley and others, Reinforcement

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Stages by the semismooth Newton method, for sets of any shape.
 #pragma once
@@ -13,8 +13,8 @@ namespace ricochet::detail {
 ///     (c A w - kappa f - sigma G reaction - q) / scale
 ///     sigma (reaction - P(reaction - rho y)) / scale
 ///
-/// with the derivative of a bound by the state where the system declares it, and without
-/// it as if the bound were constant: the iteration then converges linearly.
+/// with the derivative of a bound by the state where the system declares it. Without it the
+/// bound is treated as constant, and the iteration converges linearly.
 template <int N, int M>
 class RICOCHET_ALIGNED StageNewton {
 public:
@@ -110,7 +110,7 @@ public:
             v_.row(n + i) *= stage_->sigma;
         }
         s.factors[0].valid = false;
-        // Undamped directions at kinks can be singular; the search would stall there.
+        // Undamped directions at kinks can be singular, which would stall the search.
         return dense_direction(v_, lu_, Vector(f * scale_), d);
     }
 

@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// How long may the next step be?
+// Choice of the length of the next step.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace ricochet {
 ///     h_new = h min(10, max(1/5, 0.9 error^(-1/order)))
 ///
 /// (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I,
-/// eq. II.4.13). A value, so that other rules can take its place.
+/// eq. II.4.13). It is a value, so that other rules can take its place.
 struct ErrorRule {
     double safety = 0.9;
     double smallest = 0.2;
@@ -26,7 +26,7 @@ struct ErrorRule {
     [[nodiscard]] double factor(double error, int order) const noexcept
     {
         if (error == 0) return largest;
-        double floor = 1;  // (safety / largest)^order: no power is taken below it
+        double floor = 1;  // (safety / largest)^order: no power is computed below it
         for (int i = 0; i < order; ++i) {
             floor *= safety / largest;
         }

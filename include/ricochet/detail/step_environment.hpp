@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Steps chosen by reinforcement learning: a run as an environment, an action as a step.
 //
@@ -7,13 +7,13 @@
 //     const StepTrial trial = follow(world, trained.policy);   // its true errors
 //
 // An episode is one run of one problem. The action is the length of the next step, which is taken
-// if its stages can be solved, however wrong it is, as in
+// if its stages can be solved, however large its error, as in
 //
 //   D. M. Riley and others, "Reinforcement learning-based adaptive time-integration for nonsmooth
 //   dynamics", section 4.
 //
-// What differs from it: work is counted rather than timed, so that runs repeat; the last step ends
-// where the run does; and what is observed are the intensive inputs of `StepPolicy`.
+// There are three differences: work is counted rather than timed, so that runs repeat; the last
+// step ends where the run does; and the observations are the intensive inputs of `StepPolicy`.
 #pragma once
 
 #include <cstdint>
@@ -30,17 +30,17 @@ enum class StepReward {
     ///
     ///     x (1 - (w - 1) / (expensive - 1)) exp(-alpha E),  or -x of a step that cannot be solved
     ///
-    /// where w are the Newton iterations per solve, at most `expensive`; systems whose solves all
-    /// cost the same have 1. E is the scaled error of the step.
+    /// where w are the Newton iterations per solve, at most `expensive`; in systems whose solves
+    /// all cost the same w = 1. E is the scaled error of the step.
     published,
-    /// -work / work_unit - lambda (integral over the step of |y - y_ref|^2) / (that of |y_ref|^2
-    /// over the run): the sum over an episode is minus what the run costs, and is wrong.
+    /// -work / work_unit - lambda (integral over the step of |y - y_ref|^2) / (integral of
+    /// |y_ref|^2 over the run): the sum over an episode is minus the cost and the error of the run.
     additive,
 };
 
 /// Map from an action in [-1, 1] to a step in [h_min, h_max].
 enum class StepScale {
-    linear,       ///< as the source's code
+    linear,       ///< as in the source's code
     logarithmic,  ///< equal factors
 };
 
@@ -52,36 +52,36 @@ struct StepWorldOptions {
     double work_unit = 10;  ///< iterations of a fault, solves of other systems; positive
     StepScale scale = StepScale::logarithmic;
     double h_min = 1e-5;  ///< [s] positive
-    double h_max = 0;     ///< [s] above h_min; 0: the source's
-    /// `doubling` is the source's, with its norm and its atol = tolerance / 1000; it costs six
-    /// solves instead of two.
+    double h_max = 0;     ///< [s] above h_min; 0: that of the source
+    /// `doubling` is that of the source, with its norm and its atol = tolerance / 1000; it costs
+    /// six solves instead of two.
     ErrorEstimate estimate = ErrorEstimate::embedded;
-    FirstStage first_stage = FirstStage::averaged;  ///< at_end: the source's
+    FirstStage first_stage = FirstStage::averaged;  ///< at_end: that of the source
     double tolerance = 1e-3;                        ///< to which E is scaled, positive
-    /// A fault's episode ends when nothing moves any more, nor will. The source continues.
+    /// A fault's episode ends when nothing moves any more, nor ever will. The source continues.
     bool until_rest = false;
     std::uint64_t max_attempts = 20'000;  ///< then an episode is cut
-    /// Told of the reference's run and of an episode after every step; false ends them.
+    /// Called during the reference run and after every step of an episode; false ends them.
     StepWatch watch{};
 };
 
-/// The source's own.
+/// The options of the source.
 [[nodiscard]] StepWorldOptions published_step_world(double alpha = 2);
 
-/// How often in a row a step may not be solved before an episode ends.
+/// Number of consecutive unsolvable steps after which an episode ends.
 inline constexpr int step_world_failures = 10;
 
 /// An environment and the state of the run in it. Copies share the run.
 struct StepWorld {
-    /// Nine observations of order one: the error, length and share of switches of the last step,
-    /// and the state as of the system's `StepLayout`. Every episode is the same run.
+    /// Nine observations of order one: the error, length and fraction of switches of the last step,
+    /// and the state as in the system's `StepLayout`. Every episode is the same run.
     Environment environment{};
     std::function<StepTrial()> trial{};                ///< of the episode, ended or not
     std::function<double(double action)> length_of{};  ///< [s]
     std::function<double(double length)> action_of{};  ///< its inverse
 };
 
-/// @throws std::invalid_argument naming the option, and as the systems' runs.
+/// @throws std::invalid_argument naming the option, or as the systems' runs do.
 [[nodiscard]] StepWorld step_world(const StrikeSlipFault& fault, double t_end,
                                    const StepWorldOptions& options = {});
 [[nodiscard]] StepWorld step_world(const SlidingMode& system, double from, double t_end,

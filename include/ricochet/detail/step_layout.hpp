@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What a system tells a rule that chooses steps.
+// The data that a system provides to a rule that chooses steps.
 #pragma once
 
 #include <array>
@@ -12,8 +12,7 @@
 
 namespace ricochet {
 
-/// An input of a policy, and roughly where it lies: it enters the network less `centre`, over
-/// `width`.
+/// An input of a policy, and its typical range: the network receives (input - `centre`) / `width`.
 struct StepInput {
     std::string_view name;
     double centre = 0;
@@ -30,8 +29,8 @@ struct StepLayout {
     [[nodiscard]] std::string recipe() const;
 };
 
-/// A system that declares inputs for policies: `step_inputs(t, w, rate, reaction, out)` of the end
-/// of a step, with the rate of w there, and the unit of time [s] over which steps are measured.
+/// A system that declares inputs for policies: `step_inputs(t, w, rate, reaction, out)` at the end
+/// of a step, with the rate of w there, and the unit of time [s] in which steps are measured.
 template <class System, class State, class Reaction>
 concept DeclaresStepInputs = requires(const System& system, double t, const State& w,
                                       const Reaction& reaction,

@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A step in progress as plain data, and what takes it.
+// A step in progress as plain data, and the table of functions that take it.
 //
-// The loop is compiled in the library for a few types of state; what it knows of a method and of a
-// flow is a `StepKernel`, made where the system is known, so that the flow is inlined into the
+// The loop is compiled in the library for a few types of state; it accesses a method and a
+// flow through a `StepKernel`, made where the system is known, so that the flow is inlined into the
 // whole step and a small state stays in registers from stage to stage.
 #pragma once
 
@@ -34,7 +34,7 @@ struct StepStart {
     Instant t;
     Mode mode = 0;
     X x{};
-    X remainder{};  ///< what rounding left out of x
+    X remainder{};  ///< rounding error of x, not contained in it
     X rate{};       ///< dx/ds there
 };
 
@@ -71,12 +71,12 @@ struct StepState {
     Instant start;
     Mode mode = 0;
     bool backward = false;  ///< time runs backward, and offsets and rates with it
-    bool flow_fits = true;  ///< the flow has given its rate the dimension of the state, always
+    bool flow_fits = true;  ///< the flow has always given its rate the dimension of the state
     std::uint64_t flow_calls = 0;
     double h = 0;
 
     X x0, remainder, zero, rate0;
-    X w, w_rate1;  ///< at the end; the rate only where the method gives it
+    X w, w_rate1;  ///< at the end; the rate only where the method computes it
     X x1, rate1;
     X error, at;
     const double* component_atol = nullptr;  ///< one for each component, in place of one for all
@@ -90,20 +90,21 @@ struct StepState {
     };
     [[no_unique_address]] std::conditional_t<is_small<X>, None, Large> large{};
 
-    X middle;  ///< w there, where `has_middle`
+    X middle;  ///< w at the middle, where `has_middle`
     mutable bool has_middle = false;
-    mutable std::size_t asked_alone = 0;  ///< components of the middle, by views
+    mutable std::size_t asked_alone = 0;  ///< components of the middle computed one by one, by
+                                          ///< views
 
-    const HostStepTable* host = nullptr;  ///< the current step, where a host has taken it
+    const HostStepTable* host = nullptr;  ///< the current step, where a host program has taken it
 
     [[nodiscard]] double in_time(double s) const noexcept { return backward ? -s : s; }
     [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }
 };
 
-/// The first crossing of a guard in a step, where its series tells.
+/// The first crossing of a guard in a step, where its series determines it.
 struct SeriesCrossing {
     std::size_t which = 0;
-    Side side = Side::plateau;  ///< that the guard leaves
+    Side side = Side::plateau;  ///< side that the guard leaves
     double end = 0;             ///< its value at the end of the step
     bool from_surface = false;  ///< it starts there
     std::uint64_t calls = 0;    ///< of the guard
@@ -113,7 +114,7 @@ struct SeriesCrossing {
     double slope = 0, error = 0;
 };
 
-/// A method for one system. Without functions it is a host's.
+/// A method for one system. Without functions the steps are those of a host program.
 template <class X>
 struct StepKernel {
     int order = 0;
@@ -127,11 +128,11 @@ struct StepKernel {
     /// Takes a step like `take`. Returns its largest estimated error over atol + rtol max(|x0|,
     /// |x1|); NaN if anything is not finite. Null without an estimate.
     double (*attempt)(void* door, StepState<X>& step, double h, double rtol, double atol) = nullptr;
-    /// The departure after a step of length s, with its rate where the method gives it; the current
-    /// step stays as it is.
+    /// The departure after a step of length s, with its rate where the method computes it; the
+    /// current step is unchanged.
     void (*depart)(void* door, StepState<X>& step, double s, X& w, X& rate) = nullptr;
-    /// The length of the step from here that meets the tolerance; then `attempt` at no more than
-    /// that returns 0. Null where a length is known to be right only afterwards.
+    /// The length of the step from here that meets the tolerance; then `attempt` with at most that
+    /// length returns 0. Null where a length is known to be right only afterwards.
     double (*reach)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
     /// w(s) on an interpolant of the method's own, or null.
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
@@ -140,19 +141,19 @@ struct StepKernel {
     /// Largest error of the current step's polynomial inside the step, over atol + rtol max(|x0|,
     /// |x1|). Null where the step's own error limits it.
     double (*roughness)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
-    /// The guards on it, all of them, or null.
+    /// All guards as power series on it, or null.
     SeriesTerms (*guard_series)(void* door, const StepState<X>& step) = nullptr;
     /// Locates a crossing by a guard's series, and leaves the state there in `at`; false where that
-    /// is not sure. Null where guards have no series.
+    /// is not certain. Null where guards have no series.
     bool (*cross)(void* door, StepState<X>& step, SeriesCrossing& crossing) = nullptr;
-    /// The state has another dimension. Null where nothing is kept.
+    /// Called when the state has another dimension. Null where nothing is kept.
     void (*renew)(void* door) = nullptr;
 
     [[nodiscard]] bool interpolates() const noexcept { return is_dopri5 || departure; }
 };
 
-/// The polynomial of a step at offset s, or its derivative, a component at a time. Where the middle
-/// of the step is not known yet it is computed for the components that are asked for alone.
+/// The polynomial of a step at offset s, or its derivative, one component at a time. Where the
+/// middle of the step is not known yet it is computed only for the components requested.
 template <class X, bool derivative>
 class LargeStepView {
     using Dopri5 = RungeKutta<Dopri5Tableau, X>;

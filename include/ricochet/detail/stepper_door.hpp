@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What a run with a stepper of the user's keeps beside the system.
+// The data of a run with a user-defined stepper, beside the system.
 #pragma once
 
 #include <type_traits>
@@ -10,7 +10,7 @@
 
 namespace ricochet::detail {
 
-/// A door with what a stepper of the user's keeps.
+/// A door with the data of a user-defined stepper.
 template <class System, class X, class Method>
 struct StepperDoor : Door<System, X> {
     using Stepper = typename Method::template Stepper<X>;

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Functions of a stiffness matrix, as Chebyshev polynomials in it.
 #pragma once
@@ -10,8 +10,8 @@
 
 namespace ricochet {
 
-/// A polynomial on an interval, sum of c_k T_k(x), x from -1 to 1 across it. On the
-/// matrix it is as far from the function as it is on the eigenvalues.
+/// A polynomial on an interval, sum of c_k T_k(x), with x from -1 to 1 across it. Applied to the
+/// matrix, it deviates from the function as much as it does on the eigenvalues.
 class StiffnessSeries {
 public:
     using Function = std::function<double(double)>;
@@ -21,7 +21,7 @@ public:
     StiffnessSeries(const Function& f, Spectrum interval, int degree);
     /// The least degree for which a polynomial is found within `bound` of f, relative to f,
     /// which is positive on the interval: the best one, by Remez's exchange, or the series.
-    /// @throws std::invalid_argument where none up to `most_terms` is.
+    /// @throws std::invalid_argument where none up to `most_terms` is found.
     [[nodiscard]] static StiffnessSeries within(const Function& f, Spectrum interval, double bound);
     static constexpr int most_terms = 400;
 

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Training states sampled from the event surface backward.
 //
@@ -25,12 +25,12 @@
 
 namespace ricochet::learn {
 
-/// One guard, as the sampler needs to know it. Times are counted in the unit of
-/// the step, states are of any copyable type.
+/// Requirements of the sampler on one guard. Times are counted in the unit of
+/// the step, and states are of any copyable type.
 ///
 ///     surface(random)    a random point of the event surface, about to cross it
 ///     guard(x)           E(x), positive before the event
-///     horizon(x)         how far back from a surface point the flow is free of
+///     horizon(x)         how long the flow backward from a surface point is free of
 ///                        events, positive; infinite if there is no limit
 ///     magnitude(x, h)    sum of the magnitudes of the terms that cancel in
 ///                        E(map(x, h)); positive
@@ -68,7 +68,7 @@ struct SurfaceOptions {
     std::size_t events = 50'000;  ///< as many events as clear states keep the classes balanced
     std::size_t clear = 50'000;
     double margin = 0.1;     ///< clear states nearer to the boundary than this are the band
-    bool keep_band = false;  ///< keep the band, as for an assessment, instead of counting it
+    bool keep_band = false;  ///< keep the band, for an assessment, instead of counting it
     double longest = 1e3;    ///< [steps] furthest sample step backward where nothing else limits it
     double closest = 1e-6;   ///< [steps] sample steps approach 0, h and the horizon up to this
     double beyond_share =
@@ -80,7 +80,7 @@ struct SurfaceOptions {
 struct SurfaceSample {
     DataSet data;
     std::size_t band = 0;     ///< clear states inside the margin that were drawn
-    std::size_t outside = 0;  ///< states outside the domain that were drawn and left out
+    std::size_t outside = 0;  ///< states outside the domain that were drawn and discarded
 };
 
 namespace detail {
@@ -98,7 +98,7 @@ inline double sample_step(double lower, double upper, double closest, Random& ra
     }
 }
 
-/// A state whose next step of h is to meet the surface, or not, as asked.
+/// A state whose next step of h meets the surface, or does not, as requested.
 template <class Problem, class Map>
 typename Problem::State propose(const Problem& problem, const Map& map, bool event,
                                 const SurfaceOptions& options, Random& random)
@@ -112,7 +112,7 @@ typename Problem::State propose(const Problem& problem, const Map& map, bool eve
         if (event && random.chance(0.5)) {
             return map(on_surface, random.log_uniform(closest, options.longest * h));
         }
-        // On the far side, about to come back; it does within the step, or too late.
+        // A state on the far side returns within the step, or too late.
         const double early = event ? h + random.log_uniform(closest, options.longest * h)
                                    : sample_step(0, h, closest, random);
         return map(on_surface, -(horizon + early));
@@ -126,8 +126,8 @@ typename Problem::State propose(const Problem& problem, const Map& map, bool eve
 
 /// Samples the event surface of `problem`.
 ///
-/// A state x is an event iff E(map(x, h)) <= 0 (eq. 4), whatever it was drawn
-/// for, so that rounding cannot mislabel one. Its margin is E(map(x, h)) over
+/// A state x is an event iff E(map(x, h)) <= 0 (eq. 4), regardless of the class for which
+/// it was drawn, so that rounding cannot mislabel one. Its margin is E(map(x, h)) over
 /// magnitude(x, h).
 ///
 /// @param map  the one-step map of the integrator, x(t + h) = map(x(t), h), for

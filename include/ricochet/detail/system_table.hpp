@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A system at the door of the loop: its functions as pointers, whatever spelling they have.
+// A system as the loop sees it: its functions as pointers, whatever their spellings.
 //
 // Functions that a system does not have are null. Each takes the door first, which holds the
-// system (detail/door.hpp). Rates are with respect to the offset in a step: of a run backward in
-// time they are negative.
+// system (detail/door.hpp). Rates are with respect to the offset in a step: in a run backward in
+// time they have the opposite sign.
 #pragma once
 
 #include <cstddef>
@@ -35,13 +35,13 @@ struct SystemTable {
     bool guarded = false;
     bool moded = false;
     bool rated = false;        ///< every guard's rate is known in closed form
-    bool guard_alone = false;  ///< one guard can be had without the others
+    bool guard_alone = false;  ///< one guard can be evaluated without the others
     bool fixed_dimension = false;
     bool changes_dimension = false;  ///< in resets, whatever the mode
     bool forward_only = false;
     bool bounded = false;
 
-    /// False: the flow has given its rate another dimension, and it is NaN now.
+    /// False: the flow has given its rate another dimension, and the rate is now NaN.
     bool (*flow)(Door, Mode, double t, const X& x, X& dxdt) = nullptr;
     std::size_t (*mode_count)(Door) = nullptr;   ///< 0: not declared
     std::size_t (*guard_count)(Door) = nullptr;  ///< 0 where it has none
@@ -54,7 +54,7 @@ struct SystemTable {
     double (*guard)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     double (*guard_on)(Door, std::size_t which, Mode, double t, const View& x) = nullptr;
     /// Rate of a guard with x' = dxdt: in closed form, else the central difference over 1e-5
-    /// `scale`, at the price of `calls_of_rate` evaluations of the guard.
+    /// `scale`, at the cost of `calls_of_rate` evaluations of the guard.
     double (*rate)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
                    const X& dxdt, double scale) = nullptr;
     double (*rate_on)(Door, std::size_t which, Mode, bool backward, double t, const View& x,
@@ -127,7 +127,7 @@ private:
     void* door_;
 };
 
-/// One guard of a system in one mode, for probes: as `GuardView`, behind the door.
+/// One guard of a system in one mode, for probes: as `GuardView`, but through the door.
 template <class X>
 class CoreGuard {
     using View = PolynomialView<X, false>;

@@ -1,7 +1,7 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// What a run by Taylor's method keeps beside the system: the constants of its flow, and the current
-// step.
+// The data of a run by Taylor's method beside the system: the constants of its flow, and the
+// current step.
 #pragma once
 
 #include <algorithm>
@@ -54,18 +54,18 @@ concept ConstantModeCount = requires
 };
 
 /// A flow whose operations the compiler can read: a template over its scalar that a constant
-/// expression evaluates, of an object that is constructed by default.
+/// expression evaluates, for an object that is constructed by default.
 template <class System, std::size_t n>
 concept ConstantFlow = n >
 0 && std::is_default_constructible_v<System> &&
     (ScalarFlow<System, n> || (ModedScalarFlow<System, n> && ConstantModeCount<System>)) &&
     RecordableFlow<System, n>;
 
-/// The same of a flow that is known to be no template over its scalar where it is none.
+/// The same, where flows that are no templates over their scalar are ruled out first.
 template <class System, std::size_t n>
 concept HasSeries = FlowOfScalars<System, ArraysOf<n>::template Of>&& ConstantFlow<System, n>;
 
-/// How many tapes the compiler makes of a flow: one for each mode.
+/// The number of tapes that the compiler makes of a flow: one for each mode.
 template <class System, std::size_t n>
 [[nodiscard]] constexpr std::size_t tape_count() noexcept
 {
@@ -78,7 +78,7 @@ template <class System, std::size_t n>
     }
 }
 
-/// How many guards have series of their own, where the size of the state is known.
+/// The number of guards with series of their own, where the size of the state is known.
 template <class System, std::size_t n>
 [[nodiscard]] constexpr std::size_t guards_with_series() noexcept
 {
@@ -91,7 +91,7 @@ template <class System, std::size_t n>
     }
 }
 
-/// A step of a state of n components, 0: sized at run time, and scratch of its size.
+/// A step of a state of n components (0: sized at run time), and scratch of its size.
 template <class System, class X, std::size_t n>
 struct TaylorSizes {
     static constexpr std::size_t m = guards_with_series<System, n>();
@@ -99,7 +99,7 @@ struct TaylorSizes {
     using Step = TaylorStep<n, m>;
     struct Room {
         using Array = std::array<double, n>;
-        /// States that guards are evaluated at.
+        /// States at which guards are evaluated.
         using Guarded = std::conditional_t<fixed_size<X>() == 0, Array, X>;
         Array w, rate;
         Guarded x, there;
@@ -120,9 +120,9 @@ struct TaylorSizes<System, X, 0> {
 
 /// A door with the operations of the flow and the current step.
 ///
-/// Operations that the compiler has read are unrolled by it. Where it cannot, or the object does
-/// other ones than an object that is constructed by default, they are recorded here, once for each
-/// mode, and done one by one.
+/// Operations that the compiler has read are unrolled by it. Where it cannot read them, or where
+/// the operations of the object differ from those of an object that is constructed by default, they
+/// are recorded here, once for each mode, and executed one by one.
 template <class System, class X, std::size_t n>
 struct TaylorDoor : Door<System, X> {
     using Sizes = TaylorSizes<System, X, n>;
@@ -168,10 +168,10 @@ struct TaylorDoor : Door<System, X> {
         given_order = order;
     }
 
-    /// For a state of another size, where it is not that of the type.
+    /// Adapts to a state of another size, where the type does not fix it.
     void resize(std::size_t size) requires(n == 0)
     {
-        step.resize(0, 0);  // until all is known, whatever the flow throws
+        step.resize(0, 0);  // until all is known, even if the flow throws
         recorded_.clear();
         if constexpr (takes_series) record_known_modes(size);
         room.w.assign(size, 0);
@@ -181,7 +181,7 @@ struct TaylorDoor : Door<System, X> {
         step.resize(size, guard_count());
     }
 
-    /// The coefficients up to `order`, or all of them where these are fewer; returns how many.
+    /// The coefficients up to `order`, or all of them where there are fewer; returns their number.
     int compute(Mode mode, double t, const double* x, int order, double* out, double* guards)
     {
         if constexpr (is_constant) {
@@ -207,7 +207,7 @@ struct TaylorDoor : Door<System, X> {
         return false;
     }
 
-    /// Those of the operations that the compiler has unrolled, each at its number.
+    /// The constants of the operations that the compiler has unrolled, each at its number.
     [[nodiscard]] const auto& constants(std::size_t mode) const noexcept
     {
         return constants_[mode];
@@ -230,7 +230,7 @@ private:
 
     // --- operations that are recorded ---
 
-    /// Known modes are recorded before the first step, so that what is wrong is said there.
+    /// Records known modes before the first step, so that errors are reported there.
     void record_known_modes(std::size_t size)
     {
         const std::size_t modes = moded ? mode_count_of(this->system()) : 1;
@@ -292,7 +292,7 @@ private:
     }
     (std::make_index_sequence<tapes>{});
 
-    /// False: this object does other operations.
+    /// False: the operations of this object differ.
     template <std::size_t... mode>
     [[nodiscard]] bool read_all(const System& system, std::index_sequence<mode...>)
     {

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Steps of Taylor's method.
 #pragma once
@@ -50,7 +50,7 @@ class TaylorKernel {
         return *static_cast<D*>(static_cast<Door<System, X>*>(door));
     }
 
-    /// The coefficients of the step from the current start, if they are not those already.
+    /// The coefficients of the step from the current start, unless they are known already.
     [[gnu::always_inline]] static TStep& expand(void* door, const State& state, int order)
     {
         D& of = at(door);
@@ -68,7 +68,7 @@ class TaylorKernel {
     [[gnu::noinline]] static void expand_anew(D& of, const State& state, int order)
     {
         TStep& step = of.step;
-        step.order = 0;  // until all is known, whatever the flow throws
+        step.order = 0;  // until all is known, even if the flow throws
         if constexpr (n == 0) {
             if (step.size() != state.x0.size()) of.resize(state.x0.size());
         }
@@ -151,13 +151,13 @@ class TaylorKernel {
         double longest = step.reach;
         if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
         if (!go(at(door), state, h)) return std::numeric_limits<double>::quiet_NaN();
-        // The last millionths are those by which a step is stretched to the end of a run.
+        // A step may be stretched by millionths to reach the end of a run.
         return h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
     }
 
     static bool take(void* door, State& state, double h)
     {
-        const int order = at(door).step.asked;  // that of the run, where it has begun
+        const int order = at(door).step.asked;  // the order of the run, where it has started
         const int given = at(door).given_order;
         expand(door, state, given ? given : order ? order : most_taylor_order);
         return go(at(door), state, h);
@@ -229,7 +229,7 @@ class TaylorKernel {
                 x[own(i, x)] = step.x[i] + (root.s * c[size + i] + w[i]);
                 rate[i] += c[size + i];
             }
-            // The guard itself has the last word: its series leaves out its last terms.
+            // The guard itself decides: its series omits its last terms.
             correction = -guard.value(state.time(root.s), x) / root.slope;
             if (std::fabs(correction) <= straight_part * root.s) break;
             root.s += correction;
@@ -243,7 +243,7 @@ class TaylorKernel {
         }
         return true;
     }
-    /// Of a root: its square is rounding, so that the motion is straight for as long.
+    /// Relative to a root: its square is rounding, so the motion is straight over this fraction.
     static constexpr double straight_part = 0x1p-26;
     static constexpr int most_corrections = 3;
 
@@ -265,7 +265,7 @@ class TaylorKernel {
         }
     };
 
-    /// Brackets the root as closely as doubles lie, or as the guard's rounding allows.
+    /// Brackets the root as closely as doubles lie, or as the rounding of the guard allows.
     static bool close_in(const OnLine& value, double correction, SeriesCrossing& crossing)
     {
         const TwoSum root = two_sum(value.near.s, correction);
@@ -325,7 +325,7 @@ class TaylorKernel {
         }
     }
 
-    /// Whether the guard has no event in the current step, of which `run.g1` is the end.
+    /// Whether the guard has no event in the current step, at whose end its value is `run.g1`.
     [[gnu::always_inline]] static bool is_clear(const TStep& step, const State& state,
                                                 const QuietRun& run)
     {
@@ -337,8 +337,8 @@ class TaylorKernel {
                series_clears_closely(terms, 0, run.sign, state.h, 0, from_surface);
     }
 
-    /// Whether the guard, if there is one, has no event in the current step, which then is the last
-    /// one that it has seen.
+    /// Whether the guard, if there is one, has no event in the current step, which then becomes the
+    /// last step that it has passed.
     [[gnu::always_inline]] static bool passes(D& of, State& state, QuietRun& run)
     {
         if constexpr (on_series) {
@@ -371,7 +371,7 @@ class TaylorKernel {
             double h = run.h_next;
             if constexpr (controlled) {
                 step.reach = length_of(at(door), state, run.rtol, run.atol);
-                // A step that is too long even so is refused by the loop.
+                // The loop refuses a step that is still too long.
                 if (!(step.reach >= smallest_step(run.h_min, state.start.value))) return;
                 h = std::min(h, step.reach);
             }

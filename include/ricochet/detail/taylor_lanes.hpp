@@ -1,10 +1,10 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Quiet steps of several runs by Taylor's method together, each with a length of its own.
 //
-// What is done here is what `TaylorKernel` does in its quiet runs, operation by operation, so that
-// every run has the bits that it has alone. A lane takes a step here only where that one would take
-// it without a second look at its guard; in front of any other step it is handed back to its own
+// The operations are those of `TaylorKernel` in its quiet runs, one by one, so that
+// every run has the bits that it has alone. A lane takes a step here only where the kernel would
+// take it without a second check of its guard; before any other step it is handed back to its own
 // loop, which has the series of that step already.
 #pragma once
 
@@ -22,7 +22,7 @@
 #include "ricochet/detail/taylor_series.hpp"
 #include "ricochet/detail/taylor_step.hpp"
 
-// The same code is compiled for registers of four doubles, too, where the processor may have them.
+// The same code is compiled for registers of four doubles too, where the processor may have them.
 #if defined(__x86_64__) && !defined(__AVX2__)
 #define RICOCHET_WIDE_LANES 1
 #else
@@ -32,7 +32,7 @@
 namespace ricochet::detail {
 
 /// As `find_reach`.
-/// @param each  absolute tolerances of the components in the place of `atol`, or null
+/// @param each  absolute tolerances of the components in place of `atol`, or null
 template <class Pack, std::size_t n>
 [[nodiscard, gnu::always_inline]] inline Pack find_reach(const std::array<Pack, n>& x0,
                                                          const double* each, const Pack* c,
@@ -80,7 +80,7 @@ template <class Pack, std::size_t n>
     return h;
 }
 
-/// As `last_terms`, of one guard.
+/// As `last_terms`, for one guard.
 template <class Pack>
 [[nodiscard, gnu::always_inline]] inline Pack last_terms(const Pack* g, int order,
                                                          const Pack& h) noexcept
@@ -92,7 +92,7 @@ template <class Pack>
     return power * (size_of(g[order]) * h + size_of(g[order - 1]));
 }
 
-/// As `series_clears`, above 0, of one guard.
+/// As `series_clears`, above 0, for one guard.
 /// @param last  its `last_terms`
 template <class Pack, class Mask = typename Pack::Mask>
 [[nodiscard, gnu::always_inline]] inline Mask series_clears(const Pack* g, int order,
@@ -127,7 +127,7 @@ template <class Pack, class Mask = typename Pack::Mask>
 }
 
 /// Whether quiet steps of such runs can be taken together: the compiler unrolls the series of the
-/// flow, which has no modes, is no polynomial, and has one guard with a series at most.
+/// flow, which has no modes, is no polynomial, and has at most one guard with a series.
 template <class System, class X>
 [[nodiscard]] constexpr bool fits_lanes() noexcept
 {
@@ -178,7 +178,7 @@ class TaylorLanes {
 public:
     using Door = D;
 
-    /// Sets what all runs have in common.
+    /// Sets the options that all runs have in common.
     /// @param order  of their series
     TaylorLanes(const Options& options, int order)
         : options_(options), order_(order), backward_(options.t_end < options.t_start)
@@ -193,10 +193,10 @@ public:
         return count;
     }
 
-    /// Takes over a run in front of steps that may be quiet.
+    /// Takes over a run before steps that may be quiet.
     void load(std::size_t lane, D& door, State& state, const QuietRun& quiet)
     {
-        // The lanes that were never used get the numbers of a run, too: these do no harm.
+        // Lanes that were never used get the numbers of a run too, which do no harm.
         for (std::size_t to = 0; to < lane_count; ++to) {
             if (to == lane || !used_[to]) put(to, door, state, quiet);
         }
@@ -205,8 +205,8 @@ public:
         active_.set(lane, true);
     }
 
-    /// Gives it back in front of the step that it does not take here. `expanded`: its series is
-    /// known, as after `advance`.
+    /// Returns it before the step that it does not take here. `expanded`: the series of that step
+    /// is known, as after `advance`.
     void store(std::size_t lane, QuietRun& quiet, bool expanded)
     {
         const auto& [door, state] = runs_[lane];
@@ -218,7 +218,7 @@ public:
         quiet.h_next = h_next_[lane];
         if (quiet.steps > 0) {
             quiet.g0 = quiet.g1 = g0_[lane];
-            quiet.rate0 = std::numeric_limits<double>::quiet_NaN();  // until it is asked for
+            quiet.rate0 = std::numeric_limits<double>::quiet_NaN();  // until it is requested
             state->h = h_[lane];
             state->flow_calls += quiet.steps;
             state->has_middle = false;
@@ -246,8 +246,8 @@ public:
         }
     }
 
-    /// Takes steps of the active runs until there is one that does not take its next step here.
-    /// Returns these runs, a bit each.
+    /// Takes steps of the active runs until some of them do not take their next step here.
+    /// Returns these runs, one bit each.
     [[nodiscard]] unsigned advance() requires(!wide || !RICOCHET_WIDE_LANES)
     {
         return advance_inline();
@@ -352,7 +352,7 @@ private:
         return fine;
     }
 
-    /// As the function for two doubles.
+    /// As the function for doubles.
     [[gnu::always_inline]] static void two_sum(const Pack& a, const Pack& b, Pack& sum,
                                                Pack& remainder) noexcept
     {
@@ -361,8 +361,8 @@ private:
         remainder = (a - (sum - b_part)) + (b - b_part);
     }
 
-    /// The guards of the lanes that are `fine` at the ends of their steps. What one throws it
-    /// throws again in its own loop.
+    /// The guards of the lanes that are `fine`, at the ends of their steps. An exception is thrown
+    /// again in the lane's own loop.
     [[gnu::always_inline]] void sample_guards(const std::array<Pack, n>& x1, const Pack& t,
                                               Pack& g1, Mask& fine)
     {
@@ -382,7 +382,7 @@ private:
         }
     }
 
-    /// As `TaylorKernel::is_clear`, without its second look.
+    /// As `TaylorKernel::is_clear`, without its second check.
     [[nodiscard, gnu::always_inline]] Mask clears(const Pack& h, const Pack& g1) const
     {
         const Pack* const g = guards_.data();

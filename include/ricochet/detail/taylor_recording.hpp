@@ -1,11 +1,11 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A flow as a list of elementary operations.
 //
-// The flow is a template over its scalar. Called with `Recorded` scalars it leaves behind the graph
+// The flow is a template over its scalar. Called with `Recorded` scalars it produces the graph
 // of its operations: once in a constant expression, from a system of the same type that is
 // constructed by default, and once at the start of a run, from the object itself. The first
-// recording fixes the operations, so that their recurrences can be unrolled by the compiler; the
+// recording fixes the operations, so that the compiler can unroll their recurrences; the
 // second one provides the constants, and both must agree in everything else.
 //
 // Compilers differ in the order in which they evaluate operands, and one compiler differs between
@@ -59,14 +59,14 @@ enum class TaylorOp : std::uint8_t {
     angle,               ///< atan2(a, b), with c = a^2 + b^2
 };
 
-/// Whether the operation has a constant of the object.
+/// Whether the operation uses a constant of the object.
 [[nodiscard]] constexpr bool has_constant(TaylorOp op) noexcept
 {
     return op == TaylorOp::constant ||
            (op >= TaylorOp::plus_constant && op <= TaylorOp::constant_over);
 }
 
-/// An array that grows, in constant expressions, too.
+/// An array that can grow, also in constant expressions.
 template <class T>
 class GrowingArray {
 public:
@@ -106,7 +106,7 @@ private:
     int capacity_ = 0;
 };
 
-/// An operation as the flow has called it.
+/// An operation as the flow calls it.
 struct RecordedOp {
     TaylorOp op = TaylorOp::input;
     int a = -1;
@@ -114,7 +114,7 @@ struct RecordedOp {
     int c = -1;
     double exponent = 0;
     double value = 0;              ///< of its constant
-    const double* from = nullptr;  ///< where the constant was read; only ever compared
+    const double* from = nullptr;  ///< address of the constant; only ever compared
 };
 
 using Recording = GrowingArray<RecordedOp>;
@@ -138,8 +138,8 @@ public:
     [[nodiscard]] constexpr const double* from() const noexcept { return from_; }
     [[nodiscard]] constexpr int index() const noexcept { return index_; }
 
-    /// A double is wanted of a series where a function was not found for series, or a parameter is
-    /// declared as double.
+    /// A series is converted to a double where no overload of a function for series was found, or
+    /// where a parameter is declared as double.
     template <class T>
     requires std::is_same_v<T, double>
     constexpr operator T() const  // NOLINT(google-explicit-constructor)
@@ -176,7 +176,7 @@ public:
     friend constexpr Recorded operator/(const Recorded& a, const Recorded& b)
     {
         if (a.is_constant() && b.is_constant()) {
-            // The values of constants do not count in constant expressions.
+            // The values of constants do not matter in constant expressions.
             if (std::is_constant_evaluated() && b.value_ == 0) return folded(a.value_);
             return folded(a.value_ / b.value_);
         }
@@ -318,7 +318,7 @@ private:
         out.value_ = value;
         return out;
     }
-    /// Keeps the place of a double, from which equal constants are told from the same one.
+    /// Keeps the address of a double, which distinguishes the same constant from an equal one.
     template <class T>
     [[nodiscard]] static constexpr Recorded number(const T& value) noexcept
     {
@@ -370,7 +370,7 @@ private:
     int index_ = -1;
 };
 
-/// Functions that no power series represents where they bend or jump.
+/// Functions that no power series represents at their kinks or jumps.
 template <class T>
 struct RefusedOfSeries {
     static_assert(is_never_series<T>,
@@ -469,9 +469,9 @@ concept ScalarGuards = fixed_guard_count<System, std::array<double, n>>()
                                 " components, expected " + std::to_string(expected));
 }
 
-/// Records the flow of `system`, and its first `guards` guards; inputs are the components and the
-/// time, in this order, outputs the rates and the guards. `x` and `dxdt` are of the size of the
-/// state, `outputs` of all.
+/// Records the flow of `system`, and its first `guards` guards. The inputs are the components and
+/// the time, in this order; the outputs are the rates and the guards. `x` and `dxdt` have the size
+/// of the state, `outputs` the total size.
 template <class System, class Xs, class Outputs>
 constexpr void record_into(const System& system, Mode mode, Recording& recording, Xs& x, Xs& dxdt,
                            [[maybe_unused]] std::size_t guards, Outputs& outputs)
@@ -515,7 +515,7 @@ constexpr void put_in_order(std::size_t states, const Recording& from, Recording
                             Outputs& outputs)
 {
     const int inputs = static_cast<int>(states) + 1;
-    GrowingArray<int> number;  // in `to`, or -1
+    GrowingArray<int> number;  // number in `to`, or -1
     for (int i = 0; i < from.size(); ++i) number.push_back(i < inputs ? i : -1);
     for (int i = 0; i < inputs; ++i) to.push_back(from[i]);
     GrowingArray<int> open;

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Taylor coefficients of a motion, from the tape of its flow.
 //
@@ -8,8 +8,8 @@
 // Derivatives, section 13.2). Coefficients are normalized: f_k is the k-th derivative over k!.
 //
 // Sums begin with their middle terms and end with the newest coefficients, so that only two
-// additions wait for the operation before. Short tapes are unrolled over operations and orders;
-// longer ones over operations alone.
+// additions depend on the previous operation. Short tapes are unrolled over operations and orders;
+// longer ones over operations only.
 //
 // The scalar S of the coefficients is double, or several doubles side by side, one for each of
 // several motions: then each has the bits that it has alone.
@@ -31,7 +31,7 @@ namespace ricochet::detail {
 {
     const int middle = (lo + hi) / 2;
     const bool above = i % 2 == 1;
-    // Of an even number of terms the middle lies below the half, of an odd one on it.
+    // The middle lies below the half for an even number of terms, and on it for an odd one.
     return above ? middle + (i + 1) / 2 : middle - i / 2;
 }
 
@@ -67,8 +67,9 @@ struct AtOrder {
     }
 };
 
-/// sum of a_j b_{-j} for j from 0 to `last`. A loop of so few terms costs as much at its end, where
-/// the processor guesses wrong, as in its terms; a call that goes where the last one went does not.
+/// sum of a_j b_{-j} for j from 0 to `last`. A loop of so few terms costs as much for the
+/// mispredicted branch at its end as for its terms; a call to the same target as the last one has
+/// no such cost.
 template <int last>
 [[nodiscard]] double reversed_product(const double* a, const double* b)
 {
@@ -84,13 +85,13 @@ inline constexpr auto reversed_products = []<int... last>(std::integer_sequence<
 }
 (std::make_integer_sequence<int, 21>{});
 
-/// Beyond this many operations only the operations are unrolled: over the orders, too, they take
-/// the compiler longer than they save.
+/// Beyond this number only the operations are unrolled: unrolling over the orders too would take
+/// the compiler longer than it saves.
 inline constexpr std::size_t most_unrolled_ops = 30;
 template <const auto& tape>
 inline constexpr bool is_unrolled = tape.ops.size() - tape.states - 1 <= most_unrolled_ops;
 
-/// f(a), of each double in it.
+/// f(a), for each double in it.
 template <class F>
 [[nodiscard, gnu::always_inline]] inline double map_lanes(double a, const F& f)
 {
@@ -102,7 +103,7 @@ template <class F>
     return f(a, b);
 }
 
-/// The coefficients of one motion: `constants`, time and state in, those of the state out.
+/// The coefficients of one motion, computed from `constants`, the time and the state.
 /// @tparam tape  of type `TaylorTape`
 /// @tparam most  the largest order
 /// @tparam S  double, or several, where operations are unrolled
@@ -113,7 +114,7 @@ class TaylorSeries {
     static constexpr int m = static_cast<int>(Tape::guards);
     static constexpr int ops = static_cast<int>(Tape::ops_count);
 
-    /// Of the series whose coefficients times their orders are wanted.
+    /// Marks the series for which coefficients times their orders are needed.
     static constexpr auto slopes_wanted = [] {
         std::array<bool, Tape::ops_count> wanted{};
         for (std::size_t i = Tape::states + 1; i < Tape::ops_count; ++i) {
@@ -145,8 +146,8 @@ class TaylorSeries {
     static constexpr bool has_slope = slopes_wanted[static_cast<std::size_t>(i)];
 
 public:
-    /// out[k n + i] = coefficient k of component i, up to `order`: `most`, or one of those that are
-    /// 4 and 8 less. The same of the m guards in `guards`.
+    /// out[k n + i] = coefficient k of component i, up to `order`, which is `most`, `most` - 4 or
+    /// `most` - 8. The same for the m guards in `guards`.
     static void compute(const S* constants, S t, const S* x, int order, S* out, S* guards)
     {
         compute_inline(constants, t, x, order, out, guards);
@@ -194,7 +195,7 @@ private:
     template <int... k>
     [[gnu::always_inline]] void unroll(int order, S* out, std::integer_sequence<int, k...>)
     {
-        // Stops where the coefficient k + 1 of the state was the last one wanted.
+        // Stops where the coefficient k + 1 of the state was the last one needed.
         static_cast<void>((... || at_order<k>(order, out)));
     }
 
@@ -271,7 +272,7 @@ private:
         return slope_[a];
     }
 
-    /// What a function of a number is at the start.
+    /// The value of a function of a number at the start.
     template <int i>
     [[gnu::always_inline]] void begin_op()
     {
@@ -379,7 +380,7 @@ private:
         const S* const a = c_[larger(op.a, 0)];
         const S* const b = c_[larger(op.b, 0)];
         const S* const own = c_[i];
-        // Ranges of j in sums of a_j b_{k-j}; with i's own coefficients, up to k - 1.
+        // Ranges of j in sums of a_j b_{k-j}; sums with coefficients of i itself go to k - 1.
         constexpr int upto_a = smaller(da, k);
         constexpr int upto_b = smaller(db, k);
         if constexpr (op.op == TaylorOp::sum) {

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A step of Taylor's method: its coefficients, its length, its polynomial.
 #pragma once
@@ -26,14 +26,14 @@ inline constexpr int least_taylor_order = 12;
     return rtol >= 1e-8 ? 12 : rtol >= 1e-11 ? 16 : 20;
 }
 
-/// log2 of a positive normal number, to 1e-3: a step from its twelfth part is right to 1e-4.
+/// log2 of a positive normal number, to 1e-3: a step, computed from 1/12 of it, is right to 1e-4.
 [[nodiscard]] inline double rough_log2(double x) noexcept
 {
     const auto bits = std::bit_cast<std::uint64_t>(x);
     const auto exponent = static_cast<double>(static_cast<std::int64_t>(bits >> 52) - 1023);
     const double m =
         std::bit_cast<double>((bits & 0xfffffffffffffULL) | 0x3ff0000000000000ULL);  // in [1, 2)
-    // Through log2 at the four Chebyshev nodes of [1, 2].
+    // Interpolates log2 at the four Chebyshev nodes of [1, 2].
     return (exponent - 2.1362320654130670) +
            m * ((3.0111621508367876 - 1.0268049073983060 * m) + 0.1527002847975194 * (m * m));
 }
@@ -44,7 +44,7 @@ inline constexpr int least_taylor_order = 12;
     constexpr double shift = 0x1.8p52;  // rounds to a whole number
     const double whole = (x + shift) - shift;
     const double y = x - whole;
-    // Through 2^y at the four Chebyshev nodes of [-1/2, 1/2].
+    // Interpolates 2^y at the four Chebyshev nodes of [-1/2, 1/2].
     const double part = (0.9999245569508709 + 0.6931367338836214 * y) +
                         y * y * (0.2426394785462585 + 0.0558382829462201 * y);
     return part * std::bit_cast<double>(
@@ -70,7 +70,7 @@ template <class X, class Array>
             last = std::max(last, std::fabs(cp[i]) * scale);
             before = std::max(before, std::fabs(cp[i - n]) * scale);
         }
-        // Nothing in the last two terms: a polynomial, as far as can be seen.
+        // The last two terms vanish: the motion is a polynomial, as far as can be detected.
         const double least = std::numeric_limits<double>::min();
         if (!(last > least) && !(before > least)) return infinity;
         const double most = std::numeric_limits<double>::max();
@@ -79,8 +79,9 @@ template <class X, class Array>
     };
     for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(x0[i]);
     double h = longest();
-    // What begins near zero and moves away has the size of its end, as with other methods.
-    // A length grows with a twelfth power of the size at most: less is not worth another root.
+    // A motion that starts near zero and moves away has the size of its end, as with other methods.
+    // The length grows at most with the twelfth root of the size: smaller changes need no further
+    // root.
     for (int again = 0; again < 3; ++again) {
         bool larger = false;
         for (std::size_t i = 0; i < n; ++i) {
@@ -99,9 +100,9 @@ struct TaylorStepOrigin {
     Instant start;
     Mode mode = 0;
     bool backward = false;
-    int order = 0;           ///< of what is known; 0: nothing
+    int order = 0;           ///< of the known coefficients; 0: none
     int asked = 0;           ///< of the run; larger where the motion is a polynomial
-    bool is_motion = false;  ///< a polynomial in time, not a series that was cut
+    bool is_motion = false;  ///< a polynomial in time, not a truncated series
     double reach = std::numeric_limits<double>::quiet_NaN();  ///< [s]; see `StepKernel::reach`
 };
 
@@ -135,14 +136,14 @@ private:
     std::size_t guard_count_ = 0;
 };
 
-/// w(s) = sum of coefficients k of degree 2 and more, and its derivative.
+/// w(s) = sum of the terms of degree 2 and more, and its derivative.
 /// @tparam S  double, or several
 template <bool with_rate, class S, class Array>
 [[gnu::always_inline]] inline void evaluate_departure(const S* c, int order, const S& s, Array& w,
                                                       Array& rate)
 {
     const std::size_t n = w.size();
-    // Four coefficients at a time: a quarter of Horner's additions wait for each other.
+    // Groups of four coefficients reduce the chain of dependent additions to a quarter of Horner's.
     const S s2 = s * s;
     const S s4 = s2 * s2;
     const auto at = [ c, n ](int k, std::size_t i) __attribute__((always_inline))

@@ -1,7 +1,7 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// A recording of a flow made ready for its series: without repetitions, in an order in which it can
-// be computed, with the degrees in time of all that it holds.
+// A recording of a flow prepared for its series: without repetitions, in an order in which it can
+// be computed, with the degrees in time of all its operations.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace ricochet::detail {
 
-/// An operation of the tape. Its constant has its own number.
+/// An operation of the tape. Its constant has the operation's number.
 struct TapeOp {
     TaylorOp op = TaylorOp::input;
     int a = -1;
@@ -22,13 +22,13 @@ struct TapeOp {
     double exponent = 0;
 };
 
-/// Of a series that is no polynomial in time.
+/// Degree of a series that is no polynomial in time.
 inline constexpr int no_degree = 1 << 20;
 
 /// The operations of a flow without repetitions, in an order in which they can be computed. The
 /// first n are the components of the state, the next one is the time.
 /// @tparam size  number of operations
-/// @tparam recorded  the same of the recording
+/// @tparam recorded  number of operations of the recording
 template <std::size_t n, std::size_t m, std::size_t size, std::size_t recorded>
 struct TaylorTape {
     static constexpr std::size_t states = n;
@@ -42,7 +42,7 @@ struct TaylorTape {
     std::array<int, recorded> place{};  ///< of a recorded operation on the tape
 };
 
-/// The same while it grows.
+/// The tape under construction.
 template <std::size_t n, std::size_t m>
 struct TapeDraft {
     Recording recording;  ///< in order
@@ -65,7 +65,7 @@ struct TapeDraft {
         return ops.push_back(op);
     }
 
-    /// Adds what the derivatives of an operation need: `partner(a)` of sin(a) is cos(a).
+    /// Adds the partners that the derivatives of operations need: `partner(a)` of sin(a) is cos(a).
     constexpr void add_partners()
     {
         for (int i = 0; i < ops.size(); ++i) {
@@ -149,8 +149,8 @@ template <class Tape>
     }
 }
 
-/// The degrees in time of all series: from states that do not move, rates raise the states, until
-/// nothing changes or a state is no polynomial of a degree that counts.
+/// The degrees in time of all series: from states that do not move, rates raise the degrees of the
+/// states, until nothing changes or a state is no polynomial of a degree that counts.
 template <class Tape>
 constexpr void find_degrees(Tape& tape) noexcept
 {
@@ -188,7 +188,7 @@ template <class Tape>
     return (most + 3) / 4 * 4;
 }
 
-/// Marks what guards depend on, partners included.
+/// Marks the operations on which guards depend, partners included.
 template <class Tape>
 constexpr void mark_for_guards(Tape& tape) noexcept
 {
@@ -248,14 +248,14 @@ concept RecordableFlow = requires
 {
     typename std::integral_constant<std::size_t, tape_size<System, n, 0, 0>().ops>;
 };
-/// The same with the guards.
+/// The same including the guards.
 template <class System, std::size_t n, std::size_t m>
 concept RecordableGuards = requires
 {
     typename std::integral_constant<std::size_t, tape_size<System, n, m, 0>().ops>;
 };
 
-/// How many guards have series: all of them, or none.
+/// The number of guards with series: all of them, or none.
 template <class System, std::size_t n>
 [[nodiscard]] constexpr std::size_t series_guards() noexcept
 {
@@ -269,7 +269,7 @@ template <class System, std::size_t n>
 template <class System, std::size_t n, Mode mode>
 inline constexpr auto taylor_tape = make_tape<System, n, series_guards<System, n>(), mode>();
 
-/// What is wrong with a recording of an object, beside the tape of its type.
+/// Result of comparing a recording of an object with the tape of its type.
 enum class TapeMatch : std::uint8_t { fits, differs, not_finite };
 
 /// The constants of `system`, each at the number of its operation.

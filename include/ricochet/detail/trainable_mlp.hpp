@@ -1,9 +1,9 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A multilayer perceptron whose weights can be trained.
 //
-// Hidden layers with one activation, the last layer linear. All in
-// double, and every sum in one fixed order, so that the result depends on
+// Hidden layers have one activation, and the last layer is linear. All numbers are
+// double, and every sum has a fixed order, so that the result depends on
 // neither the number of threads nor the width of the vector registers.
 #pragma once
 
@@ -50,7 +50,7 @@ public:
     double loss_and_gradient(std::span<const double> states, std::span<const std::uint8_t> labels,
                              std::span<double> gradient);
 
-    /// The loss of state i with these logits; writes its derivative by each of them.
+    /// The loss of state i with these logits; writes its derivative by each logit.
     using Loss = std::function<double(std::size_t i, const double* logits, double* slopes)>;
 
     /// The mean of any loss over n states, and its gradient.
@@ -77,7 +77,7 @@ private:
     std::vector<double> parameters_;
     std::size_t lanes_ = 0;                         ///< states in work, a multiple of the block
     std::vector<std::vector<double>> activations_;  ///< per layer, width x lanes; 0: the input
-    std::vector<std::vector<double>> slopes_;       ///< dL/d of what enters the activation
+    std::vector<std::vector<double>> slopes_;       ///< dL/d of the input of the activation
     std::vector<double> logits_, logit_slopes_;     ///< of one state
 };
 

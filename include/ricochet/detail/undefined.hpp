@@ -1,6 +1,6 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
-// Why a derivative through an event does not exist.
+// Reasons why a derivative through an event does not exist.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // A hybrid system together with its derivatives, as a hybrid system.
 //
@@ -6,8 +6,8 @@
 //     guards  those of x alone
 //     resets  x⁺ = R,  S⁺ by the saltation matrix (see saltation.hpp)
 //
-// so that whatever runs a system runs its variational equations: the same detectors,
-// locators and methods, with the derivatives under the same error control.
+// so that the variational equations run like any other system: with the same detectors,
+// locators and methods, and with the derivatives under the same error control.
 #pragma once
 
 #include <Eigen/Core>
@@ -58,12 +58,12 @@ struct GuardCount<counted_at_run_time> {
 ///     x    S         n components of the state, and their derivatives
 ///     T    dT        time of the last event [s], and its derivatives
 ///
-/// column by column, followed by two numbers: the `Undefined` reason why there are no
-/// derivatives any more, and the time [s] of the last event of a guard. Once a derivative
+/// column by column, followed by two numbers: the `Undefined` reason why the derivatives no
+/// longer exist, and the time [s] of the last event of a guard. Once a derivative
 /// is undefined S stays zero; the motion x continues.
 ///
-/// Derivatives of the system's functions are those that it declares (see
-/// linearization.hpp), else differences. Modes and recorded events are those of the system.
+/// The derivatives of the system's functions are those that it declares (see linearization.hpp),
+/// else dual numbers or differences. Modes and recorded events are those of the system.
 template <class System, class X = typename System::State>
 class Variational
     : public detail::GuardCount<Guarded<System, X> ? fixed_guard_count<System, X>() : 0> {
@@ -77,12 +77,13 @@ class Variational
 
 public:
     using State = std::vector<double>;
-    static constexpr bool unchecked_names = true;  // some members are absent where the system's are
+    static constexpr bool unchecked_names = true;  // some members are absent where the system lacks
+                                                   // them
     static constexpr bool changes_dimension = requires { requires System::changes_dimension; };
 
     /// @param options  tolerances of the run, by which grazing is distinguished from crossing
-    /// @throws std::invalid_argument for invalid directions, and for everything that
-    /// `Parameter::with` throws.
+    /// @throws std::invalid_argument for invalid directions; passes on all exceptions of
+    /// `Parameter::with`.
     Variational(const System& system, const X& x0, const Directions<System>& directions,
                 const Options& options)
         : detail::GuardCount<fixed_guards>(guard_count_of<X>(system)),
@@ -127,7 +128,7 @@ public:
         return matrix(y).topRightCorner(index(components(y)), index(columns()));
     }
     /// Time of the last event that changed the motion [s], and its derivatives; before
-    /// the first a number below all times.
+    /// the first event it is a number below all times.
     [[nodiscard]] double last_event(const State& y) const { return y[components(y)]; }
     [[nodiscard]] Eigen::VectorXd last_event_derivatives(const State& y) const
     {
@@ -138,14 +139,14 @@ public:
         return static_cast<Undefined>(static_cast<int>(y[y.size() - 2]));
     }
 
-    /// How a crossing of a guard at t [s] in state y moves.
+    /// Derivatives of the time at which a guard crosses, at t [s] in state y.
     [[nodiscard]] detail::EventTime crossing(std::size_t which, Mode mode, double t,
                                              const State& y) const
     {
         return saltation_.crossing(which, motion_at(mode, t, y), last_event_of(y));
     }
 
-    /// How a time event at t [s] moves.
+    /// Derivatives of the time of a time event at t [s].
     [[nodiscard]] detail::EventTime time_event(double t) const { return saltation_.time_event(t); }
 
     /// x' at t [s].
@@ -242,14 +243,14 @@ public:
             next = detail::ResetSet{fired}.apply(system(), mode, t, after, conflict);
         }
         if (!detail::fits_dimension<System>(before, after, next == mode)) {
-            y.clear();  // rejected by the loop
+            y.clear();  // the loop rejects it
             return mode;
         }
         if (conflict.any()) {
             detail::for_each_component(after, [&](auto i) { after[i] = nan; });
         }
-        // A guard that holds the motion in place, repeatedly at one time, does
-        // the same to the derivatives.
+        // A guard that holds the motion in place, repeatedly at one time, also holds the
+        // derivatives.
         const bool again = saltation_.at_one_time(last_event(y), t);
         if (again && next == mode && same(before, after)) return mode;
         transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
@@ -258,7 +259,7 @@ public:
         return next;
     }
 
-    /// The two resets of a set that contradict each other, if any do.
+    /// The two resets of a set that contradict each other, if there are any.
     [[nodiscard]] detail::Conflict conflict(const FiredGuards& fired, Mode mode, double t,
                                             const State& y) const requires Resetting<System, X>
     {
@@ -279,7 +280,7 @@ public:
             return mode;
         }
         transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
-            // The limit of the events moves as the last of them does.
+            // The limit of the events moves as the last event does.
             const detail::EventTime time = last.any ? detail::EventTime{Undefined::no, last.dt}
                                                     : saltation_.crossing(which, motion, last);
             if (time.undefined != Undefined::no) return time.undefined;
@@ -378,7 +379,7 @@ private:
         return fixed > 0 ? fixed : (pos(y.size()) - 2) / (columns() + 1) - 1;
     }
 
-    /// The state that y, or a view of one, starts with.
+    /// The state at the beginning of y, or of a view of it.
     template <class V>
     [[nodiscard]] X head(const V& y) const
     {
@@ -447,7 +448,7 @@ private:
         dydt[y.size() - 1] = 0;
     }
 
-    /// Once a derivative is undefined, the values computed here are not shown.
+    /// Once a derivative is undefined, the values computed here are not used.
     template <class S>
     void variational_series(Mode mode, const S& t, const std::vector<S>& y,
                             std::vector<S>& dydt) const

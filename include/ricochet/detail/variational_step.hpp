@@ -1,13 +1,13 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Implicit steps of a block with rate-and-state friction, each stage the stationary point
 // of an incremental potential.
 //
 //     m x'' = k (x_p(t) - x) - N f(x', xi),      xi' = xi'(x', xi)
 //
-// Singly diagonally implicit Runge-Kutta methods, L-stable and stiffly accurate: every
-// stage is one step of backward Euler from a shifted history, so that what holds of the
-// variational step of order 1 holds of theirs.
+// The methods are singly diagonally implicit Runge-Kutta methods, L-stable and stiffly accurate:
+// every stage is one step of backward Euler from a shifted history, so the properties of the
+// variational step of order 1 hold for all of them.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@
 
 namespace ricochet {
 
-/// Where a block is.
+/// State of a block.
 struct SliderState {
     double t = 0;   ///< [s]
     double x = 0;   ///< [m]
@@ -40,9 +40,9 @@ concept LoadPath = requires(const Load& load, double t)
 struct StepReport {
     int iterations = 0;       ///< of all stages
     int most_iterations = 0;  ///< of one stage
-    int unsolved = 0;         ///< stages
-    int not_convex = 0;       ///< stages
-    double residual = 0;      ///< largest of a stage
+    int unsolved = 0;         ///< number of unsolved stages
+    int not_convex = 0;       ///< number of stages that are not convex
+    double residual = 0;      ///< largest of all stages
     SliderState error{};      ///< estimate, by a method of lower order (none for order 1)
     [[nodiscard]] bool solved() const noexcept { return unsolved == 0; }
 };

@@ -29,7 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// The table that was asked for.
+/// The requested table.
 Table table_of(const SystemEntry& system, const EnsembleRequest& request)
 {
     if (request.table && request.count) {
@@ -49,8 +49,8 @@ Table table_of(const SystemEntry& system, const EnsembleRequest& request)
     return random_table(system, request.vary, *request.count, request.seed.value_or(1));
 }
 
-/// The directory of the results, made if it is not there.
-/// @throws BadInput where it cannot be, or keeps an ensemble in another number of shares.
+/// The directory of the results, created if it does not exist.
+/// @throws BadInput where it cannot be, or holds an ensemble with another number of shares.
 fs::path claim_directory(const EnsembleRequest& request, const Share& share)
 {
     if (!request.out) throw BadInput("--out DIR is missing: where the results are kept");
@@ -75,7 +75,7 @@ fs::path claim_directory(const EnsembleRequest& request, const Share& share)
     return directory;
 }
 
-/// Says on standard error how far the rows are, where somebody may wait for them.
+/// Reports progress of the rows on standard error, where a person may be waiting for them.
 class RowProgress {
 public:
     void show(const EnsembleProgress& now)
@@ -101,7 +101,7 @@ private:
     double next_ = 2;  ///< [s]
 };
 
-/// A share in the works.
+/// A share in progress.
 class ShareRun {
 public:
     ShareRun(const EnsembleRuns& runs, const Share& share, const fs::path& directory)
@@ -121,7 +121,7 @@ public:
         }
     }
 
-    /// Runs what is missing.
+    /// Runs the missing blocks.
     void run(unsigned threads)
     {
         std::vector<std::unique_ptr<std::string>> results(
@@ -133,7 +133,7 @@ public:
         RowProgress progress;
         EnsembleOptions options{.threads = threads, .cancelled = Interrupts::flag()};
         options.progress = [&](const EnsembleProgress& now) {
-            // A row that was interrupted is run again.
+            // An interrupted row is run again.
             if (Interrupts::any()) return false;
             const std::size_t chunk = now.first / block_rows;
             const auto block = std::exchange(results[chunk], nullptr);
@@ -152,8 +152,8 @@ public:
                     runs_.run_row(missing_[chunk] * block_rows + row.index % block_rows,
                                   *results[chunk]);
                 } catch (...) {
-                    // Beside the runs themselves there is only memory to run out of: this block
-                    // lacks a row, and is not to be kept.
+                    // Apart from the runs themselves only memory can fail: this block lacks a row,
+                    // and must not be kept.
                     Interrupts::raise_for(Cause::memory);
                     throw;
                 }
@@ -162,7 +162,7 @@ public:
         if (!all.failures.empty()) std::rethrow_exception(all.failures.front().exception);
     }
 
-    /// Runs blocks that `next` numbers until there are no more, but for those that are `kept`.
+    /// Runs blocks numbered by `next` until there are no more, except those in `kept`.
     void run_dealt(const std::function<std::size_t()>& next, const AllBlocks& kept)
     {
         for (std::size_t b = next(); b < runs_.blocks(); b = next()) {
@@ -208,7 +208,7 @@ private:
     std::vector<std::size_t> missing_;
 };
 
-/// What a command has done, for people and as JSON.
+/// Result of a command, for people and as JSON.
 struct Summary {
     std::string system;
     Share share;
@@ -307,7 +307,7 @@ int run_share(const EnsembleRequest& request)
     return 0;
 }
 
-/// The set-up of all shares of a directory, and where their blocks are.
+/// The set-up of all shares of a directory, and the places of their blocks.
 struct Merged {
     Json setup;
     std::size_t shares = 0;
@@ -315,7 +315,7 @@ struct Merged {
     EnsembleTally tally;
 };
 
-/// @throws BadInput where the shares are of different set-ups.
+/// @throws BadInput where the shares have different set-ups.
 Merged read_shares(const fs::path& directory)
 {
     const std::vector<Share> shares = shares_in(directory);
@@ -331,7 +331,7 @@ Merged read_shares(const fs::path& directory)
     Merged out;
     out.shares = shares.front().count;
     for (const Share& share : shares) {
-        // Tallied below, where no block counts twice.
+        // Blocks are tallied below, where none counts twice.
         ShareContent content = read_share(directory / file_name(share), [](std::string_view) {});
         if (!out.blocks) {
             out.setup = content.setup;
@@ -394,11 +394,11 @@ int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer
     const Interrupts interrupts;
     {
         ShareRun work(runs, dealer.place, directory);
-        dealer.wait_for_all();  // all files are there
+        dealer.wait_for_all();  // now all files exist
         const Merged there = read_shares(directory);
         work.run_dealt(dealer.next, *there.blocks);
     }
-    dealer.wait_for_all();  // all of them are complete
+    dealer.wait_for_all();  // now all of them are complete
     if (Interrupts::any()) return ended_early("and the same call goes on");
     return dealer.place.index == 1 ? merge(directory, request.json) : 0;
 }

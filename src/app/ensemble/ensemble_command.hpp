@@ -30,21 +30,21 @@ struct EnsembleRequest {
     friend bool operator==(const EnsembleRequest&, const EnsembleRequest&) = default;
 };
 
-/// Runs the rows of this process's share that are not kept yet, and prints how they ended; the only
-/// share writes the results, too. With `merge` nothing is run, and the results are written from the
-/// shares.
+/// Runs the rows of this process's share that are not kept yet, and prints how they ended; if it is
+/// the only share, it writes the results, too. With `merge` nothing is run, and the results are
+/// written from the shares.
 ///
-/// Ctrl-C and a request to terminate end it between blocks of rows; the same call goes on.
+/// Ctrl-C and a request to terminate end it between blocks of rows; the same call continues it.
 ///
-/// @return 0 if every row of the share has been run, however its run ended; 129, 130 or 143 if a
-///         signal ended it
+/// @return 0 if every row of the share has been run, whatever the outcome of its run; 129, 130 or
+///         143 if a signal ended it
 /// @throws BadInput, ModelError, WriteError
 int run_ensemble(const EnsembleRequest& request);
 
-/// Processes that share the blocks as they become free, in place of shares that are fixed.
+/// Processes that share the blocks as they become free, in place of fixed shares.
 struct BlockDealer {
     Share place;                         ///< the file of this process
-    std::function<std::size_t()> next;   ///< 0, 1, 2, ..., each to one process alone
+    std::function<std::size_t()> next;   ///< 0, 1, 2, ..., each to only one process
     std::function<void()> wait_for_all;  ///< until all processes have called it
 };
 

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t outcome_width = 24;  // characters; the longest is time_event_not_ahead
 constexpr std::string_view failed = "failed";
 
-/// @throws BadInput for a parameter that is set for all rows and in each, or on which a model
+/// @throws BadInput for a parameter that is set both for all rows and in each, or on which a model
 ///         depends.
 void check_columns(const SystemEntry& system, const RunRequest& request,
                    const RunSettings& settings, const Table& table)

@@ -28,10 +28,10 @@ public:
         return (table_.rows + block_rows - 1) / block_rows;
     }
 
-    /// Everything that the results depend on, and the fields that they have.
+    /// Everything on which the results depend, and the fields that they have.
     [[nodiscard]] Json setup() const;
 
-    /// Runs a row and appends its fields. What it throws becomes the outcome "failed", with the
+    /// Runs a row and appends its fields. An exception becomes the outcome "failed", with its
     /// message. Several threads may call it.
     void run_row(std::size_t row, std::string& out) const;
 
@@ -45,7 +45,7 @@ private:
     Table table_;
 };
 
-/// How rows ended, and the events that they had.
+/// Outcomes of rows, and the number of their events.
 struct EnsembleTally {
     std::map<std::string, std::size_t> outcomes{};
     std::uint64_t events = 0;

@@ -1,4 +1,4 @@
-// `ricochet-mpi ensemble`: blocks of rows dealt out by a counter over MPI, where runs differ so
+// `ricochet-mpi ensemble`: a counter over MPI distributes blocks of rows, for runs that differ so
 // much in length that fixed shares would leave processes idle.
 #include <fmt/format.h>
 #include <mpi.h>
@@ -27,7 +27,7 @@ public:
         if (rank == 0) *value_ = 0;
         MPI_Barrier(MPI_COMM_WORLD);
     }
-    /// Freeing waits for all processes, and those that failed do not come.
+    /// Freeing waits for all processes, and failed ones do not take part.
     ~Counter()
     {
         if (std::uncaught_exceptions() == 0) MPI_Win_free(&window_);
@@ -79,7 +79,7 @@ int main(int count, char** arguments)
     MPI_Init(&count, &arguments);
     const int status = run_program(
         [](CLI::App& app, int& status) { add_ensemble(app, status, deal); }, count, arguments);
-    // The others may be waiting for this one.
+    // The other processes may be waiting for this one.
     if (status != 0) MPI_Abort(MPI_COMM_WORLD, status);
     MPI_Finalize();
     return status;

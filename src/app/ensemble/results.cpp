@@ -25,7 +25,7 @@ std::string quoted_for_python(std::string_view text)
     return out + '\'';
 }
 
-/// "('height', '<f8')" or nothing, where NumPy's table lacks the field.
+/// "('height', '<f8')", or nothing if NumPy's table lacks the field.
 std::string numpy_field(const Field& field)
 {
     std::string type;
@@ -62,7 +62,7 @@ std::string numpy_header(const std::vector<Field>& fields, std::size_t rows)
     return out + text;
 }
 
-/// A text of NumPy: four bytes a character.
+/// Appends a text of NumPy: four bytes per character.
 void put_characters(std::string_view text, std::size_t width, std::string& out)
 {
     for (std::size_t i = 0; i < width; ++i) {

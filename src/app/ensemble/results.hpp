@@ -10,10 +10,10 @@
 
 namespace ricochet::app {
 
-/// Where every block of an ensemble is.
+/// Places of all blocks of an ensemble.
 class AllBlocks {
 public:
-    /// @param blocks  that the table has
+    /// @param blocks  number of blocks of the table
     explicit AllBlocks(std::size_t blocks) : places_(blocks) {}
 
     /// Adds the blocks of a file. A block that two files have is taken from the first.

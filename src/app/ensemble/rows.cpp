@@ -41,7 +41,7 @@ std::uint64_t check_of(std::uint64_t block, std::string_view rows)
     return checksum(rows, block + rows.size());
 }
 
-/// Reads as many bytes as there are, up to `bytes`.
+/// Reads up to `bytes` bytes, as many as there are.
 std::string read_up_to(std::ifstream& in, std::uint64_t bytes)
 {
     std::string out(bytes, '\0');
@@ -50,7 +50,7 @@ std::string read_up_to(std::ifstream& in, std::uint64_t bytes)
     return out;
 }
 
-/// The set-up in the first line; `in` is left behind it.
+/// The set-up in the first line; `in` is left after it.
 Json setup_of(const fs::path& file, std::ifstream& in)
 {
     std::string line;
@@ -241,7 +241,7 @@ void ShareFile::begin(std::string_view first_line)
 {
     std::ifstream in(file_, std::ios::binary);
     const std::string there = read_up_to(in, first_line.size());
-    // Nothing, or what a process that was killed has written of it.
+    // The file holds nothing, or the part that a killed process has written.
     if (there.size() == first_line.size() || !first_line.starts_with(there)) return;
     if (ftruncate(descriptor_, 0) != 0 || !write_all(descriptor_, first_line)) fail();
 }

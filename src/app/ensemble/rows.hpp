@@ -1,8 +1,8 @@
-// What an ensemble keeps of its runs: rows of fields, in blocks, in a file for each share.
+// The stored runs of an ensemble: rows of fields, in blocks, in a file for each share.
 //
-// A file begins with a line of JSON, its set-up, and goes on with blocks, each with its number and
-// a checksum. Blocks are appended whole, so that a process which is killed loses the blocks that it
-// has not finished, and no more.
+// A file begins with a line of JSON, its set-up, followed by blocks, each with its number and
+// a checksum. Blocks are appended whole, so that a process which is killed loses only the blocks
+// that it has not finished.
 #pragma once
 
 #include <cstddef>
@@ -20,19 +20,19 @@
 
 namespace ricochet::app {
 
-/// What a field of a row is: a whole number, a number, or a text.
+/// Type of a field of a row: a whole number, a number, or a text.
 enum class FieldKind { count, number, text };
 
 struct Field {
     std::string name;
     std::string unit;
     FieldKind kind = FieldKind::number;
-    /// Characters that a text has in a table of NumPy; 0: the field is not in that table.
+    /// Characters of a text in a table of NumPy; 0: the field is not in that table.
     std::size_t width = 0;
 };
 
 [[nodiscard]] Json to_json(const std::vector<Field>& fields);
-/// @throws nlohmann::json::exception for anything but what `to_json` returns.
+/// @throws nlohmann::json::exception for anything other than the results of `to_json`.
 [[nodiscard]] std::vector<Field> fields_from(const Json& json);
 
 /// A row as bytes, to which fields are appended in their order.
@@ -53,7 +53,7 @@ private:
     std::string& out_;
 };
 
-/// The fields of rows, one after another, from bytes.
+/// Reads the fields of rows, one after another, from bytes.
 class RowReader {
 public:
     explicit RowReader(std::string_view bytes) : rest_(bytes) {}
@@ -70,14 +70,14 @@ private:
     std::string_view rest_;
 };
 
-/// Where a block lies in its file.
+/// Place of a block in its file.
 struct BlockPlace {
     std::uint64_t block = 0;
     std::uint64_t offset = 0;  ///< of its rows
     std::uint64_t bytes = 0;
 };
 
-/// What a share's file holds. What follows the last whole block is no part of it.
+/// Content of a share's file. Bytes after the last whole block are no part of it.
 struct ShareContent {
     std::filesystem::path file;
     Json setup;
@@ -86,12 +86,12 @@ struct ShareContent {
 };
 
 /// @param each  called with the rows of every block
-/// @throws BadInput naming the file, where it is none of a share or cannot be read.
+/// @throws BadInput naming the file, if it is no file of a share or cannot be read.
 [[nodiscard]] ShareContent read_share(const std::filesystem::path& file,
                                       const std::function<void(std::string_view rows)>& each);
 
 /// The rows of a block.
-/// @throws std::runtime_error where the file has changed.
+/// @throws std::runtime_error if the file has changed.
 [[nodiscard]] std::string read_block(const std::filesystem::path& file, const BlockPlace& place);
 
 /// "share-3-of-16.rows"
@@ -100,16 +100,16 @@ struct ShareContent {
 /// The shares whose files are in a directory, in their order.
 [[nodiscard]] std::vector<Share> shares_in(const std::filesystem::path& directory);
 
-/// First difference between two set-ups, as a sentence's part such as "rtol is 1e-08 there, and
+/// First difference between two set-ups, as part of a sentence, such as "rtol is 1e-08 there, and
 /// 1e-10 here"; empty if there is none.
 [[nodiscard]] std::string difference(const Json& there, const Json& here);
 
-/// The file of the share that this process runs, locked against other processes while this object
-/// lives.
+/// The file of the share that this process runs, locked against other processes during the life of
+/// this object.
 class ShareFile {
 public:
-    /// Goes on with the file that there is, or creates it.
-    /// @throws BadInput where it is of another set-up or in use, WriteError
+    /// Continues an existing file, or creates one.
+    /// @throws BadInput if it has another set-up or is in use, WriteError
     ShareFile(const std::filesystem::path& directory, const Share& share, const Json& setup,
               const std::function<void(std::string_view rows)>& each);
     ~ShareFile();

@@ -22,8 +22,8 @@ std::optional<std::uint64_t> variable(const Environment& environment, const char
     return whole_number(name, text, lowest, lowest + 4'000'000'000);
 }
 
-/// Rank and size of one launcher.
-/// @throws BadInput where one of the two is missing, or the rank is none of that size.
+/// Rank and size by one launcher.
+/// @throws BadInput where one of the two is missing, or the rank is not valid for the size.
 std::optional<Share> launched_by(const Environment& environment, const char* rank_name,
                                  const char* size_name)
 {
@@ -55,16 +55,16 @@ std::optional<Share> slurm_task(const Environment& environment)
 {
     const auto rank = variable(environment, "SLURM_PROCID", 0);
     const auto size = variable(environment, "SLURM_NTASKS", 1);
-    // What a batch script itself has: srun sets the number of tasks, sbatch need not. A number
-    // of tasks alone is what salloc leaves in its shell.
+    // Variables of the batch script itself: srun sets the number of tasks, sbatch need not. The
+    // number of tasks alone is also left by salloc in its shell.
     if (environment("SLURM_JOB_ID") != nullptr && rank.value_or(0) == 0 && (!rank || !size)) {
         return std::nullopt;
     }
     return launched_by(environment, "SLURM_PROCID", "SLURM_NTASKS");
 }
 
-/// The rank of Open MPI, PMI or Slurm. Slurm's is that of what started the MPI processes, where
-/// these have ranks of their own: usually 0, or of another size.
+/// The rank of Open MPI, PMI or Slurm. Slurm's is the rank of the process that started the MPI
+/// processes, if these have ranks of their own: usually 0, or with another size.
 std::optional<Share> rank_of(const Environment& environment)
 {
     constexpr std::string_view open_mpi = "Open MPI";

@@ -1,4 +1,4 @@
-// Which part of an ensemble a process runs.
+// The part of an ensemble that a process runs.
 #pragma once
 
 #include <cstddef>
@@ -27,12 +27,12 @@ struct Share {
 /// An environment variable by name; null where it is not set.
 using Environment = std::function<const char*(const char* name)>;
 
-/// Share of this process as its launcher tells it: Open MPI's or PMI's rank, or else Slurm's,
-/// within the task of a Slurm array. 1/1 where nothing launched it.
+/// Share of this process according to its launcher: Open MPI's or PMI's rank, or else Slurm's,
+/// within the task of a Slurm array. 1/1 without a launcher.
 /// @throws BadInput for a rank without a size, or two that contradict each other.
 [[nodiscard]] Share share_from(const Environment& environment);
 
-/// The share that was given, or that of the launcher.
+/// The given share, or that of the launcher.
 [[nodiscard]] Share chosen_share(const std::optional<std::string>& given);
 
 }  // namespace ricochet::app

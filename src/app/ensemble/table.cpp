@@ -19,7 +19,7 @@ namespace ricochet::app {
 
 namespace {
 
-/// Number of letters that have to be inserted, left out or changed to make one word of the other.
+/// Number of letters to insert, omit or change to turn one word into the other.
 std::size_t distance(std::string_view a, std::string_view b)
 {
     std::vector<std::size_t> row(b.size() + 1);
@@ -57,7 +57,7 @@ std::vector<std::string_view> cells(std::string_view line)
     return out;
 }
 
-/// The parameter whose value is the start of component i, and of nothing else, if there is one.
+/// The parameter that sets the start of component i, and nothing else, if there is one.
 std::optional<std::size_t> parameter_of(const SystemEntry& system, std::size_t component)
 {
     std::vector<double> values;
@@ -72,7 +72,7 @@ std::optional<std::size_t> parameter_of(const SystemEntry& system, std::size_t c
             try {
                 start = system.start(other);
             } catch (const std::exception&) {
-                continue;  // parameters that do not go together
+                continue;  // the parameters are incompatible
             }
             if (start.size() != base.size() || start[component] != value) break;
             start[component] = base[component];
@@ -141,7 +141,7 @@ public:
     {
         const std::string_view line = trimmed(text);
         if (line.empty() || line.front() == '#') return;
-        // A trailing comma is a cell: the blanks at the ends are not.
+        // An empty cell after a trailing comma counts; blanks at the ends do not.
         columns_.empty() ? take_names(number, text) : take_numbers(number, text);
     }
 

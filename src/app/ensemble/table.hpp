@@ -13,7 +13,7 @@
 
 namespace ricochet::app {
 
-/// What a column of a table sets: a parameter, or a component of the state at the start.
+/// Target of a column of a table: a parameter, or a component of the state at the start.
 struct Column {
     std::string name;
     std::string unit;
@@ -26,22 +26,22 @@ struct Table {
     std::vector<Column> columns;
     std::size_t rows = 0;
     std::function<double(std::size_t row, std::size_t column)> value;
-    std::string identity;  ///< the same for the same numbers, and for no others but by chance
+    std::string identity;  ///< equal for equal numbers, and different for others except by chance
 };
 
-/// The column of that name. A component that a parameter of another name gives is that parameter.
+/// The column of that name. A component that a parameter of another name sets is that parameter.
 /// @param where  for messages
-/// @throws BadInput naming what is nearest.
+/// @throws BadInput naming the nearest name.
 [[nodiscard]] Column column_named(const SystemEntry& system, std::string_view where,
                                   std::string_view name);
 
-/// Comma-separated values: names in the first line, with their units in brackets or without; empty
-/// lines and those that begin with # are passed over.
+/// Comma-separated values: names in the first line, with or without their units in brackets; empty
+/// lines and lines that begin with # are skipped.
 /// @throws BadInput naming line and column.
 [[nodiscard]] Table read_table(const SystemEntry& system, const std::filesystem::path& file);
 
-/// Rows in which every column is uniform in an interval. A row's numbers follow from the seed and
-/// its index alone.
+/// Rows in which every column is uniform in an interval. A row's numbers depend only on the seed
+/// and its index.
 /// @param vary  such as "height=1:10"
 /// @throws BadInput
 [[nodiscard]] Table random_table(const SystemEntry& system, const std::vector<std::string>& vary,

@@ -46,7 +46,7 @@ void refuse_what_is_not_for_faults(const RunRequest& run)
     }
 }
 
-/// How the rupture is integrated, by name.
+/// Integrators of the rupture, by name.
 struct Integration {
     std::string integrator = "explicit";
     std::string controller = "constant";
@@ -292,7 +292,7 @@ std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& value
 {
     std::string out;
     const int n = fault.elements();
-    if (n == 1) {  // a picture of one point would be empty: of four
+    if (n == 1) {  // a picture of one point would be empty: it has four
         const double side = fault.parameters().side / 1000;
         for (const double z : {0.25, 0.75}) {
             for (const double x : {0.25, 0.75}) {

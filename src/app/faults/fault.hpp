@@ -15,21 +15,21 @@ namespace ricochet::app {
 struct SystemEntry;
 struct SimulateRequest;
 
-/// From the entry's parameters, in its order.
+/// Parameters from those of the entry, in its order.
 /// @throws BadInput for a number that is not whole.
 [[nodiscard]] StrikeSlipFault::Parameters fault_parameters(
     const std::vector<double>& values, const std::optional<std::filesystem::path>& kernel = {});
 
-/// How many parameters the fault has without those of rate-and-state friction, which follow.
+/// Number of parameters of the fault without those of rate-and-state friction, which follow.
 inline constexpr std::size_t weakening_parameters = 14;
 
-/// The mean motion at `n` even times, between the samples that there are.
+/// The mean motion at `n` even times, interpolated between the samples.
 struct MeanSamples {
     std::vector<double> t, slip, velocity;
 };
 [[nodiscard]] MeanSamples sampled(const Rupture& rupture, double t_end, std::size_t n);
 
-/// x [km], depth [km], value; rows separated by blank lines, as gnuplot's images want them.
+/// x [km], depth [km], value; rows separated by blank lines, as gnuplot's images require.
 [[nodiscard]] std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& values);
 
 /// Whether a parameter is among the assignments "name=value".
@@ -38,13 +38,13 @@ struct MeanSamples {
 /// @throws BadInput unless the value of this parameter is a whole number.
 double whole(std::string_view name, double value);
 
-/// Whether these parameters ask for rate-and-state friction.
+/// Whether these parameters choose rate-and-state friction.
 [[nodiscard]] bool has_rate_and_state(const std::vector<double>& values);
 
 /// @throws BadInput if a parameter of rate-and-state friction is set.
 void refuse_rate_and_state(const std::vector<std::string>& set, const SystemEntry& system);
 
-/// `ricochet simulate` of the systems that the program ricochet-fault has; as `simulate`.
+/// `ricochet simulate` for the systems of the program ricochet-fault; as `simulate`.
 [[nodiscard]] int simulate_fault(const SystemEntry& system, const SimulateRequest& request);
 [[nodiscard]] int simulate_rate_state_fault(const SystemEntry& system,
                                             const SimulateRequest& request,

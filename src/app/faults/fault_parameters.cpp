@@ -1,4 +1,4 @@
-// From the parameters of the fault as typed to those of the library.
+// Converts the parameters of the fault as typed to those of the library.
 #include <fmt/format.h>
 
 #include <algorithm>

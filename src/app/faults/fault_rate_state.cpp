@@ -45,7 +45,7 @@ enum : std::size_t {
     all_parameters
 };
 
-/// Parameters of friction that weakens with slip; the slip distance is then but a unit.
+/// Parameters of friction that weakens with slip; the slip distance is then only a unit.
 constexpr std::string_view of_weakening[] = {"residual_friction", "friction_drop", "slip_distance"};
 
 FaultFriction friction_of(const std::vector<double>& p)
@@ -191,7 +191,7 @@ std::string text(const SystemEntry& system, const StrikeSlipFault& fault, const 
     return out;
 }
 
-/// At the ends of the steps: even times would miss the earthquakes.
+/// Rows at the ends of the steps: even times would miss the earthquakes.
 std::string csv(const RateStateRupture& r, char separator)
 {
     constexpr std::size_t parts = 4;  // of a step, in the history of the means
@@ -290,7 +290,7 @@ int simulate_rate_state_fault(const SystemEntry& system, const SimulateRequest& 
              },
              [&] {
                  if (!request.plot) return;
-                 // When the earthquakes are is known only now: the run is repeated for its
+                 // The times of the earthquakes are known only now: the run is repeated for its
                  // pictures, of which an interrupted one has none.
                  asked.snapshot_times = times_of_pictures(r);
                  if (!cancelled) {

@@ -16,8 +16,8 @@
 
 namespace ricochet::app {
 
-/// Silent for two seconds. Then a line that is redrawn on a terminal; elsewhere a line immediately
-/// and further ones at growing intervals, so that a log of an hour has some dozens.
+/// Silent for two seconds. After that it redraws a line on a terminal; elsewhere it prints a line
+/// immediately and others at growing intervals, so that a log of an hour has some dozens.
 class LongRun {
 public:
     LongRun() = default;
@@ -25,7 +25,7 @@ public:
     LongRun(const LongRun&) = delete;
     LongRun& operator=(const LongRun&) = delete;
 
-    /// @param done  share of what `label` names
+    /// @param done  completed fraction of the task named by `label`
     void show(std::string_view label, double done)
     {
         const double now = seconds();
@@ -43,7 +43,7 @@ public:
         }
     }
 
-    /// The line is free again for something else.
+    /// Frees the line for other output.
     void clear()
     {
         if (drawn_) say("\r\x1b[K");
@@ -65,7 +65,7 @@ private:
     double next_ = patience;  // [s]
 };
 
-/// The same run, with what is done of it shown.
+/// The same options, with the progress shown.
 [[nodiscard]] inline RuptureOptions shown(RuptureOptions options, LongRun& progress,
                                           std::string label)
 {

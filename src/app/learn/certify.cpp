@@ -36,7 +36,7 @@ std::string text(const learn::Estimate& e)
     return fmt::format("about {:.2g} boxes and {}", e.boxes, duration(e.seconds));
 }
 
-/// The estimate of each level, then a bar on a terminal; elsewhere a line every tenth.
+/// Shows the estimate of each level, then a bar on a terminal; elsewhere a line every tenth.
 class Bar {
 public:
     void show(const learn::CertifyProgress& now)
@@ -63,7 +63,7 @@ public:
         }
     }
 
-    /// The line is free again for something else.
+    /// Frees the line for other output.
     void clear()
     {
         if (drawn_) say("\n");
@@ -167,7 +167,7 @@ bool stopped(learn::CertifyOutcome outcome)
            outcome == learn::CertifyOutcome::out_of_memory;
 }
 
-/// @throws BadInput if the checkpoint to resume is not there or of another proof.
+/// @throws BadInput if the checkpoint to resume does not exist or is of another proof.
 learn::CertifiedModel run(const Model& model, const learn::GuardProblem& problem,
                           const learn::CertifyOptions& options,
                           const learn::CertifyCallback& progress)
@@ -194,7 +194,7 @@ int certify(const CertifyRequest& request)
     learn::CertifyOptions options = options_of(request);
     options.checkpoint = request.checkpoint;
     if (options.checkpoint.empty()) options.checkpoint = file.string() + ".checkpoint";
-    Claims claims;  // the model itself may get the certificate
+    Claims claims;  // the model file itself may receive the certificate
     std::error_code error;
     if (out != file && !fs::equivalent(out, file, error)) claims.reads("the model", file);
     claims.replaces("--out", out);
@@ -220,7 +220,7 @@ int certify(const CertifyRequest& request)
         throw BadInput(fmt::format("the proof takes {}, above the limit of {}; --limit raises it",
                                    text(report.estimates.back()), duration(options.limit)));
     }
-    // A checkpoint speaks of the model as it was: while one is left the file is not touched.
+    // A checkpoint refers to the unchanged model: while one is left the file is not modified.
     const bool write = !report.levels.empty() && !(goes_on && out == file);
     deliver({[&] {
                  if (write) keep_model(certified.model, out, options.checkpoint);

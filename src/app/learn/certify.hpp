@@ -1,4 +1,4 @@
-// `ricochet certify`: a proof that where a model clears, its guard is above a margin.
+// `ricochet certify`: a proof that wherever a model clears, its guard is above a margin.
 #pragma once
 
 #include <cstddef>
@@ -21,9 +21,9 @@ struct CertifyRequest {
 
 /// Prints the estimate and the progress on standard error, then the result, and writes the
 /// model with its certificate. Ctrl-C and the time limit leave a checkpoint to resume from; the
-/// levels that were finished by then are written.
+/// levels finished by then are written.
 ///
-/// @return 0 if all levels were proved, if need be with unproved boxes listed, else 1.
+/// @return 0 if all levels were proved, perhaps with unproved boxes listed, else 1.
 /// @throws BadInput also if the estimate is above the limit; ModelError, std::invalid_argument.
 int certify(const CertifyRequest& request);
 

@@ -1,4 +1,4 @@
-// `ricochet-certify`: what `ricochet certify` runs.
+// `ricochet-certify`: the program of `ricochet certify`.
 #include <memory>
 
 #include "certify.hpp"

@@ -76,7 +76,7 @@ learn::GateSpec pendulum(const Values& value)
 
 struct Known {
     std::string_view name;
-    std::vector<std::string_view> parameters;  ///< that the gate depends on
+    std::vector<std::string_view> parameters;  ///< parameters on which the gate depends
     learn::GateSpec (*make)(const Values& value);
 };
 

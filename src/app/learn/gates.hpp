@@ -1,4 +1,4 @@
-// Gates of the systems on the command line: from which runs they are trained.
+// Gates of the systems on the command line, and the runs on which they are trained.
 #pragma once
 
 #include <string_view>
@@ -14,8 +14,8 @@ namespace ricochet::app {
 /// "gate-adaptive", for error control. Empty: none.
 [[nodiscard]] std::vector<std::string_view> gate_kinds(std::string_view system);
 
-/// Trains a horizon gate. With defaults it is one of the models that come with the library.
-/// @throws BadInput for what this training does not have; as `learn::train_gate`.
+/// Trains a horizon gate. With defaults it is one of the models of the library.
+/// @throws BadInput for options that this training does not have; as `learn::train_gate`.
 [[nodiscard]] learn::TrainedGate train_system_gate(const SystemEntry& system,
                                                    const TrainingRequest& request,
                                                    const learn::ProgressCallback& progress);

@@ -10,7 +10,7 @@ namespace ricochet::app {
 
 namespace {
 
-/// The height is a component of the state; no parameter has a part in it.
+/// The height is a component of the state, and independent of parameters.
 learn::GuardProblem ball_problem(const Model& model)
 {
     learn::detail::check_certifiable(model, "bouncing-ball", 2);
@@ -30,7 +30,7 @@ learn::GuardProblem arm_problem(const Model& model)
     return learn::guard_problem(made, model, made.start());
 }
 
-/// Proofs ask for bounds over many boxes: a table repays itself.
+/// Proofs evaluate bounds over many boxes, so a table pays.
 learn::GuardProblem eigenvalue_problem(const Model& model)
 {
     std::vector<double> p = parameters_of(find_system(LeastEigenvalue::name), model);

@@ -49,7 +49,7 @@ public:
         const std::size_t percent =
             progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
         const bool trains = stage_ == learn::Progress{}.stage;
-        // What has just begun may be refused, and some stages have no measure.
+        // A stage that has just begun may be refused, and some stages have no measure.
         if (!trains && (progress.total == 0 || (!terminal_ && percent < 10))) return;
         const std::string figures =
             fmt::format("{:>3} %  {} of {}{}  {}", percent, progress.iteration, progress.total,
@@ -72,7 +72,7 @@ public:
         tenth_ = percent / 10;
     }
 
-    /// The line is free again for something else.
+    /// Frees the line for other output.
     void finish() const
     {
         if (terminal_ && started_) say("\n");
@@ -90,7 +90,7 @@ private:
     }
 
     bool terminal_ = isatty(STDERR_FILENO) == 1;
-    std::optional<double> drawn_{};  ///< [s] when
+    std::optional<double> drawn_{};  ///< [s] time of the last drawing
     std::string_view stage_;
     bool started_ = false;
     std::size_t first_iteration_ = 0;
@@ -98,8 +98,8 @@ private:
     std::size_t tenth_ = 100;
 };
 
-/// A training that is given what to call with its progress, until it is done or interrupted. What
-/// it throws before the first call is about the checkpoint that it was to resume.
+/// Runs a training that reports progress to the given callback, until it is done or interrupted. An
+/// exception before the first call is about the checkpoint to resume.
 template <class Train>
 auto train_under_bar(bool resume, const Train& train)
 {

@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t held_out = 1'000'003;  // added to a seed: other problems
+constexpr std::uint64_t held_out = 1'000'003;  // added to a seed, for other problems
 
 std::string table(const std::vector<learn::StepScore::Part>& parts, bool judges_final)
 {
@@ -106,7 +106,7 @@ int train_policy(const TrainPolicyRequest& request)
     if (request.evaluations) options.evaluations = *request.evaluations;
     if (request.seconds) options.seconds = *request.seconds;
     if (request.threads) options.threads = *request.threads;
-    const RunWatch watch(0.5);  // a generation, and what is assessed in the end, may take long
+    const RunWatch watch(0.5);  // a generation, and the assessment at the end, may take long
     const learn::StepFamily family = step_family(request.system, seed);
     const learn::TrainedStepPolicy trained = trained_policy(family, options);
     const bool stopped = trained.search.outcome == learn::EvolutionOutcome::stopped;

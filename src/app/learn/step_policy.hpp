@@ -32,12 +32,12 @@ struct TrainPolicyRequest {
 /// @throws BadInput, ModelError, std::invalid_argument or std::runtime_error.
 int train_policy(const TrainPolicyRequest& request);
 
-/// Where a training is kept that is interrupted.
-/// @throws BadInput if files cannot be what they are to be.
+/// The checkpoint of a training that is interrupted.
+/// @throws BadInput if files cannot be used in their roles.
 [[nodiscard]] std::filesystem::path checked_checkpoint(const TrainPolicyRequest& request);
 
 /// Random problems of that system, for training or held out.
-/// @throws BadInput naming the systems that have some.
+/// @throws BadInput naming the systems that have such problems.
 [[nodiscard]] learn::StepFamily step_family(const std::string& system, std::uint64_t seed);
 
 /// `train_policy` by TQC or TD3 on the source's problem of the system; prints its run there.

@@ -1,4 +1,4 @@
-// The problems on which the source trained its actors, and the actors that come along.
+// The problems on which the source trained its actors, and the actors of the library.
 #pragma once
 
 #include <string>
@@ -14,11 +14,12 @@ namespace ricochet::app {
 [[nodiscard]] learn::StepWorld source_world(const std::string& system,
                                             const learn::StepWorldOptions& options);
 
-/// The one that comes along for a system.
-/// @throws BadInput or ModelError if it is not there or something else.
+/// The actor of the library for a system.
+/// @throws BadInput or ModelError if it does not exist or is no actor.
 [[nodiscard]] Model shipped_actor(std::string_view system);
 
-/// How an actor is assessed: it takes the steps that it was trained with, until nothing moves.
+/// Options for assessing an actor: it takes the steps that it was trained with, until nothing
+/// moves.
 [[nodiscard]] learn::StepWorldOptions judged(const Model& actor);
 
 }  // namespace ricochet::app

@@ -67,7 +67,7 @@ std::string_view kind_named(const SystemEntry& system, const std::vector<Trainin
     throw unknown(fmt::format("kind of network for {}", system.name), given, known);
 }
 
-/// @throws BadInput if the checkpoint to resume is not there or of another training.
+/// @throws BadInput if the checkpoint to resume does not exist or is of another training.
 template <class Train>
 auto run_training(const Train& train, const TrainingRequest& request,
                   const learn::ProgressCallback& progress)
@@ -84,7 +84,7 @@ auto run_training(const Train& train, const TrainingRequest& request,
         if (request.resume && !started) throw BadInput(error.what());
         throw;
     } catch (const std::invalid_argument& error) {
-        // Only the samples have shown it: a training that fails, not an input that is refused.
+        // Only the samples have shown this: the training fails, the input is not refused.
         if (samples) throw std::runtime_error(error.what());
         throw;
     }
@@ -153,7 +153,7 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
 
     const learn::GateReport& report = trained.report;
     if (report.outcome == learn::TrainingOutcome::stopped) {
-        // What it misses has not been measured: no model yet.
+        // Its misses have not been measured: there is no model yet.
         if (report.iterations > 0 || training.resume) {
             say_what_is_kept(training.checkpoint, report.checkpoint_trouble);
         } else {

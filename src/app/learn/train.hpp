@@ -15,7 +15,7 @@ namespace ricochet::app {
 
 /// Request for a training. Absent values have the library's defaults.
 struct TrainingRequest {
-    std::string kind;                ///< one of the system's
+    std::string kind;                ///< one of the system's kinds
     std::vector<std::string> set{};  ///< name=value
     std::optional<double> step{};    ///< [s]
     std::optional<std::size_t> states{}, fresh_events{}, iterations{};
@@ -43,13 +43,13 @@ struct TrainRequest {
 [[nodiscard]] const std::vector<TrainingKind>& ball_kinds();
 
 /// Trains one of them.
-/// @throws BadInput for what this training does not have; as `learn::train_bouncing_ball`.
+/// @throws BadInput for options that this training does not have; as `learn::train_bouncing_ball`.
 [[nodiscard]] learn::Trained train_ball(const TrainingRequest& request,
                                         const learn::ProgressCallback& progress);
 
 /// Trains, shows progress on standard error, prints the report and writes the
 /// model. Ctrl-C stops the training and keeps the best so far; a checkpoint beside
-/// the model, or where the request says, lets it be resumed.
+/// the model, or at the requested place, lets it be resumed.
 ///
 /// @return 0 if the training ran to its end and the model was written, else 1.
 /// @throws BadInput, ModelError, std::invalid_argument or std::runtime_error.

@@ -1,4 +1,4 @@
-// `ricochet-train`: what `ricochet train` runs.
+// `ricochet-train`: the program of `ricochet train`.
 #include <fmt/format.h>
 
 #include <limits>

@@ -121,7 +121,7 @@ std::vector<std::pair<std::string, RunRequest>> ways(const SystemEntry& system,
     add("bathe, filter h211b", "bathe", "filter", step);
     add(fmt::format("backward Euler, {} s", step), "time-stepping", "", step);
     for (const double rtol : {1e-4, 3e-8, 1e-12}) {
-        // Fehlberg's error estimate is blind to rates of time alone.
+        // Fehlberg's error estimate is zero for rates that depend on time alone.
         RunRequest& request = add(fmt::format("hand-over, rtol {:.0e}", rtol), "handover", "", 0);
         request.rtol = request.atol = rtol;
         if (system.state.size() > 1) request.stepper = "fehlberg78";
@@ -205,7 +205,7 @@ int compare_set_valued(const SystemEntry& system, const CompareRequest& request)
                            row.events, row.seconds, row.l2, row.relative, row.largest);
     }
     json["methods"] = std::move(methods);
-    // They are of the defaults.
+    // They are for the defaults.
     const std::vector<std::string_view> published =
         request.set.empty() ? system.published_errors : std::vector<std::string_view>{};
     json["published"] = published;

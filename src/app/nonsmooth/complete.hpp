@@ -1,4 +1,4 @@
-// One function for each system of this directory, which fills in what its entry in systems/ lacks.
+// One function for each system of this directory, which completes its entry in systems/.
 #pragma once
 
 #include "../registry.hpp"
@@ -16,7 +16,7 @@ void complete_super_twisting(SystemEntry& entry);
 void complete_two_contact_block(SystemEntry& entry);
 void complete_woodpecker(SystemEntry& entry);
 
-/// All of them, and how they are integrated.
+/// Completes all of them, with their integrators.
 void complete_set_valued_systems();
 
 }  // namespace ricochet::app

@@ -50,7 +50,7 @@ TimedRun run(const RunSettings& settings, int repeats)
     return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
-/// From rest on the right; else none are known.
+/// Events for a start from rest on the right; others are not known.
 std::vector<double> exact_events(const std::vector<double>& p, double t_end)
 {
     const CoulombOscillator oscillator = system(p);

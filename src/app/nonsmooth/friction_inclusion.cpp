@@ -55,7 +55,7 @@ TimedRun run(const RunSettings& settings, int repeats)
     return run_friction(system(p), {p[position], p[velocity]}, settings, repeats);
 }
 
-/// From the branches of the sliding velocity, faster than the belt first.
+/// The mode for a branch of the sliding velocity, where faster than the belt is the first.
 Mode oscillator_mode(Mode branch)
 {
     constexpr std::array modes{FrictionOscillator::slip_right, FrictionOscillator::stick,

@@ -10,7 +10,7 @@ namespace ricochet::app {
                                     const FrictionInclusion::Vector& w0,
                                     const RunSettings& settings, int repeats);
 
-/// The same in the modes of `FrictionOscillator`; set-valued steps are one more.
+/// The same with the modes of `FrictionOscillator`, and one more for set-valued steps.
 [[nodiscard]] TimedRun run_oscillator(const FrictionInclusion& system,
                                       const FrictionInclusion::Vector& w0,
                                       const RunSettings& settings, int repeats);

@@ -1,4 +1,5 @@
-// From settings to the integrators of mechanical systems with contacts. Included once per system.
+// Converts settings to the integrators of mechanical systems with contacts. Included once per
+// system.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// From settings to the integrators of inclusions. Included once per system.
+// Converts settings to the integrators of inclusions. Included once per system.
 #pragma once
 
 #include <chrono>
@@ -22,7 +22,7 @@ template <class V>
 }
 
 /// Modes are those of `BranchModes`, and one for set-valued steps; without branches there is
-/// but one.
+/// only that one.
 template <class System>
 [[nodiscard]] Mode shown_mode(Mode mode)
 {
@@ -111,7 +111,7 @@ template <class Motion, class Observer>
     }
 }
 
-/// Bathe's steps, or backward Euler's; samples are straight lines between nodes.
+/// Bathe's steps, or backward Euler's; samples lie on straight lines between nodes.
 template <class System>
 [[nodiscard]] TimedRun run_by_steps(const System& system, const StateOf<System>& w0,
                                     const RunSettings& settings)

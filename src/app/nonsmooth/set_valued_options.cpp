@@ -47,7 +47,7 @@ double tolerance(std::string_view option, const std::optional<double>& given, do
 }
 
 /// Inputs of the policies of a system.
-/// @throws BadInput naming the systems that have some.
+/// @throws BadInput naming the systems that have policies.
 const StepLayout& layout_of(const SystemEntry& system)
 {
     const std::vector<std::string_view> known{SlidingMode::name, DiodeCircuit::name, "fault"};
@@ -151,7 +151,7 @@ SetValuedOptions set_valued_options(const RunSettings& settings)
         options.estimate = ErrorEstimate::embedded;
         options.scheme.first_stage = FirstStage::switch_aware;
     } else if (chosen.controller != "constant") {
-        // As the source of these rules estimates and limits.
+        // The source of these rules estimates and limits in this way.
         options.estimate = ErrorEstimate::doubling;
         options.error_order = 1;
         options.h_max = 10 * chosen.step;

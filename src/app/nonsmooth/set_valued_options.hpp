@@ -8,9 +8,9 @@
 
 namespace ricochet::app {
 
-/// `SystemEntry::choose_integrator` of a differential inclusion. False: by events alone, as any
+/// `SystemEntry::choose_integrator` of a differential inclusion. False: by events alone, like any
 /// other system.
-/// @throws BadInput for what does not fit the system or the integrator.
+/// @throws BadInput for options that do not fit the system or the integrator.
 [[nodiscard]] bool choose_set_valued(const SystemEntry& system, const RunRequest& request,
                                      RunSettings& settings);
 

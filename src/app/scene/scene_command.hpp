@@ -15,7 +15,7 @@ class App;
 
 namespace ricochet::app {
 
-/// What was typed after `simulate` or `explain`. What is absent is as the file says.
+/// The arguments of `simulate` or `explain`. Absent ones are taken from the file.
 struct SceneRequest {
     std::string file;
     std::optional<double> t_start{}, t_end{}, rtol{}, atol{}, contact_step{};
@@ -25,8 +25,8 @@ struct SceneRequest {
     std::optional<std::string> csv{}, plot{}, animate{};
 };
 
-/// The scene of the request, its options set.
-/// @throws BadInput for a file or an option that is not as it must be
+/// The requested scene, with its options set.
+/// @throws BadInput for an invalid file or option
 [[nodiscard]] SceneFile requested_scene(const SceneRequest& request);
 
 /// @return the exit status

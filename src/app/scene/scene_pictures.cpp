@@ -24,7 +24,7 @@ struct Frame {
     [[nodiscard]] double height() const { return high[1] - low[1]; }
 };
 
-/// Of a surface at the sample times; of one that stays, or without samples, one.
+/// Displacements of a surface at the sample times; a single one if it is fixed, or without samples.
 std::vector<Vector2> displacements(const Scene::Surface& surface, const SceneRun& run)
 {
     if (std::holds_alternative<Fixed>(surface.motion)) return {{}};
@@ -34,7 +34,7 @@ std::vector<Vector2> displacements(const Scene::Surface& surface, const SceneRun
     return out;
 }
 
-/// Around all that is seen of bodies and terrain, with a margin.
+/// A frame around all bodies and terrain shown, with a margin.
 Frame frame_of(const SceneFile& file, const SceneRun& run)
 {
     constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -66,7 +66,7 @@ Frame frame_of(const SceneFile& file, const SceneRun& run)
     return frame;
 }
 
-/// A surface that is displaced, as a chain of points; of a wall what the frame shows of it.
+/// A displaced surface as a chain of points; for a wall, the part inside the frame.
 std::vector<Vector2> line_of(Scene::Surface surface, const Vector2& moved, const Frame& frame)
 {
     for (Vector2& p : surface.points) p = {p[0] + moved[0], p[1] + moved[1]};
@@ -90,7 +90,7 @@ std::vector<Vector2> line_of(Scene::Surface surface, const Vector2& moved, const
             {from[0] + last * along[0], from[1] + last * along[1]}};
 }
 
-/// Where a body was struck, between the samples around that time.
+/// Places where bodies were struck, between the samples around that time.
 std::string struck(const SceneRun& run)
 {
     std::string out;
@@ -110,13 +110,13 @@ std::string struck(const SceneRun& run)
     return out;
 }
 
-/// Positions of one body in pixels, and the samples at which they cannot be told from others.
+/// Positions of one body in pixels, and the samples at which they are distinct.
 struct Track {
     std::vector<std::array<double, 2>> at;
     std::vector<std::size_t> kept;
 };
 
-/// Keeps what lies more than half a pixel from the straight motion between what is kept.
+/// Keeps samples farther than half a pixel from the straight motion between the kept ones.
 void keep_between(Track& track, const std::vector<double>& times, std::size_t first,
                   std::size_t last)
 {
@@ -148,7 +148,7 @@ bool is_still(const Track& track)
     return track.kept.size() <= 2 && track.at.front() == track.at.back();
 }
 
-/// Length and key times of what is animated, up to its values.
+/// Length and key times of an animation, up to its values.
 void key_times(fmt::memory_buffer& out, const Track& track, const std::vector<double>& times)
 {
     const auto to = std::back_inserter(out);
@@ -162,7 +162,7 @@ void key_times(fmt::memory_buffer& out, const Track& track, const std::vector<do
     fmt::format_to(to, "\" values=\"");
 }
 
-/// Of a surface that moves without turning.
+/// Animates a surface that moves without turning.
 void animate_shift(fmt::memory_buffer& out, const Track& track, const std::vector<double>& times)
 {
     const auto to = std::back_inserter(out);

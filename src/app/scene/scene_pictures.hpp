@@ -8,12 +8,12 @@
 
 namespace ricochet::app {
 
-/// Ways of the bodies, where they end, surfaces, and where bodies were struck; drawn by gnuplot.
+/// Paths and ends of the bodies, surfaces, and places of impacts; drawn by gnuplot.
 /// @throws WriteError as `plot` does
 void plot_scene(const SceneFile& file, const SceneRun& run, const std::filesystem::path& picture);
 
-/// The motion as one SVG that a browser plays again and again, in the time of the scene. Positions
-/// are kept to half a pixel, and what does not move costs nothing.
+/// The motion as one SVG that a browser plays repeatedly, in the time of the scene. Positions
+/// are accurate to half a pixel, and fixed parts cost nothing.
 [[nodiscard]] std::string animated_scene(const SceneFile& file, const SceneRun& run);
 
 }  // namespace ricochet::app

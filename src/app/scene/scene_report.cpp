@@ -1,4 +1,4 @@
-// What a run of a scene came to: as text, JSON and comma-separated values.
+// Results of a run of a scene: as text, JSON and comma-separated values.
 #include <fmt/format.h>
 
 #include <algorithm>

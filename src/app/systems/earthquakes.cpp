@@ -1,5 +1,5 @@
-// The fault and the spring-slider as the command line lists them. They are simulated by the program
-// ricochet-fault: this one takes the defaults from the headers of ricochet::faults, and does not
+// The fault and the spring-slider in the lists of the command line. The program ricochet-fault
+// simulates them: this one takes the defaults from the headers of ricochet::faults, and does not
 // link to it.
 #include <limits>
 #include <vector>
@@ -11,7 +11,7 @@ namespace ricochet::app {
 
 namespace {
 
-/// Those of rate-and-state friction, which follow the others.
+/// Parameters of rate-and-state friction, which follow the others.
 std::vector<Parameter> rate_state_parameters()
 {
     constexpr Range positive{.lower = 0};

@@ -38,7 +38,7 @@ namespace ricochet::app {
 [[nodiscard]] SystemEntry two_contact_block_entry();
 [[nodiscard]] SystemEntry spring_slider_entry();
 
-/// All of them, in the order in which they are listed.
+/// All of them, in the order of the lists.
 [[nodiscard]] inline std::vector<SystemEntry> all_entries()
 {
     return {

@@ -1,4 +1,4 @@
-// Which systems the stepper taylor takes.
+// Determines which systems the stepper taylor accepts.
 #pragma once
 
 #include "ricochet/detail/components.hpp"

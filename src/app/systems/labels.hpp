@@ -1,4 +1,4 @@
-// The names of guards and modes, as systems declare them.
+// The names of guards and modes, as declared by systems.
 #pragma once
 
 #include <initializer_list>
@@ -9,7 +9,7 @@
 
 namespace ricochet::app {
 
-/// The guards of a system by their own names, with what happens on their surfaces.
+/// The guards of a system by their own names, with the events on their surfaces.
 template <class System>
 [[nodiscard]] std::vector<GuardLabel> labels(const System& system,
                                              std::initializer_list<std::string_view> events)
@@ -30,7 +30,7 @@ template <class System>
     return out;
 }
 
-/// The same, and that of set-valued steps.
+/// The same, and the mode of set-valued steps.
 template <class System>
 [[nodiscard]] std::vector<std::string_view> mode_names_and_set_valued()
 {

@@ -106,7 +106,7 @@ TimedRun run(const RunSettings& settings, int repeats)
     return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
 }
 
-/// From rest; else none are known.
+/// Events for a start from rest; others are not known.
 std::vector<double> exact_events(const std::vector<double>& p, double t_end)
 {
     std::vector<double> times;

@@ -1,4 +1,4 @@
-// From settings to a run: every method, detector and locator for one system. Included once per
+// Converts settings to a run: every method, detector and locator for one system. Included once per
 // system.
 #pragma once
 
@@ -39,7 +39,7 @@ struct ChosenLocator {
     }
 };
 
-/// A detector as the loop takes it.
+/// A detector in the form that the loop takes.
 template <class X>
 struct ChosenDetector {
     detail::DetectorTable<X> table;
@@ -80,7 +80,7 @@ TimedRun with_gate(const RunSettings& settings, Use&& use)
 }
 
 /// Calls `use` with the detector of the settings.
-/// @throws std::logic_error for one that the system's entry does not offer.
+/// @throws std::logic_error for a detector that the system's entry does not offer.
 template <class System, class X, class Use>
 TimedRun with_detector(const RunSettings& settings, Use&& use)
 {
@@ -93,7 +93,7 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
             return use(chosen<System, X>(Verified<Extremum>(settings.network.value())));
         }
     }
-    // Lines and networks are of systems that tell their parameters.
+    // Lines and networks apply to systems that provide their parameters.
     if constexpr (CurvedGuard<System, X> && requires(const System& s) { s.parameter(""); }) {
         if (settings.detector == DetectorKind::line) {
             return use(chosen<System, X>(BallisticLine{}));
@@ -107,7 +107,7 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
     }
 }
 
-/// The same run with states of one type for all systems; without its solution, which
+/// The same run with one type of state for all systems; without its dense solution, which
 /// is not needed here.
 template <class X>
 [[nodiscard]] Run<std::vector<double>> with_plain_states(Run<X> run)
@@ -209,7 +209,7 @@ template <class Steps, class System, class X>
 /// Runs `system` from x0 `repeats` times as `integrate` does, and returns the last run.
 ///
 /// The loop takes its method, detector and locator as tables: one run is compiled for each system,
-/// whatever the settings, and one more where its flow can be a power series.
+/// for all settings, and one more if its flow can be a power series.
 template <class System, class X>
 [[nodiscard]] TimedRun run_system(const System& system, const X& x0, const RunSettings& settings,
                                   int repeats)

@@ -1,4 +1,4 @@
-// A ball, and what a page may do with it.
+// A ball, and the statements that a page may use with it.
 #include <ricochet/ricochet.hpp>
 #include <ricochet/systems/bouncing_ball.hpp>
 

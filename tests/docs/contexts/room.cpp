@@ -1,4 +1,4 @@
-// Declarations alone: a local class whose functions are defined nowhere.
+// Only declarations: a local class whose functions are defined nowhere.
 #include <array>
 #include <cmath>
 

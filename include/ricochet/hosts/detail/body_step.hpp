@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The step of a physics engine that moves a body by v(s) = v0 + s a, x(s) = x0 + s v(s).
 #pragma once

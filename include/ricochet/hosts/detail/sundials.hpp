@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // What the integrators of SUNDIALS have in common: steps taken one by one, with dense output.
 #pragma once
