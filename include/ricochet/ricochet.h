@@ -182,8 +182,8 @@ typedef struct rc_callbacks {
 } rc_callbacks;
 
 /** Makes a system; `*system` is null after a failure. The callbacks struct need not be kept.
- *  RC_INVALID: no flow, no dimension, guards without a callback, a contradiction in a guard's
- *  infos. RC_WRONG_SIZE, RC_NO_MEMORY. */
+ *  RC_INVALID: no flow, no dimension, guards without a callback. RC_WRONG_SIZE, RC_NO_MEMORY. What
+ *  guards say of themselves is checked where a run or a simulation starts. */
 RC_API rc_status rc_system_new(const rc_callbacks* callbacks, rc_system** system);
 
 /** Lets go of the system; simulations of it keep what they need. Null is allowed. */

@@ -139,6 +139,16 @@ _KNOWN = ("flow", "guard", "reset", "rest", "guard_rate", "unilateral", "directi
           "previous_time_event", "time_reset", "changes_dimension", "parameters", "formula")
 
 
+def _times(given):
+    try:
+        times = sorted(float(t) for t in given)
+    except (TypeError, ValueError):
+        raise TypeError(f"time_events: found {given!r}, expected a sequence of times") from None
+    if any(t != t for t in times):
+        raise ValueError("time_events: found nan, expected times")
+    return times
+
+
 class System:
     """A hybrid system: a subclass with the methods below, or an instance made from functions.
 
@@ -271,7 +281,7 @@ class System:
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
         following, preceding = self.next_time_event, self.previous_time_event
         if self.time_events is not None:
-            times = sorted(float(t) for t in self.time_events)
+            times = _times(self.time_events)
             if following is None:
                 def following(t, *_):
                     k = bisect_right(times, t)

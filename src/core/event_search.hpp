@@ -365,7 +365,7 @@ private:
             record.next = record.side;
             return true;
         }
-        if (watch.departs && barely_departs(probe, watch, record)) {
+        if (record.from > 0 && ends_within_rounding(probe, watch, record.slope)) {
             record.next = record.side;
             return true;
         }
@@ -384,14 +384,17 @@ private:
         return false;
     }
 
-    /// Whether a step from an event of the guard is too short to tell on which side it is: it
-    /// lasts a few units in the last place of the time, and the guard stays in the event's band.
-    [[nodiscard]] static bool barely_departs(const Probe& probe, const Watch& watch,
-                                             const GuardRecord& record)
+    /// Whether the interval after an event is so short that the rounding of time and state hides on
+    /// which side the guard is at its end.
+    [[nodiscard]] static bool ends_within_rounding(Probe& probe, const Watch& watch, double slope)
     {
-        const double t = probe.step().time(watch.end.s);
-        constexpr double ulps = 8 * std::numeric_limits<double>::epsilon();
-        return probe.step().h() <= ulps * std::fabs(t) && std::fabs(watch.end.value) <= record.band;
+        if (side_of(watch.end.value) == watch.side) return false;
+        constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
+        const double width = watch.end.s - watch.start.s;
+        const bool brief = width <= ulps * std::fabs(probe.step().time(watch.end.s));
+        if (!brief && !(std::isfinite(slope) && width <= 0x1p-20 * probe.step().h())) return false;
+        const double blur = probe.blur(watch.end.s);
+        return std::fabs(watch.end.value) <= blur && (brief || width * std::fabs(slope) <= blur);
     }
 
     /// Whether a guard that has left its side by `node` has no other event in the rest of
@@ -466,6 +469,7 @@ private:
             if (start.rate == 0) start.rate = start.value;
         }
         bank.go_on_from(i, side, start);
+        bank[i].slope = where.slope;
     }
 
     /// Adds a hit of an acting guard, and its touches before it.

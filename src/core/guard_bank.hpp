@@ -268,6 +268,7 @@ public:
         arm(i, side);
         records_[i].next = side;
         records_[i].from = start.s;
+        records_[i].slope = std::numeric_limits<double>::quiet_NaN();
         g0_[i] = start.value;
         rate0_[i] = start.rate;
     }

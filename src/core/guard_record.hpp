@@ -84,6 +84,7 @@ struct GuardRecord {
         0;  ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
     bool estimated = false;  ///< the tolerance is the error of location, not a value of the guard
     double from = 0;         ///< [s] offset in the step up to which it has been examined
+    double slope = 0;        ///< [1/s] its rate there; NaN if it is not known
     std::uint64_t events = 0;
     double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
     Side last_side = Side::plateau;                          ///< the side it left then

@@ -464,7 +464,7 @@ private:
     }
 
     /// Samples of the current step before its offset s.
-    void emit_samples(double s);
+    void emit_samples(double s, double end);
 
     /// Samples of a state that stays constant, before the time `until`.
     void emit_held_samples(double until);

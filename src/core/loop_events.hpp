@@ -25,9 +25,10 @@ bool Loop<X, single>::search(bool cleared)
     }
     if (error_controlled_ && step_.may_be_rough() && !smooth_step()) return true;
     if (!this->find(cleared)) return ended_;
-    emit_samples(search_.at());
+    const double t = on_time_ ? time_event_ : this->time_of_set();
+    emit_samples(search_.at(), t);
     record_step(search_.at());
-    limit_next_step(on_time_ ? time_event_ : this->time_of_set());
+    limit_next_step(t);
     this->cut_short();
     this->settle_all();
     return true;

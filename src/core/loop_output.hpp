@@ -6,10 +6,10 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline void Loop<X, single>::emit_samples(double s)
+inline void Loop<X, single>::emit_samples(double s, double end)
 {
     const auto& times = options_.sample_times;
-    while (next_sample_ < times.size() && lies_before(times[next_sample_], step_.time(s))) {
+    while (next_sample_ < times.size() && lies_before(times[next_sample_], end)) {
         const double offset = std::min(step_.until(times[next_sample_]), s);
         X x = step_.x0();
         if (offset > 0) step_.sample(offset, x);

@@ -107,7 +107,7 @@ inline void Loop<X, single>::reach_end()
 template <class X, bool single>
 inline void Loop<X, single>::accept()
 {
-    emit_samples(step_.h());
+    emit_samples(step_.h(), step_.time(step_.h()));
     record_step(step_.h());
     if (is_last_) {
         step_.accept_at(options_.t_end);
@@ -137,6 +137,8 @@ inline bool Loop<X, single>::take_step(double remaining)
     const bool to_the_end = h_next_ * (1 + 1e-6) >= longest;
     is_last_ = to_the_end && longest == remaining;
     const double h = to_the_end ? longest : h_next_;
+    step_.pin(to_the_end ? h : std::numeric_limits<double>::quiet_NaN(),
+              is_last_ ? options_.t_end : time_event_);
     return error_controlled_ ? take_controlled_step(h, h_next_) : take_fixed_step(h);
 }
 

@@ -52,8 +52,11 @@ public:
 
     [[nodiscard]] const StepState<X>& state() const noexcept { return state_; }
     /// State of the step for a quiet run, which starts from here and leaves its current step here.
-    [[nodiscard]] StepState<X>& lend() noexcept { return state_; }
-    [[nodiscard]] double time(double s) const noexcept { return state_.time(s); }
+    [[nodiscard]] StepState<X>& lend() noexcept { return unpin(), state_; }
+    [[nodiscard]] double time(double s) const noexcept
+    {
+        return s == pinned_h_ ? pinned_t_ : state_.time(s);
+    }
     [[nodiscard]] const Instant& start() const noexcept { return state_.start; }
     [[nodiscard]] Mode mode() const noexcept { return state_.mode; }
     [[nodiscard]] bool backward() const noexcept { return state_.backward; }
@@ -61,6 +64,8 @@ public:
     /// The time at offset s + `remainder`.
     [[nodiscard]] Instant instant(double s, double remainder) const noexcept
     {
+        if (s == pinned_h_)
+            return Instant{pinned_t_, 0}.after(state_.in_time(std::min(remainder, 0.0)));
         const Instant at = state_.start.after(state_.in_time(s));
         return remainder == 0 ? at : at.after(state_.in_time(remainder));
     }
@@ -79,6 +84,13 @@ public:
     {
         const double ahead = state_.start.until(t);
         return state_.backward ? -ahead : ahead;
+    }
+    /// Declares that the step of length h from here ends at t, whatever time its sum rounds to: a
+    /// guard that is zero at t is zero at its end. NaN: no step does.
+    void pin(double h, double t) noexcept
+    {
+        pinned_h_ = h;
+        pinned_t_ = t;
     }
     [[nodiscard]] double h() const noexcept { return state_.h; }
     [[nodiscard]] const X& x0() const noexcept { return state_.x0; }
@@ -479,8 +491,11 @@ private:
         for_components([&](auto i) { dxdt[i] = (dxdt[i] - at[i]) / (to - from); });
     }
 
+    void unpin() noexcept { pinned_h_ = std::numeric_limits<double>::quiet_NaN(); }
+
     void begin(const X& x, Mode mode)
     {
+        unpin();
         state_.mode = mode;
         if (x.size() != state_.x0.size()) resize(x);
         assign(state_.x0, x);
@@ -579,6 +594,7 @@ private:
     mutable X defect_{};  ///< error of a host's interpolant at the start
     mutable bool aligned_ = false;
     mutable double straight_ = 0;  ///< [s] length of the straight part at the start
+    double pinned_h_ = std::numeric_limits<double>::quiet_NaN(), pinned_t_ = 0;  ///< [s] see `pin`
 };
 
 }  // namespace ricochet::detail

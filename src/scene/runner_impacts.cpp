@@ -359,7 +359,8 @@ void Runner::resolve_cluster(std::uint32_t i)
     fruitless_ = 0;
     ++result_.event_count;
     if (result_.event_count >= world_.options.max_events) {
-        fail(Outcome::step_limit, {}, "max_events events have happened");
+        fail(Outcome::step_limit, {},
+             fmt::format("max_events = {} events have happened", world_.options.max_events));
     }
 }
 

@@ -134,7 +134,7 @@ SurfaceId Scene::wall(const Wall& wall)
 {
     require_vector(wall.point, "point of a wall");
     require_vector(wall.normal, "normal of a wall");
-    const double length = norm(wall.normal);
+    const double length = std::hypot(wall.normal[0], wall.normal[1]);  // squares may overflow
     if (!(length > 0) || !std::isfinite(length)) refuse("the normal of a wall has no length");
     require_material(wall.material, "a wall");
     check_motion(wall.motion, wall.name.empty() ? "a wall" : wall.name);

@@ -194,7 +194,10 @@ SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const 
         const auto nth = static_cast<std::ptrdiff_t>(options.max_events - 1);
         std::ranges::nth_element(times, times.begin() + nth);
         const double end = times[static_cast<std::size_t>(nth)];
-        failure = {Outcome::step_limit, {end, 0}, {}, "max_events events have happened"};
+        failure = {Outcome::step_limit,
+                   {end, 0},
+                   {},
+                   fmt::format("max_events = {} events have happened", options.max_events)};
         Failure later;
         run = run_until(scene, options, tuning, end, &later);
     }

@@ -17,6 +17,7 @@
 #include "ricochet/hybrid/filippov.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/locators.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::events_hard_test {
 namespace {
@@ -780,8 +781,8 @@ struct ResetAtRoots : RootAtAnEnd {
 
 TEST(HardEvents, ARootNextToTheEndOfAStepIsResetOnce)
 {
-    // From the event to the end of the step is one unit in the last place of the time; there the
-    // guard lies on the other side by less than at the event.
+    // From the root to the end of the step is a unit in the last place of the state, in which the
+    // guard is zero by rounding.
     int runs = 0;
     for (const double off : {0.0, 1.0, 10.0, 100.0, 1e4}) {
         for (int i = 1; i <= 8; ++i) {
@@ -797,6 +798,52 @@ TEST(HardEvents, ARootNextToTheEndOfAStepIsResetOnce)
         }
     }
     EXPECT_EQ(runs, 240);
+}
+
+/// A clock beside a motion that makes its steps irregular.
+struct Alarm {
+    using State = X1;
+    double at = 0;
+    void flow(double t, const X1&, X1& dxdt) const { dxdt[0] = std::cos(t); }
+    [[nodiscard]] double guard(double t, const X1&) const { return t - at; }
+    [[nodiscard]] GuardInfo guard_info() const { return {.crossing = Crossing::either}; }
+};
+
+TEST(HardEvents, AGuardThatIsZeroAtTheEndOfTheRunHasItsEventThere)
+{
+    // The end of the last step rounds to t_end, or the guard is a unit in the last place short.
+    for (int k = 1; k <= 2000; ++k) {
+        const double end = 0.001 * k;
+        const auto run = integrate(Alarm{end}, X1{0}, {.t_end = end});
+        ASSERT_EQ(run.events.size(), 1U) << k;
+        // The guard is zero at two neighbouring times where the sum of a step rounds to the other.
+        EXPECT_NEAR(run.events[0].t, end, std::numeric_limits<double>::epsilon() * end) << k;
+        EXPECT_EQ(run.t, end);
+        const auto early = integrate(Alarm{-end}, X1{0}, {.t_start = -2.5, .t_end = -end});
+        ASSERT_EQ(early.events.size(), 1U) << k;
+        const auto back = integrate(Alarm{-end}, X1{0}, {.t_end = -end});
+        ASSERT_EQ(back.events.size(), 1U) << k;
+    }
+}
+
+TEST(HardEvents, ASampleAtTheTimeOfAnEventShowsTheStateAfterIt)
+{
+    std::size_t samples = 0;
+    for (int k = 0; k < 200; ++k) {
+        const X start{0.5 + 0.0125 * k, 0};
+        Options options{.t_end = 2, .rtol = 1e-9, .atol = 1e-9};
+        const auto run = integrate(BouncingBall(), start, options);
+        for (const auto& event : run.events) options.sample_times.push_back(event.t);
+        const auto sampled = integrate(BouncingBall(), start, options);
+        ASSERT_EQ(sampled.trajectory.x.size(), run.events.size());
+        for (std::size_t i = 0; i < run.events.size(); ++i) {
+            // The event is within a unit in the last place of 2 s, in which the ball falls 2e-15 m.
+            EXPECT_NEAR(sampled.trajectory.x[i][0], run.events[i].after[0], 4e-15) << k;
+            EXPECT_NEAR(sampled.trajectory.x[i][1], run.events[i].after[1], 4e-15) << k;
+            ++samples;
+        }
+    }
+    EXPECT_GT(samples, 300U);
 }
 
 }  // namespace

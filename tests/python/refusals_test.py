@@ -22,6 +22,22 @@ def fall(t, y):
 
 # --- arguments ---
 
+@pytest.mark.parametrize("times, error", [
+    (1.0, TypeError), (["a"], TypeError), ([1.0, math.nan], ValueError), ([math.nan], ValueError)])
+def test_time_events_that_are_none(times, error):
+    with pytest.raises(error, match="time_events"):
+        ricochet.integrate(ricochet.System(decay, time_events=times), [1.0], 2.0)
+
+
+def test_a_solution_at_no_time():
+    solution = ricochet.solve_ivp(decay, (0, 1), [1.0], dense_output=True).sol
+    with pytest.raises(ValueError, match="nan"):
+        solution(math.nan)
+    with pytest.raises(ValueError, match="nan"):
+        solution([0.5, math.nan])
+
+
+
 @pytest.mark.parametrize("y0, error", [
     ([], ValueError), ([[1.0, 2.0]], ValueError), (1.0, ValueError), ([1j], ValueError),
     (["a"], (TypeError, ValueError)), ([None], (TypeError, ValueError)), ([math.nan], ValueError),

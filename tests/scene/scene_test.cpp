@@ -145,6 +145,7 @@ TEST(Scene, WrongValuesAreRefusedInOneSentence)
                   scene.wall({.normal = {0, 0}});
               }),
               "Scene: the normal of a wall has no length");
+    for (const double size : {1e-300, 1e300}) EXPECT_NO_THROW(scene.wall({.normal = {0, size}}));
     scene.disc({.name = "b", .at = {1.5, 5}});
     EXPECT_EQ(refusal([&] { static_cast<void>(simulate(scene, {.t_end = 1})); }),
               "Scene: a and b overlap by 0.5 at the start");

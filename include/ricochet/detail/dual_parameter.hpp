@@ -84,6 +84,20 @@ concept IsComplete = requires
     sizeof(S);
 };
 
+/// The derivative of the flow as a power series, of scalar R.
+template <class X, class R, class Make>
+[[nodiscard]] auto series_by_duals(const Make& make, double nominal)
+{
+    return [make, nominal](Mode mode, const R& t, const R* x, std::size_t n, R* df) {
+        using Series = Dual<1, R>;
+        const auto system = make(Series(R(nominal), {R(1.0)}));
+        const auto state = still_state<X, Series>(x, n);
+        auto rate = state;
+        flow_of_scalar(system, mode, Series(t, {R(0.0)}), state, rate);
+        for (std::size_t i = 0; i < n; ++i) df[i] = rate[i].slope[0];
+    };
+}
+
 /// @param make  builds the system with a parameter of any scalar
 template <class System, class X, class Make>
 [[nodiscard]] ParameterDerivatives derivatives_by_duals(const Make& make, double nominal)
@@ -103,15 +117,7 @@ template <class System, class X, class Make>
         };
     }
     if constexpr (FlowAt<Made, D, States> && IsComplete<Recorded, Make>) {
-        exact.flow_series = [make, nominal](Mode mode, const Recorded& t, const Recorded* x,
-                                            std::size_t n, Recorded* df) {
-            using Series = Dual<1, Recorded>;
-            const auto system = make(Series(Recorded(nominal), {Recorded(1.0)}));
-            const auto state = still_state<X, Series>(x, n);
-            auto rate = state;
-            flow_of_scalar(system, mode, Series(t, {Recorded(0.0)}), state, rate);
-            for (std::size_t i = 0; i < n; ++i) df[i] = rate[i].slope[0];
-        };
+        exact.flow_series = series_by_duals<X, Recorded>(make, nominal);
     }
     if constexpr (GuardAt<Made, D, States>) {
         exact.guard = [make, nominal](std::size_t which, Mode mode, double t,

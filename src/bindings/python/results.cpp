@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <map>
@@ -169,6 +170,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
 py::array PySolution::at(const py::object& t, bool before) const
 {
     const auto evaluate = [&](double time) {
+        if (std::isnan(time)) throw py::value_error("t: found nan, expected numbers");
         return before ? solution->before(time) : (*solution)(time);
     };
     const py::array_t<double, py::array::c_style | py::array::forcecast> times(t);
