@@ -274,7 +274,7 @@ def _sample_times(t_eval, t0, t1):
         raise ValueError(f"t_eval: found {outside[0]}, expected times within t_span, {t0} to {t1}")
     steps = np.diff(times)
     if np.any(steps <= 0 if t1 > t0 else steps >= 0):
-        raise ValueError("t_eval: found times out of order, expected them as the run meets them")
+        raise ValueError("t_eval: found times out of order or repeated, expected them as the run meets them")
     return times
 
 

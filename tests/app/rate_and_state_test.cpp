@@ -60,7 +60,6 @@ TEST_F(App, RefusesWhatTheSpringSliderIsNot)
     refused({"--step", "0"}, {"--step must be positive, got 0"});
     refused({"--t-end", "-1"}, {"--t-end must be positive, got -1"});
     refused({"--detector", "ends"}, {"--detector is not for the spring-slider"});
-    expect_refused({"compare", "rate-and-state", "--set", "a=1"}, {"no parameters to set"});
 }
 
 }  // namespace

@@ -343,6 +343,9 @@ TEST_F(Robust, ComparisonsKeepTheMethodsThatWereRun)
 
 TEST_F(Robust, CompareStepControlShowsHowFarItIs)
 {
+    if (!fs::exists(fs::path(RICOCHET_APP).parent_path() / "ricochet-studies")) {
+        GTEST_SKIP() << "ricochet-studies is not built";
+    }
     // Minutes of work, of which the first lines of progress are enough. They begin after two
     // seconds, and there are few of them unless a terminal shows them.
     const Result shown = interrupted({"compare", "step-control", "--system", "fault", "--set",
