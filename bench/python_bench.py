@@ -23,15 +23,16 @@ import ricochet
 
 
 def least_time(run, repeats=5):
-    run()
-    best = math.inf
-    for _ in range(repeats):
-        count, start = 0, time.process_time()
-        while (took := time.process_time() - start) < 0.05:
+    def seconds(count):  # of so many runs: the clock takes as long as a short one
+        start = time.process_time()
+        for _ in range(count):
             run()
-            count += 1
-        best = min(best, took / count)
-    return 1e6 * best
+        return time.process_time() - start
+
+    count = 1
+    while seconds(count) < 0.02:
+        count *= 2
+    return 1e6 * min(seconds(count) for _ in range(repeats)) / count
 
 
 def by_scipy(fun, event, reset, t_end, y0, **options):
