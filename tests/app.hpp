@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "ricochet/systems/bouncing_ball.hpp"
@@ -40,6 +42,23 @@ struct Result {
     std::string out;
     std::string err;
 };
+
+/// Waits until the process has a handler of its own for the signal, which it installs when its
+/// work begins; then for `work`, so that there is a result to keep.
+inline void wait_for_handler(pid_t child, int signal, std::chrono::milliseconds work)
+{
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (std::chrono::steady_clock::now() < deadline) {
+        const std::string status = content("/proc/" + std::to_string(child) + "/status");
+        const std::size_t at = status.find("SigCgt:");
+        if (at != std::string::npos &&
+            (std::stoull(status.substr(at + 7), nullptr, 16) >> (signal - 1) & 1) != 0) {
+            break;
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    std::this_thread::sleep_for(work);
+}
 
 /// Each test has a directory of its own, in which the program runs.
 class App : public testing::Test {
@@ -95,6 +114,18 @@ protected:
         return {.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1,
                 .out = content(root_ / "out"),
                 .err = content(root_ / "err")};
+    }
+
+    using Milliseconds = std::chrono::milliseconds;
+
+    /// A run that gets the signal some time after its work has begun.
+    [[nodiscard]] Result interrupted(const Words& words, int signal,
+                                     Milliseconds after = Milliseconds(300)) const
+    {
+        const pid_t child = start(words);
+        wait_for_handler(child, signal, after);
+        kill(child, signal);
+        return wait_for(child);
     }
 
     [[nodiscard]] Result run(const Words& words, const Words& environment = {}) const

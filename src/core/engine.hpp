@@ -291,7 +291,7 @@ protected:
 
     [[nodiscard]] bool fits_dimension(const X& before, const X& after, bool same_mode) const
     {
-        return system_.fits_dimension(before, after, same_mode);
+        return after.size() > 0 && system_.fits_dimension(before, after, same_mode);
     }
 
     // --- settling ---

@@ -67,8 +67,7 @@ inline bool EventEngine<X, single>::goes_on()
         end(Outcome::conflicting_resets, resets_.conflict().first);
     } else if (modes > 0 && resets_.mode() >= modes) {
         end(Outcome::unknown_mode, first_fired());
-    } else if (resets_.after().size() == 0 ||
-               !fits_dimension(search_.before(), resets_.after(), resets_.mode() == step_.mode())) {
+    } else if (!fits_dimension(search_.before(), resets_.after(), resets_.mode() == step_.mode())) {
         end(Outcome::wrong_dimension, first_fired());
     } else if (!all_finite(resets_.after())) {
         end(Outcome::non_finite, first_fired());

@@ -103,7 +103,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
             .error = error});
     const std::size_t modes = system_.modes();
     if (modes > 0 && mode_after >= modes) return end(Outcome::unknown_mode, i);
-    if (after.size() == 0 || !fits_dimension(before, after, mode_after == mode)) {
+    if (!fits_dimension(before, after, mode_after == mode)) {
         return end(Outcome::wrong_dimension, i);
     }
     if (!all_finite(after)) {

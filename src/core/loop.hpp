@@ -463,7 +463,7 @@ private:
         return backward_ ? t > end : t < end;
     }
 
-    /// Samples of the current step before its offset s.
+    /// Samples of the current step before the time `end` of its offset s, as events record it.
     void emit_samples(double s, double end);
 
     /// Samples of a state that stays constant, before the time `until`.

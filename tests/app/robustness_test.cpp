@@ -33,36 +33,8 @@ private:
     rlimit before_{};
 };
 
-/// Waits until the process has a handler of its own for the signal, which it installs when its
-/// work begins; then for `work`, so that there is a result to keep.
-void wait_for_handler(pid_t child, int signal, std::chrono::milliseconds work)
-{
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (std::chrono::steady_clock::now() < deadline) {
-        const std::string status = content("/proc/" + std::to_string(child) + "/status");
-        const std::size_t at = status.find("SigCgt:");
-        if (at != std::string::npos &&
-            (std::stoull(status.substr(at + 7), nullptr, 16) >> (signal - 1) & 1) != 0) {
-            break;
-        }
-        std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
-    std::this_thread::sleep_for(work);
-}
-
 class Robust : public App {
 protected:
-    using Milliseconds = std::chrono::milliseconds;
-
-    [[nodiscard]] Result interrupted(const Words& words, int signal,
-                                     Milliseconds after = Milliseconds(300)) const
-    {
-        const pid_t child = start(words);
-        wait_for_handler(child, signal, after);
-        kill(child, signal);
-        return wait_for(child);
-    }
-
     /// A run that a signal ends prints valid JSON that says so.
     void expect_kept(const Words& words, int signal, const std::string& cause,
                      Milliseconds after = Milliseconds(300)) const
@@ -339,22 +311,6 @@ TEST_F(Robust, ComparisonsKeepTheMethodsThatWereRun)
                 soon);
     EXPECT_TRUE(content(work() / "a.csv").ends_with("\n# incomplete: interrupted\n"));
     expect_kept({"compare", "stick-slip", "--json"}, SIGTERM, "asked to terminate", soon);
-}
-
-TEST_F(Robust, CompareStepControlShowsHowFarItIs)
-{
-    if (!fs::exists(fs::path(RICOCHET_APP).parent_path() / "ricochet-studies")) {
-        GTEST_SKIP() << "ricochet-studies is not built";
-    }
-    // Minutes of work, of which the first lines of progress are enough. They begin after two
-    // seconds, and there are few of them unless a terminal shows them.
-    const Result shown = interrupted({"compare", "step-control", "--system", "fault", "--set",
-                                      "elements=7", "friction_drop=0.4", "residual_friction=0.3"},
-                                     SIGINT, std::chrono::seconds(5));
-    EXPECT_EQ(shown.status, 130) << shown.err;
-    EXPECT_NE(shown.err.find("ricochet: fault: "), std::string::npos) << shown.err;
-    EXPECT_NE(shown.err.find(" %, "), std::string::npos) << shown.err;
-    EXPECT_LT(std::count(shown.err.begin(), shown.err.end(), '\n'), 60) << shown.err;
 }
 
 TEST_F(Robust, EventsAreKeptWhenMemoryRunsShort)

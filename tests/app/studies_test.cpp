@@ -3,6 +3,7 @@
 #include "app.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <string>
 
 namespace ricochet::studies_test {
@@ -99,6 +100,19 @@ TEST_F(App, CompareStepControlShowsWhereAPolicyWasNotTrained)
         EXPECT_NE(shown.out.find("use          trained on"), std::string::npos) << shown.out;
         EXPECT_NE(shown.out.find("Take "), std::string::npos) << shown.out;
     }
+}
+
+TEST_F(App, CompareStepControlShowsHowFarItIs)
+{
+    // Minutes of work, of which the first lines of progress are enough. They begin after two
+    // seconds, and there are few of them unless a terminal shows them.
+    const Result shown = interrupted({"compare", "step-control", "--system", "fault", "--set",
+                                      "elements=7", "friction_drop=0.4", "residual_friction=0.3"},
+                                     SIGINT, std::chrono::seconds(5));
+    EXPECT_EQ(shown.status, 130) << shown.err;
+    EXPECT_NE(shown.err.find("ricochet: fault: "), std::string::npos) << shown.err;
+    EXPECT_NE(shown.err.find(" %, "), std::string::npos) << shown.err;
+    EXPECT_LT(std::count(shown.err.begin(), shown.err.end(), '\n'), 60) << shown.err;
 }
 
 TEST_F(App, ComparesRefuseWhatTheyDoNotTake)
