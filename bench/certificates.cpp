@@ -1,10 +1,12 @@
-// What certificates cost, and how much they clear: a ball in a cavern, a planar arm of two,
-// three and four joints among few obstacles, and a smallest eigenvalue under four loads.
+// Cost of certificates, and the fraction of states that they clear: a ball in a cavern, a planar
+// arm of two, three and four joints among few obstacles, and a smallest eigenvalue under four
+// loads.
 //
-// Networks are trained here, on the distance, unless DIR holds them. For each scene: shape, boxes
-// and seconds (wall and processor) of the proof, the estimate that was made before it, the share
-// of the states beyond a tenth of the scene's scale that are cleared, and the lowest logit in a
-// million adversarially searched states within the margin, which must not be below the threshold.
+// Networks are trained here, on the distance, unless DIR holds them. For each scene the program
+// prints the shape, the boxes and seconds (wall and processor) of the proof, the estimate that was
+// made before it, the fraction of the states beyond a tenth of the scene's scale that are cleared,
+// and the lowest logit among a million adversarially searched states within the margin, which must
+// not be below the threshold.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -38,7 +40,7 @@ using learn::Random;
 struct Scene {
     std::string name;
     std::size_t dimension;   ///< components that the guard depends on
-    std::size_t components;  ///< of the state
+    std::size_t components;  ///< number of components of the state
     std::vector<Interval> domain;
     double margin;
     double far;  ///< a tenth of the scene's scale
@@ -91,7 +93,7 @@ Scene arm()
                                 std::copy_n(x, 2 * N, state.begin());
                                 return system->guard(0, state);
                             },
-                        // A joint that turns by dq moves what is beyond it by at most its reach dq.
+                        // Turning a joint by dq moves the part beyond it by at most its reach dq.
                         .slack =
                             [link](const double* h) {
                                 double sum = 1e-12;
@@ -102,7 +104,7 @@ Scene arm()
                             }}};
 }
 
-/// The guard's least value over a box is that of the corners, from a table.
+/// The scene of the smallest eigenvalue. Its bound over a box comes from a table at the corners.
 Scene eigenvalue()
 {
     const auto system =
@@ -186,7 +188,7 @@ private:
         return s;
     }
 
-    /// Mostly states about which there is something to learn.
+    /// Draws a state, mostly where the network still has something to learn.
     State near()
     {
         for (;;) {
@@ -195,7 +197,7 @@ private:
         }
     }
 
-    /// Of states within the margin, those with the lowest logits.
+    /// Finds the states within the margin that have the lowest logits.
     void find_hard()
     {
         constexpr std::size_t drawn = 20'000;
@@ -274,7 +276,7 @@ double cleared_share(const Scene& scene, const Model& model)
 
 struct Proof {
     bool holds = false;  ///< proved, and no searched state contradicts it
-    double seconds = 0;  ///< of wall time, all of it
+    double seconds = 0;  ///< [s] total wall time
     double boxes = 0;    ///< examined, over the estimate made before
     double share = 0;    ///< of the states beyond `far` that are cleared
 };

@@ -1,4 +1,4 @@
-// What certificates of networks cost, and how much they clear.
+// Cost of certificates of networks, and the fraction of states that they clear.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,16 @@
 namespace ricochet::bench {
 
 /// The network of a scene, "cavern" for example, trained and proved here at the levels of
-/// `options`, whose margin is that of the scene. `iterations` of the training; 0: the scene's.
-/// @throws std::invalid_argument for a scene that there is not, std::runtime_error for a proof that
-/// does not succeed.
+/// `options`, whose margin is that of the scene. `iterations` of the training; 0: the default of
+/// the scene.
+/// @throws std::invalid_argument for an unknown scene, std::runtime_error if the proof fails.
 [[nodiscard]] Model certified_network(std::string_view scene, std::size_t iterations,
                                       learn::CertifyOptions options);
 
-/// Trains a network for each scene, or the one called `only`, unless the directory `models` holds
-/// it, proves it and prints what came of it. Whether all was proved and clears 80 % of the states
-/// beyond a tenth of the scene's scale. `iterations` of the training; 0: the scene's.
+/// Trains a network for each scene, or for the one called `only`, unless the directory `models` has
+/// it; proves it and prints the results. Returns whether everything was proved and clears 80 % of
+/// the states beyond a tenth of the scene's scale. `iterations` of the training; 0: the default of
+/// the scene.
 [[nodiscard]] bool certify_scenes(const std::string& only, const std::string& models,
                                   std::size_t iterations, const learn::CertifyOptions& options);
 

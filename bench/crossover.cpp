@@ -1,17 +1,17 @@
-// Which way to look at a guard is fastest, by what the guard costs, how often it fires and on how
-// many components it depends.
+// Which way of checking a guard is fastest, depending on the cost of the guard, how often it fires
+// and the number of components that it depends on.
 //
-// Scenes whose guards are made dearer. Every way runs the same steps; the processor time of a run
-// is measured with the guard as it is, and what dearer guards add is their number of calls times
-// their price.
+// The guards of several scenes are made more expensive. All detectors run the same steps. The
+// processor time of a run is measured with the guard as it is; a more expensive guard adds its
+// number of calls times the additional price.
 //
-//     every step  a look at every step
+//     every step  a check at every step
 //     planned     bounds, and lower bounds where there is a table
-//     every k     a look at every k-th step, with a way back; may miss
-//     network     a gate for a guard of which only the sign is known; may miss
+//     every k     a check at every k-th step, with rollback; may miss events
+//     network     a gate for a guard of which only the sign is known; may miss events
 //
-// With --plot FILE.svg a map of who wins is written, with --gnuplot FILE a script that draws the
-// planner's gain. --networks also trains gates, for some minutes.
+// With --plot FILE.svg a map of the fastest detectors is written, with --gnuplot FILE a script that
+// draws the planner's gain. --networks also trains gates, which takes some minutes.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -73,7 +73,7 @@ void print(const std::vector<Regime>& regimes)
     }
 }
 
-/// Gain of the planner over a look at every step, over price and rate of events.
+/// Gain of the planner over a check at every step, by price and rate of events.
 void write_plot(const std::string& file, const std::vector<Regime>& regimes)
 {
     std::ofstream out(file);

@@ -1,4 +1,4 @@
-// Ways to look at a guard, and what they cost by the price of the guard.
+// Ways of checking a guard, and their cost as a function of the price of the guard.
 #pragma once
 
 #include <cstddef>
@@ -15,19 +15,19 @@ namespace ricochet::bench {
 struct Way {
     std::string name;
     double time = 0;   ///< [s] a step, with the guard as it is
-    double calls = 0;  ///< exact, a step
+    double calls = 0;  ///< exact calls per step
     std::size_t events = 0;
-    bool same = true;  ///< the events of a look at every step
+    bool same = true;  ///< same events as with a check at every step
 
-    /// [s] a step where the guard is dearer by `price` [s].
+    /// [s] per step with a guard that is more expensive by `price` [s].
     [[nodiscard]] double cost(double price) const { return time + calls * price; }
 };
 
-/// A scene at one rate of events; the first way is a look at every step.
+/// A scene at one rate of events; the first way is a check at every step.
 struct Regime {
     std::string name;
     std::size_t dimension = 0;  ///< components that the guard depends on
-    bool opaque = false;        ///< nothing is known of the guard but its sign
+    bool opaque = false;        ///< only the sign of the guard is known
     double rate = 0;            ///< events per 1000 steps
     std::vector<Way> ways{};
 };
@@ -48,7 +48,7 @@ template <class System, class Detector>
             .same = hash == 0 || hash_of(run) == hash};
 }
 
-/// A look at every step and at every k-th; whoever calls adds what is smarter.
+/// A check at every step and at every k-th; the caller adds other detectors.
 template <class System>
 [[nodiscard]] Regime plain_regime(std::string name, std::size_t dimension, const System& system,
                                   const Options& options, std::uint64_t& hash)
@@ -74,7 +74,7 @@ template <class System>
 /// The same scenes behind black boxes, and gates that are trained here on their runs.
 [[nodiscard]] std::vector<Regime> opaque_regimes();
 
-/// Who wins, as a map of price and rate for every dimension.
+/// Writes a map of the fastest way by price and rate for every dimension.
 /// @throws std::runtime_error if the file cannot be written.
 void write_map(const std::string& file, const std::vector<Regime>& regimes,
                const std::vector<double>& prices);

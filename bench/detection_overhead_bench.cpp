@@ -114,7 +114,7 @@ void controlled(benchmark::State& state, const System& system, const Array& x0, 
     per_step(state, system, x0, options, ErrorControlled<Dopri5>{}, detector);
 }
 
-/// Times a run through a scene with a dear guard.
+/// Times a run through a scene with an expensive guard.
 template <class System, class Detector>
 void scene(benchmark::State& state, const System& system, const Detector& detector)
 {
@@ -136,7 +136,7 @@ void scene(benchmark::State& state, const System& system, const Detector& detect
         Counter(steps, Counter::kIsIterationInvariantRate | Counter::kInvert);
 }
 
-/// Every step, planned, and every tenth.
+/// Registers three detectors: every step, planned, and every tenth step.
 template <class System>
 void register_scene(const std::string& name, const System& system)
 {

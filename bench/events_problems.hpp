@@ -1,5 +1,4 @@
-// Problems of events: impacts of a forced oscillator, and systems of which the cost of
-// their guards is of interest.
+// Event problems: impacts of a forced oscillator, and systems for measuring the cost of guards.
 #pragma once
 
 #include <array>
@@ -14,8 +13,8 @@
 
 namespace ricochet::bench {
 
-/// The oscillator x'' + 0.1 x' + x = cos w t from rest, with a wall on one side of which
-/// the restitution is 0.8, over so many periods of the force.
+/// The oscillator x'' + 0.1 x' + x = cos w t from rest, with a wall on one side with restitution
+/// 0.8, over the given number of periods of the force.
 [[nodiscard]] inline Problem<ImpactOscillator, ImpactOscillator::State> impacts(double frequency,
                                                                                 double wall,
                                                                                 int periods)
@@ -113,7 +112,7 @@ private:
     std::vector<double> squares_;  ///< w_i² [1/s²]
 };
 
-/// The first of them alone, with one guard.
+/// A single one of these oscillators, with one guard.
 struct Oscillator {
     using State = std::array<double, 2>;
 

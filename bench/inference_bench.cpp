@@ -1,4 +1,4 @@
-// What one evaluation of a small network costs.
+// Cost of one evaluation of a small network.
 //
 //     infer/<hidden layers>/<type>/<activation>/<kernel>
 //

@@ -1,8 +1,8 @@
-// What it costs to locate an event: one flight of the ball that ends at its first
-// impact, taken in one step, with and without location.
+// Cost of locating an event: one flight of the ball that ends at its first impact, taken in one
+// step, with and without location.
 //
-// A run of one step without an event is timed beside it; the difference is the
-// location, the reset left out since the run stops there.
+// A run of one step without an event is timed as well; the difference is the cost of location,
+// without the reset, since the run stops there.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // Mesh against mesh: the trees of this library, checked against brute force and, where FCL is
 // found (Debian: libfcl-dev), against that library, and timed beside it.
 //
-// The cave and the body are those of `CaveBody`, the poses those of a run of it: drawn at random
-// (each a new question), and step by step (where the last answer is a hint).
+// The cave and the body are those of `CaveBody`. The poses come from one of its runs: far apart in
+// time (each a new query), and step by step (where the last result is a hint).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -48,7 +48,7 @@ std::vector<CaveBody::State> states_of(const CaveBody& body, std::size_t count)
     return integrate(body, body.start(), options, FixedStep<Rk4>{}, Planned{}).trajectory.x;
 }
 
-/// Median time of a question [s].
+/// Median time of a query [s].
 double time_of(const std::vector<Pose>& poses, const std::function<double(const Pose&)>& ask)
 {
     double sink = 0;

@@ -37,12 +37,12 @@ namespace ricochet::bench {
 inline constexpr double operations_per_round = 12 * 8 * 2;
 
 #if defined(__FMA__)
-/// `rounds` times 12 independent chains of 256-bit multiply-adds: what a core of
-/// x86-64-v3 can do at most.
+/// `rounds` times 12 independent chains of 256-bit multiply-adds: the peak performance of a core of
+/// x86-64-v3.
 [[gnu::always_inline]] inline void multiply_add_rounds(std::size_t rounds)
 {
     typedef float Lanes __attribute__((vector_size(32)));
-    // The assembler is told the operation, so that 12 registers are 12 registers.
+    // The operation is written in assembler, so that the 12 sums stay in 12 registers.
     Lanes a0{}, a1{}, a2{}, a3{}, a4{}, a5{}, a6{}, a7{}, a8{}, a9{}, a10{}, a11{};
     const Lanes b = 0.5F - Lanes{};
     for (std::size_t i = 0; i < rounds; ++i) {

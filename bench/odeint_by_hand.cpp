@@ -1,9 +1,8 @@
-// Two traps are avoided. The first-same-as-last steppers keep the last derivative,
-// which an impact makes stale: the stepper is started anew. And the stepper that
-// advances is never used to probe inside its own step. On a parabola the error is
-// nothing but rounding and the step grows without bound, so it is held to what is
-// left of the run. After an impact the guard is zero, which a root finder would take for
-// its root: TOMS 748 starts a thousandth of the step later.
+// Two pitfalls are avoided. The first-same-as-last steppers keep the last derivative, which an
+// impact makes invalid: the stepper is restarted. And the stepper that advances is never used to
+// probe inside its own step. On a parabola the only error is rounding and the step would grow
+// without bound, so it is limited to the remaining time. After an impact the guard is zero, which a
+// root finder would take for its root: TOMS 748 starts a thousandth of the step later.
 #include "odeint_by_hand.hpp"
 
 #include <algorithm>

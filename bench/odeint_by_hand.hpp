@@ -14,7 +14,7 @@
 
 namespace ricochet::bench {
 
-/// What a run by hand returns; the counts are the user's own.
+/// Result of a run by hand; the counts are made by the user's code.
 struct ByHand {
     std::vector<double> times;  ///< [s]
     std::size_t steps = 0;

@@ -66,9 +66,9 @@ using BallProblem = Problem<BouncingBall, std::array<double, 2>>;
         .events = {0.4515236409857308, 1.264266194760045, 1.995734493156927, 2.654055961714119}};
 }
 
-/// A spiral that winds outwards to a limit cycle, and is thrown back inside: smooth,
-/// nonlinear, and solved in closed form from event to event. Rounding aside, all
-/// error is that of the method.
+/// A spiral that winds outwards to a limit cycle, with a reset that moves it back inside: smooth,
+/// nonlinear, and solved in closed form from event to event. Except for rounding, all error is that
+/// of the method.
 ///
 ///     flow    x' = x (1 - x² - y²) - 3 y,  y' = y (1 - x² - y²) + 3 x
 ///     guard   0.9² - x² - y², falling
@@ -79,8 +79,8 @@ struct Spiral {
     using State = std::array<double, 2>;
 
     static constexpr double turn = 3;      ///< [1/s] angular velocity
-    static constexpr double rim = 0.9;     ///< radius at which it is thrown back
-    static constexpr double shrink = 0.5;  ///< by this factor
+    static constexpr double rim = 0.9;     ///< radius of the event surface
+    static constexpr double shrink = 0.5;  ///< factor of the reset
 
     template <class X>
     void flow(double /*t*/, const X& x, X& dxdt) const noexcept
@@ -137,8 +137,8 @@ struct Spiral {
             .events = {period, 2 * period, 3 * period, 4 * period}};
 }
 
-/// A pendulum of 1 m, x'' = -9.8 sin x, with a guard far above it: the cost of
-/// watching for what never happens.
+/// A pendulum of 1 m, x'' = -9.8 sin x, with a guard far above it: the cost of a guard that never
+/// fires.
 struct WatchedPendulum {
     using State = std::array<double, 2>;
 
@@ -162,7 +162,7 @@ struct WatchedPendulum {
     }
 };
 
-/// The flow of another system without its guard: what is left is the plain step.
+/// The flow of another system without its guard, for the cost of the plain step.
 template <class System>
 class Unguarded {
 public:

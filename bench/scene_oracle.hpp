@@ -1,11 +1,11 @@
-// How many looks at a guard a perfect forecast would need: the ceiling of every way to
-// decide when to look.
+// Number of guard evaluations that a perfect forecast would need: a limit for all detectors that
+// decide when to check.
 //
-// The states of a run are recorded at the ends of steps, with the guard and its bounds. From
-// a look the greedy planner goes to the furthest step at which a look will close the
-// stretch, which it knows, since it has seen the future. A step that no two looks close is
-// put before the exact detector: one look at its end. "Bounded" also has the bound of the value
-// at the end of any step for nothing, and lets it stand in where it closes a stretch.
+// The states at the ends of the steps of a run are recorded, with the guard and its bounds. From
+// each evaluation the greedy planner goes to the furthest step at which an evaluation closes the
+// interval; it knows this step, since it has the whole run. A step that no two evaluations close is
+// left to the exact detector, at the cost of one evaluation at its end. The "bounded" count also
+// uses the bound of the value at the end of any step, at no cost, where that closes an interval.
 #pragma once
 
 #include <algorithm>
@@ -45,13 +45,13 @@ struct SeenGuard {
 };
 
 struct OracleCalls {
-    std::uint64_t looks = 0;          ///< with exact values alone
-    std::uint64_t bounded_looks = 0;  ///< with bounds of the value for nothing
+    std::uint64_t looks = 0;          ///< evaluations, if only exact values are used
+    std::uint64_t bounded_looks = 0;  ///< evaluations, if bounds of the value are free
     std::uint64_t steps = 0;
 };
 
-/// Looks that one guard needs over one smooth piece of motion, whose last step may end in an
-/// event. `margin`: of the planner.
+/// Number of evaluations that one guard needs over one smooth piece of motion, whose last step may
+/// end in an event. `margin` is that of the planner.
 [[nodiscard]] std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin,
                                         bool with_bounds);
 
@@ -99,7 +99,7 @@ template <class Stepping, class System>
                 seen.upper = detail::call_upper_bound(system, i, Mode{}, at.t, at.x);
             }
             if (at.after_reset && !piece.empty()) {
-                // The event's own step: it ends at the surface.
+                // the step with the event: it ends at the surface
                 SeenGuard last = seen;
                 last.value = 0;
                 piece.push_back(last);

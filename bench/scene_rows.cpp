@@ -26,12 +26,12 @@ bool closes(const SeenGuard& from, double value, const SeenGuard& to, double end
 std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin, bool with_bounds)
 {
     std::uint64_t looks = 0;
-    std::size_t at = 0;  // of the last exact look
+    std::size_t at = 0;  // index of the last exact evaluation
     while (at + 1 < piece.size()) {
         const double value = piece[at].value;
         const double sign = value < 0 ? -1 : 1;
         std::size_t best = at;
-        std::size_t free = at;  // as far as lower bounds alone have closed it
+        std::size_t free = at;  // index up to which lower bounds alone have closed
         const auto cheap = [&](std::size_t k) {
             return sign < 0 ? piece[k].upper : piece[k].lower;
         };
@@ -47,8 +47,8 @@ std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin, bo
             if (closed_to(k, cheap(k))) free = k;
         }
         if (free + 1 == piece.size()) return looks;
-        // What lower bounds reach is looked at only if nothing beyond closes; a step that no
-        // two looks close is judged by its end.
+        // The step that lower bounds reach is evaluated only if no later evaluation closes; a step
+        // that no two evaluations close costs one at its end.
         at = best > free ? best : free > at ? free : at + 1;
         ++looks;
     }

@@ -1,5 +1,5 @@
-// A scene with a dear guard, run with a check at every step and planned: the same events,
-// processor time, exact calls, and what a forecast that knows the future would need.
+// A scene with an expensive guard, run with a check at every step and planned: the same events,
+// processor time, exact calls, and the calls that a perfect forecast would need.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@
 
 namespace ricochet::bench {
 
-/// What tells two runs apart: kind, guard, time and both states of every event, and the end,
-/// as bits (FNV-1a).
+/// Hash (FNV-1a) of the bits by which two runs are compared: kind, guard, time and both states of
+/// every event, and the end.
 template <class X>
 [[nodiscard]] std::uint64_t hash_of(const Run<X>& run)
 {
@@ -37,8 +37,8 @@ template <class X>
     return hash.value();
 }
 
-/// One scene: a look at every step and planned, with the guard as it is well built and as
-/// every segment, edge or face in turn. Both give the same bits.
+/// One scene, with a check at every step and planned, each with the efficient guard and with a
+/// guard that examines every segment, edge or face. Both guards give the same bits.
 struct SceneRow {
     std::string name;
     std::size_t guards = 1;
@@ -46,16 +46,16 @@ struct SceneRow {
     OracleCalls oracle{};
     bool same = false;       ///< events and end of all runs, bit for bit
     double alone = 0;        ///< [s] a run without guards
-    double every_brute = 0;  ///< [s] a look at every step
+    double every_brute = 0;  ///< [s] a check at every step
     double every_built = 0;
     double planned_brute = 0;  ///< [s] planned
     double planned_built = 0;
 
     /// Exact calls that locating an event takes beyond those at the ends of steps.
     [[nodiscard]] double location() const;
-    /// A look at every step by brute force, over planned with the guard well built.
+    /// A check at every step by brute force, over planned with the efficient guard.
     [[nodiscard]] double time_ratio() const { return every_brute / planned_built; }
-    /// Both by brute force.
+    /// The same ratio with brute force for both.
     [[nodiscard]] double brute_ratio() const { return every_brute / planned_brute; }
     [[nodiscard]] double call_ratio() const
     {
@@ -65,11 +65,12 @@ struct SceneRow {
     [[nodiscard]] double oracle_calls(std::uint64_t looks) const;
 };
 
-/// All rows must show the same events, and some; the first `demanded` must reach the target.
+/// Table of the rows, with a verdict: all must have the same events in all runs, and at least one;
+/// the first `demanded` rows must reach the target.
 [[nodiscard]] Measured scene_table(const std::vector<SceneRow>& rows, std::size_t demanded,
                                    double target, double (SceneRow::*ratio)() const);
 
-/// Release builds check no bounds; neither do measurements in other builds.
+/// A planner that does not check bounds, as in release builds, whatever the build.
 [[nodiscard]] inline Planned<> planner(bool two_ended = true)
 {
     return Planned<>({.two_ended = two_ended, .check_bounds = false});

@@ -11,7 +11,7 @@ namespace ricochet::bench {
 
 struct Score {
     std::size_t missed = 0;    ///< of the reference, not found
-    std::size_t spurious = 0;  ///< found, and not in the reference
+    std::size_t spurious = 0;  ///< events found that are not in the reference
     double error = 0;          ///< [s] largest error of those found
 
     [[nodiscard]] bool complete() const noexcept { return missed == 0 && spurious == 0; }

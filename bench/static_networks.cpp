@@ -1,5 +1,5 @@
-// Compiled for x86-64-v3 where the compiler has it: nothing here may be emitted
-// under a name that another file could be given by the linker.
+// Compiled for x86-64-v3 if the compiler has it. Nothing here may have a name with which the linker
+// could merge it into another file.
 #include "static_networks.hpp"
 
 #include "networks.hpp"

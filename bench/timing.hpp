@@ -1,8 +1,8 @@
 // Timing on a busy machine: many short samples, their median and their spread.
 //
-// The clock is the processor time of this thread, so that waiting for other
-// programs is not counted. What is compared is timed in turns, sample by sample,
-// so that a change of the processor's frequency falls on all alike.
+// The clock is the processor time of this thread, so that waiting for other programs is not
+// counted. Works to be compared are timed in turns, sample by sample, so that a change of the
+// processor's frequency affects all alike.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ inline void keep(T& value)
 /// Something that can be done `n` times in a row.
 using Work = std::function<void(std::size_t n)>;
 
-/// `function` as work: its result is kept, its repetition is not optimised away.
+/// Makes a work of `function`; its result is kept, so that repetitions are not optimised away.
 template <class Function>
 [[nodiscard]] Work repeated(Function function)
 {
@@ -46,7 +46,7 @@ struct Timing {
 
 struct TimingOptions {
     double sample = 2e-4;     ///< [s] shortest sample
-    double budget = 4e-2;     ///< [s] to spend on each work
+    double budget = 4e-2;     ///< [s] time for each work
     std::size_t fewest = 11;  ///< samples
     std::size_t most = 201;   ///< samples
 };
@@ -63,7 +63,7 @@ struct TimingOptions {
 /// every step, as `keep` forces.
 [[nodiscard]] Work yardstick();
 
-/// [s] What the yardstick costs on the reference machine.
+/// [s] Time of the yardstick on the reference machine.
 inline constexpr double yardstick_reference = 4.5e-9;
 
 /// What `seconds` would be on the reference machine, where the yardstick took

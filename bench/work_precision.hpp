@@ -1,9 +1,9 @@
-// Work against precision: what an answer costs, and how right it is.
+// Work against precision: cost of an answer, and its error.
 //
-// A case is one problem, solved by one method at one step or tolerance. It is solved
-// once and scored against the reference before its time is taken. Of this library
-// nothing is called but `integrate`, so that any other solver of events can stand
-// in the same table: a rival is a function that returns event times.
+// A case is one problem, solved by one method at one step or tolerance. It is solved once and
+// scored against the reference before it is timed. Only `integrate` of this library is called, so
+// that any other solver of events can be in the same table: a rival is a function that returns
+// event times.
 //
 //     CaseList cases;
 //     cases.add(b1(), {"dopri5", "extremum", "rtol", 1e-8},
@@ -30,7 +30,7 @@
 
 namespace ricochet::bench {
 
-/// What is varied between the cases of a problem.
+/// Parameters that distinguish the cases of a problem.
 struct Setting {
     std::string method;    ///< e.g. "dopri5"
     std::string detector;  ///< e.g. "extremum"
@@ -38,7 +38,7 @@ struct Setting {
     double value = 0;      ///< of the knob
 };
 
-/// What one run says of itself; a rival leaves out what it does not count.
+/// Result of one run; a rival leaves out what it does not count.
 struct Answer {
     std::vector<double> times{};  ///< [s] of events, ascending
     bool finished = true;         ///< the run reached its end
@@ -53,7 +53,7 @@ struct Case {
     Setting setting;
     std::vector<double> reference;  ///< [s]
     std::function<Answer()> solve;
-    Work work;  ///< the same run, over and over, for the clock
+    Work work;  ///< the same run, repeated for timing
 
     /// e.g. "b1/dopri5/extremum/rtol=1e-08"
     [[nodiscard]] std::string name() const;
@@ -90,7 +90,7 @@ public:
                           .work = repeated(solve)});
     }
 
-    /// Any other way to the event times; `to_answer` is not part of the time.
+    /// Adds another way to compute the event times; `to_answer` is not timed.
     template <class Solve, class ToAnswer>
     void add_rival(const std::string& problem, const std::vector<double>& reference,
                    Setting setting, Solve solve, ToAnswer to_answer)
@@ -139,7 +139,7 @@ struct Row {
 /// Solves, scores and times. An answer that misses or invents events is not timed.
 [[nodiscard]] Row run(const Case& c, const TimingOptions& options = {});
 
-/// A table for people.
+/// The rows as a readable table.
 [[nodiscard]] std::string table(std::span<const Row> rows, const Timing& yardstick);
 
 /// The same for programs; times in seconds, absent counts null.

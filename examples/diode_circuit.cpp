@@ -1,9 +1,9 @@
 // A circuit whose diode takes any current at voltage zero.
 //
-// The motion is a differential inclusion: where V1 is zero the diode's current is whatever,
-// within its bound, keeps it there. Bathe's composite step solves for it; with
-// `Switches::located` every change between conducting one way, the other, and holding is
-// where a step ends.
+// The motion is a differential inclusion: while V1 is zero, the diode's current takes the value,
+// within its bound, that keeps it zero. Bathe's composite step solves for it. With
+// `Switches::located`, steps end where the diode changes between conducting one way, conducting the
+// other way, and holding.
 
 #include <cmath>
 #include <cstdio>

@@ -1,7 +1,7 @@
 // A system of your own: a damped pendulum that strikes a wall at the vertical.
 //
-// It declares a flow, a guard and a reset, and nothing else. The rate of the guard
-// is then taken along the flow, and the state type is whatever the run starts from.
+// It declares only a flow, a guard and a reset. The rate of the guard is then computed along the
+// flow, and the state type is that of the start of the run.
 
 #include <array>
 #include <cmath>

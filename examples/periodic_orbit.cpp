@@ -39,7 +39,7 @@ int main()
                     std::abs(multiplier));
     }
 
-    // When does the impact come if the motion starts elsewhere, or the force is faster?
+    // Derivatives of the time of impact with respect to the start and the frequency of the force.
     ricochet::Options period = options;
     period.t_end = oscillator.period();
     const auto s = ricochet::sensitivities(

@@ -1,5 +1,5 @@
-// A ball falls through a forest of pegs. The guard, its distance to the nearest of a thousand, is
-// expensive; bounds on its speed say when it need not be asked.
+// A ball falls through a forest of pegs. The guard, its distance to the nearest of a thousand pegs,
+// is expensive; bounds on its rate of change determine when it need not be evaluated.
 
 #include <array>
 #include <cmath>
@@ -58,7 +58,7 @@ struct Pegboard {
         x[3] -= (1 + restitution) * speed * normal[1];
     }
 
-    // What the distance can change: no faster than the ball moves, whose speed grows by gravity.
+    // The distance changes no faster than the ball moves, whose speed grows by gravity.
     [[nodiscard]] double speed_bound(double, const State& x) const
     {
         return std::hypot(x[2], x[3]);

@@ -1,7 +1,7 @@
 // Stick-slip with rate-and-state friction, by steps that always have a solution.
 //
-// The ageing law has an exact pair of potentials, so that an implicit step is the minimum
-// of a function: convex for small steps, and solvable for any.
+// The ageing law has an exact pair of potentials, so that an implicit step minimises a function. It
+// is convex for small steps, and has a minimum for any step.
 
 #include <cmath>
 #include <cstdio>
@@ -20,7 +20,7 @@ int main()
     std::printf("f = %.12f and dDdag/dV = %.12f, xi' = %.6f and dD*/dd = %.6f 1/s\n", law.friction,
                 potentials.friction, law.rate, potentials.rate);
 
-    // A block of 1 kg on a spring half as stiff as steady sliding needs.
+    // A block of 1 kg on a spring with half the stiffness at which steady sliding becomes stable.
     ricochet::SpringSlider slider;
     slider.block.stiffness = 0.5 * ricochet::critical_stiffness(rock, 1, 9.81, load_velocity);
     slider.load = {9.81 * rock.f_star / slider.block.stiffness, load_velocity};

@@ -1,4 +1,4 @@
-// A break on a billiard table: fifteen balls in a rack, and what one stroke makes of them.
+// A break on a billiard table: fifteen balls in a rack, and their motion after one stroke.
 #include <cmath>
 #include <cstdio>
 

@@ -1,4 +1,4 @@
-// An arm among falling discs: a hybrid system as a body of a scene, with stops of its own.
+// An arm among falling discs: a hybrid system as a body of a scene, with its own guards as stops.
 //
 //     example_scene_arm [arm.svg]    also draws its motion, for a browser
 #include <array>
@@ -43,7 +43,7 @@ public:
         const double s = std::sin(x[0]);
         return {{r * c, r * s}, {-r * x[1] * s, r * x[1] * c}};
     }
-    /// The energy, which only falls, bounds angle and rate, and these the acceleration.
+    /// The energy never increases; it bounds angle and rate, and these bound the acceleration.
     double shape_acceleration(std::size_t k, double /*t*/, const State& x) const
     {
         const double twice = inertia * x[1] * x[1] + stiffness * x[0] * x[0];
@@ -65,7 +65,7 @@ private:
     static constexpr double stop = 0.6;      // [rad]
 };
 
-/// Circles that move as the samples say, 1 m to 200 pixels.
+/// Draws animated circles from the samples, 1 m as 200 pixels.
 void draw(const char* file, const ricochet::Scene& scene, const ricochet::SceneRun& run)
 {
     std::ofstream out(file);

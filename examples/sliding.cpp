@@ -46,7 +46,7 @@ int main()
                     block.mode_name(event.mode_before).data(),
                     block.mode_name(event.mode_after).data());
     }
-    // Sticking friction is what the two bounds make on average.
+    // The friction force while sticking is the average of the two bounds with these weights.
     const double share = block.shares(run.mode, run.t, run.x)[0];
     std::printf("at %.0f s %+.6f m, friction %+.6f N\n", run.t, run.x[0], 0.3 - 0.6 * share);
     return run.events.size() == 3 && run.x[1] == 0 ? 0 : 1;

@@ -29,7 +29,7 @@ int main()
                 name(run.outcome).data(), run.state.t, run.state.w[0], run.state.reaction[0],
                 static_cast<unsigned long long>(run.statistics.event_driven.steps),
                 run.phases.size(), run.phases.size() == 1 ? "" : "s");
-    // It slips again one period after it began to slip at the start.
+    // Slip starts again one period after the start, where it first began.
     return run.events.size() == 4 && std::abs(run.events[1].t - ricochet::StickSlip::period) < 1e-8
                ? 0
                : 1;

@@ -1,9 +1,9 @@
 // A gate for a system of your own, trained in seconds and used immediately.
 //
-// A drone flies among columns; whether it hits one is known to a black box that only says yes or
-// no, and takes its time. The gate learns from runs how long nothing will happen, and the run asks
-// the black box only then. What is skipped is not proved: the miss rate was measured, on runs
-// that the gate was not trained on.
+// A drone flies among columns. Whether it hits one is known only to a slow black box that answers
+// yes or no. The gate learns from runs for how long no hit will occur, and the run calls the black
+// box only at the end of that time. Skipped checks are not proved to be clear: the miss rate was
+// measured, on runs that the gate was not trained on.
 
 #include <array>
 #include <cmath>
@@ -34,7 +34,7 @@ struct Drone {
         return std::hypot(std::fabs(x[0]) - 1, std::fabs(x[1]) - 1) > 0.2;
     }
 
-    // Bounces off, a millimetre away from the column.
+    // Bounces off, and is placed a millimetre outside of the column.
     template <class X>
     void reset(double, X& x) const
     {

@@ -83,7 +83,7 @@ public:
 private:
     void restart(double t) { require(CVodeReInit(memory_, t, x_), "CVodeReInit"); }
 
-    /// CVODE's counts begin anew at every start.
+    /// CVODE's counts are reset at every initialisation.
     void add_counts(Answer& answer)
     {
         long steps = 0;

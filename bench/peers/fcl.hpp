@@ -17,7 +17,7 @@ public:
     FclMeshes(const FclMeshes&) = delete;
     FclMeshes& operator=(const FclMeshes&) = delete;
 
-    /// Of their surfaces.
+    /// Distance of their surfaces.
     [[nodiscard]] double distance(const geometry::Pose& pose) const;
 
     [[nodiscard]] static std::string_view version();

@@ -1,5 +1,5 @@
-// SUNDIALS ARKODE, ERKStep: the pair of Dormand and Prince with its own root finding;
-// ERKStepReInit after a reset. Memory is set up once, outside of the time.
+// SUNDIALS ARKODE, ERKStep: the pair of Dormand and Prince with its own root finding, and
+// ERKStepReInit after a reset. Setting up the memory, once, is not timed.
 #include <arkode/arkode_erkstep.h>
 
 #include <memory>

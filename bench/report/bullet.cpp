@@ -12,7 +12,7 @@ namespace ricochet::report {
 
 namespace {
 
-/// A world with bodies of its own.
+/// A world that owns its bodies.
 class World {
 public:
     explicit World(double gravity) { world.setGravity({0, 0, btScalar(-gravity)}); }
@@ -23,7 +23,7 @@ public:
         for (btRigidBody& body : bodies) world.removeRigidBody(&body);
     }
 
-    /// A mass of zero stays where it is.
+    /// Adds a body. A body with mass zero is static.
     btRigidBody& add(btCollisionShape* shape, double mass, const btVector3& at, double restitution,
                      double friction)
     {
@@ -91,7 +91,8 @@ Answer slide(bool rolls, double step)
     if (rolls) shape = &sphere;
     btRigidBody& body = in.add(shape, 1, {0, 0, height}, 0, sliding::friction);
     body.setLinearVelocity({btScalar(sliding::start), 0, 0});
-    // [m/s] Single precision and ten iterations leave more than what other engines rest with.
+    // [m/s] Single precision and ten iterations leave a larger residual velocity than other
+    // engines.
     constexpr double noise = 1e-4 * sliding::start;
     Answer answer{.finished = true, .steps = 0};
     EndOfSliding end;
@@ -125,7 +126,7 @@ void find_struck(btCollisionDispatcher& dispatcher, std::size_t discs,
     std::sort(out.begin(), out.end());
 }
 
-/// In centimetres, since its manual asks for bodies of 0.05 to 10 units.
+/// Lengths are in centimetres, since Bullet's manual recommends bodies of 0.05 to 10 units.
 Answer collide(std::size_t discs, double step)
 {
     constexpr double unit = 100;

@@ -1,7 +1,7 @@
 // Cells of the report: one problem, solved by one peer at one setting.
 //
-// Each cell is run in a process of its own (main.cpp), so that a peer that crashes takes nothing
-// along. What a cell returns is scored by the program that asks (run.py).
+// Each cell is run in a process of its own (main.cpp), so that a crash affects no other cell. The
+// result of a cell is scored by the program that runs it (run.py).
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@
 
 namespace ricochet::report {
 
-/// What one run says of itself; a peer leaves out what it does not count.
+/// Result of one run; a peer leaves out what it does not count.
 struct Answer {
     bool finished = false;              ///< the run reached its end
     std::vector<double> times{};        ///< [s] of events, in the order found
@@ -28,7 +28,7 @@ struct Answer {
     std::optional<std::uint64_t> steps{};
     std::optional<std::uint64_t> flow_calls{};
     std::optional<std::uint64_t> guard_calls{};
-    std::optional<double> energy_change{};  ///< relative, over the run, where none should be
+    std::optional<double> energy_change{};  ///< relative, over a run that conserves energy
     std::string note{};                     ///< why it did not finish
 
     void add(double t, std::size_t guard)
@@ -62,7 +62,7 @@ struct Reference {
 class Cells {
 public:
     void add(Cell cell) { cells_.push_back(std::move(cell)); }
-    /// `make` is called where the reference is asked for, since some take a while.
+    /// `make` is called when the reference is needed, since some references take a while.
     void add_reference(std::function<Reference()> make) { references_.push_back(std::move(make)); }
     void add_version(std::string peer, std::string version)
     {
@@ -93,8 +93,8 @@ private:
     return is_large ? std::span<const double>(all).subspan(3, 1) : all;
 }
 
-/// Every problem once: `visit(name, title, make_task)`, where a call of `make_task` returns
-/// the task. Problems of several runs are given as vectors of tasks.
+/// Calls `visit(name, title, make_task)` once for every problem; `make_task` returns the task. A
+/// problem of several runs has a vector of tasks.
 template <class Visit>
 void for_each_problem(Visit visit)
 {
@@ -155,7 +155,7 @@ template <class S>
     return out;
 }
 
-/// Notes how far the energy of a system that keeps it has changed at its last state.
+/// Records the relative change of energy up to the last state, for a system that conserves it.
 template <class S, class X>
 void note_energy(const Task<S>& task, const X& x, Answer& answer)
 {

@@ -1,6 +1,6 @@
-// SUNDIALS CVODE with its own root finding, as its manual says: Adams with a fixed-point iteration,
-// since none of these problems is stiff; directions of the roots set; CVodeReInit after a reset.
-// Memory is set up once, outside of the time.
+// SUNDIALS CVODE with its own root finding, as its manual recommends: Adams with a fixed-point
+// iteration, since none of these problems is stiff; directions of the roots set; CVodeReInit after
+// a reset. Setting up the memory, once, is not timed.
 #include <cvode/cvode.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 

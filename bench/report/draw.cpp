@@ -1,5 +1,5 @@
-// ricochet_report_draw: draws panels that are given as JSON on standard input, as every figure of
-// ricochet is drawn.
+// ricochet_report_draw: draws panels given as JSON on standard input, in the style of all figures
+// of ricochet.
 //
 //     ricochet_report_draw <file.svg>
 //

@@ -173,7 +173,7 @@ void add_fault(Cells& cells)
     cells.add_reference(fault_reference);
     for (const double tolerance : {1e-3, 1e-4, 1e-6, 1e-8, 1e-10}) {
         for (const int order : {2, 4}) {
-            if (order == 2 && tolerance < 1e-8) continue;  // which takes seconds
+            if (order == 2 && tolerance < 1e-8) continue;  // a run would take seconds
             cells.add({"fault", "ricochet", "variational, order " + std::to_string(order),
                        tolerance, [=] {
                            return [made = fault(), order, tolerance] {

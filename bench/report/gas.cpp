@@ -12,14 +12,14 @@ namespace {
 using Long = long double;
 constexpr Long never = std::numeric_limits<Long>::infinity();
 
-/// A disc from the time of its last collision on.
+/// The free flight of a disc since its last collision.
 struct Flight {
     Long t, x, y, u, v, r, m;
     [[nodiscard]] Long x_at(Long s) const { return x + (s - t) * u; }
     [[nodiscard]] Long y_at(Long s) const { return y + (s - t) * v; }
 };
 
-/// A collision to come.
+/// A predicted collision.
 struct Meeting {
     Long t = never;
     std::size_t guard = 0;
@@ -39,7 +39,7 @@ public:
         for (std::size_t i = 0; i < flights_.size(); ++i) predict(i);
     }
 
-    /// The next collision, which is carried out.
+    /// Performs the next collision and returns it.
     Meeting next()
     {
         const Meeting meeting =
@@ -61,7 +61,7 @@ public:
                 predict(k);
             }
         }
-        // Others may now meet these earlier.
+        // Other discs may now collide with these earlier.
         for (const std::size_t struck : {meeting.i, meeting.j}) {
             for (std::size_t k = 0; k < flights_.size(); ++k) consider(k, struck);
         }
@@ -93,7 +93,7 @@ private:
         for (std::size_t j = 0; j < flights_.size(); ++j) consider(i, j);
     }
 
-    /// Lets disc i meet disc j if that is the first that happens to it.
+    /// Records the collision of disc i with disc j if it is the first of disc i.
     void consider(std::size_t i, std::size_t j)
     {
         if (i == j) return;

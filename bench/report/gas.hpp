@@ -2,8 +2,8 @@
 // every pair for peers that solve ordinary differential equations, and by brute force in long
 // double for the reference.
 //
-// Deviations grow about fivefold with every collision of a disc, so that times are scored for the
-// first 60 collisions of the gas alone; the runs go on to about one collision a disc.
+// Deviations grow about fivefold with every collision of a disc, so that only the times of the
+// first 60 collisions of the gas are scored; the runs last for about one collision per disc.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace ricochet::report {
 
 inline constexpr std::size_t scored_collisions = 60;
 inline constexpr std::size_t gas_sizes[] = {100, 1000, 10000};
-/// The guards of more discs are too many for peers that have all in one state.
+/// Largest number of discs for peers that need one state: more have too many guards.
 inline constexpr std::size_t gas_in_one_state = 100;
 
 [[nodiscard]] inline std::string gas_title(std::size_t discs)
@@ -170,7 +170,8 @@ struct FirstCollisions {
     double until = 0;  ///< [s] halfway between the last of them and the next
 };
 
-/// All pairs and walls in long double; those of a disc are predicted anew where it has been struck.
+/// Computes the first collisions in long double, with all pairs and walls; the predictions of a
+/// disc are renewed when it is hit.
 [[nodiscard]] FirstCollisions first_collisions(const Scene& scene, std::size_t count);
 
 /// The gas as one state.

@@ -123,7 +123,7 @@ private:
         return system_.guard(which, t0 + s, memory);
     }
 
-    /// The crossings in the step, in order; where the system acts, the first.
+    /// Finds the crossings in the step, in order; only the first if the system has resets.
     void find(const gsl_odeiv2_system& callbacks, double t0, double length)
     {
         hits_.clear();

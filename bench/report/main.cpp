@@ -1,9 +1,9 @@
 // ricochet_report: solves cells of the report, for the program that scores and times them.
 //
-//     ricochet_report list             what there is: versions, references, cells, as JSON
-//     ricochet_report serve <cell>     answers lines of standard input, in JSON: `solve` by the
-//                                      answer, `time <n>` by the seconds of n runs
-//     ricochet_report run <cell>       both once, for people
+//     ricochet_report list             versions, references and cells, as JSON
+//     ricochet_report serve <cell>     answers each line of standard input, in JSON: `solve` with
+//                                      the answer, `time <n>` with the seconds of n runs
+//     ricochet_report run <cell>       prints both once
 #include <fmt/format.h>
 
 #include <cstdio>

@@ -3,18 +3,18 @@
 //
 //     ricochet_map > map.json
 //
-// A ball in a cavern of 10 000 segments, whose wall is shown through pinholes: its value alone;
-// value and rate; these and bounds; the sign alone. Events are made rarer or more frequent by the
-// length of the steps. Ways:
+// A ball in a cavern of 10 000 segments, whose wall is known in four degrees: the value of the
+// guard alone; value and rate; these and bounds; the sign alone. The length of the steps determines
+// how many events there are per step. Ways:
 //
-//     every step   the exact detector at every step, which the others are compared with
-//     every k      at every k-th, with a way back; may miss events
+//     every step   the exact detector at every step, with which the others are compared
+//     every k      at every k-th step, with rollback; may miss events
 //     planned      bounds and a table of lower bounds
 //     verified     the planner with a horizon gate as its forecast; keeps events
 //     certified    the planner with levels that a network clears, proved here; keeps events
-//     calibrated   a horizon gate that is believed; may miss events
+//     calibrated   a horizon gate without verification; may miss events
 //
-// All ways of a guard run the same steps, and are timed in turns. What an expensive guard adds is
+// All ways of checking a guard run the same steps, and are timed in turns. An expensive guard adds
 // its number of calls times its price. Gates are trained here on the sign alone, one for each
 // length of the steps.
 #include <fmt/format.h>
@@ -44,11 +44,11 @@ using Stepping = FixedStep<Rk4>;
 using X = Cavern::State;
 
 constexpr double step_lengths[] = {1e-3, 4e-3, 1.6e-2, 6.4e-2};  ///< [s]
-/// [s] Beyond it hardly a state is without an event.
+/// [s] Nearly every state has an event within a longer time.
 constexpr double longest_horizon = 0.5;
 constexpr double steps_of_run = 40'000;
 
-/// A system of which the value of the guard and its rate are shown, and no bounds.
+/// A system that exposes the value and the rate of the guard, but no bounds.
 class WithRate : public Hidden<Cavern> {
 public:
     using Hidden<Cavern>::Hidden;
@@ -60,7 +60,7 @@ public:
     }
 };
 
-/// One way to check a guard, and what a run of it gives.
+/// One way of checking a guard, and the measurements of one of its runs.
 struct Contender {
     struct Result {
         std::uint64_t hash, steps, calls, events;
@@ -105,7 +105,7 @@ template <class System, class Detector>
             {"ways", ways}};
 }
 
-/// Ways that need no more than the sign.
+/// Ways that use only the sign.
 template <class System>
 [[nodiscard]] std::vector<Contender> without_bounds(const System& system, double step,
                                                     const Model& gate)

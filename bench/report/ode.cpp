@@ -42,8 +42,8 @@ public:
     dJointGroupID contacts = dJointGroupCreate(0);
     dSurfaceParameters surface{};
     double t = 0;              ///< [s] start of the step
-    std::size_t bodies = 0;    ///< where collisions are recorded
-    Answer* answer = nullptr;  ///< takes them
+    std::size_t bodies = 0;    ///< number of bodies whose collisions are recorded
+    Answer* answer = nullptr;  ///< receives them
 
     void step(double length, bool iterative = false)
     {

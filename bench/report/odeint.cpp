@@ -1,8 +1,8 @@
-// Boost.Odeint as a competent user drives it by hand: a sign check after each step, the crossing
-// located on the step's own map (a second stepper repeats it, TOMS 748 on its length) with states
-// as arrays, or on the dense output with states as vectors.
+// Boost.Odeint in a loop written by hand, as an experienced user does: a sign check after each
+// step, the crossing located on the step's own map (a second stepper repeats it, with TOMS 748 on
+// its length) with states as arrays, or on the dense output with states as vectors.
 //
-// Compiled in a file of its own, so that what stands around it does not change how well it is
+// It is compiled in a file of its own, so that surrounding code does not change how well it is
 // optimised.
 #include <algorithm>
 #include <boost/math/tools/roots.hpp>
@@ -22,8 +22,8 @@ namespace {
 
 namespace odeint = boost::numeric::odeint;
 
-/// The end of the bracket in which `guard` crosses, where it is worth `g_lo` at `lo` and `g_hi` at
-/// `hi`: the end on the far side.
+/// The end of the bracket on the far side of the crossing of `guard`, whose values are `g_lo` at
+/// `lo` and `g_hi` at `hi`.
 template <class Guard>
 double cross(const Guard& guard, double lo, double hi, double g_lo, double g_hi)
 {
@@ -48,8 +48,8 @@ struct Watch {
     std::vector<Hit> hits;
 };
 
-/// Whether any guard has crossed; `watch.hits` are the crossings, in order, where `value(which,
-/// s)` is a guard at s in [0, length]. Where the system acts, only the first of them.
+/// Whether any guard has crossed; `watch.hits` are the crossings, in order, or only the first if
+/// the system has resets. `value(which, s)` is a guard at s in [0, length].
 template <class S, class Value>
 bool find(Watch& watch, double length, const Value& value)
 {

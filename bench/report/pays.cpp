@@ -1,7 +1,7 @@
-// What a scene pays for: the bouncing ball, with one thing added. Compiled once for each thing, so
-// that the size of the program and its allocations show what it brings along.
+// Cost of features: the bouncing ball with one feature added. The program is compiled once for
+// each, so that its size and its allocations show what the feature brings along.
 //
-// Prints one line of JSON: seconds of a run, allocations in one, events.
+// It prints one line of JSON: seconds of a run, allocations in a run, events.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -64,7 +64,7 @@ struct Ball {
 #endif
 };
 
-/// The ball with its two ways as modes: it changes from up to down where it stands still.
+/// The ball with moving up and moving down as modes; it changes from up to down at velocity zero.
 struct BallWithModes {
     using State = Two;
     enum : Mode { down, up };

@@ -1,8 +1,8 @@
 // The problems of the report, each written once for all peers.
 //
-// A system is what ricochet takes: flow, guards, resets, modes. Peers see it through `Seen`
-// (seen.hpp). Flows are templates over scalar and state, so that one text serves arrays, vectors,
-// plain memory and power series.
+// A system is declared as for ricochet: flow, guards, resets, modes. Peers use it through `Seen`
+// (seen.hpp). Flows are templates over scalar and state, so that one definition serves arrays,
+// vectors, plain memory and power series.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct Expected {
     std::size_t guard = 0;
 };
 
-/// A system, its start and what is known of the motion.
+/// A system, its start and its reference solution.
 template <class System>
 struct Task {
     System system{};

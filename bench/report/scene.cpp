@@ -1,4 +1,4 @@
-// ricochet itself: N balls as a scene, each with a clock of its own.
+// ricochet itself: N balls as a scene, each with its own time.
 #include "ricochet/scene/scene.hpp"
 
 #include "cells.hpp"

@@ -1,5 +1,5 @@
-// A hybrid system as other libraries see it: one way to call what ricochet's systems may declare
-// in several.
+// A uniform interface for other libraries to ricochet's systems, which may declare their functions
+// in several forms.
 #pragma once
 
 #include <concepts>
@@ -10,8 +10,8 @@
 
 namespace ricochet::report {
 
-/// A system and the mode that it is in. `X` is the state of the peer: an array, a vector, or a
-/// pointer to memory of its own.
+/// A system and its current mode. `X` is the state type of the peer: an array, a vector, or a
+/// pointer to its memory.
 template <class System>
 class Seen {
     using State = typename System::State;
@@ -84,7 +84,8 @@ public:
     {
         return crossing() == Crossing::falling ? -1 : crossing() == Crossing::rising ? 1 : 0;
     }
-    /// Whether a guard that was worth `before` and is worth `after` has made the crossing.
+    /// Whether a guard with the value `before` that now has the value `after` has made the
+    /// crossing.
     [[nodiscard]] static constexpr bool crossed(double before, double after)
     {
         const bool falls = before > 0 && after <= 0;

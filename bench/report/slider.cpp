@@ -23,7 +23,7 @@ namespace {
 
 constexpr double slider_end = 1;    ///< [s]
 constexpr double threshold = 2e-4;  ///< [m/s]
-constexpr std::size_t onset = 0;    ///< guards of events
+constexpr std::size_t onset = 0;    ///< guards in the list of events
 constexpr std::size_t arrest = 1;
 
 /// 0.61 of the critical stiffness; the spring is drawn to N f* at the start.
@@ -151,7 +151,7 @@ void add_slider(Cells& cells)
         add(
             cells, "ricochet", "variational, order " + std::to_string(order),
             [order](double tolerance) { return by_variational_steps(order, tolerance); },
-            order == 2 ? 1e-8 : 0);  // which takes seconds below
+            order == 2 ? 1e-8 : 0);  // smaller tolerances take seconds
     }
     add(cells, "ricochet", "Rosenbrock4", by_event_loop<Rosenbrock4>);
     add(cells, "ricochet", "dopri5", by_event_loop<Dopri5>);

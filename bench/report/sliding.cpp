@@ -1,5 +1,5 @@
-// ricochet's own ways with sliding bodies beside those of all problems: the block as a scene and as
-// an inclusion, and both bodies by Moreau and Jean's time stepping.
+// Further methods of ricochet for sliding bodies, beside those for all problems: the block as a
+// scene and as an inclusion, and both bodies by the time stepping of Moreau and Jean.
 #include "sliding.hpp"
 
 #include "cells.hpp"

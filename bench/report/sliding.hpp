@@ -40,7 +40,7 @@ struct SlidingBlock {
         dxdt[0] = x[1];
         dxdt[1] = mode == slides ? -sliding::braking : 0.0;
     }
-    /// Positive for ever where the block sticks: nothing pulls it.
+    /// Always positive while the block sticks: nothing pulls it.
     template <class T, class X>
     [[nodiscard]] constexpr auto guard(std::size_t /*which*/, Mode mode, const T& /*t*/,
                                        const X& x) const
@@ -116,8 +116,9 @@ struct RollingBall {
             .events = {{2 * sliding::start / (7 * sliding::braking), 0}}};
 }
 
-/// Watches the steps of an engine: sliding ends with the first step after which its speed is below
-/// a millionth of that at the start. What slides again later gives another event when it ends.
+/// Observes the steps of an engine: sliding ends with the first step after which the sliding speed
+/// is below a millionth of the initial one. If a body slides again later, the end of that is
+/// another event.
 class EndOfSliding {
 public:
     /// `speed` [m/s] of sliding at the end of the step that ends at t [s].

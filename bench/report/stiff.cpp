@@ -85,7 +85,7 @@ public:
     }
 
 private:
-    /// The flow is affine: its columns are differences.
+    /// Matrix of the affine flow; its columns are differences.
     [[nodiscard]] static Matrix matrix(Mode mode)
     {
         const BuckConverter buck;
@@ -107,7 +107,7 @@ private:
     std::array<Matrix, halvings + 1> powers_;
 };
 
-/// Times at which the diode begins and ceases to conduct.
+/// Exact times at which the diode starts and stops conducting.
 class ExactBuck {
 public:
     [[nodiscard]] std::vector<Expected> events()
@@ -127,7 +127,8 @@ public:
     }
 
 private:
-    /// Goes to the next event of the diode, or to the next switching; tells which.
+    /// Advances to the next event of the diode, or to the next switching. Returns whether it was
+    /// the diode.
     [[nodiscard]] bool cross()
     {
         const Real stop = Real(BuckConverter::half_period) * (switchings_ + 1);
@@ -237,8 +238,8 @@ int node_voltage(double /*t*/, N_Vector x, double* g, void* /*user*/)
     return 0;
 }
 
-/// As its manual says: a dense Jacobian by differences, stop times at the switchings, one root with
-/// the direction in which the diode changes, initialised anew after each of them.
+/// As recommended by the manual: a dense Jacobian by differences, stop times at the switchings, one
+/// root with the direction in which the diode changes, and a new initialisation after each of them.
 Answer by_roots(double tolerance)
 {
     Mode mode = start_mode;

@@ -1,4 +1,4 @@
-// What the solvers of SUNDIALS share: a system behind their callbacks.
+// Code shared by the solvers of SUNDIALS: a system behind their callbacks.
 #pragma once
 
 #include <nvector/nvector_serial.h>

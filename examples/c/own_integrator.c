@@ -1,5 +1,5 @@
-/* A program with an integrator of its own, Runge-Kutta of order four with fixed steps, in which a
- * ball falls from 10 m and bounces: the monitor says where steps end at an impact. */
+/* A program with its own integrator, Runge-Kutta of order four with fixed steps. A ball falls from
+ * 10 m and bounces; the monitor tells where a step ends at an impact. */
 #include <stdio.h>
 #include <string.h>
 

@@ -40,7 +40,7 @@ struct StickSlip {
     }
 };
 
-/// What CVODE passes to the flow.
+/// Data that CVODE passes to the flow.
 struct Motion {
     StickSlip system;
     ricochet::Mode mode = StickSlip::sticks;

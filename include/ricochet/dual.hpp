@@ -244,7 +244,7 @@ struct Dual {
     {
         return fabs(a);
     }
-    /// A step function: its derivative is 0 wherever there is one.
+    /// A piecewise constant function: its derivative is 0 wherever it exists.
     friend constexpr Dual floor(const Dual& a)
     {
         using std::floor;

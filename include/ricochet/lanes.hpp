@@ -32,8 +32,8 @@ namespace ricochet {
 
 namespace detail {
 
-/// Whether the compiler fuses products with sums, as it may where the machine it compiles for does:
-/// then bits depend on which products it fuses.
+/// Whether the compiler fuses products and sums, as it may when compiling for a machine with such
+/// an instruction: then the bits of a result depend on which products it fuses.
 [[nodiscard]] inline bool fuses_products() noexcept
 {
     const volatile double above = 1 + 0x1p-30, below = 1 - 0x1p-30, less = -1;
@@ -76,9 +76,9 @@ private:
     std::map<std::size_t, RowFailure> failures_;
 };
 
-/// Runs in lanes, whose next one takes the place of one that has ended.
-/// @tparam SystemOf  gives the system of a row
-/// @tparam wide  as of `TaylorLanes`
+/// Runs a table of starts in lanes; a run that has ended is replaced by the next row.
+/// @tparam SystemOf  function that returns the system of a row
+/// @tparam wide  as for `TaylorLanes`
 template <class System, class X, bool wide, class SystemOf, class Detector, class Locator>
 class LaneRuns {
     using Stepping = ErrorControlled<Taylor>;
@@ -148,7 +148,7 @@ private:
         go_on(slot, lane, false);
     }
 
-    /// Lets a run go on alone, until it may be in its lane again or has ended.
+    /// Advances a run alone, until it may return to its lane or has ended.
     void go_on(Slot& slot, std::size_t lane, bool beyond)
     {
         if (slot.loop->go_to_quiet_steps(slot.quiet, beyond)) {
@@ -193,7 +193,7 @@ private:
     const Locator& locator_;
     Lanes lanes_;
     std::array<Slot, lane_count> slots_;
-    std::size_t next_ = 0;  ///< row that was not begun
+    std::size_t next_ = 0;  ///< next row to start
     LaneResults<X> results_;
 };
 
@@ -228,23 +228,25 @@ template <class System, class X, class SystemOf, class Detector, class Locator>
 
 }  // namespace detail
 
-/// Whether runs of such systems share their series. Others are done one after the other: flows with
-/// modes, that are polynomials in time, of more than thirty operations, or that are no
-/// `UnrolledSeries`, and systems with more than one guard or one without a series.
+/// Whether runs of such systems share their series. Other systems are integrated one run after the
+/// other: those with modes, with a flow that is a polynomial in time, has more than thirty
+/// operations or is no `UnrolledSeries`, with more than one guard, or with a guard without a
+/// series.
 template <class System, class X = typename System::State>
 inline constexpr bool runs_in_lanes = detail::fits_lanes<System, X>();
 
 /// Integrates `system` from each of `starts`, four runs at a time. Row i has the bits of
-/// `integrate(system, starts[i], options, stepping, detector, locator)`, in its events and its
-/// statistics, too; where that throws it is empty, and `failures` has the exception.
+/// `integrate(system, starts[i], options, stepping, detector, locator)`, events and statistics
+/// included. Where that would throw, the row is empty and `failures` has the exception.
 ///
-/// A run is in a lane where it takes steps without events, alone otherwise: with
-/// `Options::record_steps`, until the last of its `sample_times`, and with a detector that does not
-/// examine every step or is no `Extremum` or `Bernstein`. Where the compiler may fuse products with
-/// sums (as g++ does with -march=native, but not with -ffp-contract=off) all are alone, since bits
-/// would differ. Threads: give blocks of starts to `ensemble`.
+/// A run shares a lane while it takes steps without events. It is computed alone around events,
+/// until the last of its `sample_times`, with `Options::record_steps`, with a detector other than
+/// `Extremum` and `Bernstein`, and with one that does not examine every step. Where the compiler
+/// may fuse products and sums (as g++ does with -march=native, but not with -ffp-contract=off) all
+/// runs are computed alone, since their bits would differ. For several threads, give blocks of
+/// starts to `ensemble`.
 ///
-/// @param options  of all runs; those that `cancelled` ends have that outcome
+/// @param options  apply to all runs; those that `cancelled` ends have that outcome
 template <class System, class X = typename System::State, class Detector = Extremum,
           class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>

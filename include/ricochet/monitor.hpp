@@ -39,7 +39,7 @@ namespace ricochet {
 template <class S>
 concept HostStep = requires(const S& step, double s, std::span<double> x)
 {
-    Instant{step.t0()};  // [s]; or an Instant, from a host that keeps what its sum of times loses
+    Instant{step.t0()};  // [s]; or an Instant, which also holds the rounding error of the time
     {
         step.h()
         } -> std::convertible_to<double>;  // [s]
@@ -246,9 +246,9 @@ public:
         return monitor_->examine(table);
     }
 
-    /// After a cut, once the host has gone to `cut().after`: arms all guards with the rate there.
-    /// May return another cut: guards that a reset has carried across their surfaces, at the same
-    /// instant, or a motion that comes to rest.
+    /// Arms all guards after a cut, with the rate at `cut().after`, to which the host must have
+    /// gone. May return another cut at the same instant: for guards that a reset has carried across
+    /// their surfaces, or for a motion that comes to rest.
     [[nodiscard]] Verdict resume(std::span<const double> dxdt, double scale)
     {
         return monitor_->resume(checked(dxdt, monitor_->x().size()), scale);
@@ -277,8 +277,7 @@ public:
     [[nodiscard]] double must_stop_at() const noexcept { return monitor_->must_stop_at(); }
 
     /// Time [s] up to which no guard needs a check, by the bounds that the system declares or a
-    /// gate
-    /// (`Planned`, `Certified`, ...): the host may go there in steps that it does not show, by
+    /// gate (`Planned`, `Certified`, ...): the host may go there in steps that it does not show, by
     /// `skip_to`. Without bounds it is the current time.
     [[nodiscard]] double quiet_until() const noexcept { return monitor_->quiet_until(); }
 

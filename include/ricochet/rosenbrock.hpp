@@ -3,14 +3,14 @@
 //     #include "ricochet/rosenbrock.hpp"
 //     integrate(system, x0, {.t_end = 100, .rtol = 1e-6}, ErrorControlled<Rosenbrock4>{});
 //
-// A step solves six linear systems with one matrix, I / (gamma h) - J. The Jacobian J is, in this
-// order, the one that the system writes, row by row,
+// A step solves six linear systems with one matrix, I / (gamma h) - J. The Jacobian J is the first
+// available of these three: the one that the system writes, row by row,
 //
 //     void jacobian([Mode,] double t, const X& x, std::span<double> rows) const
 //
-// the one that dual numbers have where the flow takes any scalar (hybrid/scalar.hpp), or forward
-// differences, whose error of 1e-8 costs the method its order at tolerances below that. The matrix
-// is dense: the method is for states of up to a few dozen components.
+// the one from dual numbers, if the flow takes any scalar (hybrid/scalar.hpp), or forward
+// differences, whose error of 1e-8 reduces the order of the method at tolerances below that. The
+// matrix is dense: the method is for states of up to a few dozen components.
 #pragma once
 
 #include <algorithm>
@@ -33,11 +33,13 @@ namespace ricochet {
 /// The method RODAS, of order 4 with an error estimate of order 3 and an interpolant of order 3;
 /// L-stable and stiffly accurate (E. Hairer and G. Wanner, Solving Ordinary Differential Equations
 /// II, 2nd edition, section IV.7). Steps are those of odeint's rosenbrock4 where the flow does not
-/// depend on the time; there odeint's is of order 1, by the sign of one coefficient (d4).
+/// depend on time; otherwise odeint's method has order 1, because one coefficient (d4) has the
+/// wrong sign.
 ///
-/// The polynomial of a step is its cubic interpolant; samples and acting events are computed by
-/// steps of their own. Rates at the ends of a step are those of the interpolant: in stiff motion
-/// the flow at a computed state is its error times the fastest rate.
+/// The polynomial of a step is its cubic interpolant; samples and state-changing or terminal events
+/// are computed by separate steps. Rates at the ends of a step are those of the interpolant,
+/// because in stiff motion the flow at a computed state is dominated by the error of that state
+/// times the fastest rate.
 struct Rosenbrock4 {
     template <class State>
     struct Stepper {
@@ -90,14 +92,14 @@ concept JacobianWritten = requires(const System& system, Mode mode, double t, co
     system.jacobian(t, x, rows);
 };
 
-/// Whether the system has a function `jacobian` that no form of call fits.
+/// Whether the system has a function `jacobian` with an unsuitable signature.
 template <class System, class X>
 concept JacobianMisfits = !JacobianWritten<System, X> && requires
 {
     &System::jacobian;
 };
 
-/// Storage of fixed size, or sized at run time, as C is.
+/// Storage for an n x n matrix, of fixed size or sized at run time like C.
 template <class C>
 using MatrixLike =
     std::conditional_t<(fixed_size<C>() > 0), std::array<double, fixed_size<C>() * fixed_size<C>()>,
@@ -291,7 +293,7 @@ class KernelOf<System, X, Rosenbrock4> {
         return std::sqrt(std::numeric_limits<double>::epsilon() * std::max(1e-5, std::fabs(x)));
     }
 
-    /// Computes f, df/ds and J at the start, unless they are already those of this start.
+    /// Computes f, df/ds and J at the start of a step, unless they are known for this very start.
     static void prepare(D& door, State& state)
     {
         Room& room = door.room;
@@ -302,7 +304,7 @@ class KernelOf<System, X, Rosenbrock4> {
             for_each_component(state.x0, [&](auto i) { same = same && room.x[i] == state.x0[i]; });
         if (same) return;
         if (room.x.size() != state.x0.size()) room = Room(state.x0);
-        room.known = false;  // until everything is known, even if the flow throws
+        room.known = false;  // stays so if the flow throws
         room.h = std::numeric_limits<double>::quiet_NaN();
         flow(door, state, 0, state.x0, room.rate);
         const double sign = state.backward ? -1 : 1;
@@ -315,7 +317,7 @@ class KernelOf<System, X, Rosenbrock4> {
             by_time_by_differences(door, state);
         } else if constexpr (by_duals) {
             jacobian_by_duals(door, state);
-            turn();  // df/ds changes its sign twice
+            turn();  // but not df/ds, whose sign changes twice
         } else {
             jacobian_by_differences(door, state);
             by_time_by_differences(door, state);

@@ -14,16 +14,15 @@
 //         dxdt[1] = cos(frequency * t) - x[0];
 //     }
 //
-// It may use + - * / sqrt cbrt pow exp log sin cos tan asin acos atan atan2 sinh cosh tanh
-// hypot, and
-// must be the same operations whatever the state is: no comparisons, no kinks. A system with
-// modes takes the mode first, and its `mode_count` is a constant. The system has a constexpr
+// It may use + - * / sqrt cbrt pow exp log sin cos tan asin acos atan atan2 sinh cosh tanh hypot,
+// and must perform the same operations whatever the state is: no comparisons, no kinks. A system
+// with modes takes the mode first, and its `mode_count` is a constant. The system has a constexpr
 // default constructor; the parameters of the object are those of the run.
 //
-// Where the compiler cannot know the operations they are recorded at the start of a run, and done
-// one by one, in four to five times the time: for states in vectors (const std::vector<S>& x), a
-// flow that is not constexpr, a system that cannot be constructed by default, parameters that
-// decide what is computed.
+// Where the compiler cannot know the operations, they are recorded at the start of a run and
+// executed one by one, which takes four to five times as long. This concerns states in vectors
+// (const std::vector<S>& x), a flow that is not constexpr, a system that cannot be constructed by
+// default, and parameters that decide which operations are performed.
 #pragma once
 
 #include <cstddef>

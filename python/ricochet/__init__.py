@@ -1,8 +1,9 @@
 """Hybrid systems: smooth motion, events, resets.
 
 ``solve_ivp`` takes SciPy's arguments and returns SciPy's result; events may also reset the
-state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation`` run it, ``Monitor`` finds
-its events in the steps of another integrator, and ``BouncingBall``, ``Pendulum`` and others are ready. Events are located to neighbouring
+state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation`` run it,
+``Monitor`` finds its events in the steps of another integrator, and ``BouncingBall``,
+``Pendulum`` and others are ready-made systems. Events are located to neighbouring
 floating-point numbers.
 """
 

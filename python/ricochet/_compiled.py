@@ -2,7 +2,7 @@
 
 import sys
 
-#: What the functions are declared as, for ``cffi`` and headers of C.
+#: C declarations of the functions, for ``cffi`` and C headers.
 C_FLOW = ("void (uint32_t mode, double t, const double *x, double *dxdt, size_t n, "
           "void *user)")
 C_GUARD = "double (uint32_t mode, double t, const double *x, size_t n, void *user)"
@@ -12,18 +12,18 @@ C_RESET = "uint32_t (uint32_t mode, double t, double *x, size_t n, void *user)"
 
 
 class Compiled:
-    """A compiled function, to be called without Python.
+    """A compiled function, which is called without Python.
 
     Parameters
     ----------
     function
         A function pointer of ``cffi`` or ``ctypes``, a ``numba.cfunc``, or an address. Its
-        signature is `C_FLOW`, `C_GUARD` (also for bounds), `C_RATE` or `C_RESET` (also for
-        ``rest`` and ``time_reset``), by what it stands for. It is not checked: one that does
-        not fit crashes the program.
+        signature must be `C_FLOW`, `C_GUARD` (also for bounds), `C_RATE` or `C_RESET` (also for
+        ``rest`` and ``time_reset``), according to its use. The signature is not checked; a wrong
+        one crashes the program.
     user
-        Handed over as the last argument: an address, a ``cffi`` or ``ctypes`` pointer, or a
-        NumPy array, whose first element is pointed to.
+        Passed as the last argument: an address, a ``cffi`` or ``ctypes`` pointer, or a NumPy
+        array, of which the address of the first element is passed.
 
     Both are kept alive. A system all of whose functions are compiled runs without the
     interpreter lock.

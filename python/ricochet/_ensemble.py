@@ -8,7 +8,7 @@ from ._ready import Ready
 from ._run import numbers_from, set_mode, set_tolerance
 
 _COUNTS = ("events", "steps", "rejected", "flow_calls", "guard_calls")
-_BLOCK = 256  # rows that an executor gets at a time
+_BLOCK = 256  # number of rows submitted to an executor at a time
 
 
 class Ensemble:
@@ -17,8 +17,8 @@ class Ensemble:
     rows : ndarray
         A structured array with the fields ``outcome``, ``t``, ``x`` (the final state), ``mode``,
         ``events`` (how many), ``steps``, ``rejected``, ``flow_calls`` and ``guard_calls``. A field
-        is also an attribute. ``outcome`` is ``"failed"`` for a row that could not be run, and empty
-        for one that was not.
+        is also an attribute. ``outcome`` is ``"failed"`` for a row whose run raised an exception,
+        and empty for a row that was not run.
     failures : dict
         The message of every row that failed.
     complete : bool
@@ -100,7 +100,7 @@ def _tables(system, found, x0):
 
 
 def _run(name, names, parameters, starts, options, threads, progress=None):
-    """Runs rows; also what an executor calls, so that everything in it can be pickled."""
+    """Runs rows; executors call it, so all its arguments must be picklable."""
     options = dict(options)
     set_gate(options)
     found = _ricochet.ensemble(name, names, parameters, starts, options, threads, progress)
@@ -126,7 +126,7 @@ def _joined(parts, starts):
 
 
 def _run_by(executor, arguments, options, progress):
-    """Blocks of rows by an executor, put together in their order."""
+    """Submits blocks of rows to an executor and joins the results in order."""
     name, names, parameters, starts = arguments
     total = len(starts)
     begins = range(0, total, _BLOCK)
@@ -158,26 +158,27 @@ def ensemble(system, table, t_end, *, columns=None, x0=None, threads=None, execu
     Parameters
     ----------
     system : a ready system, or its class
-        Its parameters are those of all rows, but for the columns.
+        Gives the parameters that are not columns of the table.
     table : dict of arrays, structured array, or array_like of shape (rows, columns)
-        Columns are parameters of the system or components of its state at the start.
+        Columns are parameters of the system or components of its initial state.
     t_end : float
     columns : sequence of str
         The names of the columns of an array without fields.
     x0 : array_like
-        The start, but for the columns; by default ``system.start``.
+        The initial state of components that are not columns; by default ``system.start``.
     threads : int
         By default one for each core that the process may use. The results do not depend on it.
     executor
-        Blocks of rows are submitted to it instead: one of `concurrent.futures`, of
+        If given, blocks of rows are submitted to it: an executor of `concurrent.futures` or
         `mpi4py.futures`, or a client of `dask.distributed`. The results are the same.
     progress : callable
-        Called with the rows done and the rows of the table now and then; False ends the ensemble
-        with what there is.
+        Called regularly with the number of finished rows and the number of rows; if it returns
+        False, the ensemble ends with the results so far.
     mode
-        At the start of all rows.
+        Initial mode of all rows.
     **options
-        As for `integrate`, but for what is kept along the way: the events are counted.
+        As for `integrate`, except for options that record results along the way: events are only
+        counted.
 
     Returns
     -------

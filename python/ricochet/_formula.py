@@ -1,4 +1,4 @@
-"""Functions as formulas: called once with symbols, then computed without Python."""
+"""Functions as formulas: recorded by calling them with symbols, computed without Python."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ _a_number = _refused("a number wanted of a symbol, as by functions of math",
 
 
 class Symbol:
-    """The time, a component of the state, or what a formula makes of them."""
+    """The time, a component of the state, or the result of a formula."""
 
     __slots__ = ("_tape", "_index")
     __hash__ = None
@@ -60,7 +60,7 @@ for _method, _name in dict(add="add", sub="subtract", mul="multiply", truediv="d
     setattr(Symbol, f"__r{_method}__", _binary(_name, swapped=True))
 setattr(Symbol, "__neg__", _unary("negate"))
 for _name in ("sqrt", "cbrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh"):
-    setattr(Symbol, _name, _unary(_name))  # which functions of NumPy call
+    setattr(Symbol, _name, _unary(_name))  # called by the functions of NumPy
 for _method, _name in dict(arcsin="asin", arccos="acos", arctan="atan").items():
     setattr(Symbol, _method, _unary(_name))
 for _method, _name in dict(arctan2="atan2", hypot="hypot").items():
@@ -90,7 +90,7 @@ class _Tape:
 
 
 class Formula:
-    """A function of Python that was called with symbols, once for each mode.
+    """A formula recorded from a Python function, once for each mode.
 
     function([mode,] t, x, *args) with ``x`` an array of ``components`` symbols.
     """

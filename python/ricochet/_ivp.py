@@ -22,10 +22,10 @@ _WITHOUT = {
 _IMPLICIT_OPTIONS = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 _KINDS = {kind.value: kind.name.lower() for kind in Kind}
 _EPS = np.finfo(float).eps
-#: What SciPy says of these, for programs that compare.
+#: SciPy's messages for these outcomes, for programs that compare them.
 _MESSAGES = {"reached_end": "The solver successfully reached the end of the integration interval.",
              "stopped_by_event": "A termination event occurred."}
-#: The other outcomes, of functions that SciPy's arguments name.
+#: Messages for other outcomes, with the names of SciPy's arguments.
 _OWN_MESSAGES = {
     "zeno": "the motion presses on an event with a reset, or its events accumulate there, and "
             "nothing stops it; give the event a rest, or end t_span earlier",
@@ -49,7 +49,7 @@ _WORDS = (("t_end - t_start", "t_span[1] - t_span[0]"), ("t_end", "t_span[1]"),
 
 
 def _in_our_words(error, events):
-    """A message of the library that names its own options as the arguments of solve_ivp."""
+    """A message of the library with option names replaced by the arguments of solve_ivp."""
     text = str(error)
     if not text.startswith("integrate: ") or hasattr(error, "ricochet_run"):
         return error
@@ -66,7 +66,7 @@ def _in_our_words(error, events):
 
 
 class OdeResult(dict):
-    """A dictionary whose values are attributes, too."""
+    """A dictionary whose values are also attributes."""
 
     def __getattr__(self, name):
         try:
@@ -86,7 +86,7 @@ class OdeResult(dict):
 
 
 class _Constant:
-    """The solution over no time."""
+    """The solution over an interval of length zero."""
 
     def __init__(self, t, y):
         self.t_min = self.t_max = t
@@ -104,12 +104,12 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
               vectorized=False, args=None, **options):
     """Solves y' = fun(t, y), y(t0) = y0, with events and resets.
 
-    Arguments and result are those of ``scipy.integrate.solve_ivp``; code that uses these runs
-    unchanged. What differs:
+    Arguments and result are those of ``scipy.integrate.solve_ivp``, and code that uses these runs
+    unchanged. Differences:
 
-    - ``method``: ``'RK45'`` (Dormand and Prince, as SciPy's) or ``'DOP853'``, for which a method
-      of order 8 by Fehlberg stands in; for ready systems and formulas also ``'Taylor'``. There
-      are no others.
+    - ``method``: ``'RK45'`` (Dormand and Prince, as in SciPy) or ``'DOP853'``, which is replaced
+      by Fehlberg's method of order 8; for ready systems and formulas also ``'Taylor'``. No other
+      methods are available.
     - ``fun`` may also be a `System`, whose guards then are the events.
     - An event may have, besides ``terminal`` (also a number of events) and ``direction``:
 
@@ -122,8 +122,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
       name : str
           for messages.
 
-    - ``rtol`` is one number; of several the smallest holds for all. ``atol`` may have one for each
-      component.
+    - ``rtol`` is one number; of several numbers the smallest is used. ``atol`` may have one number
+      for each component.
     - Further options are those of `integrate`, such as ``event_tolerance`` and ``max_steps``.
 
     Returns
@@ -135,8 +135,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         'crossing', 'touch', 'jump' or 'accumulation'; ``modes``, before and after; ``outcome``
         and ``statistics``, whose ``evidence`` counts why steps were taken to hold no event.
 
-    An exception of ``fun`` or of an event arrives unchanged; its ``ricochet_run`` is the `Run` so
-    far.
+    If ``fun`` or an event raises an exception, it is passed on unchanged, with the `Run` so far as
+    its attribute ``ricochet_run``.
     """
     if isinstance(method, type):
         method = method.__name__
@@ -199,7 +199,7 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
 
 
 def _refuse_near_names(event, who):
-    """What is nearly an attribute of an event is one misspelt: SciPy ignores it."""
+    """Rejects misspelt attributes of an event, which SciPy would ignore."""
     known = ("terminal", "direction", "reset", "rest", "rate", "unilateral", "name")
     for found in getattr(event, "__dict__", ()):
         if found in known or found.startswith("_"):
@@ -209,7 +209,7 @@ def _refuse_near_names(event, who):
             raise ValueError(f"{who}: found an attribute {found!r}, expected {meant[0]!r}")
 
 
-#: What SciPy has other names for.
+#: Options that SciPy's arguments already give.
 _HERE = ("t_start", "method", "sample_times", "record_steps", "rtol", "atol")
 _ARGUMENTS = ("method", "t_eval", "dense_output", "events", "vectorized", "args", "rtol", "atol",
               "max_step", "first_step")
@@ -279,7 +279,7 @@ def _sample_times(t_eval, t0, t1):
 
 
 def _guards(events, t0, start, args):
-    """Dictionaries of guards, and whether there are events at all."""
+    """A list of dictionaries of guards, and whether there are events."""
     if events is None:
         return [], False
     if callable(events) or isinstance(events, (Guard, Compiled)):
@@ -318,7 +318,7 @@ def _guards(events, t0, start, args):
         if not isinstance(event, Compiled):
             try:
                 first = event(t0, y.copy(), *args)
-            except Exception:  # the run meets it again, and hands it on
+            except Exception:  # raised again, and passed on, by the run
                 first = None
             specification["boolean"] = isinstance(first, (bool, np.bool_))
         out.append(specification)
@@ -355,7 +355,7 @@ def _result(run, count, dense_output, events_given):
 
 
 def _nothing(t, y, samples, dense_output, count):
-    """The result over no time."""
+    """The result of an integration over an interval of length zero."""
     t_out = np.array([t]) if samples is None else samples
     nobody = None if count is None else [np.empty(0) for _ in range(count)]
     return OdeResult(t=t_out, y=np.tile(np.array(y)[:, None], (1, t_out.size)),

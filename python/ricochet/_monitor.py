@@ -1,4 +1,4 @@
-"""Events of a motion that somebody else integrates."""
+"""Events of a motion that another integrator computes."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from ._run import set_mode, source_of, state_from
 
 
 class Verdict(IntEnum):
-    """What a host is to do next."""
+    """The next action of a host."""
 
     STANDS = 0  #: the step stands: continue from its end
     CUT = 1     #: the step ends at a set of events: continue from ``cut.after``, and ``resume``
@@ -21,19 +21,19 @@ _VERDICTS = tuple(Verdict)
 
 
 class Cut(NamedTuple):
-    """A set of events that ends a step, at the same time for all its members."""
+    """A set of events, all at the same time, that ends a step."""
 
     t: float             #: its time
-    s: float             #: from the start of the step shown last
+    s: float             #: offset from the start of the last step
     before: object       #: the state before the resets
     after: object        #: the state after them
     mode_before: object
     mode_after: object
-    fired: list          #: the numbers of the guards that fired, rising
+    fired: list          #: numbers of the guards that fired, ascending
     fired_names: list
-    on_time: bool        #: with a time event
-    accumulation: bool   #: ``after`` is what ``rest`` makes of the limit of infinitely many events
-    state_changed: bool  #: False: the host need not start again
+    on_time: bool        #: whether a time event is among them
+    accumulation: bool   #: whether ``after`` is the state of ``rest`` after infinitely many events
+    state_changed: bool  #: if False, the host need not restart
 
 
 _OPTIONS = ("event_tolerance", "event_rtol", "event_window", "look_inside", "record_events",
@@ -58,23 +58,24 @@ class Monitor(_ricochet.Monitor):
     Parameters
     ----------
     system : System or a ready one
-        Its flow is asked for where no rate is given.
+        Its flow is used if the host gives no rate.
     like : array_like
         A state of the dimension of the motion.
     backward : bool
         The host's time runs backward.
     cut_at_all : bool
-        Every crossing ends its step, also of guards without a reset: for hosts that change the
+        Every crossing ends its step, even if the guard has no reset: for hosts that change the
         state themselves.
     event_tolerance, event_rtol, event_window, look_inside, record_events, event_states,
     detector, locator, gate
         As for `integrate`.
 
-    Rates are dx/dt. Steps out of turn, with a gap, beyond a time event or before ``resume`` are a
-    RuntimeError, and nothing has changed then; arrays of another shape and lengths that are not
-    positive are a ValueError. One thread at a time: a second one gets a RuntimeError. An exception of
-    a function of the system or of ``interpolate`` arrives unchanged, its ``ricochet_run`` the `Run`
-    so far; then the monitor waits for ``start`` or ``restore``.
+    Rates are dx/dt. A step out of turn (with a gap, beyond a time event, or before ``resume``)
+    raises a RuntimeError and changes nothing; arrays of another shape and lengths that are not
+    positive raise a ValueError. Only one thread at a time may use a monitor; a second one gets a
+    RuntimeError. Exceptions from functions of the system or from ``interpolate`` are passed on
+    unchanged, with the `Run` so far as ``ricochet_run``; the monitor then accepts only ``start``
+    or ``restore``.
     """
 
     def __init__(self, system, like, *, backward=False, cut_at_all=False, **options):
@@ -101,35 +102,35 @@ class Monitor(_ricochet.Monitor):
     def start(self, t, x, scale, rate=None, mode=None):
         """Arms all guards at a state that no event has led to: at the start, or after a gap.
 
-        ``scale`` is the length of the next step, roughly; ``rate`` dx/dt at ``x``, by default the
-        system's flow there; ``mode`` by default that of the system. May return ``Verdict.CUT``:
-        a guard that is about to be crossed.
+        ``scale`` is the approximate length of the next step; ``rate`` is dx/dt at ``x``, by default
+        the system's flow; ``mode`` is by default the initial mode of the system. May return
+        ``Verdict.CUT``, if a guard is about to be crossed.
         """
         return _VERDICTS[self._start(t, x, scale, rate, self._number(mode))]
 
     def examine(self, t0, h, x0, x1, rate0, rate1, interpolate=None):
         """Looks for events in the next step, from ``t0`` over the length ``h``, above zero.
 
-        ``x0``, ``x1`` are the states at its ends, ``rate0``, ``rate1`` dx/dt there.
-        ``interpolate(t)`` returns the state at a time within, as the dense output of SciPy; by default
-        the cubic through the four.
+        ``x0`` and ``x1`` are the states at its ends, ``rate0`` and ``rate1`` the values of dx/dt
+        there. ``interpolate(t)`` returns the state at a time within the step, like SciPy's dense
+        output; the default is the cubic through these four.
         """
         return _VERDICTS[self._examine(t0, h, x0, x1, rate0, rate1, interpolate)]
 
     def resume(self, scale, rate=None, *, after=None, mode=None):
         """After a cut, once the host has gone to ``cut.after``: arms all guards there.
 
-        May return ``Verdict.CUT`` again. ``after`` and ``mode`` are for hosts that go to a state of
-        their own making instead.
+        May return ``Verdict.CUT`` again. ``after`` and ``mode`` are for hosts that continue from
+        another state than ``cut.after``.
         """
         return _VERDICTS[self._resume(scale, rate, after, self._number(mode))]
 
     def hold(self, t):
-        """The state of a motion at rest has been kept until ``t``, at most ``must_stop_at``."""
+        """Tells the monitor that the state was kept until ``t``, at most ``must_stop_at``."""
         return _VERDICTS[self._hold(t)]
 
     def skip_to(self, t, x, rate):
-        """The host has continued to ``t``, at most ``quiet_until``, in steps that it has not shown."""
+        """Tells the monitor that the host went to ``t`` <= ``quiet_until`` in steps not shown."""
         self._skip_to(t, x, rate)
 
     @property

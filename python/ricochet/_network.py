@@ -8,19 +8,19 @@ from . import _ricochet
 class Network(_ricochet.Network):
     """A trained network, read from a model file.
 
-    Called with features, ``(n,)`` or one row for each state, it gives its outputs, one row of them
-    for each. What the features are made of is its ``recipe``: ``"state"`` is the state itself.
-    Contiguous arrays of floats are read where they lie, without the interpreter lock, and threads
-    may share a network.
+    Calling it with features, an array ``(n,)`` or one row for each state, returns its outputs, one
+    row for each state. The ``recipe`` determines the features: ``"state"`` is the state itself.
+    Contiguous arrays of floats are not copied, the interpreter lock is not held, and threads may
+    share a network.
 
-    In runs it decides where guards are evaluated: ``integrate(system, x0, t_end, gate=network,
-    detector="calibrated")``; a path will do as well.
+    In a run it decides where guards are evaluated: ``integrate(system, x0, t_end, gate=network,
+    detector="calibrated")``; instead of the network, its path may be given.
 
     Parameters
     ----------
     path : str or path-like
-        A file that ``ricochet train`` or a training has written. One that is damaged or does not fit
-        together is a ValueError.
+        A file written by ``ricochet train`` or by a training. A damaged or inconsistent file
+        raises a ValueError.
     """
 
     def __init__(self, path):
@@ -31,13 +31,13 @@ class Network(_ricochet.Network):
 
     @classmethod
     def from_bytes(cls, content, name="bytes"):
-        """The network whose file has this content; ``name`` stands for it in messages."""
+        """The network in the contents of a file; ``name`` stands for the file in messages."""
         network = cls.__new__(cls)
         _ricochet.Network.__init__(network, content, name)
         return network
 
     def save(self, path):
-        """Writes the model file, which is complete, or as it was before."""
+        """Writes a model file. On failure, an existing file is unchanged."""
         path = os.fspath(path)
         part = path + (b".part" if isinstance(path, bytes) else ".part")
         try:
@@ -63,7 +63,7 @@ class Network(_ricochet.Network):
 
 
 def set_gate(options):
-    """``gate`` as a network, where it is a path."""
+    """Replaces a path given as ``gate`` by the network in that file."""
     gate = options.get("gate")
     if gate is not None and not isinstance(gate, _ricochet.Network):
         if not isinstance(gate, (str, bytes, os.PathLike)):

@@ -9,17 +9,17 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     Parameters
     ----------
     run : Run or the result of `solve_ivp`
-        With states: made with ``sample_times`` or ``record_steps``.
+        With states, so made with ``sample_times`` or ``record_steps``.
     components : sequence of int
-        Which to draw; by default all.
+        Components to draw; by default all.
     labels : sequence of str
-        What they are called.
+        Their labels.
     phase : (int, int)
         Draws the second component over the first instead.
     events : bool
         Whether events are marked, before and after their resets.
     ax : matplotlib.axes.Axes
-        Where; by default the current one.
+        The axes to draw in; by default the current ones.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
         raise ValueError("plot: found a run without states, expected one with sample_times or "
                          "record_steps=True")
     ax = pyplot.gca() if ax is None else ax
-    # Where a reset has taken place a line is not drawn through.
+    # No line is drawn across a reset.
     jumps = np.flatnonzero(np.diff(t) == 0) + 1
     t = np.insert(t, jumps, np.nan)
     x = np.insert(x, jumps, np.nan, axis=0)

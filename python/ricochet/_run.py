@@ -11,10 +11,10 @@ from ._system import System
 
 
 class Kind(IntEnum):
-    """What happened at an event: the field ``kind`` of ``run.events``."""
+    """Kind of an event: the field ``kind`` of ``run.events``."""
 
     CROSSING = 0      #: the guard changed sign
-    TOUCH = 1         #: it reached its surface and turned back
+    TOUCH = 1         #: the guard reached its surface and turned back
     TIME = 2          #: a time event
     ACCUMULATION = 3  #: the limit of infinitely many events
     MODE = 4
@@ -78,7 +78,7 @@ def set_mode(options, system, modes):
 
 
 def source_of(system, args=None):
-    """The system in C++, and its list of modes."""
+    """The C++ object of a system, and its list of modes."""
     if isinstance(system, Ready):
         if args:
             raise TypeError("args: found some for a ready system, expected none")
@@ -90,7 +90,7 @@ def source_of(system, args=None):
 
 
 def prepare(system, x0, t_end, options, args=None):
-    """What the functions of C++ take."""
+    """The arguments of the C++ functions."""
     source, modes = source_of(system, args)
     x0 = state_from(x0, "x0")
     options = dict(options, t_end=float(t_end))
@@ -132,7 +132,7 @@ def integrate(system, x0, t_end, **options):
         1e-8, 1e-10. ``atol`` may have one number for each component; components that a reset adds
         then have the smallest of these that is not zero.
     sample_times : array_like
-        Where ``run.times`` and ``run.states`` are wanted.
+        Times at which states are recorded, in ``run.times`` and ``run.states``.
     record_steps : bool
         Keep the whole solution, for ``run.solution``, and, without ``sample_times``, the ends of
         all steps, both sides of resets, in ``run.times`` and ``run.states``.
@@ -140,8 +140,8 @@ def integrate(system, x0, t_end, **options):
         ``"extremum"`` (default), ``"ends"``, ``"bernstein"``, ``"planned"``; with a ``gate``
         ``"foreseen"``, ``"certified"``, ``"calibrated"``, ``"calibrated-bounds"`` or ``"network"``.
     gate : Network or path
-        The network that such a detector asks. It is for systems of its ``system`` as their name, with
-        its ``parameters``.
+        The network of a detector that uses one. The ``name`` and the ``parameters`` of the system
+        must be those for which it was trained.
     locator : str
         ``"newton"`` (default), ``"bisection"`` or ``"toms748"``.
     step, h_min, h_max, event_tolerance, event_rtol, event_window, look_inside, stop_at_event,
@@ -152,18 +152,18 @@ def integrate(system, x0, t_end, **options):
     -------
     Run
 
-    An exception of a function of the system arrives unchanged; its ``ricochet_run`` is the `Run` so
-    far.
+    If a function of the system raises an exception, it is passed on unchanged, with the `Run` so
+    far as its attribute ``ricochet_run``.
     """
     source, x0, options, modes = prepare(system, x0, t_end, options)
     return _ricochet.integrate(source, x0, options, modes)
 
 
 class Simulation(_ricochet.Simulation):
-    """A run that is driven by hand; arguments as for `integrate`.
+    """A run that the caller drives step by step; arguments as for `integrate`.
 
-    One thread at a time: a second one gets a RuntimeError, as does a function of the system that
-    asks the simulation that has called it.
+    Only one thread at a time may use it: a second one gets a RuntimeError, as does a function of
+    the system that uses the simulation by which it is called.
     """
 
     def __init__(self, system, x0, t_end, **options):

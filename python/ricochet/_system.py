@@ -15,29 +15,29 @@ class Guard:
     Parameters
     ----------
     value : function (t, x) -> float
-        Positive inside the mode. Of a system with modes this and all the following functions
-        take the mode first.
+        Positive inside the mode. In a system with modes this and all the following functions
+        take the mode as first argument.
     name : str
-        What messages call it; by default the name of the function.
+        Name in messages; by default that of the function.
     direction : -1, 0 or 1
         -1 (default): falling through zero, as a motion leaves the mode; 1: rising; 0: either.
     reset : function (t, x) -> x
         The state after the event; with modes a mode, or a tuple (mode, x). Without it the event is
         only recorded.
     rest : function (t, x) -> x
-        What becomes of the motion where infinitely many events accumulate.
+        The state after an accumulation of infinitely many events.
     rate : function (t, x, dxdt) -> float
-        dg/dt along the flow; by default a difference, for two more calls of ``value``.
+        dg/dt along the flow; by default a difference, which costs two more calls of ``value``.
     enabled : function (t, x) -> bool
         Whether a crossing here and now is an event.
     in_modes : sequence of modes
-        Where the guard is looked at; by default in every mode.
+        Modes in which the guard is examined; by default all.
     unilateral : bool
         The guard bounds the motion: it is never negative. Needs a reset.
     boolean : bool
-        Only the sign means anything.
+        Only the sign of the guard has a meaning.
     degree : int
-        Of the guard as a polynomial in time and state, for ``detector="bernstein"``.
+        Degree of the guard as a polynomial in time and state, for ``detector="bernstein"``.
     touch : float
         ``|g|`` at a turning point that counts as a touch.
     stop_after : int
@@ -45,8 +45,8 @@ class Guard:
     speed_bound, acceleration_bound, lower_bound, upper_bound : functions (t, x) -> float
         With ``lipschitz``, for ``detector="planned"``.
 
-    In a class ``guard`` makes one of a method, whose ``reset``, ``rest`` and further functions are
-    methods decorated with ``@name.reset`` and so on, as those of a ``property`` are.
+    In a class, ``guard`` turns a method into a guard, whose ``reset``, ``rest`` and further
+    functions are methods decorated with ``@name.reset`` and so on, like those of a ``property``.
     """
 
     def __init__(self, value=None, *, name=None, direction=-1, reset=None, rest=None, rate=None,
@@ -155,13 +155,13 @@ class System:
     flow(t, x) -> dx/dt
         The smooth motion. ``x`` is an array that may be kept.
     guard(t, x), reset(t, x), rest(t, x), guard_rate(t, x, dxdt)
-        Of a system with one guard, with the attributes ``unilateral`` and ``direction``; for
-        more there is `Guard`.
+        For a system with one guard, with the attributes ``unilateral`` and ``direction``; for
+        several guards see `Guard`.
     guards
         A sequence of `Guard`; those that a class makes with ``@guard`` come first.
     modes
         A number, a sequence of names, or an Enum. Every function takes the mode before ``t``, as
-        it is written there, and a reset returns a mode, or a tuple (mode, x).
+        a number, name or member of the Enum, and a reset returns a mode, or a tuple (mode, x).
     guard_values(t, x) -> numbers
         All guards at once, instead of their own functions.
     reset_set(t, x, fired) -> x
@@ -177,10 +177,10 @@ class System:
     formula : int
         The number of components of a state whose flow and guards are formulas: they are called
         once with symbols, in each mode, and then computed without Python, also by
-        ``method="taylor"``. They use arithmetic and functions of NumPy (np.sin, ...), and neither
-        compare nor branch on what they are given but the mode.
+        ``method="taylor"``. They use arithmetic and functions of NumPy (np.sin, ...). Apart from
+        the mode, they must not compare their arguments or branch on them.
     name, parameters
-        What a network is trained for: a text, and a dictionary of numbers.
+        Identification for networks: a text, and a dictionary of numbers.
     """
 
     flow = None

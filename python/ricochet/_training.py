@@ -28,21 +28,21 @@ def _learn():
 
 
 class Trained:
-    """What a training has made.
+    """Result of a training.
 
     network : Network or None
-        None where it was stopped before anything was learned.
+        None if the training was stopped before anything was learned.
     outcome : str
         ``"finished"``, ``"stopped"``, ``"misses_remain"`` or ``"diverged"``; ``message`` says it as
         a sentence.
     misses_none : bool
-        Whether no event was missed on any set that was looked at.
+        Whether no event was missed on any of the examined sets.
     trial : SimpleNamespace
-        The runs that compare it with the exact detector, counted.
+        Counts of the runs that compare the network with the exact detector.
     verdict : str
-        What came out of them, as a sentence that says so where it does not pay.
+        The result of these runs as a sentence, which says whether the network pays.
     report : dict or None
-        Of the training, with its sets.
+        Report of the training, with its sets.
     """
 
     def __init__(self, network, outcome, message, misses_none, trial, verdict, report):
@@ -59,12 +59,12 @@ class Trained:
 
 
 class Certified:
-    """What a proof has come to.
+    """Result of a proof.
 
     network : Network
-        With its certificate, which has the levels that were finished.
+        The network with its certificate, which contains the levels that were finished.
     proved : bool
-        Whether all levels were proved, but for boxes that the certificate lists.
+        Whether all levels were proved, except for boxes that the certificate lists.
     outcome : str
         ``"proved"``, ``"partly_proved"``, ``"refuted"``, ``"not_provable"``, ``"too_long"``,
         ``"out_of_time"``, ``"out_of_memory"`` or ``"interrupted"``; ``message`` says it as a
@@ -128,7 +128,7 @@ def _certified(found):
 
 
 class _Bar:
-    """Where a training is, in one line on stderr."""
+    """Shows the progress of a training in one line on stderr."""
 
     def __init__(self):
         self.last = 0.0
@@ -161,7 +161,7 @@ class _Bar:
 
 
 def _with_progress(progress, note, work):
-    """Calls ``work`` with a callback, or with a bar that is closed again."""
+    """Calls ``work`` with the callback, or with a progress bar."""
     if progress is None:
         progress = sys.stderr.isatty()
     if not isinstance(progress, bool):
@@ -218,7 +218,7 @@ def _split(options):
 
 
 def _pilot(system, rows, box, mode, how, length, events, labels=0):
-    """A sentence about what sampling will take, from one short run; ``labels`` further steps."""
+    """A sentence on the cost of sampling and ``labels`` further steps, from one short run."""
     start = np.mean(rows, axis=0) if box else rows[0]
     given = dict(how, max_steps=1000, record_events=False, stall_steps=0)
     if getattr(system, "modes", None) is not None:
@@ -249,7 +249,7 @@ def train_classifier(system, starts, *, step, mode=None, method="rk4", progress=
     system : System or a ready one
         With one guard; flow and guard depend on the state alone.
     starts : tuple (lower, upper), or array_like, shape (n, components)
-        The corners of a box, or states of which each run takes one.
+        The corners of a box, or states of which each run uses one.
     step : float
         Of the fixed steps that the network is for.
     mode
@@ -257,9 +257,9 @@ def train_classifier(system, starts, *, step, mode=None, method="rk4", progress=
     method : str
         ``"rk4"`` or ``"dopri5"``.
     progress : callable, bool or None
-        Called with ``stage, iteration, total, loss, misses, seconds``; False stops, and what was
-        learned until then is returned. True: a bar on stderr, and an estimate before it. None: a
-        bar where stderr is a terminal.
+        Called with ``stage, iteration, total, loss, misses, seconds``; if it returns False, the
+        training stops and returns what was learned so far. True: a bar on stderr, and an estimate
+        before it. None: a bar if stderr is a terminal.
     seed : int
         1. The same seed gives the same network, to the bit on one machine.
     run_length, surface_points, states, fresh_states, trial_events, most_steps, margin, widened,
@@ -273,7 +273,7 @@ def train_classifier(system, starts, *, step, mode=None, method="rk4", progress=
         Its ``network`` is for ``integrate(system, ..., method=method, fixed=True, step=step,
         detector="network", gate=network)``.
 
-    KeyboardInterrupt, or an exception of ``progress``, has the `Trained` so far as its
+    KeyboardInterrupt and exceptions of ``progress`` have the `Trained` so far as attribute
     ``ricochet_trained``.
     """
     module = _learn()
@@ -295,7 +295,7 @@ def train_classifier(system, starts, *, step, mode=None, method="rk4", progress=
 
 def train_gate(system, starts, levels=None, *, step=None, mode=None, method=None, progress=None,
                **options):
-    """Trains a gate: a network that says for how long no event is to be expected.
+    """Trains a gate: a network that predicts for how long no event occurs.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def train_gate(system, starts, levels=None, *, step=None, mode=None, method=None
         Its ``network`` is for ``integrate(system, ..., gate=network, detector="calibrated")``, or
         ``"foreseen"``.
 
-    KeyboardInterrupt, or an exception of ``progress``, has the `Trained` so far as its
+    KeyboardInterrupt and exceptions of ``progress`` have the `Trained` so far as attribute
     ``ricochet_trained``.
     """
     module = _learn()
@@ -385,8 +385,8 @@ def certify(network, system, slack, *, least=None, progress=None, **options):
     Certified
         Its ``network`` is for ``integrate(system, ..., gate=network, detector="certified")``.
 
-    KeyboardInterrupt, or an exception of ``progress``, has the `Certified` so far as its
-    ``ricochet_trained``. A slack or bound that is found broken is a ValueError with the states.
+    KeyboardInterrupt and exceptions of ``progress`` have the `Certified` so far as attribute
+    ``ricochet_trained``. If a slack or bound is found violated, a ValueError gives the states.
     """
     module = _learn()
     if not isinstance(network, _ricochet.Network):

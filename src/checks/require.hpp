@@ -1,4 +1,4 @@
-// Checks of what a caller gives. Each throws std::invalid_argument with one sentence that begins
+// Validation of arguments. Each check throws std::invalid_argument with one sentence that begins
 // with the name of a type or a function, such as
 //
 //     Pendulum: length must be positive and finite, got -1
@@ -8,7 +8,7 @@
 
 namespace ricochet::detail {
 
-/// Refuses in the name of `who`:
+/// Throws with a message that begins with `who`:
 ///
 ///     constexpr Refuse refuse{"snapshot"};
 ///     if (text.empty()) refuse("the text is empty");   // snapshot: the text is empty
@@ -42,7 +42,7 @@ void require_finite(std::string_view who, std::string_view parameter, double giv
 void require_above(std::string_view who, std::string_view parameter, double given,
                    std::string_view other, double bound);
 
-/// Finite, and no less than `bound`, the value of another parameter.
+/// Requires a finite value of at least `bound`, the value of another parameter.
 void require_at_least(std::string_view who, std::string_view parameter, double given,
                       std::string_view other, double bound);
 

@@ -328,9 +328,8 @@ protected:
     /// not rise above its rounding any more.
     [[nodiscard]] bool fades(std::size_t i);
 
-    /// Whether the reset has put guard i farther from its surface, on the side that it came from,
-    /// than an error of location explains, so that the guard need not rise.
-    [[nodiscard]] bool is_away(std::size_t i, double rounding);
+    /// How far from its surface the reset has put guard i, positive on the side that it came from.
+    [[nodiscard]] double distance_put_back(std::size_t i);
 
     /// The rate [1/s] of guard i at the start of the step; a difference quotient, if it has to
     /// be one, is taken over 1e-5 of `scale` [s].

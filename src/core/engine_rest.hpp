@@ -38,7 +38,21 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
     double rate = departure(i, h_next_);
     const bool low = record.intervals.is_low_at(rate);
     const double rounding = low ? rounding_of(i) : 0;
-    if (low && is_away(i, rounding)) return false;
+    bool jump_lost = false;
+    if (low) {
+        const double away = distance_put_back(i);
+        // A crossing so soon after this one would be taken for its repetition.
+        const double soon = 2 * std::fabs(rate) * resolution_.window(step_.start().value);
+        jump_lost = record.intervals.jump_is_lost(away, std::max(rounding, soon));
+        // Farther than an error of location explains: it is there whether the guard rises or not.
+        // Without a location the reset of another guard may carry it across its surface.
+        if ((located_ ? away : std::fabs(away)) > 1024 * rounding) {
+            record.turned = away > 0;
+            return false;
+        }
+    } else {
+        record.intervals.forget_jumps();
+    }
     bool lost = false;
     if (!system_->rated) {
         if (low) {
@@ -56,20 +70,15 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
     record.rated_over = low ? stale : h_next_;
     record.turned = lost || sign_of(record.last_side) * rate > 0;
     if (record.turned) record.intervals.depart(rate, low);
+    if (jump_lost && located_ && (lost || !record.turned)) return true;
     return low && record.intervals.fades(rounding);
 }
 
 template <class X, bool single>
-inline bool EventEngine<X, single>::is_away(std::size_t i, double rounding)
+inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 {
-    GuardRecord& record = bank_[i];
     const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
-    // The reset of another guard may carry it far across its surface, which is no motion towards
-    // it.
-    const double away = located_ ? sign_of(record.last_side) * g : std::fabs(g);
-    if (!(away > 1024 * rounding)) return false;
-    record.turned = sign_of(record.last_side) * g > 0;
-    return true;
+    return sign_of(bank_[i].last_side) * g;
 }
 
 template <class X, bool single>

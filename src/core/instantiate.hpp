@@ -9,6 +9,7 @@
 #include "core/engine_record.hpp"
 #include "core/engine_rest.hpp"
 #include "core/engine_settle.hpp"
+#include "core/event_notes.hpp"
 #include "core/event_series.hpp"
 #include "core/event_sets.hpp"
 #include "core/large_kernel.hpp"

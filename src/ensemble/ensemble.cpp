@@ -20,7 +20,7 @@ namespace {
 
 constexpr unsigned most_threads = 1024;
 
-/// Cores that the process may use: a launcher binds its processes to some.
+/// Number of cores that the process may use; a launcher may bind its processes to some of them.
 unsigned cores()
 {
 #ifdef __linux__
@@ -43,7 +43,7 @@ std::string message_of(const std::exception_ptr& thrown)
     }
 }
 
-/// What the threads of one ensemble share.
+/// State shared by the threads of one ensemble.
 class Progress {
 public:
     Progress(std::size_t rows, const EnsembleOptions& options) : rows_(rows), options_(options) {}

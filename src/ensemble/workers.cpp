@@ -6,8 +6,8 @@ namespace ricochet::detail {
 
 namespace {
 
-// A task follows another within a fraction of a millisecond; waiting and
-// being woken takes a good part of that.
+// Tasks follow each other within a fraction of a millisecond, and being woken takes a good part of
+// that, so threads spin first.
 constexpr int spins = 4000;
 
 constexpr std::uint64_t task = std::uint64_t{1} << 32U;
@@ -34,7 +34,7 @@ Workers::Workers(unsigned threads)
     try {
         for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this] { wait_for_work(); });
     } catch (const std::system_error&) {
-        // The caller does it with those that there are.
+        // The remaining work is done by the threads that exist and the caller.
     }
 }
 

@@ -1,4 +1,4 @@
-// Threads that wait for work.
+// A team of threads that share tasks.
 #pragma once
 
 #include <atomic>
@@ -24,8 +24,9 @@ public:
     Workers(const Workers&) = delete;
     Workers& operator=(const Workers&) = delete;
 
-    /// Calls `part(i)` for i = 0 ... n - 1, n < 2^32, and returns when all are done. What is
-    /// not begun when one throws is left out; of the parts that threw, the first is thrown on.
+    /// Calls `part(i)` for i = 0 ... n - 1, n < 2^32, and returns when all are done. If a part
+    /// throws, parts that have not started are skipped, and of the parts that threw, the
+    /// exception of the one with the lowest i is thrown again.
     void run(std::size_t n, const std::function<void(std::size_t)>& part);
 
 private:

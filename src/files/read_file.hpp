@@ -1,4 +1,4 @@
-// Files that are read whole, whatever their format.
+// Reading whole files.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,10 @@
 
 namespace ricochet::detail {
 
-/// The bytes of a file. One that does not begin with `first` is read no further than that.
+/// The bytes of a file. A file that does not begin with `first` is read no further than that.
 ///
-/// @param refuse  called with what is wrong with the file, and must not return: it cannot be read,
-///                is longer than `longest`, or is a directory, a device or a pipe, which might
-///                never end
+/// @param refuse  called with the reason if the file cannot be read, is longer than `longest`, or
+/// is a directory, a device or a pipe, which might never end; must not return
 template <class Refuse>
 [[nodiscard]] std::string read_file(
     const std::filesystem::path& file, const Refuse& refuse,

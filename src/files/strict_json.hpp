@@ -1,4 +1,4 @@
-// JSON from files that anybody may have written.
+// JSON from untrusted files.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -19,8 +19,8 @@ public:
     using JsonTrouble::JsonTrouble;
 };
 
-/// JSON in which no object has a key twice and nothing lies deeper than `levels`: what is nested a
-/// hundred thousand times would exhaust the stack of whatever walks through it.
+/// Parses JSON in which no object has a key twice and nothing is nested deeper than `levels`:
+/// nesting of a hundred thousand levels would exhaust the stack of any code that traverses it.
 /// @throws JsonTrouble
 [[nodiscard]] nlohmann::json parse_strictly(std::string_view text, int levels);
 

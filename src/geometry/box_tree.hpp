@@ -1,13 +1,12 @@
-// A tree of boxes around many small things, for questions of the kind "which is nearest?".
+// A tree of boxes around many small items, for nearest-neighbour queries.
 //
-// The things are put in an order in which neighbours are near one another; then four of
-// them make a block, four blocks a node, four nodes the node above, and so on. Position
-// alone determines the tree, so there are no pointers, and four boxes are compared
-// with a query together.
+// The items are ordered so that neighbours are near one another; then four of them make a block,
+// four blocks a node, four nodes the node above, and so on. Position alone determines the tree, so
+// there are no pointers, and four boxes are compared with a query together.
 //
-// The nearest so far bounds the search, so it pays to begin with a good guess: with the
-// answer of the last question little more is opened than the way down to the new one. The
-// guess decides what is opened, never what is found.
+// The nearest item so far bounds the search, so it pays to begin with a good guess: with the answer
+// of the previous query, little more than the path to the new answer is opened. The guess decides
+// what is opened, never what is found.
 #pragma once
 
 #include <algorithm>
@@ -63,7 +62,7 @@ private:
     }
 };
 
-/// Four boxes, a coordinate of all of them together.
+/// Four boxes; one coordinate of all of them is contiguous.
 template <std::size_t Dim>
 struct alignas(32) FourBoxes {
     double lower[Dim][4];
@@ -100,9 +99,9 @@ class BoxTree {
 public:
     BoxTree() = default;
 
-    /// Over boxes, one for each thing; widened by 1e-14 of the largest coordinate, so that
-    /// the rounding of a distance computed from a thing's corners never takes it
-    /// below that to its box.
+    /// Builds a tree over boxes, one for each item. They are widened by 1e-14 of the largest
+    /// coordinate, so that a distance computed from an item's corners is never, by rounding, less
+    /// than the distance to its box.
     explicit BoxTree(std::vector<Box<Dim>> boxes)
     {
         double reach = 0;
@@ -120,23 +119,24 @@ public:
     /// The box around everything.
     [[nodiscard]] const Box<Dim>& bounds() const noexcept { return bounds_; }
 
-    /// Levels of nodes: 0 holds the boxes of the blocks, the last is one node. A node holds
-    /// those with four times its place, and the three after them, on the level below.
+    /// Number of levels of nodes: level 0 holds the boxes of the blocks, the last is one node. The
+    /// four children of node i are the nodes 4 i to 4 i + 3 on the level below.
     [[nodiscard]] std::size_t levels() const noexcept { return levels_.size(); }
     [[nodiscard]] const std::vector<FourBoxes<Dim>>& level(std::size_t i) const noexcept
     {
         return levels_[i];
     }
 
-    /// Opens whatever may hold something at a squared distance of at most `best`, nearer
-    /// things first. `bound(four)` gives lower bounds for four boxes; `open(first, last)`
-    /// examines the places of a block, and lowers `best`. Finite `best` only.
+    /// Opens all blocks that may hold an item at a squared distance of at most `best`, nearer ones
+    /// first. `bound(four)` gives lower bounds for four boxes; `open(first, last)` examines the
+    /// places of a block, and lowers `best`. `best` must be finite.
     template <class Bound, class Open>
     void search(double& best, const Bound& bound, const Open& open) const
     {
         if (levels_.empty()) return;
-        // Each level leaves at most three waiting, and there are at most 16 levels. Numbers in
-        // columns of their own: what was written in parts is slow to read as a whole.
+        // Each level leaves at most three nodes waiting, and there are at most 16 levels. Bounds
+        // and nodes are separate arrays, because a struct written in parts is slow to read as a
+        // whole.
         std::array<double, 64> bounds;
         std::array<std::uint64_t, 64> nodes;  // level and place in it
         constexpr std::uint64_t level_one = std::uint64_t{1} << 32U;
@@ -161,7 +161,7 @@ public:
                 nearest = below[i] < bounds[nearest] ? count : nearest;
                 count += below[i] <= best ? 1 : 0;
             }
-            if (nearest + 1 < count) {  // is the next to be opened
+            if (nearest + 1 < count) {  // so that it is opened next
                 std::swap(bounds[nearest], bounds[count - 1]);
                 std::swap(nodes[nearest], nodes[count - 1]);
             }
@@ -226,7 +226,7 @@ private:
         }
     }
 
-    /// The first four; what is missing is infinitely far away.
+    /// The first four boxes; missing ones are infinitely far away.
     static FourBoxes<Dim> four(std::span<const Box<Dim>> boxes)
     {
         FourBoxes<Dim> out;

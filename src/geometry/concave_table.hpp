@@ -24,11 +24,10 @@ struct Tangent {
 
 /// Bounds of a concave function from its values and tangents at the nodes of a grid.
 ///
-/// *From below.* A point is a mean of corners of its cell, with weights that are not negative and
-/// add up to 1, and a concave function is at least the same mean of its values there. The
-/// corners are those of a simplex: the components of the place within the cell, sorted, say in
-/// which order to walk from the lowest corner to the highest (Kuhn 1960, "Some combinatorial
-/// lemmas in topology").
+/// *From below.* A point is a convex combination of corners of its cell, and a concave function is
+/// at least the same combination of its values there. The corners are those of a simplex: the order
+/// of the components of the point within the cell determines in which order to walk from the lowest
+/// corner to the highest (Kuhn 1960, "Some combinatorial lemmas in topology").
 ///
 /// *From above.* The tangents at the same corners.
 ///
@@ -80,7 +79,7 @@ public:
             }
             size = std::max(size, here);
         }
-        // Place, weights and sums: each a few roundings of what they are made of.
+        // Allows for a few roundings each of place, weights and sums.
         slack_ = error + 64 * std::numeric_limits<double>::epsilon() * size;
     }
 
@@ -121,7 +120,8 @@ public:
     }
 
 private:
-    /// From the lowest corner of a cell along the axes, those first on which p is furthest.
+    /// Order of the axes along which to walk from the lowest corner of a cell: largest offset
+    /// first.
     struct Walk {
         std::size_t index = 0;
         Point offset{};  ///< of p, in [0, 1]

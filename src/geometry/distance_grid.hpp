@@ -21,8 +21,8 @@ public:
 
     DistanceGrid() = default;
 
-    /// Tabulates `distance` in `cells` cells along each side of `box`, and allows for an error of
-    /// `error` of its values.
+    /// Tabulates `distance` in `cells` cells along each side of `box`; its values may be wrong by
+    /// `error`.
     /// @throws std::invalid_argument for 0 cells, or a box without a volume.
     template <class Distance>
     DistanceGrid(const Box<Dim>& box, std::size_t cells, double error, const Distance& distance)
@@ -66,7 +66,8 @@ public:
         return static_cast<double>(values_[index]) - std::sqrt(squared);
     }
 
-    /// Bound for the whole cell: lower than `lower_bound`, and a square root cheaper.
+    /// A lower bound for the whole cell of p: less than `lower_bound`, and cheaper by a square
+    /// root.
     [[nodiscard]] double lower_bound_of_cell(const Point& p) const noexcept
     {
         std::size_t index = 0;

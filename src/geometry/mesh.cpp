@@ -29,7 +29,7 @@ class Lines {
 public:
     explicit Lines(std::string_view text) : text_(std::string(text)) {}
 
-    /// The next line with something in it; false at the end.
+    /// Reads the next line that is not empty; false at the end.
     bool next(std::istringstream& out)
     {
         std::string line;

@@ -24,9 +24,9 @@ struct Mesh {
 /// does not exist.
 [[nodiscard]] Mesh read_mesh(std::string_view text);
 
-/// @throws std::invalid_argument if there is no face; naming the face that has a vertex which does
-/// not exist or is not finite, that has no area, or that has an edge which does not lead
-/// to exactly one other face, run through the other way.
+/// @throws std::invalid_argument if there is no face, or naming a face that has a vertex which does
+/// not exist or is not finite, that has no area, or that has an edge which is not shared with
+/// exactly one other face in the opposite direction.
 void require_closed(const Mesh& mesh);
 
 /// How often the surface of a closed mesh winds around p, from the solid angles of its faces

@@ -39,7 +39,7 @@ public:
         return dot(p - found.point, normal) < 0 ? -found.distance : found.distance;
     }
 
-    /// Into the polygon, of unit length.
+    /// Normal of an edge, into the polygon, of unit length.
     [[nodiscard]] Point2 edge_normal(std::uint32_t edge) const noexcept
     {
         return edge_normals_[edge];

@@ -1,6 +1,6 @@
-// The least of many squared distances between segments and a point, for one instruction
-// set. Included by one file for each, which is compiled with its flags, without
-// contraction: the bits are the same.
+// The least of many squared distances between segments and a point, for one instruction set. This
+// file is included by one source file per set, compiled with its flags and without contraction, so
+// that the bits are the same.
 #pragma once
 
 #include <cstddef>

@@ -191,7 +191,7 @@ NearestPair nearest_points(const Segment2& s, const Segment2& other) noexcept
         const Point2 common = s.a + (start / (start - end)) * d;
         return {0, 0, common, common};
     }
-    // Those that do not cross are nearest at an end of one of them.
+    // Segments that do not cross are nearest at an end of one of them.
     NearestPair best;
     double least = infinity;
     const auto offer = [&](Point2 on_s, Point2 on_other, double squared) {
@@ -214,7 +214,7 @@ NearestPair nearest_points(const Segment2& s, const Segment2& other) noexcept
 
 namespace {
 
-/// A segment that is asked about, with what all the others are compared with.
+/// The query segment, with precomputed quantities for the comparisons.
 struct Asked {
     explicit Asked(const Segment2& s) noexcept
         : a(s.a), b(s.b), d(s.b - s.a), inverse(dot(d, d) > 0 ? 1 / dot(d, d) : 0)
@@ -239,7 +239,7 @@ template <class T>
     const auto less = [](const T& u, const T& v) { return u < v ? u : v; };
     const T bx = ax + dx;
     const T by = ay + dy;
-    // Those that do not cross are nearest at an end of one of them.
+    // Segments that do not cross are nearest at an end of one of them.
     T least = less(detail::squared_distance<T>(ax, ay, dx, dy, inverse, s.a.x, s.a.y),
                    detail::squared_distance<T>(ax, ay, dx, dy, inverse, s.b.x, s.b.y));
     const auto from_end = [&](const T& x, const T& y) {

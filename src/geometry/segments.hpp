@@ -44,7 +44,7 @@ struct Segment2 {
 
 /// The point of a segment that is nearest to another point.
 struct NearestOnSegment {
-    std::uint32_t segment = 0;  ///< which
+    std::uint32_t segment = 0;  ///< index of the segment
     double distance = 0;
     double along = 0;  ///< 0 at its first end, 1 at its second
     Point2 point;
@@ -52,16 +52,16 @@ struct NearestOnSegment {
 
 /// The nearest points of two segments, one of them out of many.
 struct NearestPair {
-    std::uint32_t segment = 0;  ///< which of the many
+    std::uint32_t segment = 0;  ///< index of the other segment
     double distance = 0;        ///< 0 where they cross
-    Point2 point;               ///< on the segment asked about
-    Point2 other;               ///< on the one out of many
+    Point2 point;               ///< on the query segment
+    Point2 other;               ///< on the other segment
 };
 
-/// Segments of positive length that do not change.
+/// Fixed segments of positive length.
 ///
-/// `nearest` searches the tree, `nearest_brute` examines every segment; both return the
-/// same bits, also which segment it is: of several at the same distance, the first.
+/// `nearest` searches the tree, `nearest_brute` examines every segment; both return the same bits.
+/// Of several segments at the same distance, both return the first.
 class Segments {
 public:
     /// @throws std::invalid_argument if there is none, or naming the segment that has no
@@ -72,19 +72,21 @@ public:
     [[nodiscard]] const Segment2& operator[](std::size_t i) const noexcept { return segments_[i]; }
     [[nodiscard]] const Box<2>& bounds() const noexcept { return tree_.bounds(); }
 
-    /// `hint` is a segment that may be near. A point that is not a number is at distance
-    /// NaN from segment 0, one so far away that squares overflow at infinity.
+    /// The nearest segment to p. `hint` is a segment that may be near. A point that is not a number
+    /// has distance NaN from segment 0; a point so far away that squares overflow has distance
+    /// infinity.
     [[nodiscard]] NearestOnSegment nearest(Point2 p, std::uint32_t hint = 0) const noexcept;
     [[nodiscard]] NearestOnSegment nearest_brute(Point2 p) const noexcept;
 
-    /// The nearest to a segment, if it is nearer than `limit`; else distance `limit`, and
-    /// nothing else is meant.
+    /// The nearest segment to s, if it is nearer than `limit`; otherwise only the distance is set,
+    /// to `limit`.
     [[nodiscard]] NearestPair nearest(const Segment2& s, double limit,
                                       std::uint32_t hint = 0) const noexcept;
     [[nodiscard]] NearestPair nearest_brute(const Segment2& s, double limit) const noexcept;
 
 private:
-    /// Ends, directions and 1 / length², each together; filled up with copies of the last.
+    /// Ends, directions and 1 / length², in separate arrays, padded with copies of the last
+    /// segment.
     struct Columns {
         std::vector<double> ax, ay, dx, dy, inverse;
         void append(const Segment2& s);

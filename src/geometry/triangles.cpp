@@ -143,7 +143,7 @@ NearestFaces nearest_points(const Triangle& a, const Triangle& b) noexcept
         }
     }
     best.distance = std::sqrt(least);
-    // Those that cross have an edge through a face, and are close elsewhere too.
+    // Triangles that cross have an edge through a face.
     Vector3d where;
     for (std::size_t i = 0; i < 3; ++i) {
         if (pierces(a[i], a[(i + 1) % 3], b, where) || pierces(b[i], b[(i + 1) % 3], a, where)) {
@@ -212,7 +212,7 @@ Triangle moved(const Triangle& t, const Pose& pose) noexcept
     return out;
 }
 
-/// The best so far of two meshes.
+/// The nearest pair of faces of two meshes found so far.
 struct BestPair {
     NearestFaces found{.face = std::numeric_limits<std::uint32_t>::max(),
                        .other_face = std::numeric_limits<std::uint32_t>::max(),
@@ -269,8 +269,8 @@ NearestFaces Triangles::nearest(const Triangles& body, const Pose& pose,
         const std::uint32_t other = hint.other_face < body.size() ? hint.other_face : 0;
         best.offer(triangles_[face], face, moved(body[other], pose), other);
     }
-    // Going back and forth between the surfaces soon comes near to the nearest pair, or to one that
-    // is hardly further. The search that follows only has to show that.
+    // Alternating projections between the surfaces soon come near the nearest pair, or a pair that
+    // is hardly further apart. The search that follows then has little more to do than to prove it.
     Vector3d from = best.found.other_point;
     for (int turn = 0; turn < most_turns; ++turn) {
         const NearestOnTriangle here = nearest(from, best.found.face);
@@ -285,8 +285,8 @@ NearestFaces Triangles::nearest(const Triangles& body, const Pose& pose,
     const auto ball_at = [&](const Ball& ball) {
         return Ball{pose.rotation * ball.centre + pose.translation, ball.radius};
     };
-    // Everything of this mesh that a ball around a part of the body may be nearest to.
-    // Whatever the ball covers is at least as far as the ball; 1e-12 for rounding.
+    // Squared radius around the centre of a ball within which a part of this mesh may be nearer to
+    // the ball's contents than the best pair so far; 1e-12 for rounding.
     const auto squared_reach = [&](double radius) {
         const double reach = (best.found.distance + radius) * (1 + 1e-12);
         return std::min(reach * reach, largest);

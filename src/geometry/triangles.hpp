@@ -20,7 +20,7 @@ struct NearestOnTriangle {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
 };
 
-/// Where two meshes are nearest: a face of each, and a point on it.
+/// The nearest points of two meshes, with their faces.
 struct NearestFaces {
     std::uint32_t face = 0, other_face = 0;
     double distance = 0;  ///< 0 where they cross
@@ -34,7 +34,7 @@ struct Pose {
     Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 };
 
-/// A ball, and what it covers.
+/// A ball that covers a part of a mesh.
 struct Ball {
     Eigen::Vector3d centre;
     double radius;

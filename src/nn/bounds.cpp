@@ -26,7 +26,7 @@ double gamma(std::size_t n, double u = unit) noexcept
 
 constexpr detail::Refuse refuse_bounds{"NetworkBounds"};
 
-/// Half a block: registers of every x86-64 hold two doubles.
+/// A vector of two doubles, which fits a register of every x86-64 processor.
 using Pair = double __attribute__((vector_size(2 * sizeof(double))));
 
 Pair load_pair(const double* from) noexcept
@@ -41,7 +41,7 @@ Pair magnitude(Pair x) noexcept
 
 }  // namespace
 
-/// The normalised features of a box: |x - centre| <= radius, and what holds of both.
+/// The normalised features of a box: |x - centre| <= radius.
 struct NetworkBounds::Place {
     std::array<double, max_inputs> centre;
     std::array<double, max_inputs> radius;
@@ -284,7 +284,7 @@ double NetworkBounds::backward(const Place& at, Scratch& s) const noexcept
             double factor = s.back[j];
             if (high <= 0 || factor == 0) continue;
             if (!(low >= 0)) {
-                if (factor > 0) {  // relu(z) >= z or 0, whichever leaves less between
+                if (factor > 0) {  // relu(z) >= z or 0: the one with the smaller gap
                     if (!(high > -low)) continue;
                 } else {  // relu(z) <= slope z + offset
                     const double slope = high / (high - low);
@@ -326,7 +326,7 @@ Interval NetworkBounds::over(const double* lower, const double* upper, double en
     return range;
 }
 
-/// Over the domain: the largest values, and what rounding can do to them.
+/// Bounds the values over the domain, and the effect of rounding on them.
 void NetworkBounds::bound_evaluation(const Model& model)
 {
     const bool single = model.precision == Precision::f32;

@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// FNV-1a over whatever it is given.
+/// FNV-1a hash of the data added to it.
 class Hash {
 public:
     void add(std::uint64_t value)

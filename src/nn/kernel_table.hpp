@@ -11,7 +11,7 @@ template <class T>
 using ChooseKernel = Kernel<T> (*)(const Network<T>&, bool relu, bool common_shapes) noexcept;
 
 struct KernelTable {
-    ChooseKernel<float> single = nullptr;  ///< null: not in this build
+    ChooseKernel<float> single = nullptr;  ///< null if this build has none
     ChooseKernel<double> double_ = nullptr;
 };
 

@@ -1,8 +1,8 @@
 // The kernels of `Mlp` for one instruction set.
 //
-// Included by one file per instruction set, which is compiled with its flags and
-// has defined RICOCHET_KERNEL_NAMESPACE. Only what lives in that namespace may be
-// called here: see detail/kernel.hpp.
+// Included by one file per instruction set, which is compiled with the flags of that set and
+// defines RICOCHET_KERNEL_NAMESPACE. Only functions in that namespace may be called here: see
+// detail/kernel.hpp.
 #pragma once
 
 #include "kernel_table.hpp"
@@ -14,7 +14,7 @@
 
 namespace ricochet::detail::RICOCHET_KERNEL_NAMESPACE {
 
-/// Any shape.
+/// Kernel for any shape.
 template <class T, class Activation>
 void run(const Network<T>& net, const T* in, T* out, std::size_t samples) noexcept
 {

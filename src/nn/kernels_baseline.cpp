@@ -1,4 +1,4 @@
-// The kernels as the whole library is compiled.
+// The kernels, compiled with the flags of the whole library.
 #define RICOCHET_KERNEL_NAMESPACE library_baseline
 #include "kernels.hpp"
 

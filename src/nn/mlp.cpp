@@ -24,8 +24,8 @@ const detail::KernelTable& table(InstructionSet set) noexcept
     return detail::kernels_baseline;
 }
 
-/// Asked for the features that tell the levels apart; no processor has them
-/// without the rest of its level.
+/// Whether the processor has an instruction set. Only the features that distinguish the levels are
+/// tested; no processor has them without the rest of its level.
 bool processor_has(InstructionSet set) noexcept
 {
 #if defined(__x86_64__)

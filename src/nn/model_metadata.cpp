@@ -46,7 +46,7 @@ public:
         return parse<std::uint64_t>(key, text(key));
     }
 
-    /// As many as there are.
+    /// A list of numbers of any length.
     [[nodiscard]] std::vector<double> numbers(std::string_view key) const
     {
         return numbers(key, words(key).size());
@@ -97,7 +97,7 @@ private:
     const Refusal& refuse_;
 };
 
-/// The levels of a gate and what was seen of it.
+/// Reads the levels of a gate and its calibration.
 void read_gate(const Metadata& metadata, const Refusal& refuse, Model& model)
 {
     const std::string levels = "metadata \"levels\"";

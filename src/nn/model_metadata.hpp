@@ -1,4 +1,4 @@
-// What a model file says of its network, as text of the header.
+// Metadata of a model file, as text of the header.
 #pragma once
 
 #include <map>
@@ -14,10 +14,10 @@ inline constexpr std::string_view format_version = "1";
 /// Refuses a file of another version of the format.
 void check_version(const Header& header, const Refusal& refuse);
 
-/// Reads what the header says of a model whose layers have been read.
+/// Reads the metadata of a model whose layers have been read.
 void read_metadata(const Header& header, const Refusal& refuse, Model& model);
 
-/// The metadata of a file of `model`.
+/// Metadata for a file of `model`.
 [[nodiscard]] std::map<std::string, std::string> metadata_of(const Model& model,
                                                              const SelfTest& self_test,
                                                              const Refusal& refuse);

@@ -30,7 +30,7 @@ constexpr std::size_t max_header = std::size_t{1} << 20;
 /// More than the largest network that `Mlp` takes, and a header.
 constexpr std::size_t max_file = std::size_t{1} << 26;
 
-/// Little-endian, whatever the machine.
+/// Reads a little-endian word on any machine.
 template <class Word>
 Word read_word(const std::byte* from)
 {
@@ -219,7 +219,7 @@ Model load_model(const std::string& path, const LoadOptions& options)
 std::vector<std::byte> to_safetensors(const Model& model, const LoadOptions& options)
 {
     const Refusal refuse("model");
-    // Nothing below may index beyond vectors that are too short.
+    // Checked first, so that nothing below reads beyond a vector that is too short.
     static_cast<void>(classifier_of(model, refuse));
     const bool tested = !model.self_test.input.empty() || !model.self_test.output.empty();
     const SelfTest self_test = tested ? model.self_test : make_self_test(model, refuse);

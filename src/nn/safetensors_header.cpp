@@ -2,6 +2,7 @@
 
 #include "../files/strict_json.hpp"
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -69,7 +70,7 @@ Tensor parse_tensor(const std::string& name, const json& entry, const Refusal& r
 
 std::string in_quotes(std::string_view text)
 {
-    return "\"" + std::string(text) + "\"";
+    return fmt::format("\"{}\"", text);
 }
 
 std::string decimal(double value)

@@ -12,7 +12,7 @@
 
 namespace ricochet::model_file {
 
-/// Ends the work on one file with a sentence that begins with its name.
+/// Throws an error whose message begins with the name of the file.
 class Refusal {
 public:
     explicit Refusal(std::string_view file) : file_(file) {}

@@ -11,7 +11,7 @@
 namespace ricochet::model_file {
 namespace {
 
-/// How far two evaluations of the model may lie apart, per output.
+/// Bound of the difference between two evaluations of the model, per output.
 ///
 /// With unit roundoff u, a sum of n products and a bias in any order is off by at
 /// most (n + 2) u (|W| |x| + |b|) to first order. Errors e of its input arrive as

@@ -1,4 +1,4 @@
-// The one evaluation that a model file carries, and repeats when it is read.
+// The test evaluation in a model file, which is repeated when the file is read.
 #pragma once
 
 #include "ricochet/detail/classifier.hpp"
@@ -6,15 +6,16 @@
 
 namespace ricochet::model_file {
 
-/// Classifiers are made of models that have been checked; what they still refuse, such as a layer
-/// too wide, is refused in the name of the file.
+/// Makes a classifier of a model that has been checked. An error of the classifier, such as a layer
+/// that is too wide, is reported with the name of the file.
 [[nodiscard]] Classifier classifier_of(const Model& model, const Refusal& refuse);
 
 /// Refuses a model that does not give the output of its self-test.
 void repeat_self_test(const Model& model, const Refusal& refuse);
 
-/// A point inside the domain, off its middle, where normalised features may all be zero, and at
-/// another fraction for each feature, so that no two can be exchanged unnoticed.
+/// Makes a self-test at a point inside the domain. It is off the centre, where normalised features
+/// may all be zero, and at a different fraction of each feature, so that exchanged features are
+/// noticed.
 [[nodiscard]] SelfTest make_self_test(const Model& model, const Refusal& refuse);
 
 }  // namespace ricochet::model_file

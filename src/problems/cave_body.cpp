@@ -82,7 +82,7 @@ geometry::Triangles triangles(std::string_view what, const geometry::Mesh& mesh)
 
 }  // namespace
 
-/// Data that the copies of a scene share.
+/// Data shared by all copies of a scene.
 struct CaveBody::Shapes {
     Shapes(const geometry::Mesh& cave_mesh, const geometry::Mesh& body_mesh, std::size_t most)
         : cave(triangles("cave", cave_mesh)),
@@ -127,7 +127,7 @@ CaveBody::CaveBody(const Parameters& parameters, const geometry::Mesh& cave,
             "more than {}, its distance is {}",
             found.other_face, found.face, p_.clearance, found.distance));
     }
-    // Surfaces that do not cross: one vertex speaks for the whole body.
+    // The surfaces do not cross, so one vertex shows on which side the whole body is.
     if (geometry::winding_number(cave, body.vertices[body.faces[0][0]]) == 0) {
         throw std::invalid_argument(
             "CaveBody: the body must be inside of the cave at the start; face 0 is not");
@@ -177,7 +177,7 @@ double CaveBody::clearance(Search search, const Attitude& at) const noexcept
 
 namespace {
 
-/// Where the body is touched, from its position, and the direction away from the cave.
+/// Position of the touched point relative to the body, and the direction away from the cave.
 struct Lever {
     Vector3d arm, normal;
 };
@@ -207,7 +207,7 @@ CaveBody::Motion CaveBody::rebound(const Attitude& at, const Motion& motion) con
     const Lever touch = lever(nearest(p_.search, at), at);
     const double before = speed_along(touch, motion);
     const double after = std::max(-p_.restitution * before, p_.kick);
-    const double inertia = p_.gyration * p_.gyration;  // of unit mass
+    const double inertia = p_.gyration * p_.gyration;  // of a body of unit mass
     const Vector3d twist = touch.arm.cross(touch.normal);
     const double impulse = (after - before) / (1 + twist.squaredNorm() / inertia);
     Motion out = motion;

@@ -50,7 +50,7 @@ public:
 
     struct Parameters {
         int cave_refinements = 5;  ///< the cave has 20 * 4^n faces, n in [0, 7]
-        int body_refinements = 3;  ///< likewise of the body
+        int body_refinements = 3;  ///< the body has 20 * 4^n faces
         double cave_size = 5;      ///< [m] mean distance of the cave from the origin
         double body_size = 0.5;    ///< [m] mean distance of the body from its centre
         double clearance = 0.02;   ///< [m] positive
@@ -63,7 +63,7 @@ public:
         double kick = 4;           ///< [m/s] least speed of parting, zero or positive
         Search search = Search::tree;
         std::size_t grid = 64;   ///< cells along a side of the table for `lower_bound`; 0: none
-        std::size_t balls = 96;  ///< that cover the body, at most; positive
+        std::size_t balls = 96;  ///< largest number of balls that cover the body; positive
     };
 
     /// A bumpy cave and a bumpy body; 20 480 and 1 280 faces.
@@ -86,7 +86,7 @@ public:
     static constexpr std::string_view name = "cave-body";
     static constexpr bool unilateral = true;
 
-    /// At the origin, flying and turning.
+    /// Initial state: at the origin, moving and rotating.
     [[nodiscard]] static State start() noexcept
     {
         return {0, 0, 0, 1, 0, 0, 0, 3, 1, 0, 0.5, 1, 0.3};

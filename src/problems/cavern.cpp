@@ -29,7 +29,8 @@ using Last = detail::LastAnswers<Question, NearestOnSegment>;
 
 constexpr int waves = 24;
 
-/// The wall is at size (1 + sum of waves), never nearer than 0.4 size before stones.
+/// Distance of the wall from the origin: size (1 + sum of waves), at least 0.4 size before stones
+/// are added.
 std::vector<Point2> random_wall(const Cavern::Parameters& p)
 {
     detail::require(p.segments >= 8, "Cavern", "segments", "be at least 8",
@@ -75,7 +76,7 @@ void check(const Cavern::Parameters& p)
 
 }  // namespace
 
-/// Data that the copies of a cavern share.
+/// Data shared by all copies of a cavern.
 struct Cavern::Rock {
     explicit Rock(const std::vector<Point2>& vertices) : wall(vertices) {}
 

@@ -26,10 +26,10 @@ namespace ricochet {
 ///             velocity along the wall is kept and v.n becomes
 ///             max(-restitution v.n, min(kick, sqrt(top² - v_along²)))
 ///
-/// The wall gives the ball a least speed of departure, the kick, so that it never comes to
-/// rest: with a large kick it flies, with a small one it skims along the wall. It is
-/// never thrown faster than `top_speed` = max(sqrt(gravity / drag), launch_speed), where
-/// drag balances gravity; so no motion that starts slower is ever faster.
+/// The wall gives the ball a least speed of departure, the kick, so that it never comes to rest:
+/// with a large kick it flies, with a small one it skims along the wall. It is never thrown faster
+/// than `top_speed` = max(sqrt(gravity / drag), launch_speed). Above the first of these speeds drag
+/// exceeds gravity, so no motion that starts below `top_speed` ever exceeds it.
 ///
 /// *Bounds.* The distance to a set changes by at most 1 per unit of length. Along the flow
 /// ||v|'| <= gravity + drag |v|², and with |v| <= top_speed at one time of a motion it
@@ -48,11 +48,11 @@ public:
 
     struct Parameters {
         std::size_t segments = 10'000;  ///< of the wall, at least 8
-        std::uint64_t seed = 1;         ///< of its shape
+        std::uint64_t seed = 1;         ///< seed of the shape of the wall
         double size = 10;               ///< [m] mean distance of the wall from the origin
         double radius = 0.1;            ///< [m] of the ball, positive
         double gravity = 9.81;          ///< [m/s²], zero or positive
-        double turn = 0.05;             ///< [rad/s], of gravity
+        double turn = 0.05;             ///< [rad/s] angular velocity of gravity's direction
         double drag = 0.1;              ///< [1/m], positive
         double restitution = 0.9;       ///< in [0, 1]
         double kick = 6;                ///< [m/s], zero or positive, at most top_speed
@@ -151,8 +151,8 @@ public:
         return std::hypot(half_widths[0], half_widths[1]) + rounding();
     }
 
-    /// The parameter of that name, for models that depend on it. Of a wall that was given nothing
-    /// is told that would make it.
+    /// The parameter with the given name, for models that depend on it. For a given wall, none of
+    /// the parameters that would generate it.
     [[nodiscard]] std::optional<double> parameter(std::string_view of) const noexcept;
 
     /// The guard at a position, by either search.
@@ -178,7 +178,7 @@ private:
     [[nodiscard]] double rounding() const noexcept;
 
     Parameters p_;
-    bool given_ = false;  ///< the wall
+    bool given_ = false;  ///< whether the wall was given
     double top_speed_;
     std::shared_ptr<const Rock> rock_;
 };

@@ -21,9 +21,8 @@ namespace ricochet {
 /// (W. H. Enright and J. D. Pryce, Two FORTRAN packages for assessing initial value
 /// methods, ACM Transactions on Mathematical Software 13, 1987, pages 1 to 27.)
 ///
-/// Known solution: exponentials toward 110/3 and 110; see `solution`. Functions are
-/// generic in the state and its
-/// scalar.
+/// Known solution: exponentials toward 110/3 and 110; see `solution`. Functions are generic in the
+/// state and its scalar.
 class DetestF2 {
 public:
     using State = std::array<double, 1>;

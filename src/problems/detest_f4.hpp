@@ -1,4 +1,4 @@
-// A pulse, and a change of the law after it.
+// A pulse, followed by a change of the flow.
 #pragma once
 
 #include <array>

@@ -19,11 +19,11 @@ namespace ricochet {
 /// (W. H. Enright and J. D. Pryce, Two FORTRAN packages for assessing initial value
 /// methods, ACM Transactions on Mathematical Software 13, 1987, pages 1 to 27.)
 ///
-/// Where a step ends at a singularity the error is of order h^(4/3) whatever the method,
-/// so that error control takes tiny steps on both sides of each, and something of each
-/// remains: the measured error at the end is about 400 times the tolerance with dopri5,
-/// down to 4e-12 at 1e-14. Fehlberg's pair, whose error estimate is nearly blind to what
-/// depends on t alone (see `DetestF4`), is not suited.
+/// Where a step ends at a singularity the error is of order h^(4/3) for any method. Error control
+/// therefore takes tiny steps on both sides of each singularity, and an error remains: with dopri5
+/// the measured error at the end is about 400 times the tolerance, down to 4e-12 at 1e-14.
+/// Fehlberg's pair, whose error estimate is nearly blind to terms that depend on t alone (see
+/// `DetestF4`), is unsuitable.
 ///
 /// Known solution: y = exp(sum |t - i|^(4/3) / c - 1), see `solution`. Functions are
 /// generic in the state type.

@@ -16,11 +16,11 @@ namespace ricochet {
 ///
 ///     flow    grow: y' = y,  decay: y' = -y / 2
 ///     guard   grow: 2 - y, falling, to decay;  decay: y - 1, falling, to grow
-///     reset   none but of the mode
+///     reset   changes only the mode
 ///
-/// Known solution: from y = 1 in mode grow, which lies on the surface of the guard that
-/// is not looked at, the modes take log 2 and 2 log 2, so that the switches are at log 2
-/// times 1, 3, 4, 6, 7, 9, ... Functions are generic in the state and its scalar.
+/// Known solution: from y = 1 in mode grow, on the surface of the guard that this mode does not
+/// examine, the modes last log 2 and 2 log 2, so that the switches are at log 2 times 1, 3, 4, 6,
+/// 7, 9, ... Functions are generic in the state and its scalar.
 class GrowDecay {
 public:
     using State = std::array<double, 1>;

@@ -12,8 +12,8 @@ namespace ricochet {
 
 /// A star in the meridian plane of a galaxy with a potential of third degree.
 ///
-/// State (vx, vy, x, y), dimensionless; passages through the plane x = 0 with x rising
-/// are searched for, and nothing happens there.
+/// State (vx, vy, x, y), dimensionless; passages through the plane x = 0 with x rising are
+/// recorded, and change nothing.
 ///
 ///     flow    vx' = -x - 2 x y,  vy' = -y - x² + y²,  x' = vx,  y' = vy
 ///     guard   x, rising
@@ -31,9 +31,9 @@ public:
     static constexpr std::string_view name = "henon-heiles";
     static constexpr State start{-0.2525875586263492, -0.2178423952983717, 0, 0.2587703282931232};
 
-    /// [s] of the first passages after `start`: Taylor series of high order in
-    /// arithmetic of 34 digits or more, checked against half the step. The last digits
-    /// given are beyond a double's.
+    /// [s] Times of the first passages after `start`: Taylor series of high order in arithmetic of
+    /// 34 digits or more, checked against half the step. They are given to more digits than a
+    /// double holds.
     static constexpr std::array<double, 6> section_times{
         4.2208334830171685797, 10.552008560025788047, 15.887489913811527472,
         21.257937652710846512, 27.611348274257833980, 34.276637864819525341};

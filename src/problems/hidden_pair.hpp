@@ -12,7 +12,7 @@ namespace ricochet {
 
 /// A cubic in time as the solution of a differential equation.
 ///
-/// State (y); its zeros are searched for, and nothing happens there.
+/// State (y); its zeros are recorded, and change nothing.
 ///
 ///     flow    y' = 3 t² + 12 t - 4
 ///     guard   y, either direction

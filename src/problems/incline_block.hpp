@@ -50,7 +50,7 @@ public:
     }
 
     [[nodiscard]] const Parameters& parameters() const noexcept { return p_; }
-    /// Quantity that is constant while it slides, for vy > 0.
+    /// The constant of the motion above, for vy > 0.
     [[nodiscard]] double invariant(const Vector& w) const noexcept;
 
 private:

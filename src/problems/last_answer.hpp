@@ -1,8 +1,8 @@
-// The last answer of an expensive question, kept by the system that was asked.
+// Cache of the last result of an expensive query, kept by the system that answers it.
 //
-// A guard and its rate ask for the same nearest point, and the next question is near the last.
-// What is remembered is an answer to exactly the same question, or a hint; neither changes a
-// result, so systems stay values that threads may share.
+// A guard and its rate need the same nearest point, and successive queries are close together. The
+// cache returns a result only for exactly the same query, or a hint for a similar one; neither
+// changes a result, so systems stay values that threads may share.
 #pragma once
 
 #include <array>
@@ -15,13 +15,13 @@
 
 namespace ricochet::detail {
 
-/// Threads that share a system find their own answers again, but for those whose numbers fall
-/// together: of these one at a time remembers, and the others ask as if for the first time.
+/// Threads that share a system find their own results again, unless the hashes of their numbers
+/// coincide: of these threads one at a time uses the cache, and the others compute without it.
 template <class Question, class Answer>
 class LastAnswers {
 public:
     struct Memory {
-        bool known = false;  ///< there was a question
+        bool known = false;  ///< whether there was a query
         Question question{};
         Answer answer{};
     };
@@ -34,11 +34,11 @@ private:
 
 public:
     LastAnswers() = default;
-    /// A copy has not been asked yet.
+    /// A copy starts with an empty cache.
     LastAnswers(const LastAnswers& /*other*/) noexcept {}
     LastAnswers& operator=(const LastAnswers& /*other*/) noexcept { return *this; }
 
-    /// Last question of the calling thread, on loan.
+    /// The last query of the calling thread, in exclusive use.
     class Loan {
     public:
         explicit Loan(LastAnswers& all) noexcept : slot_(&all.slots_[number_of_thread()])

@@ -41,7 +41,8 @@ struct LeastEigenvalue::Matrices {
         return out;
     }
 
-    /// Rayleigh's quotient of any vector is a tangent from above; that of the eigenvector touches.
+    /// The Rayleigh quotient of any vector is affine in q and bounds the least eigenvalue from
+    /// above; that of the eigenvector touches it.
     [[nodiscard]] geometry::Tangent<4> tangent(const State& q) const
     {
         const Matrix here = at(q);

@@ -14,8 +14,8 @@
 
 namespace ricochet {
 
-/// A structure is loaded by four forces that come and go; where the smallest eigenvalue of its
-/// stiffness falls below a level it is about to buckle. Nothing happens there.
+/// A structure under four varying loads. It is about to buckle where the smallest eigenvalue of its
+/// stiffness matrix falls below a level; these events are recorded, and change nothing.
 ///
 /// State x = loads q, four components.
 ///
@@ -25,9 +25,9 @@ namespace ricochet {
 /// K_0 and K_k are random symmetric matrices of order 24, K_0 positive definite. The frequencies
 /// have no common period.
 ///
-/// *Bounds* (Weyl): an eigenvalue changes by no more than the norm of the change of the matrix,
-/// so the way per second is the sum of |q_k'| ||K_k||, and its rate at most the sum of
-/// amplitude w_k² ||K_k||, at any time.
+/// *Bounds* (Weyl): an eigenvalue changes by no more than the norm of the change of the matrix. The
+/// path per second is therefore the sum of |q_k'| ||K_k||, and its rate of change is at most the
+/// sum of amplitude w_k² ||K_k||, at any time.
 ///
 /// *Values.* The smallest eigenvalue is the least of u K(q) u over unit vectors u, a least of
 /// functions affine in q, hence concave. With `table` its values and tangents at the nodes of a
@@ -106,7 +106,7 @@ public:
         return p_.amplitude * sum;
     }
 
-    /// -infinity where the table says nothing.
+    /// A lower bound from the table; -infinity where there is none.
     template <class X>
     [[nodiscard]] double lower_bound(double /*t*/, const X& x) const noexcept
     {
@@ -126,8 +126,8 @@ public:
         for (std::size_t k = 0; k < 4; ++k) sum += norm_[k] * half_widths[k];
         return sum;
     }
-    /// A concave function is least at a corner of a box. From the table, or without one from 16
-    /// eigenvalue problems.
+    /// Lower bound over a box: a concave function is least at a corner. The values at the 16
+    /// corners come from the table, or from eigenvalue problems without one.
     template <class X>
     [[nodiscard]] double guard_least(const X& lower, const X& upper) const noexcept
     {
@@ -136,10 +136,10 @@ public:
                p_.level;
     }
 
-    /// By name; nothing for one that does not exist.
+    /// The parameter with the given name; empty if there is none.
     [[nodiscard]] std::optional<double> parameter(std::string_view which) const noexcept;
 
-    /// Eigenvalue problems that the table has cost.
+    /// Number of eigenvalue problems solved for the table.
     [[nodiscard]] std::size_t tabulated() const noexcept;
 
     /// Smallest eigenvalue of K(q); NaN where q is not finite.

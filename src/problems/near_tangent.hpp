@@ -13,7 +13,7 @@ namespace ricochet {
 
 /// y = cos(t + phase) and the level 1 - depth.
 ///
-/// State (y, y'); passages through the level are searched for, and nothing happens there.
+/// State (y, y'); passages through the level are recorded, and change nothing.
 ///
 ///     flow    y'' = -y
 ///     guard   y - (1 - depth), either direction
@@ -24,8 +24,8 @@ namespace ricochet {
 ///     depth = 0    one touch at 2 pi n - phase
 ///     depth < 0    nothing
 ///
-/// The smaller the depth, the nearer the passages and the less well-conditioned: the
-/// slope is sin of the half-width between them. Functions are generic in the state and its scalar.
+/// The smaller the depth, the closer the passages and the worse their condition: the slope is the
+/// sine of the half-width between them. Functions are generic in the state and its scalar.
 class NearTangent {
 public:
     using State = std::array<double, 2>;

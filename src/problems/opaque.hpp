@@ -1,4 +1,4 @@
-// Systems whose guards are seen through a pinhole: only their sign, or nothing but their value.
+// Systems that hide properties of their guards: only the sign, or only the value, is known.
 #pragma once
 
 #include <array>
@@ -77,7 +77,7 @@ private:
 template <class System>
 class Hidden : public detail::Pinhole<System> {
 public:
-    /// `cost` [s] is what a call of the guard takes longer.
+    /// `cost` [s] is added to each call of the guard.
     /// @throws std::invalid_argument for a cost outside of [0, 1] s.
     explicit Hidden(System system, double cost = 0)
         : detail::Pinhole<System>("Hidden", std::move(system), cost)
@@ -116,7 +116,7 @@ public:
         info.degree = 0;
         return info;
     }
-    /// Whether the state is inside. A guard that is not a number is not.
+    /// Whether the state is inside. If the guard is not a number, it is not.
     template <class X>
     [[nodiscard]] bool guard(double t, const X& x) const noexcept
     {

@@ -32,7 +32,7 @@ struct Question {
 };
 struct Answer {
     ArmScene::Contact contact{};
-    std::array<std::uint32_t, most> edges{};  ///< nearest to each link: hints
+    std::array<std::uint32_t, most> edges{};  ///< hints: the edge nearest to each link
 };
 using Last = detail::LastAnswers<Question, Answer>;
 using LastTorques = detail::LastAnswers<double, std::array<double, most>>;
@@ -69,7 +69,7 @@ double distance_to(const Outline& polygon, const Segment2& link)
 
 }  // namespace
 
-/// Data that the copies of an arm share.
+/// Data shared by all copies of an arm.
 struct ArmScene::Place {
     explicit Place(const std::vector<Segment2>& all) : edges(all) {}
 
@@ -227,13 +227,14 @@ ArmScene::Contact ArmScene::contact(Search search, const double* angles) const n
     const auto joints = ends(angles, n_, link_);
     Contact best{.distance = infinity, .link = 0, .point = {}, .normal = {}};
     NearestPair nearest;
-    // The link that was nearest goes first, and bounds what the others examine.
+    // The link that was nearest before goes first, so that it bounds the search for the others.
     const std::uint32_t first = last->answer.contact.link < n_ ? last->answer.contact.link : 0;
     for (std::uint32_t k = 0; k < n_; ++k) {
         const std::uint32_t link = k == 0 ? first : k <= first ? k - 1 : k;
         const Segment2 s{joints[link], joints[link + 1]};
         std::uint32_t& hint = last->answer.edges[link];
-        // A little beyond the nearest so far, so that of links as near the first wins.
+        // Slightly above the smallest distance so far, so that of equally near links the first is
+        // kept.
         const double limit = best.distance * (1 + 1e-15);
         if (search == Search::tree && k > 0 && lower_bound_of(s) > limit) continue;
         const NearestPair found = search == Search::tree ? place_->edges.nearest(s, limit, hint)
@@ -267,7 +268,7 @@ Point2 ArmScene::velocity(const double* angles, const double* rates, std::uint32
 {
     const auto joints = ends(angles, n_, link_);
     Point2 v{};
-    for (std::uint32_t i = 0; i <= link; ++i) {  // each joint turns all that follows
+    for (std::uint32_t i = 0; i <= link; ++i) {  // each joint turns all links beyond it
         const Point2 arm = point - joints[i];
         v = v + rates[i] * Point2{-arm.y, arm.x};
     }
@@ -332,7 +333,7 @@ std::optional<double> ArmScene::parameter(std::string_view of) const noexcept
     if (of == "damping") return p_.damping;
     if (of == "restitution") return p_.restitution;
     if (of == "least_rate") return p_.least_rate;
-    if (of == "seed") return static_cast<double>(p_.seed);  // of the torques, too
+    if (of == "seed") return static_cast<double>(p_.seed);  // also the seed of the torques
     if (of == "obstacles" && !given_) return static_cast<double>(p_.obstacles);
     return std::nullopt;
 }

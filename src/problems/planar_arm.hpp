@@ -21,21 +21,21 @@ namespace ricochet {
 /// w_1 ... w_n [rad/s]). The base is at the origin, all links are equally long.
 ///
 ///     flow    q_i' = w_i,
-///             w_i' = drive_i sin(f_i t + p_i) - spring_i 2 y / (1 + y²) - damping w_i,  y = q_i -
-///             m_i
+///             w_i' = drive_i sin(f_i t + p_i) - spring_i 2 y / (1 + y²) - damping w_i,
+///             y = q_i - m_i
 ///     guard   least distance between the links and the obstacles, less the clearance; falling
-///     reset   w⁺ = -restitution w⁻,  where the fastest joint then turns slower than
-///             `least_rate`, all rates are enlarged until it does not
+///     reset   w⁺ = -restitution w⁻; if the fastest joint then turns slower than `least_rate`,
+///             all rates are scaled up so that it turns at that rate
 ///
 /// A link that enters an obstacle crosses its edge, so that the guard is minus the clearance
 /// there.
 ///
-/// *Bounds.* The way of the arm is that of its fastest point, which is the end of a link
-/// (velocities are affine along a link, and the norm is convex); the guard changes by at most 1
-/// per unit of it. With |w_i'| <= reach_i + damping |w_i|, reach_i = drive_i + spring_i, a
-/// rate that is once below top_i = reach_i / damping stays so, and the end of link k
-/// accelerates by at most the sum over links j <= k of l sqrt(theta_j''² + theta_j'⁴), with
-/// the absolute rates theta_j' = w_1 + ... + w_j at their largest.
+/// *Bounds.* The path of the arm is that of its fastest point, which is the end of a link
+/// (velocities are affine along a link, and the norm is convex); the guard changes by at most 1 per
+/// unit of it. With |w_i'| <= reach_i + damping |w_i|, reach_i = drive_i + spring_i, a rate that is
+/// once below top_i = reach_i / damping stays so. The end of link k accelerates by at most the sum
+/// over links j <= k of l sqrt(theta_j''² + theta_j'⁴), with the absolute rates theta_j' = w_1 +
+/// ... + w_j at their largest.
 ///
 /// *Lower bound.* Each link is covered by discs; the distance of their centres to the obstacles
 /// comes from a table of the workspace.
@@ -90,7 +90,7 @@ public:
     /// step share two.
     [[nodiscard]] std::array<double, most_joints> torques(double t) const noexcept;
 
-    /// `torque`: that of the joint at this time.
+    /// @param torque  torque over inertia of the joint at this time
     [[nodiscard]] double acceleration(std::size_t joint, double torque, double q,
                                       double w) const noexcept
     {
@@ -102,12 +102,12 @@ public:
     /// Points with which the arm and the nearest obstacle touch.
     struct Contact {
         double distance = 0;      ///< [m]
-        std::uint32_t link = 0;   ///< that is nearest
-        geometry::Point2 point;   ///< on it
+        std::uint32_t link = 0;   ///< index of the nearest link
+        geometry::Point2 point;   ///< nearest point of that link
         geometry::Point2 normal;  ///< from the obstacle to it, of unit length
     };
 
-    /// `angles` has as many entries as there are joints.
+    /// @param angles  one entry for each joint
     [[nodiscard]] Contact contact(Search search, const double* angles) const noexcept;
 
     /// Velocity of a point of a link [m/s].
@@ -120,15 +120,15 @@ public:
     [[nodiscard]] double largest_acceleration(const double* rates) const noexcept;
     [[nodiscard]] double lower_bound(const double* angles) const noexcept;
 
-    /// How far a point of the arm can move where no angle changes by more than that, each joint
-    /// turning what is beyond it, with the rounding of the distance.
+    /// How far a point of the arm can move if no angle changes by more than its half-width: each
+    /// joint turns the part beyond it. The rounding of the distance is included.
     [[nodiscard]] double slack(const double* half_widths) const noexcept;
 
-    /// The parameter of that name, for models that depend on it; of obstacles that were given
-    /// nothing is told that would make them.
+    /// The parameter with the given name, for models that depend on it. For given obstacles, none
+    /// of the parameters that would generate them.
     [[nodiscard]] std::optional<double> parameter(std::string_view of) const noexcept;
 
-    /// The factor of all rates at an impact.
+    /// Factor by which an impact multiplies all rates.
     [[nodiscard]] double reversal(const double* rates) const noexcept;
 
     [[nodiscard]] std::size_t obstacle_edges() const noexcept;
@@ -149,7 +149,7 @@ private:
     Parameters p_;
     std::size_t n_;
     double link_;         ///< [m] length
-    bool given_ = false;  ///< the obstacles
+    bool given_ = false;  ///< whether the obstacles were given
     std::array<Joint, most_joints> joints_{};
     std::shared_ptr<const Place> place_;
 };
@@ -241,7 +241,7 @@ public:
         return scene_.lower_bound(part(x, 0).data());
     }
 
-    /// For certificates.
+    /// For certificates; see `ArmScene::slack`.
     template <class X>
     [[nodiscard]] double guard_slack(const X& half_widths) const noexcept
     {

@@ -16,8 +16,8 @@ namespace ricochet {
 ///     mass v'       = F,               |F| <= friction mass g      against v - radius spin - s
 ///     inertia spin' = -radius F + M,   |M| <= resistance mass g    against spin
 ///
-/// with inertia = 2/5 mass radius^2. Held F is rolling; with M held as well the ball rests on
-/// the plate, as long as |s'| <= resistance g / radius.
+/// with inertia = 2/5 mass radius^2. The ball rolls while F is held; while M is held as well it
+/// rests on the plate, which is possible as long as |s'| <= resistance g / radius.
 ///
 /// Known solution on a plate of constant speed, from spin 0 and faster than the plate by u:
 /// it slides until `rolling_time`, and rests on the plate from `rest_time` on.

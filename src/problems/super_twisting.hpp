@@ -45,7 +45,7 @@ public:
     }
     void smooth_jacobian(double /*t*/, const Vector& w, Eigen::Matrix2d& j) const
     {
-        // Infinite at zero; a finite slope there only costs Newton's method iterations.
+        // The slope is infinite at zero; a finite one only costs iterations of Newton's method.
         const double root = std::sqrt(std::max(std::abs(w[0]), 1e-24));
         j << -p_.gain_1 / (2 * root), 1, 0, 0;
     }

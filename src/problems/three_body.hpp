@@ -45,9 +45,9 @@ public:
     static constexpr std::string_view name = "three-body";
     static constexpr State start{1.2, 0, 0, -1.04935750983031990726};
 
-    /// [s] when the craft is farthest from the start, and back there: Taylor series of
-    /// high order in arithmetic of 34 digits or more, checked against half the step.
-    /// The orbit is its own mirror image, so that one is half of the other.
+    /// [s] Times at which the craft is farthest from the start, and back at it: Taylor series of
+    /// high order in arithmetic of 34 digits or more, checked against half the step. The orbit is
+    /// symmetric, so that the first is half of the second.
     static constexpr double farthest_time = 3.09608466565981985;
     static constexpr double return_time = 6.19216933131963971;
 

@@ -39,7 +39,7 @@ Zones::Zones(const Parameters& parameters) : size_(parameters.size)
 
     detail::SplitMix random(parameters.seed);
     std::vector<Zone> zones(parameters.count);
-    // As many zones as fill a tenth of the field, whatever their number.
+    // Sizes are chosen so that the zones cover a tenth of the field for any number of them.
     const double scale = size_ / std::sqrt(static_cast<double>(parameters.count));
     for (Zone& zone : zones) {
         zone.x = random.uniform(-size_, size_);

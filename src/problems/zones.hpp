@@ -14,8 +14,8 @@
 
 namespace ricochet {
 
-/// A point on two springs sweeps over a field of rotating, flower-shaped zones; that it
-/// enters or leaves one is notified, and changes nothing.
+/// A point on two springs sweeps over a field of rotating, flower-shaped zones. Entering or leaving
+/// a zone is recorded, and changes nothing.
 ///
 /// State x = (position p [m], velocity v [m/s]), two components each.
 ///
@@ -23,13 +23,13 @@ namespace ricochet {
 ///     guard i r - R_i (1 + a_i s cos(m_i (angle - turn_i t))),  either direction;
 ///             r and angle of p - centre_i,  s = 2 r² / (r² + R_i²)
 ///
-/// The factor s is 1 near the edge and makes the flower smooth in its centre.
+/// The factor s is 1 near the edge and makes the guard smooth at the centre of the flower.
 ///
-/// *Bounds.* Along r the guard changes by at most 1 + a R |s'(r)| <= 1 + 1.3 a (the largest of
-/// R s' is 3 sqrt(3) / 4), across by a m R s / r <= a m, and with the time by
-/// R a m |turn| s, at most twice R a m |turn|, which counts as way of the point. The
-/// energies of both springs are conserved and bound speed and acceleration both ways in
-/// time. With s < 2 the zone lies within a disc of radius R (1 + 2 a).
+/// *Bounds.* In the radial direction the guard changes by at most 1 + a R |s'(r)| <= 1 + 1.3 a (the
+/// largest value of R s' is 3 sqrt(3) / 4), across by a m R s / r <= a m, and with time by R a m
+/// |turn| s, at most twice R a m |turn|, which is counted as path of the point. The energies of
+/// both springs are conserved and bound speed and acceleration in both directions of time. With s <
+/// 2 the zone lies within a disc of radius R (1 + 2 a).
 ///
 /// Functions are generic in the state type.
 class Zones {
@@ -41,7 +41,7 @@ public:
         std::uint64_t seed = 1;   ///< of their places and shapes
         double size = 5;          ///< [m] zones lie within a square of twice this side
         double frequency = 0.5;   ///< [rad/s] of the slower spring, positive
-        double turn = 1;          ///< [rad/s] no zone turns faster
+        double turn = 1;          ///< [rad/s] largest angular velocity of a zone
     };
 
     Zones() : Zones(Parameters{}) {}
@@ -99,8 +99,8 @@ public:
         return std::sqrt(x[2] * x[2] + x[3] * x[3]) + (*zones_)[which].turning;
     }
 
-    /// |v'| <= w1 times the largest speed that the energies allow; a tenth of a millionth more
-    /// for the error of the integration, which changes them.
+    /// Bound of |v'|: w1 times the largest speed that the energies allow, times 1 + 1e-7,
+    /// since errors of the integration change the energies.
     template <class X>
     [[nodiscard]] double acceleration_bound(std::size_t /*which*/, double /*t*/,
                                             const X& x) const noexcept
@@ -128,7 +128,7 @@ private:
         int petals;        ///< m
         double turn;       ///< [rad/s]
         double lipschitz;
-        double turning;  ///< [m/s] its change with time, as way
+        double turning;  ///< [m/s] its change with time, counted as path
         double disc;     ///< [m] R (1 + 2 a)
     };
 

@@ -78,8 +78,8 @@ constexpr double rank_threshold = 1e-9;
     return shot.problem == ShootingEnd::closed || shot.problem == ShootingEnd::undefined_derivative;
 }
 
-/// Gaps below this leave the damping as it is, above what noise in the monodromy matrix
-/// makes of a singular direction, and far below what slows convergence.
+/// Gap below which the damping is not reduced further: well above the singular values that noise in
+/// the monodromy matrix produces, and far below values that slow down convergence.
 constexpr double least_damping = 1e-6;
 
 struct Correction {
@@ -157,7 +157,7 @@ public:
     }
 
 private:
-    /// Whether the motion closes because there is none.
+    /// Whether the motion closes only because nothing moves.
     [[nodiscard]] bool stands_still() const
     {
         const double moves =
@@ -165,7 +165,7 @@ private:
         return shooting_.autonomous && moves <= 100 * shooting_.tolerance;
     }
 
-    /// Takes a correction, or the largest part of it that brings the ends closer.
+    /// Applies the correction, halved until it reduces the gap.
     [[nodiscard]] bool correct()
     {
         const Correction whole = shooting_.autonomous ? autonomous_correction(shot_, x_, phase_)

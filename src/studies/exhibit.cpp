@@ -15,7 +15,7 @@ namespace ricochet::app {
 
 namespace {
 
-/// In gnuplot's single quotes.
+/// Quotes a text for gnuplot.
 std::string in_quotes(std::string_view text)
 {
     std::string out = "'";
@@ -38,7 +38,7 @@ std::string data(const Curve& curve)
     return out;
 }
 
-/// Column, row, value and what is written on it.
+/// Lines with column, row, value and label.
 std::string data(const Tiles& tiles)
 {
     std::string out;

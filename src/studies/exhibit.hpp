@@ -1,8 +1,8 @@
-// A table or a figure of a paper, computed by us: what is drawn, and our numbers beside the
-// paper's.
+// A table or a figure of a paper, computed with this library: the panels, and our numbers beside
+// the paper's.
 //
-// An exhibit is made by one function, without arguments but how large it is to be. Everything in it
-// is computed when it is made, but for numbers that are marked as published.
+// An exhibit is made by one function, whose only argument is its size. All numbers are computed
+// when it is made, except for those that are marked as published.
 #pragma once
 
 #include <filesystem>
@@ -15,14 +15,14 @@
 
 namespace ricochet::app {
 
-/// y over x, both as drawn.
+/// A curve y(x), in drawn units.
 struct Curve {
     enum class Style { line, dashed, points, crosses, marked, marked_dashed };
 
     std::string name;
     std::vector<double> x{}, y{};
     Style style = Style::line;
-    bool published = false;  ///< numbers of the paper
+    bool published = false;  ///< numbers taken from the paper
     int colour = -1;         ///< its place in the palette; negative: that of the curve
 };
 
@@ -30,7 +30,7 @@ struct Curve {
 struct Tiles {
     std::vector<double> x{}, y{};
     std::vector<double> value{};  ///< y.size() rows of x.size(); NaN: none
-    bool numbered = false;        ///< with their numbers written on them
+    bool numbered = false;        ///< write the values on the tiles
     bool log_colour = false;      ///< colours follow the logarithm of the values
 };
 
@@ -53,8 +53,8 @@ struct ExhibitRow {
 struct Agreement {
     std::string what;
     double ours = 0;
-    double paper = 0;             ///< NaN: it prints none
-    double lower = 0, upper = 0;  ///< where ours is held to lie, both included
+    double paper = 0;             ///< NaN: the paper does not give it
+    double lower = 0, upper = 0;  ///< interval for our number, both ends included
     [[nodiscard]] bool holds() const noexcept { return lower <= ours && ours <= upper; }
 };
 
@@ -64,7 +64,7 @@ struct Exhibit {
     std::string_view format = "{:.4g}";  ///< of the values in the rows
     std::vector<ExhibitRow> rows{};
     std::vector<Agreement> agreements{};
-    std::string remark{};  ///< sentences, where ours is something else than the paper's
+    std::string remark{};  ///< sentences on where our numbers differ in meaning from the paper's
 };
 
 /// How much is computed.
@@ -75,24 +75,24 @@ struct ExhibitSize {
 enum class ExhibitKind { table, figure };
 [[nodiscard]] std::string_view name(ExhibitKind kind) noexcept;
 
-/// A table or a figure that a paper has.
+/// Entry for a table or a figure of a paper.
 struct ExhibitEntry {
     ExhibitKind kind = ExhibitKind::figure;
     int number = 0;
-    std::string_view title;                         ///< what it shows
-    Exhibit (*make)(const ExhibitSize& size) = {};  ///< null: there is none of ours
-    std::string_view why_none{};                    ///< then, a clause
+    std::string_view title;                         ///< what the paper's exhibit shows
+    Exhibit (*make)(const ExhibitSize& size) = {};  ///< null if it is not reproduced
+    std::string_view why_none{};                    ///< the reason for that, as a clause
 };
 
 struct Paper {
-    std::string_view name;    ///< as typed
+    std::string_view name;    ///< name on the command line
     std::string_view source;  ///< authors, title
     std::vector<ExhibitEntry> exhibits;
 };
 
-/// Thrown by an exhibit between its runs after an interrupt.
+/// Thrown between two runs of an exhibit after an interrupt.
 struct ExhibitInterrupted {};
-/// @throws ExhibitInterrupted if the command is to end.
+/// @throws ExhibitInterrupted after an interrupt.
 void check_exhibit();
 
 /// `count` numbers from first to last, evenly, or by equal factors.

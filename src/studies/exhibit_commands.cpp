@@ -28,7 +28,7 @@ std::vector<Paper> papers()
     return {event_detection_paper(), step_control_paper(), potentials_paper()};
 }
 
-/// @throws BadInput naming what there is.
+/// @throws BadInput naming the available exhibits.
 const ExhibitEntry& find(const std::vector<Paper>& all, const ExhibitRequest& request,
                          const Paper*& paper)
 {

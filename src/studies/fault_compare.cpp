@@ -29,7 +29,7 @@ namespace {
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 constexpr int samples = 600;
 
-/// One way of integrating.
+/// One method of integration with its setting.
 struct Way {
     std::string label;
     RuptureOptions options;

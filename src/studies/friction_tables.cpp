@@ -36,7 +36,7 @@ StabilityTables published_tables()
     return out;
 }
 
-/// The sliders and their velocities by order 4 at 2^-15 s, which errors are measured against.
+/// The sliders, and their reference velocities by order 4 with a step of 2^-15 s.
 class StabilityStudy {
 public:
     explicit StabilityStudy(std::size_t every)
@@ -49,7 +49,7 @@ public:
         }
     }
 
-    /// Adds a method's rows, unless it was interrupted.
+    /// Adds the rows of a method, unless the study was interrupted.
     template <class Velocities>
     void add(const std::string& name, const Velocities& velocities)
     {
@@ -86,7 +86,7 @@ private:
             double sum = 0;
             double squares = 0;
             for (const auto& error : errors) sum += error[k];
-            mean.value[k] = sum / count;  // NaN of none
+            mean.value[k] = sum / count;  // NaN if there is none
             for (const auto& error : errors) {
                 squares += (error[k] - mean.value[k]) * (error[k] - mean.value[k]);
             }

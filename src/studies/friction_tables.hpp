@@ -26,14 +26,14 @@ struct StudyRow {
 struct StabilityTables {
     std::vector<StudyRow> unstable;    ///< table 3: share of the sliders
     std::vector<StudyRow> mean_error;  ///< table 4: of the sliders that are stable at every step
-    std::vector<StudyRow> deviation;   ///< the same: the standard deviation
+    std::vector<StudyRow> deviation;   ///< table 4: standard deviation over the same sliders
 };
 
-/// The methods by which our columns are made.
+/// Methods for which columns are computed.
 struct StudyMethods {
     bool variational = true;       ///< orders 1, 2 and 4
     bool explicit_steps = true;    ///< RK4 in both forms
-    bool functional = true;        ///< Adams' method, the theta form
+    bool functional = true;        ///< Adams' method in theta
     bool functional_pair = false;  ///< Adams' method, the form of the exact pair
     bool plain_newton = true;      ///< backward Euler
 };

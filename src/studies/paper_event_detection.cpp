@@ -20,7 +20,7 @@ const SystemEntry& ball()
     return find_system("bouncing-ball");
 }
 
-/// The paper's ball by fixed steps, events located to rounding, with one of our detectors.
+/// The paper's ball with fixed steps and one of our detectors; events are located to rounding.
 TimedRun run_ball(std::string_view detector, std::size_t samples)
 {
     check_exhibit();
@@ -51,7 +51,7 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
     return out;
 }
 
-/// The paper bisects to 1e-10 s.
+/// [s] Tolerance of the paper's bisection.
 constexpr double paper_tolerance = 1e-10;
 
 Exhibit table_1(const ExhibitSize& /*size*/)

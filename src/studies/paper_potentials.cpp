@@ -21,13 +21,13 @@ namespace ricochet::app {
 
 namespace {
 
-/// The pair that comes along, trained on histories and nothing else.
+/// The pair that is shipped with the library, trained on histories alone.
 AdditivePair stored_pair()
 {
     return load_pair(find_model("ageing-friction.json"));
 }
 
-/// Over time; what holds from a sample to the next is drawn as steps.
+/// A curve over time; quantities that are constant between samples are drawn as steps.
 Curve over_time(std::string name, const FrictionHistory& h, const std::vector<double>& y,
                 Curve::Style style = Curve::Style::line)
 {
@@ -60,7 +60,7 @@ const FrictionHistory& example(FrictionHistory::Between between)
                          [between](const FrictionHistory& h) { return h.between == between; });
 }
 
-/// Friction along a history as it is learned: a diagram in the paper.
+/// Friction along a history, by training progress; the paper shows a diagram here.
 Exhibit figure_1(const ExhibitSize& size)
 {
     const Histories some = part(friction_data().training, 0, size.full ? 48 : 8);

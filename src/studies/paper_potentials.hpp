@@ -1,4 +1,4 @@
-// Parts that the two files of the paper on potentials share.
+// Parts shared by the two files on the potentials paper.
 #pragma once
 
 #include <cstdint>
@@ -17,11 +17,11 @@ using Histories = std::vector<FrictionHistory>;
 
 [[nodiscard]] Histories part(const Histories& from, std::size_t first, std::size_t count);
 
-/// A training that ends after so many iterations, so that it is repeated to the bit.
+/// A training with a fixed number of iterations, so that it can be repeated bit for bit.
 [[nodiscard]] learn::LearnedFriction fit(const Histories& histories, int iterations,
                                          std::uint64_t seed = 1);
 
-/// Ours between 0 and `upper`.
+/// An agreement that holds if our number lies between 0 and `upper`.
 [[nodiscard]] Agreement at_most(std::string what, double ours, double paper, double upper);
 
 [[nodiscard]] Exhibit potentials_table_1(const ExhibitSize& size);

@@ -35,7 +35,7 @@ struct Parameter {
     std::string name;
     double ours;
     double paper;
-    double off = 0;  ///< by how much ours may differ, relative
+    double off = 0;  ///< relative difference that is allowed
 };
 
 Exhibit of_parameters(const std::vector<Parameter>& parameters, std::string remark = "")
@@ -151,7 +151,7 @@ Trace<System> trace(std::string name, const System& system, const StateOf<System
     return out;
 }
 
-/// The published scheme, its error by doubling.
+/// Options of the published scheme, with the error by step doubling.
 SetValuedOptions published_scheme(double t_end, double h_max)
 {
     const learn::StepWorldOptions world = learn::published_step_world();

@@ -1,4 +1,4 @@
-// Parts that the two files of the paper on step control share.
+// Parts shared by the two files on the step control paper.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace ricochet::app {
 
-/// [s] The steps that an actor takes in a world, without those that had no solution; empty if it
-/// does not come to the end.
+/// [s] The steps that an actor takes in an environment, without attempts that had no solution;
+/// empty if it does not reach the end.
 [[nodiscard]] std::vector<double> lengths_of(const learn::StepWorld& world, const Model& actor);
 
 [[nodiscard]] Exhibit fault_figure_5(const ExhibitSize& size);

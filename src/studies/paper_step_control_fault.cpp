@@ -1,8 +1,8 @@
 // Section 5.3 of D. M. Riley, A. Stathas, D. Gutierrez-Oribio and I. Stefanou, Reinforcement
 // learning-based adaptive time-integration for nonsmooth dynamics: a strike-slip fault.
 //
-// The paper's policies are trained by TQC for a trade-off alpha; ours multiply what a classical
-// rule proposes for a tolerance, which is therefore what the columns of its tile plots are here.
+// The paper's policies are trained by TQC for a trade-off alpha. Ours multiply the step proposed by
+// a classical rule for a tolerance, so the columns of the tile plots are tolerances here.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -137,15 +137,15 @@ FaultRun learned(const StrikeSlipFault& fault, double tolerance, bool timed = tr
         reference_step, timed, snapshots);
 }
 
-/// The actor that comes along, trained by the paper's reward on one element; it may not come to
-/// the end.
+/// A run by the shipped actor, trained with the paper's reward on one element; it may not reach the
+/// end.
 FaultRun tqc(const StrikeSlipFault& fault, bool timed = true,
              const std::vector<double>& snapshots = {})
 {
     const Model actor = shipped_actor(StrikeSlipFault::name);
     learn::StepWorldOptions options = judged(actor);
     options.watch = [](double) { return !Interrupts::any(); };
-    options.max_attempts = 500;  // ten times what a run takes
+    options.max_attempts = 500;  // ten times as many as a run takes
     const auto lengths = lengths_of(learn::step_world(fault, end_of(fault), options), actor);
     check_exhibit();
     const std::string name = fmt::format("TQC, alpha {}", actor.parameters.at("alpha"));
@@ -160,12 +160,12 @@ FaultRun tqc(const StrikeSlipFault& fault, bool timed = true,
                     lengths.front(), timed, snapshots);
 }
 
-/// Every rule on a fault, and the slip that constant steps give.
+/// Runs of every rule on one fault, and the slip of constant steps.
 struct MeshStudy {
     int elements = 0;
     double slip = 0;  ///< [m] of constant steps
     std::optional<FaultRun> heuristic{}, pi{};
-    std::vector<FaultRun> learned{};  ///< by tolerance, then TQC's
+    std::vector<FaultRun> learned{};  ///< by tolerance, then that of TQC
     [[nodiscard]] double error(const FaultRun& run) const
     {
         return run.ended() ? std::fabs(run.rupture.mean_slip / slip - 1) : none;

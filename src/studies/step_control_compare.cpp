@@ -34,7 +34,7 @@ namespace ricochet::app {
 
 namespace {
 
-/// What a reinforcement learner made of the published reward: steps without a tolerance.
+/// Steps by a reinforcement learner trained with the published reward, which have no tolerance.
 RuleRow by_actor(const Case& of, LongRun& progress)
 {
     const Model actor = shipped_actor(of.system);
@@ -82,8 +82,8 @@ void add_rows(const Case& of, std::vector<RuleRow>& out, LongRun& progress)
     check_interrupt();  // its last run may have been cut short
 }
 
-/// The learned rule where it was not trained, beside constant steps and the free estimate.
-/// @throws Interrupted with the problems until then in `out`
+/// The learned rule on problems beyond its training, beside constant steps and the free estimate.
+/// @throws Interrupted; the problems done until then are in `out`
 void add_beyond(const Case& of, std::vector<BeyondRows>& out, LongRun& progress)
 {
     for (const Beyond& each : of.beyond) {
@@ -454,7 +454,7 @@ int compare_step_control(const CompareRequest& request)
         throw BadInput("--set of compare step-control needs a --system");
     }
     LongRun progress;
-    // All is checked before anything is run.
+    // Everything is checked before the first run.
     std::vector<Case> cases;
     for (const std::string& name : wanted) {
         cases.push_back(case_of(name, request, progress));

@@ -28,7 +28,7 @@ using learn::StepTrial;
 inline constexpr double inf = std::numeric_limits<double>::infinity();
 inline constexpr std::size_t samples = 600;
 
-// Yardsticks: they need not reach the target.
+// Names of rows that are references and need not reach the target.
 inline constexpr std::string_view searched = "searched sequence";
 inline constexpr std::string_view reinforced = "TQC, eq. 7";
 
@@ -37,7 +37,7 @@ inline bool is_yardstick(const std::string& rule)
     return rule == searched || rule == reinforced;
 }
 
-/// Thrown in the midst of a rule, which is then left out.
+/// Thrown while a rule is run; the rule is then left out.
 struct Interrupted {};
 
 inline void check_interrupt()
@@ -45,7 +45,7 @@ inline void check_interrupt()
     if (Interrupts::any()) throw Interrupted{};
 }
 
-/// The same problem, of which no run begins after an interrupt.
+/// The same problem; after an interrupt no run of it begins.
 inline StepProblem interruptible(StepProblem problem)
 {
     problem.run = [run = std::move(problem.run)](const StepRule& rule) {
@@ -61,7 +61,7 @@ struct RuleRow {
     StepTrial trial{};
     double seconds = 0;
     bool reached = false;
-    int given_up = 0;  ///< settings at which time stood still
+    int given_up = 0;  ///< number of settings given up because time stood still
 };
 
 /// A problem that the policy of its system was not trained for.
@@ -70,13 +70,13 @@ struct Beyond {
     std::function<StepProblem(const learn::StepWatch& watch)> problem;
 };
 
-/// A problem with what is particular to it.
+/// A problem with its particular settings.
 struct Case {
     std::string system;
     StepProblem problem;
     StepLayout layout;
     double target = 1e-2;
-    double coarsest = 0.1;     ///< tolerance that a ladder begins with
+    double coarsest = 0.1;     ///< tolerance at which a ladder begins
     double constant_span = 8;  ///< its constant steps, over the usual one
     std::size_t evaluations = 6000;
     std::function<RuleRow(double target, LongRun& progress)> event_driven{};
@@ -84,16 +84,16 @@ struct Case {
     std::vector<Beyond> beyond{};
 };
 
-/// What three rules did on one.
+/// Results of three rules on one problem.
 struct BeyondRows {
     std::string what;
     std::string description;
     std::vector<RuleRow> rows;
 };
 
-/// Shows how far a run has come, and gives it up where time stands still: the published norm
-/// judges every component by itself, so that one element which begins to slip from rest has any
-/// relative error, and the rules that look at it shorten their steps by decades.
+/// Shows the progress of a run, and stops it if time stands still. The published norm weighs every
+/// component by itself, so that an element that begins to slip from rest has an unbounded relative
+/// error, and rules that use this norm shorten their steps by decades.
 class Standstill {
 public:
     Standstill(LongRun& progress, std::string label)
@@ -112,7 +112,8 @@ public:
     }
     [[nodiscard]] bool given_up() const { return given_up_; }
 
-    /// Steps that cover a thousandth of the time: many times those of a whole run.
+    /// A run is given up if so many steps, many times those of a whole run, cover less than a
+    /// thousandth of the time.
     static constexpr int standstill = 500;
 
 private:
@@ -123,7 +124,7 @@ private:
     bool given_up_ = false;
 };
 
-/// Rules on one problem, each by a ladder of settings.
+/// Runs of rules on one problem, each with a sequence of settings.
 class Ladders {
 public:
     Ladders(const Case& of, const StepProblem& problem, LongRun& progress)
@@ -169,7 +170,7 @@ private:
         std::string name, const std::function<std::pair<StepRule, std::string>(int)>& rung) const
     {
         constexpr int rungs = 40;
-        constexpr int enough = 4;  // finer ones that are looked at, too
+        constexpr int enough = 4;  // number of finer settings that are tried, too
         RuleRow out{.rule = std::move(name)};
         int below = 0;
         int first = -1;

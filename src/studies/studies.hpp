@@ -8,7 +8,7 @@
 
 namespace ricochet::app {
 
-/// [s] The shortest of at most five repetitions, which take `enough` [s] together or more.
+/// [s] The shortest of up to five repetitions, which end early once they have taken `enough` [s].
 [[nodiscard]] double seconds_of(const std::function<void()>& work, double enough);
 
 /// `compare step-control`: rules that choose steps, at equal true error. Prints for every rule the

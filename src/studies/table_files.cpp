@@ -19,8 +19,8 @@ namespace ricochet::studies {
 
 namespace {
 
-/// Writes everything to an open file and closes it, with the permissions of a file that is created
-/// as usual; false: errno says why not.
+/// Writes everything to an open file and closes it, with the usual permissions of a new file.
+/// Returns false on failure; errno has the reason.
 bool fill(int descriptor, std::string_view bytes)
 {
     std::FILE* out = fdopen(descriptor, "wb");

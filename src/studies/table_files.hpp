@@ -14,8 +14,8 @@ namespace ricochet::studies {
 /// The bytes of a .npy file of version 1.0: float64, little-endian, rows x columns in C order.
 [[nodiscard]] std::string to_npy(const TrainingSet& set);
 
-/// A header line, `name [unit]` for each column (without the unit 1), and the first rows of the
-/// set, at most so many. Numbers have as few digits as give the same double again.
+/// A header line, `name [unit]` for each column (the unit 1 is omitted), and at most the first
+/// `most_rows` rows of the set. Numbers have the fewest digits that give the same double again.
 [[nodiscard]] std::string to_csv(const TrainingSet& set, std::size_t most_rows);
 
 /// CRC-32 as in zip and zlib (ISO 3309).
@@ -29,8 +29,8 @@ inline constexpr std::string_view checksum_header = "model,rows,columns,bytes,cr
 [[nodiscard]] std::string checksum_line(std::string_view model, const TrainingSet& set,
                                         std::string_view npy);
 
-/// Writes a neighbouring file and renames it, so that the file is whole or as it was.
-/// @throws std::runtime_error naming the file and what the system said.
+/// Writes a neighbouring file and renames it, so that the file is either complete or unchanged.
+/// @throws std::runtime_error naming the file and the error of the system.
 void write_whole(const std::filesystem::path& file, std::string_view bytes);
 
 }  // namespace ricochet::studies

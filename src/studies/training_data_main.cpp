@@ -63,7 +63,7 @@ const ModelData& find(std::string_view model)
     throw BadInput(fmt::format("unknown model '{}'; known are {}", model, fmt::join(known, ", ")));
 }
 
-/// The models that were asked for, each once.
+/// The requested models, each once.
 std::vector<const ModelData*> wanted(const Request& request)
 {
     std::vector<const ModelData*> out;
@@ -86,7 +86,7 @@ fs::path file_of(const Request& request, const ModelData& data, std::string_view
     return request.out / fmt::format("{}{}", data.model, extension);
 }
 
-/// Refuses before anything is made.
+/// Checks the output files before any work is done.
 void check_files(const Request& request, const std::vector<const ModelData*>& models)
 {
     std::error_code error;
@@ -111,7 +111,7 @@ void check_files(const Request& request, const std::vector<const ModelData*>& mo
     }
 }
 
-/// One line on standard error every two seconds.
+/// Reports progress on standard error, one line every two seconds.
 class Reporter {
 public:
     explicit Reporter(std::string_view model) : model_(model) {}

@@ -26,7 +26,7 @@ void append(TrainingSet& set, const learn::DataSet& data, double which)
     }
 }
 
-/// Set as `train_bouncing_ball` samples it and `train` splits it.
+/// A set as sampled by `train_bouncing_ball` and split by `train`.
 template <BallModel kind>
 TrainingSet ball_set(const ProgressCallback& /*progress*/)
 {
@@ -56,7 +56,7 @@ void append(TrainingSet& set, const learn::GateSamples& samples, double which)
     }
 }
 
-/// With the system's default parameters, as the shipped gates have them.
+/// A set of the system with its default parameters, as for the shipped gates.
 template <class System, GateStepping stepping>
 TrainingSet gate_set(const ProgressCallback& progress)
 {
@@ -72,7 +72,8 @@ TrainingSet gate_set(const ProgressCallback& progress)
     return set;
 }
 
-/// The histories of `ageing-friction`: 96 for training, and all those that its errors are from.
+/// The histories of `ageing-friction`: 96 for training, and all those from which its errors are
+/// computed.
 TrainingSet friction_set(const ProgressCallback& /*progress*/)
 {
     constexpr std::size_t histories = 96;

@@ -33,13 +33,13 @@ inline constexpr double validation = 1;
 inline constexpr double test = 2;
 }  // namespace part
 
-/// Where the numbers of a model come from.
+/// Origin of the data of a model.
 struct ModelData {
     std::string_view model;  ///< name of its file, without the extension
     /// Function that makes the set, or the reason why there is none.
     std::string_view origin;
-    /// The set, the same for every call; null where there is none.
-    /// @param progress  told of runs that take seconds; its answer is not heeded
+    /// Makes the set, the same in every call; null where there is none.
+    /// @param progress  called during runs that take seconds; its result is ignored
     TrainingSet (*make)(const learn::ProgressCallback& progress);
 };
 

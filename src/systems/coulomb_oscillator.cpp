@@ -35,7 +35,7 @@ int CoulombOscillator::stops(double from) const noexcept
 {
     if (from <= reach_) return 0;
     constexpr int never = std::numeric_limits<int>::max();
-    const double n = std::ceil((from - reach_) / loss_);  // infinite without friction
+    const double n = std::ceil((from - reach_) / loss_);  // infinite if there is no friction
     return n < never ? static_cast<int>(n) : never;
 }
 

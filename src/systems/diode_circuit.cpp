@@ -32,7 +32,8 @@ void DiodeCircuit::step_inputs(double /*t*/, const Vector& w, const Vector& rate
                                const Eigen::Matrix<double, 1, 1>& reaction,
                                std::array<double, StepView::state_inputs>& out) const noexcept
 {
-    // The motion is the same mirrored: signs are those of V1, or at zero of what holds it.
+    // The motion is symmetric: signs are those of V1, or, where V1 is zero, follow from the
+    // reaction.
     const double sign = w[0] > 0 || (w[0] == 0 && reaction[0] < 0) ? 1 : -1;
     const double current = std::max(p_.current, 1e-300);
     const double voltage = current * p_.resistance;
@@ -40,7 +41,7 @@ void DiodeCircuit::step_inputs(double /*t*/, const Vector& w, const Vector& rate
                           p_.inductance * w[2] * w[2];
     const double distance = std::abs(w[0]) / voltage;
     const double speed = sign * rate[0] * step_unit() / voltage;
-    constexpr double far = 8;  // logarithm of a time without end
+    constexpr double far = 8;  // used as the logarithm of an infinite time
     const double reached =
         distance > 0 && speed < 0 ? std::clamp(std::log(distance / -speed), -far, far) : far;
     out = {0.5 * std::log(std::max(energy / (p_.capacitance_2 * voltage * voltage), 1e-16)),

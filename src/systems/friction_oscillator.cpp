@@ -22,7 +22,7 @@ Mode FrictionOscillator::mode_at(double u, double v) const noexcept
     if (v != p_.belt_speed) return v < p_.belt_speed ? slip_left : slip_right;
     const double force = spring(u);
     const double excess = std::fabs(force) - p_.static_friction;
-    // At the very limit it depends on where the belt carries the mass.
+    // Exactly at the limit it depends on the direction in which the belt carries the mass.
     const double growth = force * spring(p_.belt_speed);
     if (excess < 0 || (excess == 0 && growth <= 0)) return stick;
     return force > 0 ? slip_right : slip_left;

@@ -59,7 +59,7 @@ private:
     Real p_, q_;  // of the free one
 };
 
-/// Where `positive` turns false in (lo, hi], to neighbouring numbers.
+/// The point in (lo, hi] at which `positive` becomes false, to neighbouring numbers.
 template <class Positive>
 Real bisect(Real lo, Real hi, const Positive& positive)
 {
@@ -110,7 +110,7 @@ double ImpactOscillator::period() const noexcept
 
 std::vector<double> ImpactOscillator::impacts(double t_end) const
 {
-    constexpr Real shortest = 1e-9L;  // of a flight
+    constexpr Real shortest = 1e-9L;  // shortest flight
     const Real step = 2 * std::numbers::pi_v<Real> / (128 * std::max(1.0, p_.frequency));
     std::vector<double> times;
     Real t = 0;

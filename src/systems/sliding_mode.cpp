@@ -52,12 +52,13 @@ const StepLayout& SlidingMode::step_layout() noexcept
 void SlidingMode::step_inputs(double t, const Vector& w, const Vector& rate, const Vector& reaction,
                               std::array<double, StepView::state_inputs>& out) const noexcept
 {
-    // The motion is the same mirrored: signs are those of the state, or at zero of what holds it.
+    // The motion is symmetric: signs are those of the state, or, where it is zero, follow from the
+    // reaction.
     const double sign = w[0] > 0 || (w[0] == 0 && reaction[0] < 0) ? 1 : -1;
     const double gain = std::max(p_.gain, 1e-300);
     const double distance = std::abs(w[0]) * p_.frequency / gain;
     const double approach = sign * rate[0] / gain;
-    constexpr double far = 8;  // logarithm of a time without end
+    constexpr double far = 8;  // used as the logarithm of an infinite time
     const double reached =
         distance > 0 && approach < 0 ? std::clamp(std::log(distance / -approach), -far, far) : far;
     out = {std::log(std::max(distance, 1e-6)),

@@ -195,6 +195,28 @@ TEST(Accumulation, IntervalsThatShrinkByRoundingDoNotAccumulate)
     EXPECT_EQ(run.events.size(), 100u);
 }
 
+/// Falls onto v^2 at the rate 1, and each reset lowers that: the k-th jump is (1 - r^2) r^(2k) v^2,
+/// after which the motion falls as before. All of them end when y reaches 0.
+struct SinkingStair {
+    double ratio = 0.9;
+    double origin = 0;
+    void flow(double, const X&, X& dxdt) const { dxdt = {-1, 0}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0] - origin - x[1] * x[1]; }
+    void reset(double, X& x) const { x[1] *= -ratio; }
+};
+
+TEST(Accumulation, OfJumpsEndsWhereRoundingHidesThem)
+{
+    for (int k = 0; k < 400; ++k) {
+        const SinkingStair stair{.ratio = 0.2 + 0.00175 * k, .origin = k % 4 * 0.37};
+        const double y = 1.1 + 0.013 * k;
+        const auto run = integrate(stair, X{stair.origin + y, 1}, {.t_end = 2 * y});
+        EXPECT_EQ(run.outcome, Outcome::zeno) << k;
+        // The jump that is lost, and what falls after it, is of the order of the rounding.
+        EXPECT_NEAR(run.t, y, 1e-12) << k;
+    }
+}
+
 /// Two equal balls on a moving floor, on which they come to rest; one bit of the mode for each.
 struct PairOnMovingFloor {
     using State = std::array<double, 4>;

@@ -6,18 +6,18 @@
 //
 //     w' = f(t0 + s, x0 + s f0 + w) - f0,    w(0) = 0,    x(t0 + s) = x0 + s f0 + w(s)
 //
-// which is the same Runge-Kutta step, since the rows of a tableau sum to its nodes,
-// but w is of second order in the step: the tableau's coefficients, which are
-// rounded and reach 11.6 in Dormand and Prince's, multiply only the departure from
-// the tangent. The state is carried as x0 + remainder, so that the rounding of the
-// final addition is not lost but enters the next increment, and errors of rounding
-// do not grow with the number of steps.
+// which is the same Runge-Kutta step, since the rows of a tableau sum to its nodes, but w is of
+// second order in the step: the tableau's coefficients, which are rounded and reach 11.6 in Dormand
+// and Prince's, multiply only the departure from the tangent. The state is carried as x0 +
+// remainder, so that the rounding of the final addition is not lost but enters the next increment,
+// and errors of rounding do not grow with the number of steps.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <type_traits>
 
@@ -34,14 +34,6 @@
 #define RICOCHET_BY_ONES [[gnu::optimize("no-tree-slp-vectorize")]]
 #else
 #define RICOCHET_BY_ONES
-#endif
-
-// A program of many small systems that take few steps compiles in half the time with flows called
-// by pointer: it defines RICOCHET_CALLS_FLOWS_BY_POINTER. The bits of a run are the same.
-#if defined(__OPTIMIZE__) && !defined(RICOCHET_CALLS_FLOWS_BY_POINTER)
-#define RICOCHET_INLINES_FLOWS 1
-#else
-#define RICOCHET_INLINES_FLOWS 0
 #endif
 
 namespace ricochet::detail {
@@ -334,8 +326,13 @@ class KernelOf {
 
     static void renew(void* door)
     {
-        at(door).advancing = Stepper();
-        at(door).probing = Stepper();
+        for (Stepper* stepper : {&at(door).advancing, &at(door).probing}) {
+            if constexpr (std::is_trivially_destructible_v<Stepper>) {
+                std::construct_at(stepper);  // an assignment would copy what is not yet written
+            } else {
+                *stepper = Stepper();
+            }
+        }
     }
 
     // --- quiet runs ---

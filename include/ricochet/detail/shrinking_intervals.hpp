@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/detect/step_probe.hpp"
@@ -86,6 +87,21 @@ public:
         return sunk_ >= 3 || (sunk && shrinking_ >= 3);
     }
 
+    /// Records how far a reset put the guard back from its surface, towards which it goes on
+    /// moving; true where such jumps have fallen for three events, to a thousandth, and are now
+    /// lost in the guard's `rounding`: the next crossing exists, but is no longer seen.
+    [[nodiscard]] bool jump_is_lost(double away, double rounding) noexcept
+    {
+        if (away > 32 * rounding) {
+            falls_ = away < jump_ ? falls_ + 1 : 0;
+            highest_jump_ = falls_ > 0 ? highest_jump_ : away;
+            jump_ = away;
+        }
+        if (away > rounding) return false;  // the last jumps may differ by the error of location
+        return std::exchange(falls_, 0) >= 3 && highest_jump_ >= 1024 * rounding;
+    }
+    void forget_jumps() noexcept { falls_ = 0; }
+
     /// Whether the remainder after the event just recorded is below `tolerance` [s] or
     /// the resolution of its time. An interval that is far shorter than the previous ones
     /// suggest is the gap between two events, not the end of a series.
@@ -156,6 +172,9 @@ public:
         visit(lingering_);
         visit(sunk_);
         visit(low_);
+        visit(jump_);
+        visit(highest_jump_);
+        visit(falls_);
     }
 
 private:
@@ -191,6 +210,9 @@ private:
     std::uint32_t lingering_ = 0;
     std::uint32_t sunk_ = 0;
     bool low_ = false;
+    double jump_ = 0;          ///< how far the last reset put the guard back
+    double highest_jump_ = 0;  ///< the first of those that have fallen since
+    std::uint32_t falls_ = 0;
 };
 
 }  // namespace ricochet::detail

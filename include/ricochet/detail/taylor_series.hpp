@@ -8,8 +8,7 @@
 // Derivatives, section 13.2). Coefficients are normalized: f_k is the k-th derivative over k!.
 //
 // Sums begin with their middle terms and end with the newest coefficients, so that only two
-// additions depend on the previous operation. Short tapes are unrolled over operations and orders;
-// longer ones over operations only.
+// additions depend on the previous operation. Only short tapes are unrolled over orders, too.
 //
 // The scalar S of the coefficients is double, or several doubles side by side, one for each of
 // several motions: then each has the bits that it has alone.

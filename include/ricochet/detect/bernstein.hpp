@@ -66,9 +66,9 @@ struct BernsteinTask {
 
 }  // namespace detail
 
-/// Evidence `proved` holds for the polynomial through the guard's samples, which are taken to be
-/// rounded to four units in the last place of the largest, and relies on the degree that
-/// the system declares. For a method without dense output it costs further steps.
+/// Evidence `proved` holds for the polynomial through the guard's samples. It assumes that the
+/// samples are rounded to four units in the last place of the largest, and that the degree declared
+/// by the system is right. For a method without dense output this detector costs further steps.
 struct Bernstein {
     static constexpr bool uses_rates = true;
     static constexpr Screening screening = Screening::every;

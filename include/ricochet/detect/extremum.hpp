@@ -62,13 +62,14 @@ struct Extremum {
     static constexpr bool looks_inside = true;  ///< compares each step with the cubic of its ends
     static constexpr Evidence evidence = Evidence::checked;  ///< evidence for a step not suspected
 
-    /// Whether a step needs a check, in the guard times `sign`, positive on its
-    /// armed side: it has left, or the control points of its cubic reach across, or it
-    /// turns back from the surface. A guard that turns five times further away than it
-    /// bends would have to bend five times more than its ends show.
+    /// Whether a step needs a check, in the guard times `sign`, positive on its armed side: the
+    /// guard has left that side, or the control points of its cubic reach across the surface, or it
+    /// turns back from the surface. A guard that turns back needs no check if its control points
+    /// differ by less than a fifth of their largest: to reach the surface it would have to bend
+    /// five times as much as its values and rates at the ends show.
     ///
-    /// Free of branches, and in terms that `CubicLook` has as well, so that a loop over many guards
-    /// is vectorised.
+    /// The expression is free of branches, and in terms that `CubicLook` has as well, so that a
+    /// loop over many guards is vectorised.
     [[nodiscard, gnu::always_inline]] static constexpr bool suspects(double sign, double g0,
                                                                      double rate0, double g1,
                                                                      double rate1,

@@ -63,20 +63,20 @@ private:
 
 // Calibrated gates: checks deferred by the prediction of a network, without proof.
 //
-// Nothing else in the library skips a check without proof, so this has to be asked for by name.
-// Skipped checks count as `gated`; how often events are missed was measured, on runs, when the
-// gate was trained (`Calibration` in its model). Outside the box of the model every step keeps
-// its exact check, and is counted in `Statistics::outside_domain`.
+// These detectors skip checks without proof, and so must be requested by name. Skipped checks count
+// as `gated`; how often events are missed was measured, on runs, when the gate was trained
+// (`Calibration` in its model). Outside the box of the model every step keeps its exact check, and
+// is counted in `Statistics::outside_domain`.
 //
 //     Calibrated        a horizon gate, for a guard of which only the value or the sign is
 //                       known. No check until the end of the longest horizon that is cleared,
 //                       then one; if it finds the guard on its other side, the run returns to the
 //                       event. An event is missed if, within a horizon, the guard crosses
 //                       its surface and returns, and the network did not predict it.
-//     CalibratedBounds  a level gate, for a guard with declared bounds: as `Planned`, with
-//                       the level that is cleared as a lower bound, asked before the guard
-//                       is. Misses events only where that bound is wrong; if this is detected,
-//                       the run ends as `Outcome::wrong_bound`.
+//     CalibratedBounds  a level gate, for a guard with declared bounds: works as `Planned`, but
+//                       evaluates the gate before the guard and uses the level that it clears
+//                       as a lower bound. Misses events only where that bound is wrong; if this
+//                       is detected, the run ends as `Outcome::wrong_bound`.
 //     Foreseen          a horizon gate as the forecast of `Planned`, and nothing more: it decides
 //                       when to check; exact values and declared bounds close every interval.
 //                       Verified: with any weights the events are those of the exact detector, bit
@@ -148,8 +148,8 @@ public:
         return from.distance > 0 && to.distance > band;
     }
 
-    /// Time [s] from here that needs no check; a billionth longer than the horizon, which is a
-    /// number of steps, so that rounding does not cut off the last of them.
+    /// Time [s] from here that needs no check: the horizon, lengthened by a billionth. A horizon is
+    /// a number of steps, and without the allowance rounding would cut off the last one.
     template <class System, class X>
     [[nodiscard]] gates::Gate::Answer horizon(const System& system, Mode mode, double t,
                                               const X& x) const

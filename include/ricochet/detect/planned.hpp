@@ -73,8 +73,8 @@ struct GuardBound {
     return middle - 0.25 * gap * (gap / a);
 }
 
-/// Whether the guard cannot have reached its surface between two instants `tau` [s] apart,
-/// nor a band of `band` around it, with the change taken larger by the fraction `margin`.
+/// Whether the guard cannot have come within `band` of its surface between two instants `tau` [s]
+/// apart, with the largest change enlarged by the fraction `margin`.
 [[nodiscard]] inline bool stays_clear(const GuardBound& from, const GuardBound& to, double tau,
                                       double margin, double band) noexcept
 {
@@ -113,8 +113,8 @@ struct GuardBound {
 //     EveryK       checks every k-th step and returns where the sign has changed; two crossings
 //                  between two checks are missed
 //     SlopeSkip    skips a fraction of the time in which the guard would reach its surface at
-//                  its last slope; may miss, too
 //                  its last slope; may miss events, too
+//
 // `Planned` on a system without bounds is the exact detector, and compiles to it.
 
 /// How `Planned` plans.

@@ -277,9 +277,10 @@ public:
         return nudged(s, 64 * std::numeric_limits<double>::epsilon());
     }
 
-    /// Detection examined the polynomial. Where the step's own map disagrees with it about the
-    /// near end of the bracket, the bracket starts where the interval does; about the far end,
-    /// as it may near tangency, the polynomial is used from here on.
+    /// Makes the bracket from detection, which used the polynomial, consistent with the step's own
+    /// map. If the map disagrees with the polynomial about the near end, the bracket starts where
+    /// the interval does; if it disagrees about the far end, which can happen near tangency, the
+    /// polynomial is used from here on.
     void agree_on(GuardSample& lo, const GuardSample& hi, const GuardSample& start)
     {
         if (path_ == Path::dense) return;

@@ -7,10 +7,10 @@
 //
 //     A v + g b(s + g |v|) Sign(v)  contains  w,     A = 1 + g H + g^2 K
 //
-// whose stiffness is convex as long as g^2 times the steepest weakening is below the least
-// eigenvalue of A: steps up to 1.5 s at 3 km. It is solved by a semismooth Newton method: elements
-// slip forth, back or stick by where the proximal map puts them, and those that slip are
-// solved for by conjugate gradients. A is one polynomial in K.
+// This problem is convex as long as g^2 times the steepest weakening is below the least eigenvalue
+// of A: steps up to 1.5 s at 3 km. The problem is solved by a semismooth Newton method. The
+// proximal map decides which elements slip forward, slip backward or stick, and the linear system
+// of the slipping elements is solved by conjugate gradients. A is one polynomial in K.
 #pragma once
 
 #include <array>
@@ -24,17 +24,18 @@
 
 namespace ricochet {
 
-/// Slip at which the strength of a stage is taken.
+/// Accumulated slip at which the strength in a stage is evaluated.
 enum class FaultBound {
-    implicit,  ///< at the path of the stage's end
+    implicit,  ///< at the end of the stage
     /// at the path extrapolated with the velocity of its start: always convex, also of order 2
     extrapolated,
 };
 
-/// How the errors of the fields become one number.
+/// How the errors of velocity and slip are combined into one number.
 enum class FaultNorm {
-    /// the larger of the velocity's and the slip's, root mean square over rtol of that of the
-    /// field itself, at least `BatheOptions::floor` of the largest velocity so far
+    /// the larger of the errors of velocity and slip, each as a root mean square over rtol times
+    /// that of the field itself, which counts as at least `BatheOptions::floor` of the largest
+    /// velocity so far
     fields,
     /// root mean square over all components of error / (atol + rtol |component|), of velocity,
     /// displacement from the unloaded state, and path, in units of 0.1 mm, as the published code
@@ -44,7 +45,7 @@ enum class FaultNorm {
 /// A step that was taken, nondimensional (`StrikeSlipFault`): the fields at its start, at the end
 /// of its first stage and at its end.
 struct BatheStep {
-    double t = 0;  ///< of its start
+    double t = 0;  ///< start of the step
     double h = 0;
     std::array<const Eigen::VectorXd*, 3> velocity{};
     std::array<const Eigen::VectorXd*, 3> path{};
@@ -60,12 +61,12 @@ struct BatheOptions {
     FaultNorm norm = FaultNorm::fields;
     double rtol = 1e-3;
     double atol = 1e-6;       ///< of FaultNorm::components
-    double floor = 0.03;      ///< of FaultNorm::fields: a fault that stops needs no digits of that
+    double floor = 0.03;      ///< of FaultNorm::fields: relative to the largest velocity so far
     double h_max = 0;         ///< [s]; 0: a fifth of the run
     double tolerance = 1e-7;  ///< residual of a stage, relative to its velocities
-    int max_iterations = 50;  ///< of Newton's method
-    int max_inner = 200;      ///< of conjugate gradients, in one of them
-    /// Shown every step; of step doubling both halves.
+    int max_iterations = 50;  ///< iterations of Newton's method in a stage
+    int max_inner = 200;      ///< iterations of conjugate gradients in one Newton iteration
+    /// Called after every step; with step doubling, once for each half.
     std::function<void(const BatheStep&)> observer{};
 };
 
@@ -78,9 +79,10 @@ struct BatheOptions {
 /// @throws std::invalid_argument naming the option.
 void validate(const BatheOptions& options);
 
-/// `RuptureOptions::rtol` is not used here. Rest is known to a step.
-/// @throws std::invalid_argument for what both `validate` refuse, and a bound of the polynomial
-/// that cannot be met.
+/// Runs the fault by Bathe's steps. `RuptureOptions::rtol` is not used. The time of rest is known
+/// to within one step.
+/// @throws std::invalid_argument for options that either `validate` refuses, and for a polynomial
+/// bound that cannot be met.
 [[nodiscard]] Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
                                const BatheOptions& bathe);
 
@@ -89,7 +91,8 @@ void validate(const BatheOptions& options);
 ///     BatheMotion motion = runs.start(options, bathe);
 ///     while (!motion.ended()) motion.step(h);
 ///
-/// The steps are those of `simulate`, to the bit. What made it must outlive it.
+/// The steps are those of `simulate`, bit for bit. The `BatheRuns` that made the motion must
+/// outlive it.
 class BatheMotion {
 public:
     /// Moves the run; made by `BatheRuns::start`.
@@ -97,8 +100,9 @@ public:
     BatheMotion& operator=(BatheMotion&&) noexcept;
     ~BatheMotion();
 
-    /// One attempt over h [s], positive, or over what is left. If a stage has no solution
-    /// nothing moves: false. The controller of the options is not asked.
+    /// Attempts one step over h [s], positive, or over the remaining time if that is shorter.
+    /// Returns false if a stage has no solution; then nothing has moved. The controller of the
+    /// options is not used.
     bool step(double h);
 
     /// Whether the run has ended.
@@ -120,8 +124,8 @@ private:
     std::unique_ptr<Parts> parts_;
 };
 
-/// One fault under many rules: what depends on the fault alone, a third of a millisecond for one
-/// element, is made once. Not for two threads at a time.
+/// Runs of one fault under many rules. What depends on the fault alone, a third of a millisecond of
+/// work for one element, is computed once. Not for two threads at a time.
 class BatheRuns {
 public:
     /// @param polynomial_bound  in place of `RuptureOptions::polynomial_bound`
@@ -133,8 +137,8 @@ public:
     [[nodiscard]] const StrikeSlipFault& fault() const noexcept;
     /// Runs like the function `simulate`, with the products of this fault computed once.
     [[nodiscard]] Rupture simulate(const RuptureOptions& options, const BatheOptions& bathe);
-    /// A run to be stepped, which must end before another begins. `RuptureOptions::step` is not
-    /// used, but for being positive.
+    /// Starts a run that the caller steps; it must end before another begins.
+    /// `RuptureOptions::step` must be positive but is not used.
     [[nodiscard]] BatheMotion start(const RuptureOptions& options, const BatheOptions& bathe);
 
 private:

@@ -22,8 +22,8 @@ namespace ricochet {
 /// A function of slip rate and state with its derivatives to second order.
 struct RateStateJet {
     double value = 0;
-    double v = 0, xi = 0;              ///< first
-    double vv = 0, vxi = 0, xixi = 0;  ///< second
+    double v = 0, xi = 0;              ///< first derivatives
+    double vv = 0, vxi = 0, xixi = 0;  ///< second derivatives
 };
 
 /// Friction coefficient and rate of the state [1/s].
@@ -74,8 +74,8 @@ template <StateEvolution evolution>
         const double heal = p.v_star * std::exp(-xi) / l;
         return {heal - s / l, -1 / l, -heal, 0, 0, heal};
     } else if constexpr (evolution == StateEvolution::slip) {
-        if (!(s > 0)) return {};  // its slope is -infinity, but vanishes with ds/dV
-        const double log_omega = std::log(s / p.v_star) + xi;  // of V theta / D_RS
+        if (!(s > 0)) return {};  // the slope in s is +infinity here, but ds/dV vanishes
+        const double log_omega = std::log(s / p.v_star) + xi;  // log(V theta / D_RS)
         return {-(s / l) * log_omega, -(log_omega + 1) / l, -s / l, -1 / (l * s), -1 / l, 0};
     } else {
         const double heal = p.v_star * std::exp(-xi) / l;
@@ -238,8 +238,8 @@ using PrzLaw = RateStateLaw<StateEvolution::prz, effect>;
 struct FrictionHistory {
     /// How the slip rate continues between samples.
     enum class Between {
-        constant,  ///< the slip rate holds from its sample to the next, and jumps there
-        linear,    ///< it goes linearly from sample to sample
+        constant,  ///< the slip rate keeps the value of a sample until the next, and jumps there
+        linear,    ///< the slip rate is linear between samples
     };
     Between between = Between::constant;
     std::vector<double> t{};         ///< [s], rising
@@ -247,8 +247,8 @@ struct FrictionHistory {
     std::vector<double> friction{};  ///< empty where it is not known
 };
 
-/// @throws std::invalid_argument for a history that is empty, unsorted, of lists that do not
-/// match, or with a slip rate that is not positive, naming where.
+/// @throws std::invalid_argument for a history that is empty or unsorted, whose lists differ in
+/// length, or that has a slip rate that is not positive; the message says where.
 void validate(const FrictionHistory& history);
 
 /// theta of the ageing law over an interval in which the slip rate goes linearly from v0 to

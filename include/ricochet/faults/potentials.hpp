@@ -7,8 +7,8 @@
 //     D*(d) = sup over xi' of d xi' - D(xi'),    (8)
 //     xi' = dD*/dd at d = -dDdag/dxi             (9)
 //
-// (equations of S. Liu, K. Bhattacharya and N. Lapusta, arXiv 2507.09796, 2025). The
-// models here are exact: they are the law that they stand for, not a fit of it.
+// (equations of S. Liu, K. Bhattacharya and N. Lapusta, arXiv 2507.09796, 2025). The potentials of
+// `AgeingPotential` and `StateDependentPotential` reproduce their law exactly; they are not fitted.
 #pragma once
 
 #include <array>
@@ -212,12 +212,13 @@ public:
         PairDomain domain{};
     };
 
-    /// @throws std::invalid_argument for a unit that makes a potential not convex, a weight
-    /// that is not finite, or V* or beta not positive: net, unit and what was found.
+    /// @throws std::invalid_argument for a unit that makes a potential not convex, a weight that is
+    /// not finite, or V* or beta that is not positive. The message names the net, the unit and the
+    /// value.
     explicit AdditivePair(const Parameters& parameters);
 
     [[nodiscard]] const Parameters& parameters() const noexcept { return p_; }
-    /// Numbers that were fitted.
+    /// Number of fitted parameters.
     [[nodiscard]] std::size_t fitted() const noexcept;
 
     /// @throws std::invalid_argument for V <= 0, here and below.
@@ -232,7 +233,7 @@ public:
 
 private:
     Parameters p_;
-    double rate_at_zero_ = 0;  ///< of the units of G
+    double rate_at_zero_ = 0;  ///< rate that the units of G give at d = 0
 };
 
 static_assert(PotentialPair<AdditivePair>);
@@ -244,13 +245,13 @@ public:
     using std::runtime_error::runtime_error;
 };
 
-/// The pair in a file (JSON). A file that claims to be convex where a unit contradicts it,
-/// or whose stored test values are not those of its weights, is refused.
+/// Reads a pair from a file (JSON). A file is refused if it claims to be convex and a unit
+/// contradicts it, or if its stored test values are not those of its weights.
 /// @throws PotentialFileError
 [[nodiscard]] AdditivePair load_pair(const std::filesystem::path& path);
 [[nodiscard]] AdditivePair parse_pair(const std::string& text, const std::string& name);
 
-/// The text of a file, with test values; numbers keep their bits.
+/// Text of a file with test values; reading it back gives the same bits.
 [[nodiscard]] std::string to_json(const AdditivePair& pair);
 
 }  // namespace ricochet

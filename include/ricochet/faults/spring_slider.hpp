@@ -15,12 +15,12 @@
 
 namespace ricochet {
 
-/// The far end of the spring: piecewise at constant velocity, continuous.
+/// Position of the driven end of the spring: continuous, with piecewise constant velocity.
 class SliderLoad {
 public:
     /// A piece of constant velocity.
     struct Piece {
-        double t = 0;         ///< [s] from when on
+        double t = 0;         ///< [s] start of the piece
         double velocity = 0;  ///< [m/s]
     };
 
@@ -56,8 +56,8 @@ struct SpringSlider {
 /// Kinds of events of the slip rate.
 enum class SliderEventKind {
     onset,     ///< it rises through the threshold: slip begins
-    arrest,    ///< it falls through the threshold
-    reversal,  ///< it passes through zero
+    arrest,    ///< the slip rate falls through the threshold
+    reversal,  ///< the slip rate passes through zero
 };
 /// Name of the enumerator, e.g. "onset".
 [[nodiscard]] std::string_view name(SliderEventKind kind) noexcept;
@@ -73,10 +73,10 @@ struct SliderOptions {
     double t_end = 2;          ///< [s], after the start
     int order = 4;             ///< 1, 2 or 4
     double step = 0;           ///< [s]; 0: by error control
-    double rtol = 1e-8;        ///< of the slip rate, of x against |x| + D_RS, of xi against 1
+    double rtol = 1e-8;        ///< relative to the slip rate, to |x| + D_RS for x, and to 1 for xi
     double first_step = 1e-5;  ///< [s] under error control
     double threshold = 0;      ///< [m/s] of onset and arrest; 0: not searched for
-    std::size_t samples = 0;   ///< evenly over the run, both ends included; 0: none
+    std::size_t samples = 0;   ///< number of samples, evenly spaced, both ends included; 0: none
     std::size_t max_steps = 10'000'000;
     /// Set from another thread or a signal handler, it ends the run after the step in progress.
     const std::atomic<bool>* cancelled = nullptr;
@@ -92,13 +92,13 @@ struct SliderRun {
     std::size_t iterations = 0, stages = 0;
     int most_iterations = 0;
     std::size_t unsolved = 0, not_convex = 0;  ///< stages of accepted steps
-    double residual = 0;                       ///< largest
+    double residual = 0;                       ///< largest residual of a stage
 };
 
-/// Runs a slider by variational steps, with the asinh form of the direct effect. Steps end
-/// where the load has a corner. Events are located by repeating the step, to neighbouring
-/// doubles, and change nothing; two crossings within a step are found where the cubic
-/// through slip rates and accelerations shows them.
+/// Runs a slider by variational steps, with the asinh form of the direct effect. Steps end at the
+/// corners of the load. Events change nothing; they are located by repeating the step, to
+/// neighbouring doubles. Two crossings within a step are found if the cubic through slip rates and
+/// accelerations shows them.
 ///
 /// @throws std::invalid_argument for parameters or options outside their range.
 [[nodiscard]] SliderRun run_slider(const SpringSlider& slider, const SliderState& start,
@@ -129,9 +129,8 @@ struct SliderCase {
 ///     flow    x' = V,  m V' = k (x_p(t) - x) - N f(V, xi),  xi' = (V* e^-xi - V) / D_RS
 ///     guard   log(V / threshold), either way: onset rising, arrest falling; nothing happens
 ///
-/// Explicit steps are bounded by m V / (N a), which in stick-slip falls below a
-/// microsecond: `run_slider` takes the steps that accuracy asks for. Functions are generic in
-/// the state type.
+/// Explicit steps are bounded by m V / (N a), which in stick-slip falls below a microsecond; the
+/// steps of `run_slider` are limited by accuracy alone. Functions are generic in the state type.
 class RateStateSlider {
 public:
     using State = std::array<double, 3>;

@@ -19,14 +19,14 @@ namespace ricochet {
 /// Medium around the fault.
 enum class FaultMedium {
     full_space,  ///< elastic, without bounds: K depends on distances alone
-    half_space,  ///< under a free surface at depth 0, which the fault reaches
+    half_space,  ///< elastic half-space whose free surface, at depth 0, the fault reaches
 };
 
 /// How the square is cut into elements.
 enum class FaultMesh {
     plain,  ///< n x n elements of side L / n
-    /// n x n elements of side L / (n + 1/2), a quarter of an element away from every edge: the
-    /// slip goes to zero there like a square root, and the error of the mesh falls faster.
+    /// n x n elements of side L / (n + 1/2), a quarter of an element away from every edge. The slip
+    /// goes to zero at the edges like a square root, and the discretisation error decreases faster.
     tip_corrected,
 };
 
@@ -40,15 +40,16 @@ enum class FaultMesh {
 ///     rho L v' = -G/L K d - H v + tau - r,    r in b(s) Sign(v)
 ///     b = (residual + drop exp(-s / slip_distance)) sigma,    H = 2 zeta sqrt(rho G K)
 ///
-/// sigma, the effective normal stress, grows with depth; the stress at the start, tau = (1 +
-/// overload) b(0), exceeds the strength everywhere by a hair. K is that of the medium times
-/// L and a factor that makes the mean slip under a uniform drop of friction that of a spring of
+/// sigma, the effective normal stress, grows with depth. The initial stress, tau = (1 + overload)
+/// b(0), slightly exceeds the strength everywhere. K is the stiffness of the medium times L and a
+/// factor such that the mean slip under a uniform drop of friction equals that of a spring of
 /// stiffness G / L: for one element, K = 1.
 ///
 /// From an unstable rest the time of the rupture depends on the overload: each decade moves its
 /// peak by 1.6 s (side 3 km).
 ///
-/// Here everything is nondimensional: slip in slip_distance, time in `time_unit`, hence
+/// All quantities are nondimensional: slip in units of slip_distance, time in units of `time_unit`,
+/// hence
 ///
 ///     v' = overload b(0) + b(0) - b(s) - K d - H v   where v > 0,   H = 2 zeta sqrt(K).
 class StrikeSlipFault {
@@ -67,8 +68,8 @@ public:
         double overload = 1e-5;          ///< positive
         FaultMedium medium = FaultMedium::full_space;
         FaultMesh mesh = FaultMesh::plain;
-        /// Stresses for slip, n^2 x n^2 [1/km] as a .npy file, symmetric and negative definite,
-        /// instead of those of the medium; its mesh is plain.
+        /// A .npy file with the stresses due to slip, n^2 x n^2 [1/km], symmetric and negative
+        /// definite, to be used instead of those of the medium; the mesh must be plain.
         std::filesystem::path kernel{};
         double memory_limit = 1073741824;  ///< [bytes], positive
     };
@@ -89,7 +90,7 @@ public:
     [[nodiscard]] double time_unit() const noexcept { return time_unit_; }  ///< L sqrt(rho/G) [s]
     [[nodiscard]] double slip_unit() const noexcept { return p_.slip_distance; }  ///< [m]
     [[nodiscard]] double velocity_unit() const noexcept { return slip_unit() / time_unit_; }
-    /// Share of an element in the square.
+    /// Fraction of the square's area that one element covers.
     [[nodiscard]] double share() const noexcept { return share_; }
     /// Mean over the square of a field on the elements, zero elsewhere.
     [[nodiscard]] double mean(const Eigen::VectorXd& field) const { return share_ * field.sum(); }
@@ -103,7 +104,8 @@ public:
     /// b(0) - b(s) of an element.
     [[nodiscard]] double weakening(Eigen::Index which, double path) const;
 
-    /// Memory [bytes] that these parameters need with a run, before anything is made.
+    /// Memory [bytes] that a fault with these parameters and a run of it need; nothing is
+    /// allocated.
     [[nodiscard]] static double memory(const Parameters& parameters) noexcept;
 
 private:
@@ -121,17 +123,18 @@ private:
 //
 //     const Rupture rupture = simulate(StrikeSlipFault({.elements = 100}), {.t_end = 30});
 //
-// Slip is not stiff: the fastest mode of 100 x 100 elements takes 0.7 s. Dormand and Prince's
-// method of fifth order carries all elements that slip; those that do is settled at the start
-// of a step. After it every element whose velocity has changed its sign is stopped where its own
-// polynomial on the step is zero, and elements at rest that are driven beyond their strength start
-// again. The order is 5 before the first arrest, 2 after it, and no step is repeated for an arrest.
+// Slip is not stiff: the fastest mode of 100 x 100 elements takes 0.7 s. The fifth-order method of
+// Dormand and Prince integrates all slipping elements; which elements slip is decided at the start
+// of a step. After the step, every element whose velocity has changed sign is stopped where its own
+// polynomial on the step is zero, and elements at rest that are loaded beyond their strength start
+// to slip again. The order is 5 before the first arrest and 2 after it, and no step is repeated for
+// an arrest.
 
 /// Options of runs of the fault.
 struct RuptureOptions {
     double t_end = std::numeric_limits<double>::quiet_NaN();  ///< [s]
-    /// [s] the longest; 0: 0.29 time units, 0.25 s at 3 km, and n / 100 of it from n = 100 down to
-    /// 10, where steps cost little. Never beyond 0.95 of what is stable.
+    /// [s] Longest step; 0: 0.29 time units, which is 0.25 s at 3 km, reduced to n / 100 of it as n
+    /// falls from 100 to 10, where steps cost little. Limited to 0.95 of the stable step.
     double step = 0;
     /// Error of a step allowed, relative to the present velocity and slip of the whole field;
     /// infinity: constant steps.
@@ -141,14 +144,14 @@ struct RuptureOptions {
     double polynomial_bound = 0;
     std::vector<double> snapshot_times{};  ///< [s] ascending
     std::uint64_t max_steps = 1'000'000;
-    /// Asked after every step with the time [s]; false ends the run as `cancelled`.
+    /// Called after every step with the time [s]; if it returns false, the run ends as `cancelled`.
     std::function<bool(double t)> progress{};
 };
 
 /// @throws std::invalid_argument naming the option, what was given and what was expected.
 void validate(const RuptureOptions& options);
 
-/// Fields over the elements, along x first.
+/// Slip and velocity of all elements at one time; the index along x varies fastest.
 struct RuptureSnapshot {
     double t = 0;              ///< [s]
     Eigen::VectorXd slip;      ///< [m]
@@ -157,18 +160,18 @@ struct RuptureSnapshot {
 
 /// Counts over one run of the fault.
 struct RuptureStatistics {
-    std::uint64_t steps = 0;        ///< accepted
-    std::uint64_t rejected = 0;     ///< by the error test, or because no solution was found
-    std::uint64_t evaluations = 0;  ///< of forces
+    std::uint64_t steps = 0;        ///< accepted steps
+    std::uint64_t rejected = 0;     ///< steps that failed the error test or had no solution
+    std::uint64_t evaluations = 0;  ///< evaluations of the forces
     std::uint64_t products = 0;     ///< with K
     std::uint64_t arrests = 0;
     std::uint64_t restarts = 0;
-    std::uint64_t solves = 0;       ///< implicit stages
-    std::uint64_t iterations = 0;   ///< of their Newton method
+    std::uint64_t solves = 0;       ///< solutions of implicit stages
+    std::uint64_t iterations = 0;   ///< iterations of Newton's method in them
     std::uint64_t asked = 0;        ///< verdicts of a learned rule
     std::uint64_t handed_over = 0;  ///< of these, left to the classical one
     int degree = 0;                 ///< of the polynomial for sqrt(K)
-    double bound = 0;               ///< its relative error at most
+    double bound = 0;               ///< bound of its relative error
 };
 
 /// Result of a run of the fault.
@@ -177,17 +180,17 @@ struct Rupture {
     double t = 0;              ///< [s] reached
     double mean_slip = 0;      ///< path, mean over the square [m]
     double peak_velocity = 0;  ///< of the mean velocity [m/s]
-    double peak_time = 0;      ///< [s]
+    double peak_time = 0;      ///< time of the largest mean velocity [s]
     /// Time from which the mean velocity stays below 1e-3 of its peak [s]; of a single element,
     /// when it stops. NaN if it does not.
     double arrest_time = std::numeric_limits<double>::quiet_NaN();
-    /// When the last element stopped [s]. NaN if one still moves, or could.
+    /// Time at which the last element stopped [s]. NaN if an element still moves or may move again.
     double rest_time = std::numeric_limits<double>::quiet_NaN();
     double longest_step = 0;           ///< [s] allowed
     double stable_step = 0;            ///< [s] of the explicit method
     Eigen::VectorXd slip;              ///< [m]
     Eigen::VectorXd velocity;          ///< [m/s]
-    Eigen::VectorXd peak_velocity_of;  ///< each element's largest at the nodes of the steps [m/s]
+    Eigen::VectorXd peak_velocity_of;  ///< largest velocity of each element at ends of steps [m/s]
     Eigen::VectorXd arrival;           ///< when each was fastest [s]
     std::vector<double> times;         ///< [s] four for each step
     std::vector<double> mean_slips;    ///< [m]
@@ -196,8 +199,9 @@ struct Rupture {
     RuptureStatistics statistics;
 };
 
-/// @throws std::invalid_argument for what `validate` refuses, and a bound of the polynomial that
-/// cannot be met.
+/// Simulates the rupture of a fault by explicit steps.
+/// @throws std::invalid_argument for options that `validate` refuses, and for a polynomial bound
+/// that cannot be met.
 [[nodiscard]] Rupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options);
 
 /// The longest stable step of the explicit method for a mode of angular frequency 1 and this
@@ -213,9 +217,9 @@ struct Rupture {
 //
 //     rho L v' = -G/L K u - H u' + tau - sigma f(V, xi),    u = d - V_pl t,    xi' = xi'(V, xi)
 //
-// with a law of laws.hpp. The plates move at V_pl: a fault that slides with them
-// everywhere loads nothing, one that is locked is loaded at the rate G/L K V_pl. Both u and its
-// rate are relative to that motion, so that sliding at V_pl is steady.
+// with a law of laws.hpp. The plates move at V_pl: a fault that slides at this velocity everywhere
+// is not loaded, a locked fault is loaded at the rate G/L K V_pl. Both u and its rate are relative
+// to that motion, so that sliding at V_pl is steady.
 //
 // Steps are singly diagonally implicit of order 1, 2 or 4 (variational_step.hpp); a stage
 // is that of fault_friction_stage.hpp.
@@ -231,25 +235,25 @@ struct FaultFriction {
     double normal_stress = 0;      ///< sigma [Pa] of all elements; 0: that of the fault, with depth
     double slip_rate = 1e-9;       ///< V at the start [m/s], not zero; positive with the log form
     std::optional<double> theta{};  ///< [s] at the start, positive; none: steady at |slip_rate|
-    /// tau = (1 + overload) sigma f at the start, above -1. With 0 a start at `plate_velocity` and
-    /// its steady state continues sliding so, stable or not.
+    /// tau = (1 + overload) sigma f at the start; above -1. With 0, a start at `plate_velocity` in
+    /// its steady state continues to slide at that velocity, whether this is stable or not.
     double overload = 1e-5;
 };
 
 /// Options of runs with rate-and-state friction.
 struct RateStateOptions {
-    /// 1, 2 or 4. A step of order 4 that leaves an element creeping which it brakes to rest is
-    /// taken again with order 2. The time of the first onset depends on the order: at rtol 1e-3
-    /// order 4 is off by 1e-5 of it and order 2 by 5e-4; with the least `overload`, so that V is
-    /// steady within that tolerance for most of the time, by 1.4e-3 and 9e-3. Order 4 costs 1.2
-    /// to 1.5 times more.
+    /// Order of the method: 1, 2 or 4. If a step of order 4 brakes an element to rest but leaves it
+    /// creeping, the step is repeated with order 2. The time of the first onset depends on the
+    /// order. At rtol 1e-3 its relative error is 1e-5 with order 4 and 5e-4 with order 2; with the
+    /// least `overload`, for which V is steady within that tolerance most of the time, 1.4e-3 and
+    /// 9e-3. Order 4 costs 1.2 to 1.5 times more.
     int order = 4;
     /// [s]; 0: |slip_rate| rho L / (a sigma), in which the direct effect ends an imbalance of the
     /// start, at most a hundredth of the run.
     double first_step = 0;
     double tolerance = 1e-11;  ///< of a stage's residual, relative to the sizes of its terms
-    int max_iterations = 40;   ///< of Newton's method
-    int max_inner = 200;       ///< of conjugate gradients, in one of them
+    int max_iterations = 40;   ///< iterations of Newton's method in a stage
+    int max_inner = 200;       ///< iterations of conjugate gradients in one Newton iteration
     double threshold = 1e-3;   ///< [m/s] of the fastest element: onset and end of an earthquake
 };
 
@@ -267,8 +271,9 @@ struct FaultEarthquake {
 
 /// Result of a run with rate-and-state friction.
 struct RateStateRupture {
-    /// Slip is d, and so are the means; `arrest_time` is relative to the fastest of all times.
-    /// `statistics.rejected` are steps beyond the error or with a stage that was not solved.
+    /// `slip` is d, and the means are means of d; `arrest_time` is relative to the largest mean
+    /// velocity of the run. `statistics.rejected` counts steps whose error was too large or that
+    /// had an unsolved stage.
     Rupture rupture;
     Eigen::VectorXd xi;  ///< log(V* theta / D_RS) at the end
     std::vector<FaultEarthquake> earthquakes;
@@ -277,19 +282,20 @@ struct RateStateRupture {
     std::uint64_t inner = 0;         ///< iterations of conjugate gradients
     std::uint64_t handed_over = 0;   ///< attempts of order 4 that were taken with order 2
     std::vector<double> step_times;  ///< [s] ends of steps, the start first
-    std::vector<double> fastest;     ///< [m/s] of any element then
-    /// Elements in G D_RS / (sigma b), over which a rupture's front breaks down, at the largest
-    /// normal stress: below 1 elements fail each on its own.
+    std::vector<double> fastest;     ///< [m/s] velocity of the fastest element at these times
+    /// Number of elements in the length G D_RS / (sigma b) over which strength drops at a rupture
+    /// front, at the largest normal stress: below 1 each element fails on its own.
     double elements_of_front = 0;
 };
 
-/// Runs a fault. `RuptureOptions::step` is the longest step [s] (0: no limit); with an infinite
-/// `rtol` the length of all. Errors of a step are root mean squares over the elements: of V
-/// relative to it (and V* / 1e6), of xi against 1, of d against |u| + D_RS; the largest is compared
-/// with `rtol`. A step with a stage that is not solved is repeated with a quarter of its length.
+/// Runs a fault with rate-and-state friction. `RuptureOptions::step` is the longest step [s] (0: no
+/// limit); with an infinite `rtol`, the length of all steps. The error of a step is the largest of
+/// three root mean squares over the elements: of V relative to V (and to V* / 1e6), of xi relative
+/// to 1, and of d relative to |u| + D_RS; it is compared with `rtol`. A step with an unsolved stage
+/// is repeated with a quarter of its length.
 ///
-/// @throws std::invalid_argument for what `validate` refuses, constant steps without a length, and
-/// a bound of the polynomial that cannot be met.
+/// @throws std::invalid_argument for options that `validate` refuses, for constant steps without a
+/// length, and for a polynomial bound that cannot be met.
 [[nodiscard]] RateStateRupture simulate(const StrikeSlipFault& fault, const RuptureOptions& options,
                                         const FaultFriction& friction,
                                         const RateStateOptions& how = {});

@@ -36,7 +36,7 @@ struct ErkCalls {
 struct ArkCalls {
     static constexpr const char* name = "ARKStep";
     void* memory;
-    ARKRhsFn slow, fast;  ///< taken explicitly, implicitly; one may be null
+    ARKRhsFn slow, fast;  ///< right-hand sides: `slow` explicit, `fast` implicit; one may be null
     void* data;
 
     int evolve(double t_stop, double& t, N_Vector x) const
@@ -60,7 +60,7 @@ struct ArkCalls {
 
 }  // namespace detail
 
-/// Does not own the integrator.
+/// A host for an integrator of ERKStep, which it does not own.
 class ErkStep : public detail::SundialsHost<detail::ErkCalls> {
 public:
     /// Attaches to an initialised integrator of ERKStep, and does not own it.
@@ -70,7 +70,7 @@ public:
     }
 };
 
-/// Does not own the integrator.
+/// A host for an integrator of ARKStep, which it does not own.
 class ArkStep : public detail::SundialsHost<detail::ArkCalls> {
 public:
     /// Attaches to an initialised integrator of ARKStep, and does not own it.

@@ -3,8 +3,9 @@
 //
 //     hosts::BulletBody host({&world, &body}, t, 0.01);
 //
-// Bullet computes in single precision unless it is built otherwise, and events are as precise.
-// Steps taken again see gravity, not the forces that the program has applied for one step.
+// Bullet computes in single precision unless it is built otherwise, and events are located to the
+// same precision. Repeated steps include gravity, but not the forces that the program has applied
+// for one step.
 #pragma once
 
 #include <btBulletDynamicsCommon.h>
@@ -14,9 +15,9 @@
 
 #include "ricochet/hosts/detail/body_step.hpp"
 
-// Bullet writes vectors as floats and copies them as vectors of SSE. Where writing and reading are
-// inlined into one function, g++ 12 takes them at -O2 for different memory, and what was written
-// last is read unrounded (with -fno-strict-aliasing it is not).
+// Bullet writes vectors as floats and copies them as SSE vectors. Where writing and reading are
+// inlined into one function, g++ 12 at -O2 assumes that they concern different memory, and the
+// value that is read has not been rounded to float (with -fno-strict-aliasing it has).
 #ifdef __GNUC__
 #define RICOCHET_NOT_INLINED [[gnu::noinline]]
 #else

@@ -43,7 +43,8 @@ struct CvodeCalls {
 
 }  // namespace detail
 
-/// Does not own the integrator, which is set up but for the time and the state.
+/// A host for an integrator of CVODE, which it does not own and which is set up except for time and
+/// state.
 class Cvode : public detail::SundialsHost<detail::CvodeCalls> {
 public:
     /// @param flow, data  those of the integrator

@@ -20,7 +20,7 @@
 
 namespace ricochet::hosts {
 
-/// Uses a driver, and does not own it.
+/// A host for a driver of GSL, which it does not own.
 class Gsl : public detail::StepEnds {
 public:
     /// @throws std::invalid_argument for a multistep method, which cannot take its step again

@@ -88,10 +88,10 @@ struct FilippovState<Fields> {
 /// of twisting in skew coordinates. Sliding has no such bound: with surfaces whose rates
 /// differ in size by 1e3, rounding may lead sliding on both off its surfaces unseen.
 ///
-/// Along one surface the exits are r_below and -r_above: as smooth as the fields, with
-/// with neither quotient nor pole, and zero exactly where the share a is 0 or 1. On two they
-/// are the shares themselves, a and 1 - a, unless the combination ceases to exist
-/// before: then all four fall together.
+/// Along one surface the exits are r_below and -r_above: as smooth as the fields, with neither
+/// quotient nor pole, and zero exactly where the share a is 0 or 1. On two surfaces they are the
+/// shares themselves, a and 1 - a, unless the combination ceases to exist before: then all four
+/// fall together.
 template <class Fields>
 class Filippov : public detail::FilippovState<Fields> {
     using Rules = detail::FilippovDecision<Fields>;
@@ -222,12 +222,12 @@ public:
     /// rounding and drift that separates it from them, along the jumps of the field. The
     /// decision is made exactly on the surfaces.
     ///
-    /// On one surface: a field that leads away from it on its own side is an exit. If
-    /// there is none, the surface attracts and the motion slides. If there is one, it
-    /// is taken. If there are two, the surface is repulsive and the solution not unique:
-    /// the exit with the larger rate is taken, of equal rates the one upward. A rate that is zero,
-    /// to 2e-13 of the larger, takes the sign that it will have next along its field; an
-    /// up to 2e-13 of the larger, takes the sign that it will have next along its field; an
+    /// On one surface: a field that leads away from it on its own side is an exit. If there is
+    /// none, the surface attracts and the motion slides. If there is one, it is taken. If there are
+    /// two, the surface is repulsive and the solution not unique: the exit with the larger rate is
+    /// taken, or the upper one if the rates are equal. A rate that is zero, up to 2e-13 of the
+    /// larger, takes the sign that it will have next along its field; an exit that has fired
+    /// counts.
     ///
     /// A surface that the state is on or beyond counts as met, whichever guard has fired.
     ///

@@ -46,12 +46,11 @@
 // Bounds on how fast its guards can change, which let a detector skip most evaluations:
 // speed_bound and others, see hybrid/bounds.hpp.
 //
-// All functions are const and free of side effects; t is in seconds. A function that has one
-// of these names but none of the forms, or a name that is nearly one of
-// these, is rejected by the compiler, see detail/declarations.hpp. Guards written
-// for any x that has `x[i]` are located without computing the rest of the state. A system
-// without a guard is integrated as a plain ordinary differential equation, without
-// the machinery of events.
+// All functions are const and free of side effects; t is in seconds. A function that has one of
+// these names but none of the forms, or a name that is nearly one of these, is rejected by the
+// compiler, see detail/declarations.hpp. Guards written for any x that has `x[i]` are located
+// without computing the rest of the state. A system without a guard is integrated as a plain
+// ordinary differential equation, without the machinery of events.
 #pragma once
 
 #include <concepts>
@@ -187,7 +186,7 @@ concept PlainSingleRate = !CountsGuards<System> && requires(const System& system
 /// The system computes the rate of one guard.
 template <class System, class X, class D = X>
 concept RateWritten = ModedRateOf<System, X, D> || PlainRateOf<System, X, D> || ModedSingleRate<System, X, D> || PlainSingleRate<System, X, D>;
-/// It does, or the rate follows from the guard by dual numbers.
+/// The system computes the rate of one guard, or dual numbers derive it from the guard.
 template <class System, class X, class D = X>
 concept RateAlone = RateWritten<System, X, D> || RateByDuals<System, X>;
 

@@ -14,9 +14,9 @@ struct explicit_error_stepper_fsal_tag;
 
 namespace ricochet {
 
-/// Method made of a complete stepper type, odeint's (see `ricochet/odeint.hpp`) or the user's own,
-/// for its one state type, with odeint's `do_step`. It must be a one-step method: a multistep
-/// method has a memory that an event makes stale.
+/// Method made of a complete stepper type for one state type, odeint's (see `ricochet/odeint.hpp`)
+/// or the user's own, with odeint's `do_step`. It must be a one-step method: a multistep method
+/// keeps earlier steps, which an event makes invalid.
 template <class GivenStepper>
 struct ThisStepper {
     template <class State>

@@ -232,8 +232,8 @@ template <class X>
 /// resets r_i, one `step` is
 ///
 ///     h        = the length that error control or `Options::step` asks for, at most up to t_end
-///                and
-///                to the next time event; shorter until the error of Phi(h; q, t, x) is accepted
+///                and to the next time event; shorter until the error of Phi(h; q, t, x) is
+///                accepted
 ///     F, s     = the earliest set of acting guards that leave their side within (0, h], and its
 ///                offset; nothing and h if there is none
 ///     record the events of all other guards within (0, s], located on the step's polynomial
@@ -289,8 +289,7 @@ public:
     }
     [[nodiscard]] Mode mode() const noexcept { return loop_->mode(); }
     [[nodiscard]] bool ended() const noexcept { return loop_->ended(); }
-    /// Result so far; `finish` brings its time and state up to
-    /// date.
+    /// Result so far; `finish` brings its time and state up to date.
     [[nodiscard]] const Run<X>& run() const
     {
         if constexpr (same) {

@@ -18,8 +18,7 @@
 namespace ricochet {
 
 /// A property, as text, in which a run must agree with the run that was saved in order to continue
-/// it:
-/// {"method", "FixedStep<Euler>"}, {"rtol", "1e-08"}.
+/// it: {"method", "FixedStep<Euler>"}, {"rtol", "1e-08"}.
 struct RunProperty {
     std::string name;
     std::string value;

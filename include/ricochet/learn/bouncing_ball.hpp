@@ -43,16 +43,16 @@ struct BallTraining {
     TrainingOptions training{};         ///< its seed is replaced by the one above
 };
 
-/// The defaults from which the models that come with the library were made.
+/// Default options, from which the models that come with the library were made.
 ///
-/// A fixed-step model has five hidden layers, as the paper's, of 16, which the
-/// paper does not tell. An any-step model has one of 16, from 400 000 states: in
-/// its logarithms the boundary is two straight lines and a bend. One of 8 will do
-/// from most seeds, but from some it clips a corner of the boundary and misses.
+/// A fixed-step model has five hidden layers like the paper's; their width, which the paper does
+/// not state, is 16 here. An any-step model has one hidden layer of 16, trained on 400 000 states:
+/// in its logarithmic features the boundary is two straight lines and a bend. A layer of 8 suffices
+/// for most seeds, but for some it cuts off a corner of the boundary and misses events.
 [[nodiscard]] BallTraining ball_training(BallModel kind);
 
-/// States of a ball, sampled from the floor backward (and, for a tenth, forward),
-/// with step 1e-6 h as the closest to the boundary.
+/// States of a ball, sampled backward in time from the floor (and, for a tenth of them, forward),
+/// the closest to the boundary at 1e-6 h from it.
 ///
 /// - fixed step: speeds at the floor half uniform, half log-uniform, such that the
 ///   box of the model is filled: 15 % above `height` and 10 % above the speed of
@@ -66,8 +66,8 @@ struct BallTraining {
                                         std::size_t events, std::size_t clear, std::uint64_t seed,
                                         bool keep_band);
 
-/// Samples, trains and assesses on fresh states. The model is complete and can be
-/// stored; whether it should be, `Trained::misses_none` tells.
+/// Samples, trains and assesses on fresh states. The model is complete and can be stored;
+/// `Trained::misses_none` says whether it should be.
 /// @throws as `train`, and std::invalid_argument if a parameter is outside its range.
 [[nodiscard]] Trained train_bouncing_ball(BallModel kind, const BallTraining& training,
                                           const ProgressCallback& progress = {});

@@ -6,24 +6,24 @@
 //
 // for the logit as it is computed at run time, and the guard as the system computes it.
 //
-// *Proof*, by branch and bound. A box with centre c and half-widths h is proved if its
-// logit is nowhere below the threshold (`NetworkBounds`), or if
+// *Proof*, by branch and bound. A box with centre c and half-widths h is proved if its logit is
+// nowhere below the threshold (`NetworkBounds`), or if
 //
 //     guard(c) - guard_slack(h) > margin,
 //
-// and is cut in two where it is neither. Either bound, once it has shown that it can never
-// prove a part of a box, is not asked there again. A box that is too narrow to be cut is
-// unproved: it is listed in the record, and asked exactly at run time.
+// and is cut in two if neither holds. A bound that has shown that it can never prove a part of a
+// box is not computed again for that part. A box that is too narrow to be cut is unproved: it is
+// listed in the record, and the exact guard is evaluated there at run time.
 //
-// A system that knows more declares `guard_least`, a lower bound of its guard over a box, which
-// then takes the place of the second condition: that of a concave guard is at a corner.
+// A system may declare `guard_least`, a lower bound of its guard over a box, which then replaces
+// the second condition. For a concave guard this bound is attained at a corner.
 //
 // A gate of levels is proved level by level: its certificate says "logit < threshold_k implies
 // guard > rho_k", and its thresholds become those that were proved.
 //
-// What the proof takes as true is `guard_slack` and `guard_least`. Every cut samples the first, at
-// the centres of a box and its halves; one proof in 64 by the second compares it with the guard at
-// the centre. One that is broken is named with the states.
+// The proof assumes that `guard_slack` and `guard_least` are correct. Every cut tests the slack
+// with the values at the centres of a box and its halves; one proof in 64 by `guard_least` compares
+// it with the guard at the centre. A violation is reported with the states.
 #pragma once
 
 #include <array>
@@ -92,12 +92,12 @@ struct GuardProblem {
 /// Options of a proof.
 struct CertifyOptions {
     double margin = 0;       ///< of the first level, in units of the guard
-    std::size_t levels = 1;  ///< 1 to 32
+    std::size_t levels = 1;  ///< number of levels, 1 to 32
     double ratio = 2;        ///< between margins; above 1, needs a positive margin
     /// Margins of each level, rising, instead of the three above. Empty, and the model a gate of
     /// levels: those of the gate.
     std::vector<double> margins{};
-    /// Look for the highest threshold that can be proved, and put it into the model. Otherwise
+    /// Search for the highest threshold that can be proved, and store it in the model. Otherwise
     /// the stored threshold is proved as it is; further levels are always searched for.
     bool search = true;
     /// A search stops at this distance from the lowest logit that was found within the margin,
@@ -105,8 +105,8 @@ struct CertifyOptions {
     double closest = 1.0 / 64;
     double smallest = 1.0 / 1024;    ///< edge that is not cut further, as a share of the domain's
     std::size_t max_unproved = 256;  ///< boxes that a level may list
-    double limit = 300;              ///< [s] estimate for a level above which nothing is begun
-    double time_limit = std::numeric_limits<double>::infinity();  ///< [s] after which it stops
+    double limit = 300;              ///< [s] a level whose estimate exceeds this is not started
+    double time_limit = std::numeric_limits<double>::infinity();  ///< [s] when the proof stops
     unsigned threads = 2;                ///< 1 to 64; the result does not depend on it
     std::uint64_t seed = 1;              ///< of estimates and searches
     std::filesystem::path checkpoint{};  ///< written every few seconds and on stopping; empty: none
@@ -137,23 +137,23 @@ struct CertifyProgress {
     double share = 0;  ///< of the level that is done, in [0, 1]
 };
 
-/// Draws a bar, or returns false to stop. The first call of a level has `boxes` = 0 and tells the
-/// estimate before any of it is spent.
+/// Draws a bar, or returns false to stop. The first call for a level has `boxes` = 0, so that the
+/// estimate is known before the work starts.
 using CertifyCallback = std::function<bool(const CertifyProgress&)>;
 
 /// How a proof ended.
 enum class CertifyOutcome {
-    proved,         ///< all levels, without exception
+    proved,         ///< all levels are proved, without exceptions
     partly_proved,  ///< all levels, but for unproved boxes that are listed
-    refuted,        ///< a state clears and has a guard within the margin
+    refuted,        ///< in some state the network clears and the guard is within the margin
     not_provable,   ///< too many boxes are too narrow to be cut
-    too_long,       ///< the estimate is above the limit; nothing was begun
-    out_of_time,    ///< what was done is kept in the checkpoint
-    out_of_memory,  ///< the same
-    interrupted,    ///< by the callback; the same
+    too_long,       ///< the estimate is above the limit; the proof was not started
+    out_of_time,    ///< `time_limit` was reached; the results so far are in the checkpoint
+    out_of_memory,  ///< memory was exhausted; likewise
+    interrupted,    ///< the callback stopped the proof; likewise
 };
 
-/// Thrown by a guard or its slack to stop from there, as the callback does where it is asked: the
+/// Thrown by a guard or its slack to stop the proof, as a callback that returns false does: the
 /// outcome is `interrupted`.
 struct CertifyInterrupted {};
 
@@ -164,16 +164,16 @@ struct CertifyInterrupted {};
 struct CertifyReport {
     CertifyOutcome outcome = CertifyOutcome::proved;
     std::vector<CertificateLevel> levels{};  ///< that were finished
-    std::vector<Estimate> estimates{};       ///< of these, and of the one that was not
-    std::vector<double> counterexample{};    ///< if refuted
-    double seconds = 0;                      ///< of everything, searches and estimates included
+    std::vector<Estimate> estimates{};       ///< of these, and of the level that was not finished
+    std::vector<double> counterexample{};    ///< state that refutes the statement, if `refuted`
+    double seconds = 0;                      ///< [s] total time, searches and estimates included
     /// Why the last checkpoint could not be written; empty: it was, or there is none.
     std::string checkpoint_trouble{};
 };
 
-/// A model with its certificate, which has the levels that were finished; none: empty. The
-/// threshold is the proved one. A gate keeps the levels that were proved, with the proved
-/// thresholds, and no calibration: that was of other ones.
+/// A model and its certificate, which contains the finished levels and is empty if there are none.
+/// The threshold of the model is the proved one. A gate keeps the levels that were proved, with the
+/// proved thresholds, and loses its calibration, which was measured with other thresholds.
 struct CertifiedModel {
     Model model;
     CertifyReport report;
@@ -186,9 +186,9 @@ struct CertifiedModel {
     }
 };
 
-/// Proves what the options ask for. The same model, problem and options give the same record, but
-/// for its times, however many threads run and however often it was stopped and resumed; a
-/// search is cut short by `limit`, which depends on the speed of the machine.
+/// Proves the levels that the options specify. The same model, problem and options give the same
+/// record, except for its times, for any number of threads and of interruptions. A search is cut
+/// short by `limit`, and so depends on the speed of the machine.
 ///
 /// @throws std::invalid_argument if an option is outside its range, if the recipe of the model is
 ///         not `state`, if it is a gate of horizons (which speak of times, not of values), as
@@ -210,8 +210,8 @@ struct LowestLogit {
     std::vector<double> x{};
 };
 
-/// Looks for the lowest logit among states with guard <= margin: half of `states` at random in the
-/// domain, the others by random steps from the best of them that shrink.
+/// Searches for the lowest logit among states with guard <= margin: half of `states` are drawn at
+/// random in the domain, the others by random steps of decreasing size from the best found so far.
 [[nodiscard]] LowestLogit lowest_logit(const Model& model, const GuardProblem& problem,
                                        double margin, std::size_t states, std::uint64_t seed);
 

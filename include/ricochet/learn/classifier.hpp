@@ -2,8 +2,8 @@
 //
 // Binary cross entropy on logits, Adam, mini-batches, everything from one seed:
 // the same options and data give the same weights to the bit on one machine,
-// however many threads run. A miss is worse than a false alarm, so the decision
-// threshold is put below the logit of every event of a validation set.
+// for any number of threads. A missed event is worse than a false alarm, so the
+// decision threshold is put below the logit of every event of a validation set.
 #pragma once
 
 #include <atomic>
@@ -43,15 +43,15 @@ struct TrainingOptions {
     double test_share = 0.1;           ///< held out and never examined in training
     double validation_share = 0.1;     ///< of the rest; chooses weights and threshold
     std::size_t evaluate_every = 500;  ///< iterations between two checks at the validation set
-    double logit_margin = 1;  ///< the threshold is at least that much below the lowest event
-    double gap_share = 0.5;   ///< and by that share of the gap down to the highest clear state
-    double cleared_at_least = 0.5;  ///< share of clear states a threshold must leave cleared
+    double logit_margin = 1;           ///< least distance of the threshold below the lowest event
+    double gap_share = 0.5;  ///< the same as a fraction of the gap to the highest clear state
+    double cleared_at_least = 0.5;  ///< fraction of clear states that the threshold must clear
 
     std::uint64_t seed = 1;
     std::filesystem::path checkpoint{};   ///< written now and then and on stopping; empty: none
     std::size_t checkpoint_every = 5000;  ///< iterations
     bool resume = false;                  ///< continue from `checkpoint`
-    /// Asked before every iteration; true stops, as the callback does. Null: it is not asked.
+    /// Read before every iteration; true stops the training, as the callback does. May be null.
     const std::atomic<bool>* cancelled = nullptr;
 };
 
@@ -59,33 +59,33 @@ struct TrainingOptions {
 /// all the steps cost that the training may take.
 struct TrainingEstimate {
     std::uint64_t guard_calls = 0;
-    double seconds = 0;        ///< of processor time
-    std::uint64_t events = 0;  ///< that the training asks for
+    double seconds = 0;        ///< [s] processor time
+    std::uint64_t events = 0;  ///< number of events that the training needs
     std::uint64_t seen = 0;    ///< events in the few runs
 };
 
-/// One sentence.
+/// One sentence with the estimate.
 [[nodiscard]] std::string describe(const TrainingEstimate& estimate);
 
-/// Progress of a training; given at every check of the validation set.
+/// Progress of a training, passed to its callback at every evaluation on the validation set.
 struct Progress {
     std::size_t iteration = 0;
     std::size_t total = 0;
     double loss = 0;         ///< mean binary cross entropy on the validation set
     std::size_t misses = 0;  ///< validation events with a negative logit
     double seconds = 0;      ///< elapsed, earlier parts of a resumed training included
-    /// Anything else than "training": before or after it, with events for iterations.
+    /// Other values than "training": work before or after it, where `iteration` counts events.
     std::string_view stage = "training";
     /// In the first report of a training whose states come from runs.
     std::optional<TrainingEstimate> estimate{};
 };
 
-/// A way of looking for events.
+/// Cost and result of one way of looking for events.
 struct Rival {
     std::string name;  ///< "every step", "every 4 steps", ...
     std::uint64_t guard_calls = 0;
-    double seconds = 0;        ///< of processor time
-    std::uint64_t events = 0;  ///< that it found
+    double seconds = 0;        ///< [s] processor time
+    std::uint64_t events = 0;  ///< number of events found
 };
 
 /// One sentence that names the fastest rival and the cost of the last one, the network; empty
@@ -98,7 +98,7 @@ using ProgressCallback = std::function<bool(const Progress&)>;
 /// How a training ended.
 enum class TrainingOutcome {
     finished,       ///< all iterations; no event of the validation or test set is missed
-    stopped,        ///< by the callback; no event of these sets is missed by the best so far
+    stopped,        ///< by the callback; the best weights so far miss no event of these sets
     misses_remain,  ///< no threshold catches every event and still clears enough states
     diverged,       ///< the loss is not finite; the best before that is kept
 };
@@ -110,7 +110,7 @@ enum class TrainingOutcome {
 struct Report {
     TrainingOutcome outcome = TrainingOutcome::finished;
     std::size_t iterations = 0;  ///< done
-    double seconds = 0;          ///< of training
+    double seconds = 0;          ///< [s] time of training
     std::size_t training_states = 0;
     std::size_t band = 0;             ///< clear states drawn inside the margin and not trained on
     Assessment validation;            ///< the set the threshold was chosen on
@@ -125,8 +125,7 @@ struct Trained {
     Model model;
     Report report;
 
-    /// Whether no event was missed on any set of the report: the caller's ground
-    /// for storing the model or not.
+    /// Whether no event was missed on any set of the report, so that the model may be stored.
     [[nodiscard]] bool misses_none() const noexcept;
 };
 
@@ -138,12 +137,12 @@ struct Trained {
 ///
 ///     lowest event - max(logit_margin, gap_share (lowest event - highest clear state)),
 ///
-/// logits of the validation set, raised if necessary until `cleared_at_least` of the clear states
-/// are cleared: a network that always alarms has missed nothing and is no use. Events missed by
-/// then are reported as misses.
+/// with the logits of the validation set. It is raised if necessary until `cleared_at_least` of the
+/// clear states are cleared: a network that always predicts an event misses nothing but is useless.
+/// Events that are missed because of this are reported as misses.
 ///
-/// The model's domain is the range of the features in `data`. What the data
-/// cannot tell (system, parameters, recipe, step range) is left to the caller.
+/// The model's domain is the range of the features in `data`. Entries that the data do not
+/// determine (system, parameters, recipe, step range) are left to the caller.
 ///
 /// @throws std::invalid_argument if the data are inconsistent or lack a class, or
 ///         an option is outside its range.

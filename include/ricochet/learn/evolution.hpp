@@ -1,9 +1,9 @@
-// Search for the vector with the least score, from scores alone.
+// Minimisation of a score from its values alone.
 //
-// CMA-ES: a population is drawn from a normal distribution, ranked, and the
-// distribution moves to the better half and takes its spreads. The covariance is
-// kept diagonal, so that memory and time per generation grow with the dimension.
-// What does not have one spread per direction is found slowly, but surely.
+// CMA-ES: a population is drawn from a normal distribution and ranked, and the mean and the
+// variances of the distribution are updated from the better half. The covariance is kept diagonal,
+// so that memory and time per generation grow linearly with the dimension. Problems whose scales do
+// not align with the coordinate axes converge slowly.
 //
 //   R. Ros and N. Hansen, "A simple modification in CMA-ES achieving linear time
 //   and space complexity", PPSN X, 2008;
@@ -23,9 +23,9 @@
 
 namespace ricochet::learn {
 
-/// The score of x; less is better. Called from several threads at a time, so it
-/// must not change what it shares; must return the same for the same x, if the search
-/// is to be repeated. Infinity refuses x; NaN does so too, and ranks behind it.
+/// The score of x; less is better. Called from several threads at a time, so it must not modify
+/// shared data. It must return the same value for the same x if the search is to be repeatable.
+/// Infinity rejects x; NaN rejects it, too, and ranks last.
 using Objective = std::function<double(std::span<const double> x)>;
 
 /// Options of a search.
@@ -39,7 +39,7 @@ struct EvolutionOptions {
 
     /// The search ends after the generation in which one of these is reached.
     std::size_t max_evaluations = 10'000;
-    double max_seconds = std::numeric_limits<double>::infinity();  ///< those before a resume count
+    double max_seconds = std::numeric_limits<double>::infinity();  ///< [s] including earlier parts
     double target = -std::numeric_limits<double>::infinity();      ///< score that is good enough
     double least_spread = 1e-12;  ///< in all components, in units of `scales`
 
@@ -51,7 +51,7 @@ struct EvolutionOptions {
     bool resume = false;  ///< continue from `checkpoint`, to the same bits
 };
 
-/// How the search stands after a generation. One after the other they are its curve.
+/// State of the search after a generation; the sequence of these is its convergence history.
 struct EvolutionProgress {
     std::size_t generation = 0;   ///< 1, 2, ...
     std::size_t evaluations = 0;  ///< so far
@@ -62,19 +62,19 @@ struct EvolutionProgress {
     double seconds = 0;  ///< so far
 };
 
-/// False stops the search; what was found is kept.
+/// Returns false to stop the search; the best point found so far is kept.
 using EvolutionCallback = std::function<bool(const EvolutionProgress&)>;
 
-/// Thrown by a score that is not to be waited for any longer: the search ends as `stopped`, and
-/// what was tried of the generation in progress is tried again when it is resumed.
+/// Thrown by a score to abort the search, which ends as `stopped`. The generation in progress is
+/// evaluated again when the search is resumed.
 struct SearchStopped {};
 
 /// How a search ended.
 enum class EvolutionOutcome {
     max_evaluations,
     max_seconds,
-    target,        ///< reached
-    converged,     ///< to `least_spread`
+    target,        ///< the target score was reached
+    converged,     ///< the spread fell below `least_spread`
     stopped,       ///< by the callback, or by `SearchStopped`
     none_allowed,  ///< no x had a score below infinity in `fruitless_generations` in a row
 };
@@ -82,16 +82,16 @@ enum class EvolutionOutcome {
 /// One sentence with the remedy.
 [[nodiscard]] std::string_view describe(EvolutionOutcome outcome) noexcept;
 
-/// After so many generations without any score below infinity the search gives up. Each of them
-/// halves the spread, about where the search has been allowed last.
+/// Number of consecutive generations without a score below infinity after which the search gives
+/// up. Each of them halves the spread and moves the mean to the best point so far.
 inline constexpr std::size_t fruitless_generations = 30;
 
 /// Result of a search.
 struct EvolutionResult {
     EvolutionOutcome outcome = EvolutionOutcome::max_evaluations;
-    std::vector<double> x;  ///< with the least score of all that were tried, the start among them
-    double score = 0;       ///< of x; NaN: no x had a score below infinity
-    std::vector<double> mean;  ///< of the last distribution: what to take if scores are noisy
+    std::vector<double> x;     ///< point with the least score of all that were evaluated
+    double score = 0;          ///< of x; NaN: no x had a score below infinity
+    std::vector<double> mean;  ///< mean of the last distribution, better if scores are noisy
     std::size_t evaluations = 0;
     std::size_t generations = 0;
     double seconds = 0;
@@ -101,11 +101,10 @@ struct EvolutionResult {
 
 /// Minimises `score`, starting at x0, which is itself tried first.
 ///
-/// On one machine the result follows from score, x0, population, spread, scales and
-/// seed, to the bit, however many threads run and however often the search was
-/// interrupted and resumed. A search that had ended at a limit continues when it is
-/// resumed with a higher one. Any other exception than `SearchStopped` thrown by `score` or
-/// `progress` is thrown on.
+/// On one machine the result depends only on score, x0, population, spread, scales and seed, bit
+/// for bit, for any number of threads and of interruptions. A search that had ended at a limit
+/// continues when it is resumed with a higher one. Any exception other than `SearchStopped` thrown
+/// by `score` or `progress` is passed on.
 /// @throws std::invalid_argument if x0 is empty or not finite, or an option is outside its range.
 /// @throws std::runtime_error if the checkpoint cannot be written or read, or is of another search.
 [[nodiscard]] EvolutionResult evolve(const Objective& score, std::span<const double> x0,

@@ -1,16 +1,16 @@
-// Gates for a user's system: training, thresholds, and what they miss.
+// Gates for a user's system: training, thresholds, and measured miss rates.
 //
-// A *horizon* gate is for guards of which nothing is known but the value or the sign. States
-// come from runs; each is labelled with the time to the next event. Since a gated run examines
-// the guard at the end of every horizon, it finds an event that was cleared, unless the guard,
-// followed without its reset, has come back by then. Such states are *fatal*. The threshold of
-// each horizon lies below the logit of every fatal state that was seen, and below what makes
-// ways back more expensive than the checks that they save.
+// A *horizon* gate is for guards of which only the value or the sign is known. States come from
+// runs; each is labelled with the time to the next event. Since a gated run examines the guard at
+// the end of every horizon, it still finds an event that was cleared, unless the guard, followed
+// without its reset, has returned by then. Such states are *fatal*. The threshold of each horizon
+// lies below the logit of every fatal state that was seen, and low enough that rolling back does
+// not cost more than the skipped checks save.
 //
 // A *level* gate is for a guard with a bound and a value: a regression from below of the guard,
 // with a threshold for each level below the logit of every state whose guard is not above it.
 //
-// `learn/train_gate.hpp` makes the samples, and puts all together.
+// `learn/train_gate.hpp` samples the runs and trains a gate in one call.
 #pragma once
 
 #include <atomic>
@@ -45,7 +45,7 @@ struct RunStart {
     Mode mode = 0;
 };
 
-/// Deals out starts. One that the system refuses (behind a unilateral guard) is drawn again.
+/// Draws starts. A start that the system rejects (behind a unilateral guard) is drawn again.
 template <class X>
 using Starts = std::function<RunStart<X>(Random&)>;
 
@@ -70,7 +70,7 @@ template <class X>
     };
 }
 
-/// Horizons [s] of so many steps.
+/// Horizons [s] of the given numbers of steps.
 [[nodiscard]] inline std::vector<double> horizons(double step,
                                                   std::initializer_list<std::size_t> steps)
 {
@@ -100,20 +100,20 @@ struct GateTraining {
 
     std::size_t events = 3000;             ///< of the training runs
     std::size_t states = 200'000;          ///< kept for training, at most
-    std::size_t validation_events = 1000;  ///< choose weights and thresholds
+    std::size_t validation_events = 1000;  ///< number of events that choose weights and thresholds
     std::size_t fresh_events = 30'000;     ///< for the miss rate; 0: it is not measured
     std::size_t most_steps = 100'000'000;  ///< of each of these sets of runs
 
     std::vector<std::size_t> hidden{16, 16};
-    std::size_t iterations = 4000;  ///< of a round
-    std::size_t rounds = 2;         ///< after all but the last, hard states are added
-    std::size_t hard_events = 0;    ///< of the runs in which they are sought; 0: as `events`
+    std::size_t iterations = 4000;  ///< iterations in a round
+    std::size_t rounds = 2;         ///< hard states are added after each round except the last
+    std::size_t hard_events = 0;    ///< events of the runs searched for hard states; 0: as `events`
     std::size_t neighbours = 2;     ///< states sampled near each hard one
     std::size_t batch = 256;
     double rate = 3e-3;  ///< learning rate at the start of a round
     double final_rate = 3e-5;
     std::size_t evaluate_every = 250;
-    std::size_t patience = 8;    ///< evaluations of a round without gain before it ends
+    std::size_t patience = 8;    ///< evaluations without improvement after which a round ends
     double fatal_weight = 4;     ///< of a fatal state in the loss
     double quantile = 0.98;      ///< of a level gate: the share of states that it stays below
     double logit_margin = 0.25;  ///< of the threshold below the lowest fatal logit
@@ -121,21 +121,21 @@ struct GateTraining {
 
     std::filesystem::path checkpoint{};  ///< written at every evaluation; empty: none
     bool resume = false;                 ///< continue from `checkpoint`, to the same bits
-    /// Asked before every iteration; true stops, as the callback does. Null: it is not asked.
+    /// Read before every iteration; true stops the training, as the callback does. May be null.
     const std::atomic<bool>* cancelled = nullptr;
 };
 
-/// States of runs, and what became of them.
+/// States of runs, with the events that followed them.
 struct GateSamples {
     std::size_t width = 0;         ///< features of a state
     std::vector<double> features;  ///< row by row
     std::vector<double> event;     ///< [s] to the next event; infinite: beyond all horizons
     std::vector<double> back;      ///< [s] until the guard is seen on its side again, without reset
     std::vector<double> value;     ///< of the guard, on the side on which it is armed
-    std::vector<double> weight;    ///< how many states of the runs it stands for; 0: none
-    std::uint64_t events = 0;      ///< of the runs
+    std::vector<double> weight;    ///< number of states of the runs that it represents; 0: none
+    std::uint64_t events = 0;      ///< number of events of the runs
     std::uint64_t steps = 0;
-    std::vector<Interval> box;  ///< that the runs stayed in
+    std::vector<Interval> box;  ///< box of all states of the runs
 
     [[nodiscard]] std::size_t size() const noexcept { return event.size(); }
     /// Features of state i.
@@ -152,21 +152,21 @@ struct GateSamples {
     void visit(std::span<const double> row);
 };
 
-/// A gate in runs, side by side with the exact detector.
+/// Comparison of a gate with the exact detector on the same runs.
 struct GateTrial {
     std::uint64_t events = 0;       ///< of the exact runs
     std::uint64_t misses = 0;       ///< of these, not found, or not at the same time but for errors
     std::uint64_t steps = 0;        ///< of the exact runs
-    std::uint64_t exact_calls = 0;  ///< of the guard, with a check of every step
-    std::uint64_t gated_calls = 0;  ///< of the guard, with the gate
+    std::uint64_t exact_calls = 0;  ///< guard calls if every step is checked
+    std::uint64_t gated_calls = 0;  ///< guard calls with the gate
     std::uint64_t network_calls = 0;  ///< of the gate
-    std::uint64_t outside = 0;        ///< of its box
+    std::uint64_t outside = 0;        ///< states outside its box
     std::uint64_t repeated = 0;       ///< steps taken again
-    double seconds = 0;               ///< of processor time, both
+    double seconds = 0;               ///< [s] processor time of both
     std::vector<Rival> rivals{};  ///< other ways of looking, on some of these runs; the gate last
 
     [[nodiscard]] double miss_bound() const;  ///< at 95 % confidence
-    /// Guard calls saved: of every step over gated.
+    /// Guard calls if every step is checked, divided by guard calls with the gate.
     [[nodiscard]] double gain() const noexcept
     {
         return static_cast<double>(exact_calls) /
@@ -179,10 +179,10 @@ struct GateReport {
     TrainingOutcome outcome = TrainingOutcome::finished;
     std::size_t iterations = 0;
     double seconds = 0;               ///< of training and sampling, without the trial
-    std::size_t training_states = 0;  ///< with those of the rounds
-    std::size_t fatal_states = 0;     ///< of these
+    std::size_t training_states = 0;  ///< training states, including those added after rounds
+    std::size_t fatal_states = 0;     ///< of these, fatal
     std::uint64_t events = 0;         ///< in all runs before the trial
-    double looks = 1;                 ///< exact looks per step, as expected from the validation set
+    double looks = 1;                 ///< exact checks per step, as estimated on the validation set
     GateTrial trial;
     /// Why the last checkpoint could not be written; empty: it was, or there is none.
     std::string checkpoint_trouble{};
@@ -197,21 +197,20 @@ struct TrainedGate {
 /// The report as a JSON object.
 [[nodiscard]] std::string to_json(const GateReport& report);
 
-/// The training of one gate on states that are handed to it.
-///
-/// Everything follows from the seed, to the bit on one machine.
+/// The training of one gate on given states. These, the options and the seed determine the result,
+/// bit for bit on one machine.
 class GateTrainer {
 public:
-    /// @throws std::invalid_argument if an option is outside its range, or the samples hold no
-    /// event (or guard near its surface), or nothing else.
+    /// @throws std::invalid_argument if an option is outside its range, or if the samples contain
+    /// only events, or no event (for a level gate: no guard near its surface).
     /// @throws std::runtime_error if the checkpoint cannot be read, or is of another training.
     GateTrainer(const GateTraining& options, GateSamples training, GateSamples validation);
     ~GateTrainer();
     GateTrainer(const GateTrainer&) = delete;
     GateTrainer& operator=(const GateTrainer&) = delete;
 
-    /// One round. False: it was stopped by the callback. A round that the checkpoint has behind it
-    /// is not run again.
+    /// Runs one round. Returns false if the callback stopped it. A round that the checkpoint
+    /// contains as finished is not run again.
     /// @throws std::runtime_error if the checkpoint cannot be written.
     [[nodiscard]] bool run(std::size_t round, const ProgressCallback& progress);
 

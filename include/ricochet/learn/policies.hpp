@@ -24,7 +24,7 @@ struct Reaction {
     bool truncated = false;  ///< the episode is cut here, though rewards would follow
 };
 
-/// A world in episodes, as its functions.
+/// An environment with episodes, given by its functions.
 ///
 ///     reset(seed, o);  while not over: choose a from o;  step(a, o)
 ///
@@ -46,34 +46,35 @@ struct Environment {
 // Options, progress and result that all trainers of policies share.
 //
 // A policy is a network from observations to actions, which a reinforcement learner finds by
-// acting. It acts once per step in an `Environment`, keeps what came of it, and learns from a batch
-// of what it keeps once per step. `train_tqc` and `train_td3` do so.
+// acting. The trainer takes one action per step in an `Environment`, stores the transition in a
+// buffer, and updates the networks once per step with a batch from that buffer. `train_tqc` and
+// `train_td3` do so.
 
 /// Options that all trainers of policies share.
 struct PolicyTraining {
-    std::size_t steps = 20'000;      ///< in the environment
-    std::size_t random_steps = 100;  ///< the first ones: uniform actions, and nothing learnt yet
+    std::size_t steps = 20'000;      ///< number of steps in the environment
+    std::size_t random_steps = 100;  ///< number of first steps with uniform actions and no updates
     std::size_t batch = 256;
-    std::size_t buffer = 1'000'000;  ///< transitions kept, at most
+    std::size_t buffer = 1'000'000;  ///< largest number of transitions kept
     double discount = 0.99;          ///< of the reward per step, in [0, 1]
     double polyak = 0.005;           ///< target += polyak (network - target), in (0, 1]
     std::uint64_t seed = 1;
     unsigned threads = 2;  ///< 1 to 64; the result does not depend on it
-    double max_seconds = std::numeric_limits<double>::infinity();  ///< those before a resume count
+    double max_seconds = std::numeric_limits<double>::infinity();  ///< [s] including earlier parts
 
-    /// Every so many steps: progress, checkpoint, and a look for weights that are not finite.
+    /// Number of steps between reports: progress, checkpoint, and a test for weights that are not
+    /// finite.
     std::size_t report_every = 1000;
     std::filesystem::path checkpoint{};  ///< empty: none
     bool resume = false;                 ///< continue from `checkpoint`, to the same bits
 
-    /// The checkpoint of an earlier training, in another environment or with other options but with
-    /// networks of the same shape: this one starts from its networks and the moments of their
-    /// optimiser, with a buffer that is empty, and acts by its policy from the first step. Empty:
-    /// none.
+    /// Checkpoint of an earlier training, in another environment or with other options but with
+    /// networks of the same shape. The training starts from its networks and the moments of their
+    /// optimiser, with an empty buffer, and uses its policy from the first step. Empty: none.
     std::filesystem::path start_from{};
 };
 
-/// How the training stands. One after the other they are its curve.
+/// State of the training; the sequence of these is its learning curve.
 struct PolicyProgress {
     std::size_t step = 0;      ///< done so far
     std::size_t steps = 0;     ///< of the training
@@ -88,13 +89,14 @@ struct PolicyProgress {
     double seconds = 0;      ///< so far
 };
 
-/// Gets the deterministic policy as it is now. False stops the training; what was learnt is kept.
+/// Receives the current deterministic policy. Returns false to stop the training; what was learned
+/// is kept.
 using PolicyCallback = std::function<bool(const PolicyProgress&, const Model& policy)>;
 
 /// How a training of a policy ended.
 enum class PolicyOutcome {
-    finished,     ///< all steps
-    max_seconds,  ///< reached
+    finished,     ///< all steps were taken
+    max_seconds,  ///< `max_seconds` was reached
     stopped,      ///< by the callback
     non_finite,   ///< the environment gave a reward or an observation that is not finite
     diverged,     ///< weights are not finite; the policy is that of the last report
@@ -108,12 +110,12 @@ struct TrainedPolicy {
     PolicyOutcome outcome = PolicyOutcome::finished;
     std::string message;  ///< what was not finite, and where; else empty
 
-    /// The deterministic policy: action = tanh(network(observation)). Of `domain`, what
-    /// was observed; kind, system, parameters and recipe are left to the caller.
+    /// The deterministic policy: action = tanh(network(observation)). Its `domain` is the range of
+    /// the observations; kind, system, parameters and recipe are left to the caller.
     Model policy;
 
     std::vector<PolicyProgress> curve;
-    std::size_t steps = 0;  ///< done
+    std::size_t steps = 0;  ///< number of steps taken
     std::size_t episodes = 0;
     double seconds = 0;
     /// Why the last checkpoint could not be written; empty: it was, or there is none.
@@ -122,10 +124,10 @@ struct TrainedPolicy {
 
 // TQC: reinforcement learning with truncated quantile critics.
 //
-// Several critics estimate the distribution of the return by its quantiles; of all their quantiles
-// together the highest are left out where the target is formed, which keeps the critics from
-// overestimating. The policy is stochastic and is paid for its entropy, with a weight that
-// holds the entropy at -1 per action.
+// Several critics estimate the distribution of the return by its quantiles. The highest of all
+// their quantiles together are dropped in the target, which keeps the critics from overestimating.
+// The policy is stochastic, and the reward includes its entropy, with a weight that holds the
+// entropy at -1 per action.
 //
 //   A. Kuznetsov, P. Shvechikov, A. Grishin and D. Vetrov, "Controlling overestimation bias with
 //   truncated mixture of continuous distributional quantile critics", ICML 2020;
@@ -140,16 +142,16 @@ struct TqcOptions {
     std::vector<std::size_t> actor{64, 64};       ///< hidden layers, ReLU
     std::vector<std::size_t> critic{64, 64, 64};  ///< hidden layers, ReLU
     std::size_t critics = 5;
-    std::size_t quantiles = 25;      ///< of each critic
-    std::size_t dropped = 2;         ///< of each critic, counted; the highest of all go
+    std::size_t quantiles = 25;      ///< number for each critic
+    std::size_t dropped = 2;         ///< number per critic; the highest of all are dropped
     double rate = 3e-4;              ///< of Adam, for critics, actor and temperature
     double first_temperature = 1;    ///< weight of the entropy at the start, positive
-    std::size_t noise_interval = 1;  ///< steps after which the noise of the exploration is redrawn
+    std::size_t noise_interval = 1;  ///< steps after which the exploration noise is drawn again
 };
 
-/// Trains a policy. Everything follows from options and environment, to the bit on one machine,
-/// however many threads run and however often it was interrupted and resumed. A training that had
-/// ended continues if it is resumed with more steps.
+/// Trains a policy by TQC. The result depends only on options and environment, bit for bit on one
+/// machine, for any number of threads and of interruptions. A training that had ended continues if
+/// it is resumed with more steps.
 /// @throws std::invalid_argument if an option is outside its range, or the environment is
 /// incomplete.
 /// @throws std::runtime_error if the checkpoint cannot be written or read, is of another training,
@@ -175,7 +177,7 @@ struct Td3Options {
     double exploration = 0.1;                     ///< standard deviation of the noise on the action
     double smoothing = 0.2;                       ///< the same, on the action of a target
     double smoothing_bound = 0.5;                 ///< that noise is clamped to +- this
-    std::size_t delay = 2;  ///< the policy and the targets move at every so many-th update
+    std::size_t delay = 2;  ///< updates of the critics for each of the policy and the targets
 };
 
 /// Trains a policy by TD3 (Fujimoto, van Hoof and Meger 2018), with the contract of `train_tqc`.

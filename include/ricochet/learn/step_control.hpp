@@ -30,7 +30,7 @@ class StrikeSlipFault;
 
 namespace ricochet::learn {
 
-/// Callback that is told the fraction of the work that is done; false ends it.
+/// Callback that receives the fraction of the work that is done; returning false ends the run.
 using StepWatch = std::function<bool(double done)>;
 
 /// A rule with its tolerance, or with the length of constant steps.
@@ -40,7 +40,8 @@ struct StepRule {
     ErrorEstimate estimate = ErrorEstimate::embedded;
     /// The first step, or all of them with `ConstantStep`, over that of the problem.
     double step = 1;
-    /// Told after every step what share of the time is done; false ends the run before its end.
+    /// Called after every step with the fraction of the time that is done; false ends the run
+    /// early.
     StepWatch watch{};
 };
 
@@ -49,7 +50,7 @@ struct StepRule {
 
 /// Work and errors of a rule on a problem.
 struct StepTrial {
-    bool ended = false;      ///< reached the end
+    bool ended = false;      ///< whether the run reached its end
     double work = 0;         ///< Newton iterations, or solves
     double error = 1;        ///< relative L2 over time
     double final_error = 1;  ///< relative, of the final slip or state
@@ -57,7 +58,7 @@ struct StepTrial {
     std::uint64_t rejected = 0;
     std::uint64_t solves = 0;
     std::uint64_t iterations = 0;
-    std::uint64_t asked = 0;  ///< as of `LearnedStep`
+    std::uint64_t asked = 0;  ///< as in `LearnedStep`
     std::uint64_t handed_over = 0;
 };
 
@@ -74,7 +75,7 @@ struct StepFamily {
     StepLayout layout;
     bool judges_final = false;  ///< the final error counts as much as that over time
     std::vector<StepProblem> problems;
-    std::vector<double> tolerances;  ///< of a training
+    std::vector<double> tolerances;  ///< tolerances used in a training
 };
 
 /// Ranges of the parameters of a family of faults.
@@ -90,19 +91,22 @@ struct FaultFamilyOptions {
 /// references are explicit runs with steps far shorter.
 [[nodiscard]] StepFamily fault_family(const FaultFamilyOptions& options = {});
 
-/// A fault as a problem, its reference from an explicit run until `t_end` [s], which is watched.
+/// A fault as a problem. Its reference is an explicit run until `t_end` [s], which reports to
+/// `watch`.
 /// @throws std::runtime_error if that run ends early.
 [[nodiscard]] StepProblem fault_problem(const StrikeSlipFault& fault, double t_end,
                                         double polynomial_bound = 0, const StepWatch& watch = {});
 
-/// Sliding modes: gain, frequency and start up and down by 2, amplitude 0.4 to 0.95 of the gain;
-/// they slide for 30 to 85 % of the time. Work is counted in solves, the reference is the solution.
+/// Sliding modes: gain, frequency and start within a factor of 2 of the defaults, amplitude 0.4 to
+/// 0.95 of the gain; they slide for 30 to 85 % of the time. Work is counted in solves; the
+/// reference is the closed-form solution.
 [[nodiscard]] StepFamily sliding_mode_family(std::uint64_t seed = 1, int count = 24);
 [[nodiscard]] StepProblem sliding_mode_problem(const SlidingMode& system, double from,
                                                double t_end);
 
-/// Diode circuits: parameters up and down by 1.5, starts by 2 and of all signs. Work is counted in
-/// solves, the references are steps of order 2 with located switches, far shorter.
+/// Diode circuits: parameters within a factor of 1.5 of the defaults, starts within a factor of 2
+/// and with any signs. Work is counted in solves; the references are runs of order 2 with located
+/// switches and far shorter steps.
 [[nodiscard]] StepFamily diode_circuit_family(std::uint64_t seed = 1, int count = 24);
 [[nodiscard]] StepProblem diode_circuit_problem(const DiodeCircuit& system,
                                                 const Eigen::Vector3d& start, double t_end);
@@ -111,11 +115,11 @@ struct FaultFamilyOptions {
 class WorkCurve {
 public:
     void add(double log_work, double log_error) { points_.push_back({log_work, log_error}); }
-    /// To be called once, after the last point. Errors are averaged over `share` of work to both
-    /// sides, since they jump with where a node happens to fall.
+    /// Completes the curve; to be called once, after the last point. Errors are averaged over the
+    /// interval of log work `share` on both sides, since they jump with the position of the steps.
     void finish(double share = 0);
-    /// The log work after which the error stays below, extrapolated like that of a method of order
-    /// 2 beyond the ends.
+    /// The log work beyond which the error stays below `log_error`; beyond the ends of the curve,
+    /// extrapolated like a method of order 2.
     [[nodiscard]] double work_at(double log_error) const;
 
 private:
@@ -133,17 +137,17 @@ public:
     StepScore(const StepFamily& family, unsigned threads);
 
     /// Mean over groups and tolerances of log(work / work of the best classical rule at the error
-    /// reached) and 0.2 log(error / error of the free estimate at that tolerance)^2; where the
-    /// final error counts, and by how much its work is not 5 % below that of the best classical
-    /// rule at the final error reached. Less is better, and a network that returns zero is near 0.
-    /// A better final error earns nothing: it is small by luck too easily.
+    /// reached) + 0.2 log(error / error of the free estimate at that tolerance)^2. Where the final
+    /// error counts, the amount by which the work fails to be 5 % below that of the best classical
+    /// rule at the final error reached is added. Less is better; a network that returns zero scores
+    /// about 0. A smaller final error is not rewarded, since it is too often small by chance.
     [[nodiscard]] double operator()(const LearnedStep& rule) const;
 
-    /// The same in parts: for each group, and in it for each tolerance.
+    /// Terms of the score, for each group and each tolerance in it.
     struct Part {
         int group = 0;
         double tolerance = 0;
-        double gain = 0;        ///< log of how much less work at the error reached
+        double gain = 0;        ///< log of the factor saved in work, at the error reached
         double final_gain = 0;  ///< at the final error reached
         double off = 0;         ///< log(error / error of the classical rule)
         double failed = 0;      ///< share that did not reach the end
@@ -157,7 +161,7 @@ private:
         std::vector<const StepProblem*> problems;
         std::vector<WorkCurve> of_error;
         std::vector<WorkCurve> of_final;
-        std::vector<double> target;  ///< log error per tolerance
+        std::vector<double> target;  ///< log error for each tolerance
     };
     const StepFamily& family_;
     std::vector<Group> groups_;
@@ -169,9 +173,9 @@ struct SearchedSteps {
     StepTrial trial;
 };
 
-/// The sequence of that many steps with the least error that an evolution strategy finds, from even
-/// ones: a yardstick for rules, which see a run only as it comes. It may profit from where a node
-/// happens to fall, and is no proof that there is none better.
+/// The sequence of `count` lengths with the least error that an evolution strategy finds, starting
+/// from equal ones. It is a yardstick for rules, which know only the past of a run. It may profit
+/// from where a step happens to end, and does not prove that there is no better sequence.
 [[nodiscard]] SearchedSteps search_steps(const StepProblem& problem, std::size_t count,
                                          std::size_t evaluations, std::uint64_t seed = 1,
                                          unsigned threads = 2, const StepWatch& watch = {});
@@ -198,9 +202,9 @@ struct TrainedStepPolicy {
 /// The same family, whose runs throw `SearchStopped` as soon as `goes_on` returns false.
 [[nodiscard]] StepFamily stoppable(StepFamily family, std::function<bool()> goes_on);
 
-/// Searches the weights, from a network that returns zero. The domain of the model is what the
-/// policy and the classical rule met on the family, a tenth wider.
-/// A training that was stopped has no domain yet; its checkpoint has what was found.
+/// Searches for the weights, starting from a network that returns zero. The domain of the model is
+/// the range of inputs that the policy and the classical rule met on the family, widened by a
+/// tenth. A training that was stopped has no domain yet; its checkpoint has the best weights found.
 /// @throws as `evolve`.
 [[nodiscard]] TrainedStepPolicy train_step_policy(const StepFamily& family,
                                                   const StepTrainingOptions& options = {},

@@ -39,13 +39,13 @@ namespace ricochet::learn {
 
 /// Options of `train_classifier`.
 struct ClassifierTraining {
-    double step = 0;         ///< [s] of the fixed steps that it is for, positive
+    double step = 0;         ///< [s] fixed step for which the network is made, positive
     double run_length = 10;  ///< [s] of a run; the next one starts somewhere else
 
     std::size_t surface_points = 2000;     ///< events of the runs, from which states are taken
     std::size_t states = 100'000;          ///< for training and testing, half of them events
     std::size_t fresh_states = 40'000;     ///< for the report, from other runs
-    std::size_t trial_events = 1000;       ///< of the runs on which its cost is measured
+    std::size_t trial_events = 1000;       ///< events of the runs that measure the cost
     std::size_t most_steps = 100'000'000;  ///< of each of these sets of runs
     double margin = 0.05;  ///< clear states nearer to the boundary are not trained on
     double widened = 0.1;  ///< the domain is the box of the runs, wider by this share on each side
@@ -53,14 +53,14 @@ struct ClassifierTraining {
     TrainingOptions training{};  ///< its seed is replaced by the one above
 };
 
-/// The same runs by the exact detector `Ends` and by the network.
+/// Comparison of the exact detector `Ends` and the network on the same runs.
 struct ClassifierTrial {
     std::uint64_t events = 0;  ///< of the exact runs
-    std::uint64_t missed = 0;  ///< of these by the network: seen a step late, or never
+    std::uint64_t missed = 0;  ///< of these, found a step late by the network, or never
     std::uint64_t steps = 0;
-    std::uint64_t exact_calls = 0;    ///< of the guard
-    std::uint64_t network_calls = 0;  ///< of the guard, by the runs with the network
-    double exact_seconds = 0;         ///< of processor time
+    std::uint64_t exact_calls = 0;    ///< guard calls of the exact runs
+    std::uint64_t network_calls = 0;  ///< guard calls of the runs with the network
+    double exact_seconds = 0;         ///< [s] processor time
     double network_seconds = 0;
 
     /// Whether the network saves time.
@@ -89,17 +89,17 @@ namespace detail {
 void check(const ClassifierTraining& training);
 /// @throws std::invalid_argument: the runs hold no event.
 [[noreturn]] void throw_no_surface(std::uint64_t steps);
-/// @throws std::invalid_argument: a network sees at most as many components.
+/// @throws std::invalid_argument always: the state has more components than a network takes.
 [[noreturn]] void throw_too_many_components(std::size_t found, std::size_t most);
 
-/// Before and after the training it is asked now and then whether to continue.
+/// Regular calls of the progress callback before and after the training proper.
 class Asked {
 public:
     struct Stopped {};
 
     explicit Asked(const ProgressCallback& progress) : progress_(&progress) {}
 
-    /// @param every  of so many calls one asks
+    /// @param every  number of steps of work between two calls of the callback
     void begin(std::string_view stage, std::size_t total, std::uint64_t every = 64)
     {
         stage_ = stage;
@@ -107,8 +107,8 @@ public:
         every_ = every;
         calls_ = 0;
     }
-    /// What the runs will cost.
-    /// @throws Stopped if the callback says so
+    /// Reports the estimated cost of the runs.
+    /// @throws Stopped if the callback returns false
     void announce(const TrainingEstimate& estimate)
     {
         if (!(*progress_)({.total = total_,
@@ -224,7 +224,7 @@ public:
         }
     }
 
-    /// The method's map over so many steps, of either sign, without events.
+    /// The method's map over `steps` steps, of either sign, without events.
     [[nodiscard]] State operator()(const State& at, double steps) const
     {
         (*asked_)(0);
@@ -253,9 +253,10 @@ private:
 }  // namespace detail
 
 /// Samples runs of `system`, trains a network on them, assesses it on states of other runs, and
-/// measures what it costs beside the exact detector, on runs of the same starts. The callback is
-/// that of `train`, and is asked before and after it, too: what was computed until it says no is
-/// returned as `stopped`, with an empty model if the training had not begun.
+/// compares its cost with that of the exact detector, on runs with the same starts. The callback is
+/// that of `train`, and is also called before and after the training proper. If it stops the work,
+/// what was computed so far is returned as `stopped`, with an empty model if the training had not
+/// begun.
 ///
 /// @param options  event settings of the runs; times and the step come from `training`
 /// @throws std::invalid_argument if an option is outside its range, no run can be started, or the

@@ -1,10 +1,10 @@
-// Learning potentials of friction from histories of slip rate: recurrent neural operators
-// whose internal variables are found by the fit.
+// Fits potentials of friction to histories of slip rate: recurrent neural operators whose internal
+// variables are found by the fit.
 //
-// What is fitted knows slip rate and friction alone. Along a history the internal variables
-// xi_j' = G_j(d_j), d_j = -dDdag/dxi_j, are integrated by an L-stable method of order 4, and
-// the parameters are moved by Levenberg and Marquardt's method, with sensitivities carried
-// through the stages, so that the gradient is that of the computed friction.
+// The fit uses slip rate and friction alone. Along a history the internal variables xi_j' =
+// G_j(d_j), d_j = -dDdag/dxi_j, are integrated by an L-stable method of order 4. The parameters are
+// found by the Levenberg-Marquardt method, with sensitivities propagated through the stages, so
+// that the gradient is that of the computed friction.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,38 +42,38 @@ struct FrictionTrainingOptions {
     std::size_t direct_units = 8;   ///< of A, at most 8
     std::size_t state_units = 7;    ///< of C, at most 8
     std::size_t rate_units = 7;     ///< of G, at most 8
-    std::size_t hidden_units = 16;  ///< of N
+    std::size_t hidden_units = 16;  ///< hidden units of N
     double v_star = 1e-4;           ///< [m/s] unit of the slip rate
-    std::uint64_t seed = 1;         ///< of the weights at the start
+    std::uint64_t seed = 1;         ///< seed of the initial weights
     int iterations = 60;
-    double seconds = 60;   ///< of processor time
-    double target = 1e-7;  ///< stop at this root mean square relative error
-    /// Moves by Adam's method first, each on a few histories; Levenberg-Marquardt continues.
+    double seconds = 60;   ///< [s] limit of processor time
+    double target = 1e-7;  ///< root mean square relative error at which the fit stops
+    /// Initial iterations by Adam, each on a few histories, before those of Levenberg-Marquardt.
     int adam_iterations = 0;
     double adam_rate = 3e-3;
-    const std::atomic<bool>* cancelled = nullptr;  ///< true ends it with what was fitted so far
+    const std::atomic<bool>* cancelled = nullptr;  ///< true ends the fit; its result is kept
 };
 
-/// A fit, ready to use.
+/// A fitted model of friction.
 class LearnedFriction {
 public:
     /// Takes a fitted model; made by `train_friction`.
     explicit LearnedFriction(std::shared_ptr<const detail::FrictionModel> model);
 
-    /// Friction along a history. `refine` halves the steps of the integration as many times.
+    /// Friction along a history. The integration steps are halved `refine` times.
     /// @throws std::invalid_argument for a history that `validate` refuses.
     [[nodiscard]] std::vector<double> friction(const FrictionHistory& history,
                                                int refine = 0) const;
     /// The internal variables along it, one list for each.
     [[nodiscard]] std::vector<std::vector<double>> internal(const FrictionHistory& history) const;
 
-    /// Numbers that were fitted.
+    /// Number of fitted parameters.
     [[nodiscard]] std::size_t parameters() const noexcept;
     /// The pair of potentials, of an additive network with one internal variable; its
     /// domain is that of the training.
     [[nodiscard]] std::optional<AdditivePair> pair() const;
 
-    double seconds = 0;  ///< of processor time that the training took
+    double seconds = 0;  ///< [s] processor time of the training
     int iterations = 0;
     double training_error = 0;  ///< root mean square over histories of the relative error
 
@@ -86,13 +86,13 @@ private:
     std::shared_ptr<const detail::FrictionModel> model_;
 };
 
-/// Trains on histories with friction.
-/// @throws std::invalid_argument for options outside their range, no histories, or one that
-/// `validate` refuses or that has no friction.
+/// Fits a model to histories with friction.
+/// @throws std::invalid_argument for options outside their range, for no histories, and for a
+/// history that `validate` refuses or that has no friction.
 [[nodiscard]] LearnedFriction train_friction(const std::vector<FrictionHistory>& histories,
                                              const FrictionTrainingOptions& options = {});
 
-/// Goes on from a fit with other histories, as transfer learning does.
+/// Continues a fit with other histories, as in transfer learning.
 [[nodiscard]] LearnedFriction train_further(const LearnedFriction& from,
                                             const std::vector<FrictionHistory>& histories,
                                             const FrictionTrainingOptions& options);

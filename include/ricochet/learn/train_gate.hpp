@@ -8,9 +8,9 @@
 //         system, learn::from_box<State>(lower, upper), FixedStep<Rk4>{}, {}, training);
 //     integrate(system, x0, options, FixedStep<Rk4>{}, Calibrated(Gate(gate.model)));
 //
-// Runs with the exact detector give the states; a system whose guard is expensive is best trained
-// on while its guard is cheap, as where a waiting time is a parameter. The same seed gives the same
-// gate, to the bit on one machine.
+// Runs with the exact detector provide the states. If the guard is expensive, train with a cheap
+// version of it, for example where a waiting time is a parameter. The same seed gives the same
+// gate, bit for bit on one machine.
 #pragma once
 
 #include <string_view>
@@ -21,15 +21,15 @@
 
 namespace ricochet::learn {
 
-/// Trains a gate on runs of `system`, and measures what it misses on fresh ones, unless it was
-/// stopped. With a checkpoint a training that was stopped is resumed to the same bits. The
-/// callback is asked while states are sampled and events compared, too; if it stops the training
-/// before its first iteration, the model is empty.
+/// Trains a gate on runs of `system` and, unless the training was stopped, measures its miss rate
+/// on fresh runs. With a checkpoint, a training that was stopped is resumed to the same bits. The
+/// callback is also called while states are sampled and events compared; if it stops the work
+/// before the first iteration, the model is empty.
 ///
 /// @param options  tolerances of the runs; times and steps come from `training`
-/// @throws std::invalid_argument if an option is outside its range, the recipe does not fit the
-///         states, the runs hold no event (no guard near its surface), or nothing else, or a
-///         bound that a level gate would rely on is found broken.
+/// @throws std::invalid_argument if an option is outside its range, if the recipe does not fit the
+/// states, if the runs hold only events, or no event (for a level gate: no guard near its surface),
+/// or if a bound that a level gate would rely on is violated.
 /// @throws std::runtime_error if the checkpoint cannot be written or read, or is of another
 ///         training.
 template <class System, class X, class Stepping>
@@ -82,7 +82,7 @@ template <class System, class X, class Stepping>
     trained.report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (runs.stopped()) return stop();
-    // With weights that are not numbers there is nothing to measure.
+    // Weights that are not finite cannot be tried out.
     const bool usable = trained.report.outcome != TrainingOutcome::stopped &&
                         trained.report.outcome != TrainingOutcome::diverged;
     if (training.fresh_events == 0 || !usable) return trained;

@@ -4,10 +4,10 @@
 //
 //     logit < threshold  implies  guard > margin,
 //
-// except in the boxes that a level lists as unproved. It is made by `learn/certify.hpp`. It is
-// void as soon as any of its subjects has changed: weights, threshold,
-// normalisation, domain, recipe, system or parameters, of which it carries a fingerprint. The
-// fingerprint guards against accidents, not against forgery.
+// except in the boxes that a level lists as unproved. It is made by `learn/certify.hpp`. It
+// contains a fingerprint of everything that it depends on (weights, threshold, normalisation,
+// domain, recipe, system, parameters) and is void as soon as one of these has changed. The
+// fingerprint protects against accidents, not against forgery.
 #pragma once
 
 #include <cstddef>

@@ -1,10 +1,9 @@
 // Evaluation of a multilayer perceptron whose shape is known at run time.
 //
-// The kernels are compiled into the library for several instruction sets; the best
-// one that the processor has is chosen once, at start. Common shapes have
-// instances of their own. None of this shows in the result: for the same
-// parameters and input every instruction set and every instance, and `StaticMlp`,
-// return the same bits.
+// The kernels are compiled into the library for several instruction sets; the best one that the
+// processor supports is chosen once, at start. Common shapes have specialised instances. The result
+// does not depend on these choices: for the same parameters and input every instruction set, every
+// instance and `StaticMlp` return the same bits.
 #pragma once
 
 #include <array>

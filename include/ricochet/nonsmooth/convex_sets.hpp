@@ -10,8 +10,8 @@
 //     fault()            sentence that says why the set is invalid ("is empty"), or empty;
 //                        optional
 //
-// A user's own set that has these three functions serves like those here; `check_projection`
-// tests whether its projection is one.
+// A user's own set with these three functions can be used like those below; `check_projection`
+// tests whether its `project` is a projection.
 #pragma once
 
 #include <algorithm>

@@ -11,9 +11,9 @@
 // any more.
 //
 // The guard where a motion may come to rest must be `unilateral`, or of `either` direction and
-// without modes: only then is a motion that presses on its surface an event again immediately, so
-// that the pressing is recognised. A guard that waits for an edge lets that motion pass, and the
-// inclusion is never asked.
+// without modes: only then does a motion that presses on its surface trigger an event again
+// immediately, by which the pressing is recognised. An edge-triggered guard lets that motion pass,
+// and the inclusion is never used.
 //
 // Inclusions without events of their own are handed to hand_over.hpp directly.
 #pragma once
@@ -76,7 +76,7 @@ public:
             const Event<X>& event = events[seen_];
             const bool switches =
                 event.kind == EventKind::crossing && same_state(event.after, event.before);
-            // A parabola between two zeros.
+            // The excursion of a parabola between two zeros.
             if (switches && count_ > 0) excursions_ += std::abs(event.slope * (event.t - t_)) / 4;
             t_ = event.t;
             if (!switches) count_ = 0;
@@ -163,7 +163,7 @@ private:
         try {
             simulation.emplace(system_, run_.x, options, stepping_, detector_, locator_);
         } catch (const std::invalid_argument&) {
-            if (run_.phases.size() == 1) throw;  // by the caller
+            if (run_.phases.size() == 1) throw;  // an invalid argument of the caller
             return PhaseCause::stuck;
         }
         detail::ChatterWatch watch(run_.t, hand_over_.set_valued.step / 100);

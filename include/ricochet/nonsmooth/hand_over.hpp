@@ -1,4 +1,4 @@
-// One run of an inclusion by two integrators, each where it is at its best.
+// One run of an inclusion by two integrators, each for the phases that suit it.
 //
 //     event-driven   while every reaction is at a bound or held: an ordinary differential
 //                    equation (branch_modes.hpp), any explicit stepper, changes located to the

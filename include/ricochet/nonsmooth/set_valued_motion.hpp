@@ -31,8 +31,8 @@ enum class ErrorEstimate {
 /// How changes of branch inside a step are treated.
 enum class Switches {
     stepped_over,  ///< as in the source paper: of order 1 at a jump of the reaction
-    /// A step ends where a branch changes within it: at the last instant at
-    /// which the motion on the branches of its start agrees with them. For boxes only.
+    /// A step ends where a branch changes within it: at the last instant up to which the motion is
+    /// consistent with the branches of its start. For boxes only.
     located,
 };
 
@@ -309,7 +309,7 @@ private:
         double high = h;
         double at_high = end;
         if (end >= 0) {
-            // Left and entered again within the step? The middle stage would show it.
+            // A branch that was left and entered again within the step shows at the middle stage.
             const double middle = step_.slack(step_.middle(), start_branches_);
             if (middle >= 0) {
                 // The two half steps of `doubling` are better than the step that was examined.

@@ -57,8 +57,8 @@ struct ErrorStep {
 ///     error > 1     rejected, factor error^-q
 ///     no solution   factor down
 ///
-/// As printed, its first case counts a step of error > 1 as successful and its second has
-/// the remaining time inside a maximum; both are taken for misprints.
+/// As printed, the first case calls a step of error > 1 successful, and the second has the
+/// remaining time inside a maximum; both are taken to be misprints.
 struct HeuristicStep {
     int order = 1;
     double up = 2;
@@ -143,13 +143,13 @@ struct FilteredStep {
     [[nodiscard]] double failed() noexcept;
     void reset() noexcept { error_before = factor_before = 1, rejections = 0; }
 
-    double error_before = 1;  ///< memory
+    double error_before = 1;  ///< of the last step, memory
     double factor_before = 1;
     int rejections = 0;
 };
 
-/// Steps of lengths that were chosen before the run, whatever their errors, the last of them for
-/// the whole remainder; the first is the run's own first step.
+/// Steps of lengths that were chosen before the run, whatever their errors. The first length is the
+/// run's own first step; the last one covers the remainder.
 struct PrescribedSteps {
     std::shared_ptr<const std::vector<double>> lengths{};  ///< [s] positive; not null or empty
 
@@ -173,16 +173,16 @@ struct StepView {
     std::array<double, state_inputs> state{};  ///< inputs from its end, as the system declares them
 };
 
-/// A learned rule: the factor of `plain` times that of a policy (`nonsmooth/step_policy.hpp`).
-/// A step of an error above `plain.reject_above` is rejected, and the retry's length is that of
-/// `plain`, as it is where the policy has no answer.
+/// A learned rule: the factor of `plain` times that of a policy (`nonsmooth/step_policy.hpp`). A
+/// step of an error above `plain.reject_above` is rejected. The factors after a rejection, and
+/// where the policy returns none, are those of `plain`.
 struct LearnedStep {
     std::shared_ptr<const StepPolicy> policy{};  ///< not null
     ErrorStep plain{.order = 3, .reject_above = 100};
     StepRanges* seen = nullptr;  ///< widened by every input, unless null
 
     [[nodiscard]] StepVerdict judge(double error, double h, const StepView& view) noexcept;
-    /// Verdict of `plain`, for callers without a view.
+    /// Verdict of `plain`, for callers that have no `StepView`.
     [[nodiscard]] StepVerdict judge(double error, double h) noexcept;
     [[nodiscard]] double failed() const noexcept { return plain.failed(); }
     void reset() const noexcept {}

@@ -1,5 +1,5 @@
-// Lasting contact of the bodies of a scene: stacks, sleepers that lean on each other, chains over
-// an edge. It needs the contact solver, and is a library of its own, `ricochet::scene_contact`.
+// Lasting contact of the bodies of a scene: stacks, sleeping bodies that lean on each other, chains
+// over an edge. It needs the contact solver and is a separate library, `ricochet::scene_contact`.
 #pragma once
 
 #include "ricochet/scene/simulate.hpp"

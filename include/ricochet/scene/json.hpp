@@ -23,11 +23,12 @@ struct SceneFile {
     SceneOptions options;  ///< from "run"; t_end is NaN where it is not given
 };
 
-/// The scene that `text` describes (docs/scenes.md has the keys). `file` is what errors call it.
+/// Reads the scene that `text` describes (docs/scenes.md lists the keys). Error messages name the
+/// text `file`.
 /// @throws SceneFileError
 [[nodiscard]] SceneFile read_scene(std::string_view text, std::string_view file = "scene");
 
-/// The same from a file. @throws SceneFileError also where it cannot be read.
+/// Reads a scene from a file. @throws SceneFileError also if the file cannot be read.
 [[nodiscard]] SceneFile load_scene(const std::string& path);
 
 }  // namespace ricochet

@@ -1,8 +1,8 @@
 // Given motions of surfaces: translations as functions of time, with bounds by which a run proves
-// that nothing has been met before.
+// that no earlier contact exists.
 //
-// A surface is displaced without turning from where it is described. What it meets is pushed with
-// its velocity; nothing moves a surface.
+// A surface is translated, without rotation, from its described position. Bodies that it meets are
+// pushed with its velocity; no body moves a surface.
 #pragma once
 
 #include <array>
@@ -29,8 +29,8 @@ struct ConstantVelocity {
     double since = 0;                  ///< [s] when the surface is where it is described
 };
 
-/// Straight lines between displacements at given times, and standing still before the first and
-/// after the last of them. Where a velocity changes, the later one holds.
+/// Linear interpolation between displacements at given times; at rest before the first and after
+/// the last of them. At a time where the velocity changes, the later velocity applies.
 struct PiecewiseLinear {
     std::vector<double> times{};                         ///< [s] strictly ascending, at least one
     std::vector<std::array<double, 2>> displacements{};  ///< [m] one for each time

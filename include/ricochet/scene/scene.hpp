@@ -1,7 +1,7 @@
-// What is in a scene: discs and points, walls and terrain, springs, gravity and drag.
+// Contents of a scene: discs and points, walls and terrain, springs, gravity and drag.
 //
-// A scene describes and checks; `simulate` (scene/simulate.hpp) runs it. The plane is vertical or
-// horizontal as gravity says. Discs do not turn: friction acts on their centres.
+// A `Scene` describes and checks; `simulate` (scene/simulate.hpp) runs it. Whether the plane is
+// vertical or horizontal depends on gravity. Discs do not turn: friction acts on their centres.
 #pragma once
 
 #include <array>
@@ -47,8 +47,8 @@ namespace detail {
 class SceneSystem;
 }
 
-/// Where two materials meet, the smaller of the two restitutions and of the two coefficients of
-/// friction hold. `MaterialId{}` is elastic and smooth.
+/// Material of bodies and surfaces. At a contact the smaller of the two restitutions and the
+/// smaller of the two coefficients of friction apply. `MaterialId{}` is elastic and frictionless.
 struct Material {
     std::string name{};      ///< may be empty
     double restitution = 1;  ///< Newton's coefficient, in [0, 1]
@@ -80,7 +80,7 @@ struct Point {
 struct Wall {
     std::string name{};
     Vector2 point{};   ///< [m]
-    Vector2 normal{};  ///< of any length but zero; points to where bodies are
+    Vector2 normal{};  ///< of any length except zero; points towards the bodies
     MaterialId material{};
     SurfaceMotion motion{};
 };
@@ -122,9 +122,10 @@ public:
     /// @throws std::invalid_argument where gravity is not finite.
     explicit Scene(const Settings& settings);
 
-    /// Each is checked as it comes, and refused in one sentence that names it: a mass or radius
-    /// that is not positive, what is not finite, a name that is taken, an unknown handle, a
-    /// restitution above 1, a body that lies behind a wall or across terrain already there.
+    /// Adds a part to the scene. Each part is checked when it is added, and refused with a sentence
+    /// that names it: for a mass or radius that is not positive, a value that is not finite, a name
+    /// in use, an unknown handle, a restitution above 1, or a body that lies behind a wall or
+    /// across terrain that was added before.
     /// @throws std::invalid_argument
     MaterialId material(const Material& material);
     BodyId disc(const Disc& disc);
@@ -137,26 +138,25 @@ public:
     /// Refuses `bodies` more bodies where they would need more memory than is allowed.
     void require_room(double bodies) const;
 
-    /// Refuses bodies that overlap at the start (which, and by how much), or lie behind walls or
-    /// across terrain that came after them, or that is there at `t_start` [s]. Called by `simulate`
-    /// and `explain`.
+    /// Refuses bodies that overlap at the start, naming both and the overlap, and bodies that lie,
+    /// at `t_start` [s], behind walls or across terrain. Called by `simulate` and `explain`.
     /// @throws std::invalid_argument
     void check(double t_start = 0) const;
 
     [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
-    /// A point is a disc of radius 0 here.
+    /// All bodies. A point appears as a disc of radius 0.
     [[nodiscard]] std::span<const Disc> bodies() const noexcept { return bodies_; }
     [[nodiscard]] std::span<const Material> materials() const noexcept { return materials_; }
     [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }
 
-    /// Systems; their discs are among the bodies, with a mass that says nothing.
+    /// Systems; their discs are among the bodies, where their mass has no meaning.
     struct System {
         std::shared_ptr<const detail::SceneSystem> motion;
-        std::uint32_t first = 0;  ///< of its discs
+        std::uint32_t first = 0;  ///< index of its first disc
         std::uint32_t count = 0;
     };
     [[nodiscard]] std::span<const System> systems() const noexcept { return systems_; }
-    /// Whose disc a body is; null where it is one of its own.
+    /// The system that a body is a disc of; null for any other body.
     [[nodiscard]] const System* system_of(std::uint32_t body) const noexcept;
 
     /// Walls first, then terrain, each in the order in which it came.

@@ -1,4 +1,4 @@
-// A scene in motion: every body advances by a clock of its own, from impact to impact.
+// Simulation of a scene: every body has its own time and advances from impact to impact.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace ricochet {
 
 /// Rule for several contacts of one cluster that are struck at one instant.
 enum class ImpactLaw {
-    waves,     ///< those that approach fastest, ties together; again until none approaches
+    waves,     ///< the fastest approaching first, ties together; repeated until none approaches
     together,  ///< Newton's law for all contacts at once
 };
 
@@ -42,36 +42,36 @@ struct SceneOptions {
     double contact_step = 1e-3;  ///< [s] of groups in lasting contact, whose order is 1
 
     bool record_events = true;           ///< off: events are counted, not kept
-    std::vector<double> sample_times{};  ///< [s] ascending; they change no bit of the motion
+    std::vector<double> sample_times{};  ///< [s] ascending; they do not affect the motion
     std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();
     const std::atomic<bool>* cancelled = nullptr;  ///< set from elsewhere, ends the run
 };
 
-/// The other one in an event.
+/// The second body, or the surface, of an event.
 struct Partner {
     bool is_surface = false;
-    std::uint32_t index = 0;  ///< of a body or of a surface
+    std::uint32_t index = 0;  ///< index of the body or of the surface
     friend bool operator==(const Partner&, const Partner&) = default;
 };
 
-/// One contact that was struck, or what became of one body in contact. Contacts of one
-/// cluster have the same `number` and time, and stand in the order of their waves.
+/// One contact with an impact, or a change in the contact of one body. Contacts of one cluster have
+/// the same `number` and time, and are in the order of their waves.
 struct SceneEvent {
     /// Kinds of events.
     enum class Kind : std::uint8_t {
         impact,
         held,      ///< impacts on the surface have accumulated: it slides on it, or is at rest
-        stopped,   ///< friction has stopped what slid
-        joined,    ///< lasting contact: it goes on by steps, in a group; `other` is the body itself
+        stopped,   ///< friction has stopped a sliding body
+        joined,    ///< lasting contact: the body is advanced in a group; `other` is the body itself
         released,  ///< it has left its group, or its group contact
-        slept,     ///< its group has come to rest
+        slept,     ///< the group of the body has come to rest
     };
     double t = 0;  ///< [s]
     std::uint64_t number = 0;
     Kind kind = Kind::impact;
-    std::uint32_t body = 0;  ///< the one with the lower index
+    std::uint32_t body = 0;  ///< the body with the lower index
     Partner other{};
-    Vector2 impulse{};                ///< [N s] on `body`; the other one has its opposite
+    Vector2 impulse{};                ///< [N s] on `body`; the opposite acts on the other
     std::array<Vector2, 2> before{};  ///< [m/s] velocities of body and other
     std::array<Vector2, 2> after{};
 };
@@ -83,14 +83,14 @@ struct BodyState {
     bool asleep = false;  ///< at rest, and stays so until it is struck
 };
 
-/// Work of a run.
+/// Counts over a run.
 struct SceneStatistics {
-    std::uint64_t impacts = 0;      ///< contacts struck
-    std::uint64_t events = 0;       ///< impacts of one cluster counted once
-    std::uint64_t waves = 0;        ///< of impacts of clusters
+    std::uint64_t impacts = 0;      ///< contacts with an impact
+    std::uint64_t events = 0;       ///< events; the impacts of one cluster count once
+    std::uint64_t waves = 0;        ///< waves of impacts in clusters
     std::uint64_t collapses = 0;    ///< clusters whose restitution was spent
-    std::uint64_t predictions = 0;  ///< first contacts asked for, of pairs and surfaces
-    std::uint64_t stale = 0;        ///< predicted impacts that never came
+    std::uint64_t predictions = 0;  ///< searches for a first contact, of pairs and surfaces
+    std::uint64_t stale = 0;        ///< predicted impacts that did not happen
     std::uint64_t crossings = 0;    ///< from cell to cell
     std::uint64_t steps = 0;        ///< of islands with springs or drag
     std::uint64_t rejected = 0;
@@ -99,14 +99,14 @@ struct SceneStatistics {
     std::uint64_t contact_steps = 0;  ///< of such groups
     double contact_defect = 0;        ///< largest of their contact laws, as a fraction of the
                                       ///< velocities: 1e-10, or 1e-7 where bodies are wedged
-    std::uint64_t alone = 0;          ///< bodies that could meet none, and had no calendar
+    std::uint64_t alone = 0;          ///< bodies that could meet no other, and had no calendar
     std::uint64_t groups = 0;         ///< of bodies that could meet
 };
 
 /// Result of a run. Nothing that was computed is lost, whatever the outcome.
 struct SceneRun {
     Outcome outcome = Outcome::reached_end;
-    std::string message;  ///< empty at the end, else what ended the run, in a sentence
+    std::string message;  ///< empty at the end, otherwise a sentence on what ended the run
     std::vector<std::uint32_t> involved;          ///< bodies that the message is about
     double t = 0;                                 ///< [s] time reached, by all bodies
     std::vector<BodyState> bodies;                ///< at that time
@@ -118,11 +118,11 @@ struct SceneRun {
 };
 
 /// Simulates the scene from `t_start` to `t_end`.
-/// @throws std::invalid_argument where the scene or an option is not as it must be.
+/// @throws std::invalid_argument for an invalid scene or option.
 [[nodiscard]] SceneRun simulate(const Scene& scene, const SceneOptions& options);
 
-/// How the scene would be run: islands, how each moves, which can meet and when first, what is
-/// skipped and why, memory. Nothing is simulated.
+/// Description of how the scene would be run: islands and their motion, which bodies can meet and
+/// when first, what is skipped and why, memory. Nothing is simulated.
 /// @throws as `simulate`
 [[nodiscard]] std::string explain(const Scene& scene, const SceneOptions& options);
 

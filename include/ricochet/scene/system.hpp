@@ -11,10 +11,10 @@
 //
 // A system with modes may take the mode before t in the last three of them.
 //
-// Between impacts it goes on as in a run of its own: by steps of dopri5, whose events are found by
-// an `EventMonitor`. First contacts of its discs are located on the method's own map; the bounds on
-// accelerations prove that none is lost. One that is found broken ends the run as
-// `Outcome::wrong_bound`.
+// Between impacts the system is integrated as in a run of its own, by steps of dopri5, with events
+// found by an `EventMonitor`. First contacts of its discs are located on the method's own map, and
+// the bounds on accelerations prove that none is lost. A bound that is found to be violated ends
+// the run as `Outcome::wrong_bound`.
 #pragma once
 
 #include <cstddef>
@@ -135,7 +135,7 @@ private:
 
 }  // namespace detail
 
-/// A system as it begins, for `Scene::system`; keeps copies.
+/// Makes a system with its initial state for `Scene::system`; keeps copies of both.
 template <class System, class X>
 requires Flowing<System, X> && StateVector<X>
 [[nodiscard]] std::shared_ptr<const detail::SceneSystem> system_body(const System& system,

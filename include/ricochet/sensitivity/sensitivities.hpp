@@ -25,9 +25,9 @@ namespace ricochet {
 struct EventSensitivity {
     Eigen::VectorXd dt;        ///< of its time [s]
     Eigen::MatrixXd before;    ///< S⁻: of the state, at the fixed time of the event
-    Eigen::MatrixXd after;     ///< S⁺
-    Eigen::MatrixXd at_event;  ///< of the state before the reset, at the moving time of the event:
-                               ///< S⁻ + x' dt
+    Eigen::MatrixXd after;     ///< S⁺: of the state after it
+    Eigen::MatrixXd at_event;  ///< of the state before the reset, at the moving time of the
+                               ///< event: S⁻ + x' dt
 };
 
 /// The event at which the derivatives ended.
@@ -280,21 +280,20 @@ requires Flowing<System, X> && StateVector<X>
 
 // Periodic orbits by shooting.
 //
-// A periodic orbit is a root of x(T; x0) - x0. Newton's method takes its Jacobian,
-// M - I, from the monodromy matrix M through all events; where the period is not known
-// either, a column f(x(T)) and the row f(guess) of a phase condition border it, so that
-// corrections are taken across the orbit:
+// A periodic orbit is a root of x(T; x0) - x0. Newton's method takes its Jacobian, M - I, from the
+// monodromy matrix M through all events. If the period is unknown, too, the matrix is bordered by a
+// column f(x(T)) and by the row f(guess) of a phase condition, so that corrections are taken across
+// the orbit:
 //
 //     ( M - I      f(x(T)) ) ( dx )     ( x(T) - x0 )
 //     ( f(guess)'  0       ) ( dT )  = -(     0     )
 //
-// (R. Seydel, Practical Bifurcation and Stability Analysis, Springer, 2010, chapter 7;
-// with events: Leine and Nijmeijer 2004.) Where the orbit is one of a family, as in
-// conservative systems, that matrix becomes singular, and full corrections run along the
-// family to its end, an equilibrium. With the square of the gap as parameter, those of
-// Levenberg and Marquardt do not, and converge as fast (N. Yamashita and M. Fukushima, On
-// the rate of convergence of the Levenberg-Marquardt method, Computing Supplementa 15,
-// 2001).
+// (R. Seydel, Practical Bifurcation and Stability Analysis, Springer, 2010, chapter 7; with events:
+// Leine and Nijmeijer 2004.) If the orbit is one of a family, as in conservative systems, that
+// matrix becomes singular, and full corrections follow the family to its end, an equilibrium.
+// Corrections of the Levenberg-Marquardt method with the square of the gap as parameter do not, and
+// converge as fast (N. Yamashita and M. Fukushima, On the rate of convergence of the
+// Levenberg-Marquardt method, Computing Supplementa 15, 2001).
 
 /// Options of the search for an orbit.
 struct Shooting {
@@ -314,7 +313,7 @@ enum class ShootingEnd : std::uint8_t {
     equilibrium,           ///< the motion stands still: closed, but no orbit
     iteration_limit,       ///< `Shooting::max_iterations` corrections were made
     stalled,               ///< no correction, however small, brings the ends closer
-    run_ended,             ///< the guess has no run over a whole period
+    run_ended,             ///< the run from the guess does not last a whole period
     other_mode,            ///< the guess ends in another mode or dimension
     undefined_derivative,  ///< the guess meets an event through which there is no derivative
 };

@@ -1,4 +1,4 @@
-// The bouncing ball, the first example of every text on hybrid systems.
+// The bouncing ball, the standard example of a hybrid system.
 #pragma once
 
 #include <array>

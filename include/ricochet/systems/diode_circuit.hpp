@@ -9,7 +9,8 @@
 
 namespace ricochet {
 
-/// Two capacitors, a coil and an element whose voltage only has a sign.
+/// Two capacitors, a coil and an element whose current has a constant magnitude and the sign of its
+/// voltage, and is set-valued at voltage zero.
 ///
 /// State w = (V1 [V], V2 [V], i [A]):
 ///
@@ -66,7 +67,7 @@ public:
         return sets::IntervalSet::symmetric(p_.current);
     }
 
-    /// For policies that choose steps: they are measured over sqrt(inductance capacitance_2).
+    /// Layout for step policies: times are measured in sqrt(inductance capacitance_2).
     [[nodiscard]] static const StepLayout& step_layout() noexcept;
     [[nodiscard]] double step_unit() const noexcept
     {

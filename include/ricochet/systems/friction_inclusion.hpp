@@ -25,7 +25,7 @@ enum class FrictionLaw {
 ///     u' = v
 ///     mass v' = -stiffness u + r,     r in [-F(|y|), F(|y|)] against y
 ///
-/// Sticking bears F(0): there is no static friction beyond it.
+/// Friction in sticking reaches up to F(0); there is no larger static friction.
 class FrictionInclusion {
 public:
     struct Parameters {
@@ -41,8 +41,8 @@ public:
     FrictionInclusion() = default;
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit FrictionInclusion(const Parameters& parameters);
-    /// With the parameters of `oscillator`, whose static friction must equal the kinetic.
-    /// @throws std::invalid_argument also otherwise.
+    /// An inclusion with the parameters of `oscillator`.
+    /// @throws std::invalid_argument also if its static friction differs from the kinetic.
     [[nodiscard]] static FrictionInclusion of(const FrictionOscillator::Parameters& parameters);
 
     static constexpr std::string_view name = "friction-inclusion";
@@ -80,7 +80,7 @@ public:
     /// dF/dw.
     void bound_gradient(double t, const Vector& w, int which, Vector& gradient) const;
 
-    /// F(s) [N] at the sliding speed s >= 0 [m/s]; a little below zero it goes on smoothly.
+    /// F(s) [N] at the sliding speed s >= 0 [m/s], continued smoothly a little below zero.
     [[nodiscard]] double friction(double speed) const noexcept
     {
         const double x = p_.weakening * speed;

@@ -13,8 +13,7 @@ namespace ricochet {
 
 /// A point mass on a massless rod, swinging without friction.
 ///
-/// State x = (angle a [rad], rate w [rad/s]); its turning points are looked for, and
-/// nothing happens there.
+/// State x = (angle a [rad], rate w [rad/s]); its turning points are recorded, and change nothing.
 ///
 ///     flow    x' = (w, -(gravity / length) sin a)
 ///     guard   w, either direction

@@ -53,7 +53,7 @@ public:
         return sets::IntervalSet::symmetric(p_.gain);
     }
 
-    /// For policies that choose steps: they are measured over the disturbance's radian.
+    /// Layout for step policies: times are measured in radians of the disturbance.
     [[nodiscard]] static const StepLayout& step_layout() noexcept;
     [[nodiscard]] double step_unit() const noexcept { return 1 / p_.frequency; }
     void step_inputs(double t, const Vector& w, const Vector& rate, const Vector& reaction,

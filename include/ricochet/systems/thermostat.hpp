@@ -16,7 +16,7 @@ namespace ricochet {
 ///
 ///     flow    off: x' = -rate (x - ambient),  on: x' = -rate (x - heated)
 ///     guard   off: x - low, falling, to on;  on: high - x, falling, to off
-///     reset   none but of the mode
+///     reset   changes only the mode
 ///
 /// (R. Alur et al., The algorithmic analysis of hybrid systems, Theoretical Computer
 /// Science 138, 1995, where the ambient temperature is zero.)

@@ -1,4 +1,4 @@
-// A system of callbacks with a detector and a locator, as the engine knows them.
+// A system of callbacks with its detector and locator, in the engine's terms.
 #pragma once
 
 #include <memory>
@@ -92,7 +92,7 @@ void CallbackSetup<X>::set_detector(const FinderOptions& finders)
     }
 }
 
-// Compiled with the runs of such states.
+// Instantiated where runs with these states are compiled.
 extern template class CallbackSetup<std::vector<double>>;
 
 }  // namespace ricochet::c

@@ -19,7 +19,7 @@ namespace ricochet::c {
 [[noreturn]] void throw_callback_failed(const char* callback, int code, std::size_t guard,
                                         double t);
 
-/// Result of a callback.
+/// Checks the return value of a callback, and throws CallbackFailed unless it is 0.
 [[gnu::always_inline]] inline void heed(int code, const char* callback, double t,
                                         std::size_t guard = RC_NO_GUARD)
 {
@@ -28,15 +28,15 @@ namespace ricochet::c {
     }
 }
 
-/// Callbacks by the names that the library calls. Those that the program has not given must not
-/// be called; the table that the loop is handed leaves them out.
+/// Callbacks under the names that the library calls. A callback that the program has not given must
+/// not be called; the table for the loop omits it.
 ///
 /// @throws CallbackFailed from every function whose callback returns a number other than 0.
 class CallbackSystem {
 public:
     static constexpr bool unchecked_names = true;
 
-    /// @throws Refusal naming the field that is not as it has to be.
+    /// @throws Refusal naming the invalid field.
     explicit CallbackSystem(const rc_callbacks& given);
     CallbackSystem(const CallbackSystem&) = delete;
     CallbackSystem& operator=(const CallbackSystem&) = delete;
@@ -44,7 +44,7 @@ public:
     [[nodiscard]] const rc_callbacks& callbacks() const noexcept { return at_; }
     [[nodiscard]] std::size_t dimension() const noexcept { return at_.dimension; }
     [[nodiscard]] std::size_t guard_count() const noexcept { return at_.guard_count; }
-    /// A system without modes has one.
+    /// Number of modes; 1 for a system without modes.
     [[nodiscard]] std::size_t mode_count() const noexcept
     {
         return std::max<std::size_t>(at_.mode_count, 1);

@@ -25,7 +25,7 @@ public:
     {
     }
 
-    std::vector<double> all;  ///< guards, or their rates
+    std::vector<double> all;  ///< values or rates of all guards
     X moved, turned;
 };
 
@@ -58,7 +58,7 @@ class CallbackTable {
         return guard(door, which, mode, t, moved);
     }
 
-    /// As `GuardView::difference`.
+    /// The rate of the guard by a central difference, as `GuardView::difference`.
     static double difference(void* door, std::size_t which, Mode mode, bool backward, double t,
                              const X& x, const X& dxdt, double scale)
     {

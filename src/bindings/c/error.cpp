@@ -14,7 +14,7 @@ namespace ricochet::c {
 
 namespace {
 
-/// Room that needs no memory when there is none.
+/// Message buffer of the thread, allocated in advance so that lack of memory can be reported.
 thread_local std::array<char, 1024> message_here{};
 thread_local CallbackFailed failed_here;
 
@@ -64,7 +64,7 @@ rc_status status_of_exception() noexcept
     } catch (const std::invalid_argument& refused) {
         set_message(refused.what());
         return RC_INVALID;
-    } catch (const std::runtime_error& refused) {  // files
+    } catch (const std::runtime_error& refused) {  // errors in files
         set_message(refused.what());
         return RC_INVALID;
     } catch (const std::exception& unexpected) {

@@ -11,7 +11,7 @@
 
 namespace ricochet::c {
 
-/// A call is refused with this status.
+/// Refusal of a call, with the status that the call returns.
 class Refusal : public std::runtime_error {
 public:
     Refusal(rc_status status, const std::string& message)
@@ -24,8 +24,8 @@ private:
     rc_status status_;
 };
 
-/// A callback returned a number other than 0. Not a std::exception: nothing between the callback
-/// and the call that needed it has any business with it.
+/// Thrown when a callback returned a number other than 0. It is no std::exception, so that no
+/// handler between the callback and the call that needed it catches it.
 struct CallbackFailed {
     const char* callback = nullptr;  ///< its name; null: none has failed
     int code = 0;
@@ -33,7 +33,7 @@ struct CallbackFailed {
     double t = std::numeric_limits<double>::quiet_NaN();  ///< [s]
 };
 
-/// Sets the text that `rc_last_error` returns in this thread, as far as it fits its room.
+/// Sets the text that `rc_last_error` returns in this thread, truncated to the size of its buffer.
 void set_message(std::string_view message) noexcept;
 
 /// The status of the exception in flight, with its message set. To be called in a handler.
@@ -42,7 +42,7 @@ void set_message(std::string_view message) noexcept;
 /// The last failure of a callback in this thread.
 [[nodiscard]] CallbackFailed& last_failed_callback() noexcept;
 
-/// Calls `body`; what it throws becomes a status.
+/// Calls `body` and converts an exception to a status.
 template <class Body>
 [[nodiscard]] rc_status guarded(const Body& body) noexcept
 {
@@ -54,7 +54,7 @@ template <class Body>
     }
 }
 
-/// The same where the result is a value, and `failed` means failure.
+/// The same for a function that returns a value, with `failed` for failure.
 template <class T, class Body>
 [[nodiscard]] T guarded_value(T failed, const Body& body) noexcept
 {

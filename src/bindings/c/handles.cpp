@@ -28,7 +28,7 @@ namespace {
 }
 
 #if RICOCHET_KEEP_FREED_HANDLES
-/// Where they can be found, so that no leak is reported.
+/// Freed handles stay reachable here, so that no leak is reported.
 struct Freed {
     std::mutex mutex;
     std::vector<Handle*> handles;
@@ -54,7 +54,7 @@ void retire(Handle* handle, [[maybe_unused]] void (*release)(Handle*)) noexcept
     try {
         const std::scoped_lock lock(freed().mutex);
         freed().handles.push_back(handle);
-    } catch (...) {  // kept all the same, if not found again
+    } catch (...) {  // the handle is kept although it is not in the list
     }
 #else
     release(handle);

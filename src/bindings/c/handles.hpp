@@ -1,4 +1,4 @@
-// Handles: what makes a pointer of the caller's one of ours.
+// Handles: the validation of pointers that the caller passes.
 #pragma once
 
 #include <atomic>
@@ -32,7 +32,7 @@ void retire(Handle* handle, void (*release)(Handle*)) noexcept;
 /// @throws Refusal
 void check_handle(const Handle* handle, Kind kind);
 
-/// A handle in use by this call alone.
+/// Exclusive use of a handle during one call.
 class InUse {
 public:
     /// @throws Refusal if it is no such handle, or in use.

@@ -1,4 +1,4 @@
-// The events of a C program's own steps.
+// Events in the steps of a C program's own integrator.
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -32,8 +32,8 @@ struct rc_monitor : Handle {
     {
     }
 
-    /// The state of the caller's, in an array of ours.
-    /// @param dxdt  null: the flow will be asked
+    /// Copies the caller's state into `room`.
+    /// @param dxdt  null: the rate will come from the flow
     /// @throws Refusal
     [[nodiscard]] const State& taken(const char* function, const double* x, const double* dxdt,
                                      std::size_t n)
@@ -54,7 +54,7 @@ struct rc_monitor : Handle {
 
     std::size_t dimension, guards;
     bool backward;
-    bool started = false;  ///< it has a time and a state
+    bool started = false;  ///< whether `start` or `restore` has succeeded
     bool has_cut = false;
     rc_outcome_code outcome = RC_RUNNING;
     State room;

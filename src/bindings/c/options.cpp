@@ -60,21 +60,21 @@ rc_monitor_options defaults<rc_monitor_options>() noexcept
     return options;
 }
 
-/// Fills in a struct of the caller's of this size.
+/// Fills in a struct of the caller with the defaults, up to its `size`.
 template <class T>
 [[nodiscard]] rc_status fill_in(const char* name, T* options, std::size_t size) noexcept
 {
     return guarded([&] {
         if (!options) throw_null((std::string(name) + "_default, options").c_str());
         T full = defaults<T>();
-        // Checked as if it were there already: memory of the caller's may hold anything.
+        // `size` is checked in `full`, since the caller's struct may be uninitialised.
         full.size = size;
         static_cast<void>(size_of_given<T>(&full, name));
         std::memcpy(options, &full, size);
     });
 }
 
-/// Reader of the fields of a struct, which messages call by this name.
+/// Reader of the fields of a struct, whose name appears in messages.
 class Reader {
 public:
     explicit Reader(const char* name) : struct_(name) {}

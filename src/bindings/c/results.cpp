@@ -129,7 +129,7 @@ void require_memory(std::size_t dimension)
         throw std::bad_alloc();
     }
     const std::size_t bytes = dimension * arrays * sizeof(double);
-    void* volatile room = ::operator new(bytes, std::nothrow);  // volatile: not left out
+    void* volatile room = ::operator new(bytes, std::nothrow);  // volatile: not optimised away
     if (!room) throw std::bad_alloc();
     ::operator delete(room);
 }

@@ -10,13 +10,13 @@
 
 namespace ricochet::c {
 
-/// An event whose states are read where they lie.
+/// An event with pointers to its states.
 struct ShownEvent {
     double t = 0;
     EventKind kind = EventKind::crossing;
     std::size_t guard = 0;
     Mode mode_before = 0, mode_after = 0;
-    const double* before = nullptr;  ///< null where it was not kept
+    const double* before = nullptr;  ///< null if the state was not kept
     const double* after = nullptr;
     Bracket bracket;
     double slope = 0, error = 0;
@@ -44,13 +44,13 @@ struct Counts {
     std::size_t guard = no_guard, other_guard = no_guard;
 };
 
-// All throw Refusal if the struct is not as it has to be.
+// All of these throw Refusal if the struct is invalid.
 void write_event(rc_event* event, const ShownEvent& from);
 void write_statistics(rc_statistics* statistics, const Counts& from);
 void write_failure(rc_callback_error* error, const CallbackFailed& from);
 
-/// Fills in `*size`, and the room where there is one.
-/// @throws Refusal if it is too small.
+/// Sets `*size`, and writes the text if `bytes` is not null.
+/// @throws Refusal if the buffer is too small.
 void write_snapshot(const char* function, std::string_view text, void* bytes, std::size_t* size);
 
 /// @throws Refusal
@@ -61,8 +61,8 @@ void require_dimension(const char* function, std::size_t found, std::size_t expe
 /// @throws Refusal naming the component of `what` that is NaN or infinite.
 void require_finite(const char* function, const char* what, const double* x, std::size_t n);
 
-/// A loop has some forty arrays of the dimension of the state. Where there is no memory for
-/// them it is better known before the first is written to.
+/// Checks that there is memory for a run: a loop has some forty arrays of the dimension of the
+/// state. It is better to fail before the first of them is written to.
 /// @throws std::bad_alloc
 void require_memory(std::size_t dimension);
 

@@ -1,4 +1,4 @@
-// A run of callbacks behind one interface, whatever state its loop works with.
+// A run of callbacks behind one interface for all types of state.
 #pragma once
 
 #include <atomic>
@@ -15,8 +15,8 @@
 
 namespace ricochet::c {
 
-/// A run like `Simulation`, for states of a size known at run time. Whatever its functions throw,
-/// the run stands where its last step was complete.
+/// A run like `Simulation`, for states of a size known at run time. If one of its functions throws,
+/// the run is at the end of its last complete step.
 class AnyRun {
 public:
     AnyRun() = default;
@@ -53,7 +53,7 @@ public:
 [[nodiscard]] std::unique_ptr<AnyRun> make_run(std::shared_ptr<const CallbackSystem> system,
                                                const double* x0, const RunOptions& options);
 
-// One for each state of the loop's.
+// One function for each type of state.
 [[nodiscard]] std::unique_ptr<AnyRun> make_run_of_1(std::shared_ptr<const CallbackSystem>,
                                                     const double*, const RunOptions&);
 [[nodiscard]] std::unique_ptr<AnyRun> make_run_of_2(std::shared_ptr<const CallbackSystem>,

@@ -92,7 +92,7 @@ public:
     }
 
 private:
-    /// The last samples are taken when the run has ended.
+    /// Brings the run up to date when it has ended, so that the last samples are there.
     bool finished(bool goes_on)
     {
         if (loop_->ended()) loop_->bring_up_to_date();

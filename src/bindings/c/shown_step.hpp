@@ -1,4 +1,4 @@
-// A step of a C program's, as the engine knows it.
+// A step of a C program's integrator, in the engine's terms.
 #pragma once
 
 #include <cmath>
@@ -14,7 +14,7 @@
 
 namespace ricochet::c {
 
-/// With the cubic through its ends where the host has no path of its own.
+/// If the host gives no interpolant, the step is the cubic through its ends.
 class ShownStep {
 public:
     /// @throws Refusal naming what is missing.
@@ -33,7 +33,7 @@ public:
                 "found null for rate0 or rate1; expected the rates at its ends");
         require(given.interpolate || !given.interpolate_rate,
                 "found an interpolate_rate without an interpolate");
-        // As far as a step may begin beside the end of the last one.
+        // Largest gap that is allowed between a step and the end of the previous one.
         const double rounding =
             4 * std::numeric_limits<double>::epsilon() * std::fabs(given.t0) + 1e-9 * given.h;
         require(given.t0_remainder == 0 || std::fabs(given.t0_remainder) <= rounding,

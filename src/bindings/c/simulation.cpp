@@ -21,7 +21,7 @@ struct rc_simulation : Handle {
 
     std::unique_ptr<AnyRun> run;
     std::size_t dimension = 0;
-    std::atomic<bool> cancelled{false};  ///< asked for
+    std::atomic<bool> cancelled{false};  ///< cancellation was requested
     /// Why the last call that advanced the run did not finish: RC_RUNNING if it did.
     rc_outcome_code interrupted = RC_RUNNING;
     CallbackFailed failed;

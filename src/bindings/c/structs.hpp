@@ -1,4 +1,4 @@
-// Structs with their own size first, as another version of the header may have them.
+// Structs whose first member is their size, so that versions of the header may differ.
 #pragma once
 
 #include <cstddef>
@@ -15,9 +15,9 @@ namespace ricochet::c {
     throw Refusal(RC_INVALID, std::string(name) + ": found null; expected a pointer");
 }
 
-/// The size that a struct of the caller's says it has.
-/// @throws Refusal if it is larger than the library's, or none that a release can have had:
-/// fields come in groups of eight bytes.
+/// The size that the caller's struct claims to have.
+/// @throws Refusal if it is larger than the library's, or cannot belong to any release: fields come
+/// in groups of eight bytes.
 template <class T>
 [[nodiscard]] std::size_t size_of_given(const void* given, const char* name)
 {
@@ -40,7 +40,7 @@ template <class T>
     return size;
 }
 
-/// A struct of the caller's over `full`, whose fields stand for those that it does not have.
+/// A copy of the caller's struct; fields that it does not have are taken from `full`.
 template <class T>
 [[nodiscard]] T read_struct(const void* given, const char* name, T full = {})
 {
@@ -50,7 +50,7 @@ template <class T>
     return full;
 }
 
-/// Fills in a struct of the caller's, as far as it goes.
+/// Writes `full` to the caller's struct, up to its size.
 template <class T>
 void write_struct(T* given, T full, const char* name)
 {

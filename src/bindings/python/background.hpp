@@ -1,4 +1,4 @@
-// Work that continues while Python treats signals and draws progress.
+// Work in a second thread, while Python handles signals and draws progress.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -17,22 +17,21 @@
 
 namespace ricochet::python {
 
-/// One piece of work in a thread of its own, and what Python has to say of it.
+/// Runs one piece of work in a thread of its own and reports its progress to Python.
 ///
-/// Every 20 ms the caller's thread checks for signals and shows the latest progress. Where a
-/// handler or the callback raises an exception, or the callback returns False, the work is asked to
-/// stop.
+/// Every 20 ms the caller's thread checks for signals and shows the latest progress. If a handler
+/// or the callback raises an exception, or the callback returns False, the work is told to stop.
 template <class Progress>
 class Background {
 public:
-    /// Draws, and says whether to continue.
+    /// Shows the progress, and returns whether to continue.
     using Show = std::function<bool(const Progress&)>;
 
     explicit Background(Show show) : show_(std::move(show)) {}
 
-    /// For the work.
+    /// Whether the work must stop; to be read by the work.
     [[nodiscard]] const std::atomic<bool>& stopped() const noexcept { return stopped_; }
-    /// Hands over where it is. @returns false to stop
+    /// Reports the progress of the work. @returns false if the work must stop
     [[nodiscard]] bool report(const Progress& progress)
     {
         const std::scoped_lock lock(mutex_);
@@ -48,7 +47,7 @@ public:
         std::exception_ptr thrown;
         std::thread worker([&] {
             try {
-                // One state of the interpreter for all calls.
+                // one interpreter state for all calls
                 const PyGILState_STATE state = PyGILState_Ensure();
                 PyThreadState* const saved = PyEval_SaveThread();
                 try {

@@ -17,7 +17,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-/// The system at the door of one run, with what it shows to callbacks.
+/// Door of one run to a system of callbacks, with the arrays that its callbacks are shown.
 class CallbackDoor final : public RunDoor {
     using Table = detail::SystemTable<State>;
 
@@ -147,7 +147,7 @@ private:
                            const Further&... further) const
     {
         std::array<PyObject*, most_arguments> stack{};
-        std::size_t count = 1;  // the first place belongs to the one that is called
+        std::size_t count = 1;  // vectorcall reserves the first place
         if (source_.moded_) {
             if (mode >= source_.mode_count_) {
                 raise(PyExc_ValueError, "found the mode " + std::to_string(mode) +
@@ -200,7 +200,7 @@ private:
     {
         if (!source_.guard_values_) {
             for (std::size_t i = 0; i < g.size(); ++i) {
-                // One that is not examined in this mode may have no value there.
+                // a guard that is not examined in this mode may have no value there
                 g[i] = is_in(i, mode) ? guard(i, mode, t, x) : 1;
             }
             return;

@@ -53,7 +53,7 @@ Function::Function(PyObject* given, const std::string& who)
         user = PyLong_AsVoidPtr(with.get());
         if (PyErr_Occurred()) throw PythonError();
         is_formula = PyObject_HasAttrString(given, "_ricochet_formula") != 0;
-        object = Ref::share(given);  // keeps what it was made from
+        object = Ref::share(given);  // keeps the object that the address belongs to
         return;
     }
     if (!PyCallable_Check(given)) {
@@ -115,7 +115,7 @@ CallbackSource::CallbackSource(PyObject* specification)
     const Ref guards = item(specification, "guards");
     if (guards.get() != Py_None) {
         const auto count = static_cast<std::size_t>(PyList_GET_SIZE(guards.get()));
-        guards_.reserve(count);  // names are referred to
+        guards_.reserve(count);  // pointers to the names must stay valid
         for (std::size_t i = 0; i < count; ++i) {
             read_guard(PyList_GET_ITEM(guards.get(), static_cast<Py_ssize_t>(i)));
         }
@@ -192,7 +192,7 @@ void CallbackSource::read_guard(PyObject* specification)
 
 std::vector<std::string> CallbackSource::mode_names() const
 {
-    return {};  // the objects themselves are kept in Python
+    return {};  // Python keeps the mode objects themselves
 }
 
 std::vector<std::string> CallbackSource::guard_names() const

@@ -22,15 +22,15 @@ struct Function {
     bool is_formula = false;  ///< `user` is a `ModedFormula`
 
     Function() = default;
-    /// None is no function. An object that has `_ricochet_address` is a compiled one, one that has
-    /// `_ricochet_formula` a formula.
-    /// @throws PythonError naming `who` is something else
+    /// Takes a Python object. None stands for no function. An object with `_ricochet_address` is a
+    /// compiled function, one with `_ricochet_formula` a formula.
+    /// @throws PythonError naming `who` if the object is something else
     Function(PyObject* given, const std::string& who);
 
     explicit operator bool() const noexcept { return object || address; }
 };
 
-// Compiled functions, by what they stand for. A reset returns the next mode.
+// Signatures of compiled functions. A reset returns the next mode.
 using CompiledFlow = void (*)(std::uint32_t mode, double t, const double* x, double* dxdt,
                               std::size_t n, void* user);
 using CompiledGuard = double (*)(std::uint32_t mode, double t, const double* x, std::size_t n,
@@ -46,7 +46,7 @@ constexpr std::size_t most_arguments = 32;
 struct CallbackGuard {
     std::string name;
     std::string title;  ///< in messages: "guard floor", "events[0]"
-    std::string owner;  ///< in messages, of its reset and other functions: "floor", "events[0]"
+    std::string owner;  ///< name in messages about its reset and other functions: "floor"
     GuardInfo info;
     Function value, rate, reset, rest, enabled;
     Function speed_bound, acceleration_bound, lower_bound, upper_bound;
@@ -77,11 +77,11 @@ private:
     Function flow_, guard_values_, reset_set_;
     Function next_time_event_, previous_time_event_, time_reset_;
     std::vector<CallbackGuard> guards_;
-    std::vector<Ref> arguments_;    ///< further ones, of every function
-    Ref mode_list_, mode_numbers_;  ///< null without modes; what modes are called, and back
+    std::vector<Ref> arguments_;    ///< the user's further arguments of every function
+    Ref mode_list_, mode_numbers_;  ///< names of the modes and their numbers; null without modes
     std::size_t mode_count_ = 0;
     bool moded_ = false;
-    bool free_ = false;  ///< no function of it needs the interpreter
+    bool free_ = false;  ///< whether none of its functions needs the interpreter
     detail::SystemTable<State> table_;
 };
 

@@ -1,4 +1,4 @@
-// A system of Python's in place of a user's type, for what is a template over one.
+// A system of Python in place of a user's type, for templates over a system type.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace ricochet::python {
 
-/// Holds the interpreter, where a system needs it.
+/// Holds the interpreter lock, for systems that need it.
 class Interpreter {
 public:
     explicit Interpreter(bool needed) : needed_(needed)
@@ -149,7 +149,7 @@ private:
     const detail::SystemTable<State>* table_;
 };
 
-/// The same of a system with one guard, for what asks for a single one at compile time.
+/// A `DoorSystem` with one guard, for templates that require a single guard at compile time.
 class SingleGuardSystem {
 public:
     static constexpr bool unchecked_names = true;

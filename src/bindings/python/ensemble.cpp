@@ -33,16 +33,16 @@ namespace {
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// What all rows share.
+/// Data that all rows share.
 struct Ensembled {
     std::string system;
-    std::vector<std::string> names;  ///< of its parameters, as models have them
+    std::vector<std::string> names;  ///< names of the parameters, as in models
     Request request;
     bool mode_given = false;
     std::size_t parameters = 0;
     std::size_t components = 0;
-    const double* parameter_table = nullptr;  ///< row after row
-    const double* start_table = nullptr;      ///< row after row
+    const double* parameter_table = nullptr;  ///< row by row
+    const double* start_table = nullptr;      ///< row by row
 };
 
 /// A run by the general loop.
@@ -68,7 +68,7 @@ Record run_row(const Ensembled& all, std::size_t row)
     Request request = all.request;
     if (!all.mode_given) request.options.mode = source->start_mode();
     if (request.is_plain()) {
-        SignalWatch watch;  // signals are the caller's thread's
+        SignalWatch watch;  // signals are handled by the caller's thread
         if (std::optional<Record> whole = source->run_whole(x0, request, watch)) {
             return std::move(*whole);
         }
@@ -76,7 +76,7 @@ Record run_row(const Ensembled& all, std::size_t row)
     return run_loop(request, *source, x0);
 }
 
-/// The results as columns.
+/// Results as columns.
 struct Columns {
     Columns(std::size_t rows, std::size_t components)
         : outcome(rows), t(rows, none), x(rows * components, none), mode(rows), counts(5 * rows)
@@ -96,7 +96,7 @@ struct Columns {
     }
 
     static constexpr double none = std::numeric_limits<double>::quiet_NaN();
-    std::vector<std::string_view> outcome;  ///< empty: not run
+    std::vector<std::string_view> outcome;  ///< empty if the row was not run
     std::vector<double> t, x;
     std::vector<std::uint32_t> mode;
     std::vector<std::uint64_t> counts;
@@ -156,7 +156,7 @@ py::dict ensemble(const std::string& system, const std::vector<std::string>& nam
             rows,
             [&](const EnsembleRow& row) {
                 const Record record = run_row(all, row.index);
-                if (record.outcome == Outcome::cancelled) return;  // it is as if it had not begun
+                if (record.outcome == Outcome::cancelled) return;  // counts as not run
                 columns.put(row.index, record, all.components);
             },
             {.threads = threads,

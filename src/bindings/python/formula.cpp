@@ -11,7 +11,7 @@ namespace ricochet::python {
 
 namespace {
 
-/// In the order of `FormulaCode`.
+/// Names of the operations, in the order of `FormulaCode`.
 constexpr std::array<std::string_view, 24> names{
     "component", "time",  "constant", "add",  "subtract", "multiply", "divide", "power",
     "atan2",     "hypot", "negate",   "sqrt", "cbrt",     "exp",      "log",    "sin",

@@ -1,4 +1,5 @@
-// Flows and guards as formulas: what functions of Python do with symbols, done without Python.
+// Flows and guards as formulas: recorded by calling Python functions with symbols, evaluated
+// without Python.
 #pragma once
 
 #include <cmath>
@@ -11,7 +12,7 @@
 namespace ricochet::python {
 
 enum class FormulaCode : std::uint8_t {
-    component,  ///< of the state, number a
+    component,  ///< component number a of the state
     time,
     constant,
     add,
@@ -41,22 +42,23 @@ enum class FormulaCode : std::uint8_t {
 struct FormulaOp {
     FormulaCode code;
     std::size_t a = 0, b = 0;
-    double value = 0;  ///< of a constant
+    double value = 0;  ///< value, if it is a constant
 };
 
 /// Functions of the time and the state, for scalars of any type.
 class Formula {
 public:
-    /// @param ops      name, first and second operand, value of a constant
-    /// @param outputs  which of them are the results
-    /// @throws std::invalid_argument for an unknown name, or operands that do not come before
+    /// @param ops      for each operation: name, first and second operand, value of a constant
+    /// @param outputs  indices of the operations that are the results
+    /// @throws std::invalid_argument for an unknown name, or an operand that is not an earlier
+    /// operation
     Formula(std::size_t components,
             const std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>& ops,
             std::vector<std::size_t> outputs);
 
     [[nodiscard]] std::size_t components() const noexcept { return components_; }
 
-    /// @param values  scratch
+    /// @param values  work space
     template <class S, class Xs, class Outputs>
     void evaluate(const S& t, const Xs& x, Outputs&& out, std::vector<S>& values) const
     {
@@ -108,7 +110,7 @@ private:
     std::vector<std::size_t> outputs_;
 };
 
-/// A function of the mode, too. Its address is handed to compiled functions as `user`.
+/// A formula for each mode. Its address is passed to compiled functions as `user`.
 struct ModedFormula {
     std::vector<Formula> by_mode;  ///< one for all where there are no modes
 
@@ -118,7 +120,7 @@ struct ModedFormula {
     }
 };
 
-/// As `CompiledFlow` and `CompiledGuard`, of the formula that `user` points to.
+/// `CompiledFlow` and `CompiledGuard` that evaluate the formula at `user`.
 void formula_flow(std::uint32_t mode, double t, const double* x, double* dxdt, std::size_t n,
                   void* user);
 double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t n, void* user);

@@ -14,7 +14,7 @@
 
 namespace ricochet::python {
 
-/// Flow and guards of any scalar; all else is asked of a door to the same system.
+/// Flow and guards for any scalar; all other functions are those of a door to the same system.
 class FormulaSystem {
 public:
     static constexpr bool unchecked_names = true;
@@ -69,8 +69,8 @@ private:
     std::size_t modes_;
 };
 
-/// @param callbacks  a door to the system, which is asked for resets and whatever else is none of
-///                   flow and guards
+/// @param callbacks  a door to the system, used for resets and all functions other than flow and
+/// guards
 class FormulaDoor final : public RunDoor {
     using Table = detail::SystemTable<State>;
     using Method = detail::TaylorOf<0>;
@@ -98,7 +98,7 @@ public:
     [[nodiscard]] SignalWatch& watch() noexcept override { return callbacks_->watch(); }
 
 private:
-    /// Asks the other door.
+    /// Forwards a call to the other door.
     template <auto member>
     struct Forward;
     template <class R, class... A, R (*Table::*member)(void*, A...)>

@@ -16,7 +16,7 @@ namespace ricochet::python {
 
 namespace {
 
-/// A system at the door of a run, as far as detectors ask it.
+/// The system at the door of a run, with the functions that detectors use.
 class AskedSystem {
 public:
     AskedSystem(const Source& source, RunDoor& door)
@@ -48,8 +48,8 @@ private:
     RunDoor* door_;
 };
 
-/// A detector, and the system that it asks. The loop hands over the door of the run, of whose type
-/// the detector knows nothing.
+/// A detector together with its system. The loop passes the door of the run, whose type the
+/// detector does not know.
 template <class Detector>
 class At : public Detector {
 public:

@@ -170,7 +170,7 @@ void read(Options& options, const py::dict& given, const Setters<Options>& known
 
 using Rows = std::vector<State>;
 
-/// Uniform in the box between two states, or one of many.
+/// Starts that are uniform in the box between two states, or drawn from a list of states.
 [[nodiscard]] learn::Starts<State> starts_from(const Rows& states, bool box, Mode mode)
 {
     if (box) return learn::from_box(states[0], states[1], 0, 0, mode);
@@ -189,7 +189,8 @@ using Rows = std::vector<State>;
     return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
-/// Returns the result, or raises what was raised meanwhile with the result attached to it.
+/// Returns the result, or raises the exception that was raised during the work, with the result
+/// attached to it.
 template <class Progress>
 [[nodiscard]] py::object handed_back(const Background<Progress>& background,
                                      const py::object& result, const py::function& wrap)
@@ -318,7 +319,7 @@ py::object train_gate(const std::shared_ptr<Source>& source, const Rows& states,
         method == "rk4" ? train(FixedStep<Rk4>{}) : train(FixedStep<Dopri5>{});
     });
     using namespace py::literals;
-    // Stopped before the first evaluation it clears nothing.
+    // A network that was stopped before the first evaluation clears nothing.
     if (trained.report.outcome == learn::TrainingOutcome::stopped &&
         std::all_of(trained.model.levels.begin(), trained.model.levels.end(),
                     [](const GateLevel& level) { return level.threshold <= -1e30; })) {
@@ -346,7 +347,8 @@ py::object train_gate(const std::shared_ptr<Source>& source, const Rows& states,
 
 // --- certification ---
 
-/// Doors of one system, one for each call that is under way: the threads of a proof share them.
+/// Doors to one system, one for each concurrent call, since the threads of a proof share the
+/// system.
 class Doors {
 public:
     Doors(const Source& source, const State& like) : source_(&source), like_(like) {}
@@ -379,7 +381,7 @@ private:
     std::vector<std::unique_ptr<DoorSystem>> free_;
 };
 
-/// A bound by Python, of one or two arrays.
+/// Value of a bound that is a Python function of one or two arrays.
 [[nodiscard]] double number_from(const py::object& function, const char* what, std::size_t n,
                                  const double* a, const double* b)
 {
@@ -509,7 +511,7 @@ py::object certify(const py::bytes& content, const std::shared_ptr<Source>& sour
 PYBIND11_MODULE(_learn, module)
 {
     using namespace ricochet::python;
-    py::module_::import("ricochet._ricochet");  // which knows what a system is
+    py::module_::import("ricochet._ricochet");  // defines the type of systems
     py::register_local_exception_translator([](std::exception_ptr thrown) {
         try {
             if (thrown) std::rethrow_exception(thrown);

@@ -25,7 +25,7 @@ namespace ricochet::python {
 
 namespace {
 
-/// Numbers that a host has handed over.
+/// An array that a host has passed.
 using Given = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// A step of a host: its interpolant is a function of the time.
@@ -59,7 +59,7 @@ void hermite_rate_at(const void* step, double s, double* dxdt, std::size_t n)
     static_cast<const HermiteStep*>(step)->interpolate_rate(s, {dxdt, n});
 }
 
-/// See `ricochet.Monitor`. One thread at a time.
+/// Implementation of `ricochet.Monitor`. Not for two threads at a time.
 class PyMonitor {
 public:
     PyMonitor(std::shared_ptr<Source> source, const State& like, py::dict given, bool backward,
@@ -71,7 +71,7 @@ public:
                  .guard_names = source_->guard_names()}
     {
         Request request = request_from(given);
-        request.options.t_end = sign_;  // any finite one
+        request.options.t_end = sign_;  // any finite time
         validate(request.options, false);
         request.options.t_end = sign_ * std::numeric_limits<double>::infinity();
         start_mode_ = source_->start_mode();
@@ -82,7 +82,7 @@ public:
         table_.rate_on = nullptr;
         setup_ = setup_for(request, *source_, *door_);
         setup_.setup.system = &table_;
-        // The method is the host's.
+        // There is no method of our own: the host has its own.
         setup_.setup.stepping = "";
         monitor_ = detail::make_monitor(setup_.setup, like, request.options, cut_at_all);
     }
@@ -233,7 +233,7 @@ public:
 private:
     [[nodiscard]] Turn take_turn() { return {in_use_, "Monitor"}; }
 
-    /// Calls the monitor. What a function of the system raises has the run so far with it.
+    /// Calls the monitor. An exception of the system's functions gets the run so far attached.
     template <class Work>
     Verdict use(const Work& work)
     {
@@ -279,7 +279,7 @@ private:
         return {x.data(), x.data() + x.size()};
     }
 
-    /// With respect to offsets: of a motion backward in time negative.
+    /// The rate with respect to offsets: for a motion backward in time, minus the given one.
     [[nodiscard]] std::optional<State> rate_from(const char* name, const py::object& given,
                                                  std::size_t n) const
     {

@@ -30,7 +30,7 @@ namespace {
 
 using Features = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// One row of features, or many.
+/// Rows of features; a single state is one row.
 class Rows {
 public:
     Rows(const Features& features, std::size_t width)
@@ -46,7 +46,7 @@ public:
         count_ = single_ ? 1 : features.shape(0);
     }
 
-    /// An array with one T for each row; a scalar of NumPy's for a single one.
+    /// Returns an array with one T for each row, or a NumPy scalar for a single state.
     template <class T, class Answer>
     [[nodiscard]] py::object answers(const Answer& answer) const
     {

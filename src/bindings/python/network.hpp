@@ -1,4 +1,4 @@
-// A trained network as Python has it.
+// A trained network, as exposed to Python.
 #pragma once
 
 #include <memory>
@@ -19,9 +19,9 @@ public:
 
     [[nodiscard]] std::shared_ptr<const Model> model() const { return model_; }
     [[nodiscard]] const Classifier& classifier() const noexcept { return classifier_; }
-    /// Null unless the model is a gate.
+    /// The gate; null if the model is not a gate.
     [[nodiscard]] const gates::Gate* gate() const noexcept { return gate_ ? &*gate_ : nullptr; }
-    /// Null unless it has a certificate that holds.
+    /// The certified classifier; null if the model has no certificate that holds.
     [[nodiscard]] const CertifiedClassifier* certified() const noexcept
     {
         return certified_ ? &*certified_ : nullptr;

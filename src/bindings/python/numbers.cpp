@@ -10,7 +10,7 @@ namespace ricochet::python {
 
 namespace {
 
-/// NumPy's functions, found once. (`import_array` returns from the function it stands in.)
+/// Loads NumPy's functions once. (`import_array` is a macro that returns from its function.)
 void require_numpy()
 {
     static const bool found = [] { return _import_array() >= 0; }();

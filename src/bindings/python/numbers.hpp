@@ -1,4 +1,4 @@
-// Numbers that functions of Python return, and arrays that they are shown.
+// Numbers returned by Python functions, and arrays passed to them.
 #pragma once
 
 #include "python_error.hpp"
@@ -20,10 +20,10 @@ namespace ricochet::python {
 /// @throws PythonError naming `who` returned something else
 [[nodiscard]] double as_guard(PyObject* result, const std::string& who);
 
-/// The numbers that a callback has returned, which is kept alive by the caller.
+/// A view of the numbers that a callback has returned; the caller keeps the result alive.
 class Numbers {
 public:
-    /// @throws PythonError naming `who` and `of`, if these are not numbers
+    /// @throws PythonError naming `who` and `of` if the result is not made of numbers
     Numbers(PyObject* result, const char* who, const std::string& of);
 
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
@@ -45,8 +45,8 @@ private:
     Ref kept_;
 };
 
-/// An array that callbacks are shown. Where one has kept it, the next is shown another, so that
-/// what was kept does not change.
+/// An array that is passed to callbacks. If a callback has kept it, the next call gets another
+/// array, so that the kept one does not change.
 class ShownArray {
 public:
     [[nodiscard]] PyObject* show(const State& x);

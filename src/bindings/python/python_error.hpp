@@ -1,4 +1,4 @@
-// An exception of Python on its way through the library.
+// A Python exception that passes through the library.
 #pragma once
 
 #include <Python.h>
@@ -8,7 +8,7 @@
 
 namespace ricochet::python {
 
-/// An owned reference. The interpreter is held where one is made, copied or dropped.
+/// An owned reference. The interpreter lock must be held to create, copy or destroy one.
 class Ref {
 public:
     Ref() = default;
@@ -41,7 +41,7 @@ private:
     PyObject* object_ = nullptr;
 };
 
-/// Exception of a callback, taken from the interpreter.
+/// An exception raised by a callback, fetched from the interpreter.
 class PythonError {
 public:
     PythonError()
@@ -58,7 +58,7 @@ public:
     /// The exception itself.
     [[nodiscard]] PyObject* value() const noexcept { return value_.get(); }
 
-    /// Gives it back to the interpreter.
+    /// Restores the exception in the interpreter.
     void restore() const noexcept
     {
         Ref type = type_, value = value_, trace = trace_;
@@ -69,7 +69,7 @@ private:
     Ref type_, value_, trace_;
 };
 
-/// @throws PythonError for a null that says that something was raised.
+/// @throws PythonError if `object` is null, which means that an exception was raised.
 [[nodiscard]] inline Ref checked(PyObject* object)
 {
     if (!object) throw PythonError();

@@ -115,7 +115,7 @@ std::vector<std::string> option_names()
 {
     std::vector<std::string> names;
     for (const auto& [option, set] : setters()) {
-        // Those that Python makes of others.
+        // These three are derived in Python from other options.
         if (option != "component_atol" && option != "dense" && option != "t_end") {
             names.push_back(option);
         }

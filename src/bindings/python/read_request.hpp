@@ -1,4 +1,4 @@
-// Options of Python in the library's terms.
+// Translation of options from Python.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -10,8 +10,8 @@
 
 namespace ricochet::python {
 
-/// @throws TypeError for an option that there is not, naming those that there are, or of another
-/// type; ValueError for one with a name that there is not.
+/// @throws TypeError for an unknown option, naming the known ones, or for one of another type;
+/// ValueError for an unknown name as value.
 [[nodiscard]] Request request_from(const pybind11::dict& given);
 
 /// The names of the options that users give.

@@ -22,12 +22,12 @@ namespace ricochet::python {
 
 namespace {
 
-/// A system whose guards let signals be handled.
+/// A system whose guard evaluations let Python handle signals.
 template <class System>
 struct Watched : System {
     static constexpr bool unchecked_names = true;
 
-    constexpr Watched() = default;  // from which Taylor's method reads the operations
+    constexpr Watched() = default;  // needed by Taylor's method to read the operations
     Watched(const System& system, SignalWatch& watch) : System(system), watch_(&watch) {}
 
     template <class... Arguments>

@@ -10,13 +10,13 @@
 
 namespace ricochet::python {
 
-/// The system of that name; `parameters` are all of its own, in their order.
-/// @throws std::invalid_argument for a name that there is not, or parameters outside their range.
+/// The system with the given name; `parameters` are all its parameters, in their order.
+/// @throws std::invalid_argument for an unknown name, or parameters outside their range.
 [[nodiscard]] std::shared_ptr<Source> ready_system(std::string_view name,
                                                    std::span<const double> parameters);
 
-/// Closed-form results of that system, by the name that their function has in C++.
-/// @throws std::invalid_argument for one that there is not.
+/// Closed-form result of the system, by the name of its function in C++.
+/// @throws std::invalid_argument for an unknown name.
 [[nodiscard]] std::vector<double> closed_form(const Source& system, std::string_view what,
                                               std::span<const double> arguments);
 

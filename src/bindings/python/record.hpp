@@ -19,7 +19,7 @@ namespace ricochet::python {
 /// as the widest state of the run has.
 struct EventHead {
     double t;
-    std::int64_t guard;  ///< -1: none
+    std::int64_t guard;  ///< -1 if there is none
     double bracket[2];
     double slope;
     double error;
@@ -44,8 +44,8 @@ struct Record {
     std::vector<double> events;  ///< heads with their states, in units of 8 bytes
     std::vector<double> times;
     std::vector<double> states;                 ///< row after row of `width`
-    std::shared_ptr<Solution<State>> solution;  ///< null: not kept
-    std::string wrong_bound;                    ///< what is known of one, as a sentence
+    std::shared_ptr<Solution<State>> solution;  ///< null if it was not kept
+    std::string wrong_bound;                    ///< sentence about a violated bound
 
     [[nodiscard]] std::size_t event_stride() const noexcept
     {
@@ -62,8 +62,8 @@ void put_state(const X& x, std::size_t width, double* out)
     }
 }
 
-/// @param times, states  at the ends of steps, where they are to be kept; else those of the
-///                       trajectory are
+/// @param steps  states at the ends of steps, if they are to be kept; null: the samples of the
+/// trajectory are used
 template <class X>
 [[nodiscard]] Record record_of(Run<X>&& run, const Trajectory<X>* steps = nullptr)
 {

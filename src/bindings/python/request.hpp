@@ -1,4 +1,4 @@
-// A request from Python for a run, in the library's terms.
+// A request for a run, translated from Python.
 #pragma once
 
 #include <memory>
@@ -17,15 +17,15 @@ using State = std::vector<double>;
 struct Request {
     Options options;
     MethodName method = MethodName::dopri5;
-    bool by_series = false;  ///< by Taylor's method instead
+    bool by_series = false;  ///< use Taylor's method instead of `method`
     bool fixed = false;      ///< steps of `options.step`
     std::string_view detector = "extremum";
     std::string_view locator = "newton";
-    std::shared_ptr<const Model> gate{};  ///< for the detectors that ask one
+    std::shared_ptr<const Model> gate{};  ///< the network of a detector that uses one
     bool record_steps = false;            ///< keep the state at the end of every step
     bool dense = false;                   ///< keep every step as a polynomial
 
-    /// Everything by default, so that a loop made for its system at compile time may serve.
+    /// Whether all choices are the defaults, so that a loop compiled for the system can be used.
     [[nodiscard]] bool is_plain() const noexcept
     {
         return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense &&

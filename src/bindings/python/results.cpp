@@ -20,7 +20,7 @@ namespace ricochet::python {
 
 namespace {
 
-/// Memory of `owner` as an array that is not to be written to.
+/// A read-only array over memory of `owner`.
 [[nodiscard]] py::array view(const py::dtype& type, std::vector<py::ssize_t> shape,
                              std::vector<py::ssize_t> strides, const void* data, py::handle owner)
 {
@@ -53,7 +53,7 @@ namespace {
                      static_cast<py::ssize_t>(sizeof(EventHead) + 16 * width));
 }
 
-/// The type of events with states of `width` components; made once, since NumPy takes its time.
+/// NumPy type of events with states of `width` components; cached, since NumPy is slow to make it.
 [[nodiscard]] py::dtype event_type(std::size_t width)
 {
     // Never destroyed: the interpreter may be gone by then.

@@ -1,4 +1,4 @@
-// Results as Python sees them.
+// Results as exposed to Python.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -15,7 +15,7 @@ namespace ricochet::python {
 
 namespace py = pybind11;
 
-/// A record with the names that belong to it.
+/// A record with the names of its modes and guards.
 struct PyRun {
     Record record;
     py::object modes = py::none();  ///< a list, or None

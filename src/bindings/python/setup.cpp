@@ -16,8 +16,8 @@ namespace ricochet::python {
 
 namespace {
 
-/// In the place of a system in the tables of detectors, which ask it at no cost but bounds, and
-/// for these through the table of the run.
+/// Placeholder for the system in the tables of detectors. These only use its bounds, which they get
+/// through the table of the run.
 struct SomeSystem {
     void flow(double /*t*/, const State& /*x*/, State& /*dxdt*/) const {}
     [[nodiscard]] double guard(double /*t*/, const State& /*x*/) const { return 1; }

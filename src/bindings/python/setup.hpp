@@ -9,7 +9,7 @@
 
 namespace ricochet::python {
 
-/// A setup, and the detector that it points to where that is its own.
+/// A setup together with its detector, where the setup has one of its own.
 struct OwnedSetup {
     detail::RunSetup<State> setup;
     std::shared_ptr<const void> detector;
@@ -21,8 +21,8 @@ struct OwnedSetup {
                                                 const State& x0);
 
 /// The setup of a run of `source` at `door`, which must outlive it.
-/// @throws std::invalid_argument for a detector or locator that there is not, or a gate that is not
-/// what the detector asks.
+/// @throws std::invalid_argument for an unknown detector or locator, or a gate of a kind that the
+/// detector cannot use.
 [[nodiscard]] OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door);
 
 /// The same for the detectors that ask a gate. False: the request names another one.

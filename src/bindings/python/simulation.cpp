@@ -1,4 +1,4 @@
-// Runs: whole ones, and those that are driven by hand.
+// Runs: in one call, or driven by the caller.
 
 #include <pybind11/stl.h>
 
@@ -20,8 +20,8 @@ namespace {
 
 using Loop = detail::AnyLoop<State>;
 
-/// Goes to the end; the state at the end of every step into `steps` if there is one, both sides of
-/// a reset.
+/// Runs to the end. If `steps` is not null, appends the state at the end of every step to it, with
+/// both sides of every reset.
 void drive(Loop& loop, Trajectory<State>* steps)
 {
     if (!steps) {
@@ -52,7 +52,7 @@ void drive(Loop& loop, Trajectory<State>* steps)
     }
 }
 
-/// Does what needs no interpreter without it.
+/// Calls `work`, without the interpreter lock if `freely` is set.
 template <class Work>
 void work_freely(bool freely, const Work& work)
 {
@@ -64,7 +64,7 @@ void work_freely(bool freely, const Work& work)
     }
 }
 
-/// Before the first step.
+/// Result of a run before its first step.
 [[nodiscard]] Record start_of(const State& x0, const Options& options)
 {
     Record record;
@@ -114,7 +114,7 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
     return out;
 }
 
-/// A run driven by hand. One thread at a time.
+/// A run driven by the caller. Not for two threads at a time.
 class PySimulation {
 public:
     PySimulation(std::shared_ptr<Source> source, const State& x0, const py::dict& given,

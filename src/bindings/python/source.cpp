@@ -7,7 +7,8 @@ void SignalWatch::look() noexcept
     using std::chrono::milliseconds;
     const Clock::time_point now = Clock::now();
     if (looked_ == Clock::time_point{}) looked_ = handled_ = now;  // the first check
-    // As many calls as take a few milliseconds, by what the last ones took.
+    // The number of calls is adapted so that they take a few milliseconds, from the time of the
+    // last ones.
     const auto took = now - looked_;
     if (took < milliseconds(1)) {
         if (ticks_between_ < (1U << 20)) ticks_between_ *= 2;

@@ -1,4 +1,4 @@
-// A system, whatever it is made of, at the door of a run.
+// A system of any kind, and the doors of its runs.
 #pragma once
 
 #include "python_error.hpp"
@@ -36,7 +36,7 @@ public:
     [[nodiscard]] const std::atomic<bool>* cancelled() const noexcept { return &cancelled_; }
     /// Exception that a handler has raised.
     [[nodiscard]] const std::optional<PythonError>& raised() const noexcept { return raised_; }
-    /// The same, to be raised here; what comes after it continues.
+    /// The same exception, to be raised by the caller; afterwards runs are no longer cancelled.
     [[nodiscard]] std::optional<PythonError> take_raised() noexcept
     {
         cancelled_ = false;
@@ -56,7 +56,7 @@ private:
     std::optional<PythonError> raised_;
 };
 
-/// A system at the door of one run.
+/// The door of one run to its system.
 class RunDoor {
 public:
     RunDoor() = default;
@@ -66,7 +66,7 @@ public:
 
     [[nodiscard]] virtual const detail::SystemTable<State>& table() const noexcept = 0;
     [[nodiscard]] virtual void* door() noexcept = 0;
-    /// Whether no function of it needs the interpreter.
+    /// Whether none of the system's functions needs the interpreter.
     [[nodiscard]] virtual bool is_free() const noexcept = 0;
 
     /// Lets a run at this door, whose detector is known, take its steps by Taylor's method.
@@ -88,8 +88,8 @@ public:
     Source& operator=(const Source&) = delete;
     virtual ~Source() = default;
 
-    /// The system at the door of a run, which the source outlives.
-    /// @throws std::invalid_argument for a start that it cannot serve.
+    /// Opens a door for a run; the source must outlive it.
+    /// @throws std::invalid_argument for a start that the system does not support.
     [[nodiscard]] virtual std::unique_ptr<RunDoor> open(const State& x0) const = 0;
 
     /// The same for steps by Taylor's method.

@@ -1,4 +1,4 @@
-// One caller at a time.
+// Exclusive use of an object by one call.
 #pragma once
 
 #include <atomic>
@@ -7,7 +7,7 @@
 
 namespace ricochet::python {
 
-/// Holds what it is made for until the end of a call.
+/// Marks an object as in use until the end of a call.
 class Turn {
 public:
     /// @throws std::runtime_error if another call, of another thread or around this one, holds it.
