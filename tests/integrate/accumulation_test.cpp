@@ -217,6 +217,21 @@ TEST(Accumulation, OfJumpsEndsWhereRoundingHidesThem)
     }
 }
 
+/// Falls at the rate 1, and each reset lifts it by 0.3 of the last lift less 1e-4: to 0.2999,
+/// 0.08987 and so on, at the eighth event to -7.7e-5, from where it falls on.
+struct EndingStair {
+    void flow(double, const X&, X& dxdt) const { dxdt = {-1, 0}; }
+    [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
+    void reset(double, X& x) const { x[0] = x[1] = 0.3 * x[1] - 1e-4; }
+};
+
+TEST(Accumulation, JumpsThatEndBeyondTheSurfaceDoNot)
+{
+    const auto run = integrate(EndingStair{}, X{1, 1}, {.t_end = 5});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.events.size(), 8u);
+}
+
 /// Two equal balls on a moving floor, on which they come to rest; one bit of the mode for each.
 struct PairOnMovingFloor {
     using State = std::array<double, 4>;

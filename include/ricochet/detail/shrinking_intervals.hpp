@@ -97,8 +97,9 @@ public:
             highest_jump_ = falls_ > 0 ? highest_jump_ : away;
             jump_ = away;
         }
-        if (away > rounding) return false;  // the last jumps may differ by the error of location
-        return std::exchange(falls_, 0) >= 3 && highest_jump_ >= 1024 * rounding;
+        if (away > rounding) return false;    // the last jumps may differ by the error of location
+        const bool near = away >= -rounding;  // farther, the reset has put it beyond its surface
+        return std::exchange(falls_, 0) >= 3 && near && highest_jump_ >= 1024 * rounding;
     }
     void forget_jumps() noexcept { falls_ = 0; }
 
