@@ -45,15 +45,15 @@ struct SeenGuard {
 };
 
 struct OracleCalls {
-    std::uint64_t looks = 0;          ///< evaluations, if only exact values are used
-    std::uint64_t bounded_looks = 0;  ///< evaluations, if bounds of the value are free
+    std::uint64_t checks = 0;          ///< evaluations, if only exact values are used
+    std::uint64_t bounded_checks = 0;  ///< evaluations, if bounds of the value are free
     std::uint64_t steps = 0;
 };
 
 /// Number of evaluations that one guard needs over one smooth piece of motion, whose last step may
 /// end in an event. `margin` is that of the planner.
-[[nodiscard]] std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin,
-                                        bool with_bounds);
+[[nodiscard]] std::uint64_t count_checks(const std::vector<SeenGuard>& piece, double margin,
+                                         bool with_bounds);
 
 /// Counts over a run with a check at every step.
 template <class Stepping, class System>
@@ -79,8 +79,8 @@ template <class Stepping, class System>
     const double margin = PlannerOptions{}.margin;
     std::vector<SeenGuard> piece;
     const auto close_piece = [&] {
-        calls.looks += count_looks(piece, margin, false);
-        calls.bounded_looks += count_looks(piece, margin, true);
+        calls.checks += count_checks(piece, margin, false);
+        calls.bounded_checks += count_checks(piece, margin, true);
         piece.clear();
     };
     const std::size_t guards = guard_count_of<X>(system);

@@ -6,7 +6,7 @@ namespace ricochet::bench {
 
 namespace {
 
-/// Steps that a forecast looks ahead.
+/// Steps that a forecast checks ahead.
 constexpr std::size_t horizon = 2048;
 
 GuardBound bound_at(const SeenGuard& seen, double value, double sign)
@@ -23,9 +23,9 @@ bool closes(const SeenGuard& from, double value, const SeenGuard& to, double end
 
 }  // namespace
 
-std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin, bool with_bounds)
+std::uint64_t count_checks(const std::vector<SeenGuard>& piece, double margin, bool with_bounds)
 {
-    std::uint64_t looks = 0;
+    std::uint64_t checks = 0;
     std::size_t at = 0;  // index of the last exact evaluation
     while (at + 1 < piece.size()) {
         const double value = piece[at].value;
@@ -46,13 +46,13 @@ std::uint64_t count_looks(const std::vector<SeenGuard>& piece, double margin, bo
             if (!with_bounds || !(sign * cheap(k) > 0)) continue;
             if (closed_to(k, cheap(k))) free = k;
         }
-        if (free + 1 == piece.size()) return looks;
+        if (free + 1 == piece.size()) return checks;
         // The step that lower bounds reach is evaluated only if no later evaluation closes; a step
         // that no two evaluations close costs one at its end.
         at = best > free ? best : free > at ? free : at + 1;
-        ++looks;
+        ++checks;
     }
-    return looks;
+    return checks;
 }
 
 double SceneRow::location() const
@@ -62,9 +62,9 @@ double SceneRow::location() const
     return (static_cast<double>(every.guard_calls) - ends) / static_cast<double>(every.events);
 }
 
-double SceneRow::oracle_calls(std::uint64_t looks) const
+double SceneRow::oracle_calls(std::uint64_t checks) const
 {
-    const double all = static_cast<double>(looks) + location() * static_cast<double>(every.events);
+    const double all = static_cast<double>(checks) + location() * static_cast<double>(every.events);
     return all / static_cast<double>(oracle.steps);
 }
 
@@ -90,7 +90,7 @@ std::string line(const SceneRow& row)
         row.name, row.every.steps, row.every.events, each(row.alone), each(row.every_brute),
         each(row.every_built), each(row.planned_brute), each(row.planned_built), row.time_ratio(),
         row.brute_ratio(), calls(row.every.guard_calls), calls(row.planned.guard_calls),
-        row.oracle_calls(row.oracle.looks), row.oracle_calls(row.oracle.bounded_looks),
+        row.oracle_calls(row.oracle.checks), row.oracle_calls(row.oracle.bounded_checks),
         row.location(), row.same ? "" : "  OTHER EVENTS");
 }
 

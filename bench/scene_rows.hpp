@@ -62,7 +62,7 @@ struct SceneRow {
         return static_cast<double>(every.guard_calls) / static_cast<double>(planned.guard_calls);
     }
     /// Calls a step with a perfect forecast, and location.
-    [[nodiscard]] double oracle_calls(std::uint64_t looks) const;
+    [[nodiscard]] double oracle_calls(std::uint64_t checks) const;
 };
 
 /// Table of the rows, with a verdict: all must have the same events in all runs, and at least one;

@@ -118,7 +118,7 @@ protected:
 
     using Milliseconds = std::chrono::milliseconds;
 
-    /// A run that gets the signal some time after its work has begun.
+    /// A run that gets the signal some time after its work has started.
     [[nodiscard]] Result interrupted(const Words& words, int signal,
                                      Milliseconds after = Milliseconds(300)) const
     {

@@ -467,12 +467,12 @@ public:
             {.margin = 0.1, .threshold = 0.5, .boxes = 7, .seconds = 1, .unproved = boxes});
         all.estimates = {{}, {}};
         all.attempt = learn::Attempt{.number = 1};
-        learn::Begun begun;
-        begun.done.resize(5);
-        begun.done[1].emplace();
-        begun.done[1]->boxes = 3;
-        begun.done[1]->unproved = boxes;
-        all.current = std::move(begun);
+        learn::Started started;
+        started.done.resize(5);
+        started.done[1].emplace();
+        started.done[1]->boxes = 3;
+        started.done[1]->unproved = boxes;
+        all.current = std::move(started);
         learn::save(all, "key", file());
         document_ = json::parse(read());
     }

@@ -93,11 +93,11 @@ struct Misses {
     double widest = 0;
 };
 
-[[nodiscard]] inline Misses misses_of(std::uint32_t seed, bool look_inside = true)
+[[nodiscard]] inline Misses misses_of(std::uint32_t seed, bool check_inside = true)
 {
     const RandomGuard guard(seed);
     Options options{.t_end = RandomGuard::end};
-    options.look_inside = look_inside;
+    options.check_inside = check_inside;
     using Run = Simulation<RandomGuard, RandomGuard::State>;
     Run simulation(guard, guard.start, options);
     std::vector<double> nodes{0};

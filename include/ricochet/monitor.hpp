@@ -142,7 +142,7 @@ struct MonitorOptions {
     double event_tolerance = 0;  ///< [s] as in `Options`
     double event_rtol = 0;
     double event_window = 0;
-    bool look_inside = true;
+    bool check_inside = true;
     bool record_events = true;  ///< keep them, for `events`; off: they are only counted
     bool event_states = true;   ///< keep the states of events that change nothing, too
     bool backward = false;      ///< the host's time runs backward
@@ -357,7 +357,7 @@ private:
                     .event_tolerance = options.event_tolerance,
                     .event_rtol = options.event_rtol,
                     .event_window = options.event_window,
-                    .look_inside = options.look_inside,
+                    .check_inside = options.check_inside,
                     .record_events = options.record_events,
                     .event_states = options.event_states};
         Options finite = out;

@@ -228,7 +228,7 @@ typedef struct rc_options {
     int32_t fixed_step;    /**< 1: steps of the length `step`; 0: error control */
     int32_t detector;      /**< an rc_detector, RC_EXTREMUM */
     int32_t locator;       /**< an rc_locator, RC_NEWTON */
-    int32_t look_inside;   /**< 1: RC_EXTREMUM evaluates the guards once inside each step */
+    int32_t check_inside;  /**< 1: RC_EXTREMUM evaluates the guards once inside each step */
     int32_t stop_at_event; /**< 0; 1: the run ends with its first event */
     int32_t record_events; /**< 1; 0: events are counted, not kept */
     int32_t event_states;  /**< 1; 0: events without a reset are kept without their states if
@@ -356,10 +356,10 @@ typedef struct rc_statistics {
     uint64_t resteps;          /**< steps repeated from their start to locate an event */
     uint64_t flow_calls;
     uint64_t guard_calls;
-    uint64_t network_calls;  /**< of gates */
-    uint64_t late_events;    /**< missed at first, found at a later step */
-    uint64_t checks_put_off; /**< steps whose check a plan or a gate saved */
-    uint64_t outside_domain; /**< states outside the box of a gate: checked exactly */
+    uint64_t network_calls;   /**< of gates */
+    uint64_t late_events;     /**< missed at first, found at a later step */
+    uint64_t checks_deferred; /**< steps whose check a plan or a gate saved */
+    uint64_t outside_domain;  /**< states outside the box of a gate: checked exactly */
     uint64_t bound_calls;
     uint64_t rollbacks;      /**< intervals taken back to a step that was not closed */
     uint64_t repeated_steps; /**< steps taken again for that */
@@ -465,7 +465,7 @@ typedef struct rc_monitor_options {
     double event_window;    /**< [s] within which events happen together, 0 */
     int32_t detector;       /**< an rc_detector, RC_EXTREMUM */
     int32_t locator;        /**< an rc_locator, RC_NEWTON */
-    int32_t look_inside;    /**< 1: RC_EXTREMUM evaluates the guards once inside each step */
+    int32_t check_inside;   /**< 1: RC_EXTREMUM evaluates the guards once inside each step */
     int32_t record_events;  /**< 1; 0: events are counted, not kept */
     int32_t event_states;   /**< 1; as in rc_options */
     int32_t backward;       /**< 0; 1: the host's time runs backward */

@@ -104,7 +104,7 @@ void step_by_series(RunSetup<CoreState<X>>& setup)
     const auto& detector = setup.detector;
     const bool proves =
         detector.screening == Screening::extremum || detector.screening == Screening::every;
-    const bool alone = Kernel::on_series && proves && !detector.clears && !detector.puts_off &&
+    const bool alone = Kernel::on_series && proves && !detector.clears && !detector.defers &&
                        setup.system->guard_count(setup.door) == 1;
     if (!setup.system->guarded || alone) {
         setup.quiet = setup.error_controlled ? Kernel::template quiet<true>()

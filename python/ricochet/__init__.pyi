@@ -178,7 +178,7 @@ def integrate(system: Union[System, _Ready], x0: ArrayLike, t_end: float, *,
               t_start: float = 0.0, mode: Any = ..., method: str = "dopri5", fixed: bool = False,
               step: float = 0.0, rtol: float = 1e-8, atol: ArrayLike = 1e-10, h_min: float = 0.0,
               h_max: float = ..., event_tolerance: float = 0.0, event_rtol: float = 0.0,
-              event_window: float = 0.0, look_inside: bool = True, stop_at_event: bool = False,
+              event_window: float = 0.0, check_inside: bool = True, stop_at_event: bool = False,
               record_events: bool = True, event_states: bool = True, record_steps: bool = False,
               sample_times: Optional[ArrayLike] = None, detector: str = "extremum",
               locator: str = "newton", gate: Union[None, str, PathLike[str], Network] = None,
@@ -317,7 +317,7 @@ class Cut(NamedTuple):
 class Monitor:
     def __init__(self, system: Union[System, _Ready], like: ArrayLike, *, backward: bool = False,
                  cut_at_all: bool = False, event_tolerance: float = 0.0, event_rtol: float = 0.0,
-                 event_window: float = 0.0, look_inside: bool = True, record_events: bool = True,
+                 event_window: float = 0.0, check_inside: bool = True, record_events: bool = True,
                  event_states: bool = True, detector: str = "extremum",
                  locator: str = "newton",
                  gate: Union[None, str, PathLike[str], Network] = None) -> None: ...

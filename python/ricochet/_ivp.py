@@ -357,10 +357,10 @@ def _result(run, count, dense_output, events_given):
 def _nothing(t, y, samples, dense_output, count):
     """The result of an integration over an interval of length zero."""
     t_out = np.array([t]) if samples is None else samples
-    nobody = None if count is None else [np.empty(0) for _ in range(count)]
+    no_events = None if count is None else [np.empty(0) for _ in range(count)]
     return OdeResult(t=t_out, y=np.tile(np.array(y)[:, None], (1, t_out.size)),
-                     sol=_Constant(t, y) if dense_output else None, t_events=nobody,
-                     y_events=nobody, nfev=0, njev=0, nlu=0, status=0,
-                     message=_MESSAGES["reached_end"], success=True, y_events_after=nobody,
+                     sol=_Constant(t, y) if dense_output else None, t_events=no_events,
+                     y_events=no_events, nfev=0, njev=0, nlu=0, status=0,
+                     message=_MESSAGES["reached_end"], success=True, y_events_after=no_events,
                      kinds=None if count is None else [[] for _ in range(count)],
-                     modes=nobody, outcome="reached_end", statistics=None, guard=None, run=None)
+                     modes=no_events, outcome="reached_end", statistics=None, guard=None, run=None)

@@ -36,8 +36,9 @@ class Cut(NamedTuple):
     state_changed: bool  #: if False, the host need not restart
 
 
-_OPTIONS = ("event_tolerance", "event_rtol", "event_window", "look_inside", "record_events",
+_OPTIONS = ("event_tolerance", "event_rtol", "event_window", "check_inside", "record_events",
             "event_states", "detector", "locator", "gate")
+_FORMER = ("look_inside",)  # names of options before version 0.2
 
 
 class Monitor(_ricochet.Monitor):
@@ -66,7 +67,7 @@ class Monitor(_ricochet.Monitor):
     cut_at_all : bool
         Every crossing ends its step, even if the guard has no reset: for hosts that change the
         state themselves.
-    event_tolerance, event_rtol, event_window, look_inside, record_events, event_states,
+    event_tolerance, event_rtol, event_window, check_inside, record_events, event_states,
     detector, locator, gate
         As for `integrate`.
 
@@ -80,7 +81,7 @@ class Monitor(_ricochet.Monitor):
 
     def __init__(self, system, like, *, backward=False, cut_at_all=False, **options):
         for name in options:
-            if name not in _OPTIONS:
+            if name not in _OPTIONS + _FORMER:
                 raise TypeError(f"Monitor: found an option {name!r}, expected some of backward, "
                                 "cut_at_all, " + ", ".join(_OPTIONS))
         set_gate(options)

@@ -144,7 +144,7 @@ def integrate(system, x0, t_end, **options):
         must be those for which it was trained.
     locator : str
         ``"newton"`` (default), ``"bisection"`` or ``"toms748"``.
-    step, h_min, h_max, event_tolerance, event_rtol, event_window, look_inside, stop_at_event,
+    step, h_min, h_max, event_tolerance, event_rtol, event_window, check_inside, stop_at_event,
     record_events, event_states, max_steps, stall_steps
         As in C++.
 

@@ -224,9 +224,9 @@ def _pilot(system, rows, box, mode, how, length, events, labels=0):
     if getattr(system, "modes", None) is not None:
         given["mode"] = mode
     try:
-        begun = perf_counter()
+        started = perf_counter()
         run = integrate(system, start, length, **given)
-        took = perf_counter() - begun
+        took = perf_counter() - started
     except (ValueError, ArithmeticError):
         return ""
     found = max(run.statistics.events, 1)

@@ -221,7 +221,7 @@ void add_verdict(const std::vector<Method>& methods, bool fixed_step,
         sentences.push_back(fmt::format(
             "{}: verified deferred {} checks and takes {} a step beyond extremum ({}), with {} "
             "events.",
-            verified->stepping, verified->statistics.checks_put_off, extra(*verified, extremum),
+            verified->stepping, verified->statistics.checks_deferred, extra(*verified, extremum),
             duration(per_step(extremum)), same ? "the same" : "other"));
     }
 }
@@ -283,7 +283,7 @@ std::string cost_table(const SystemEntry& system, const std::vector<double>& exa
         const Accuracy& a = method.accuracy;
         out += row(fmt::format("{}, {}", method.label, method.stepping),
                    fmt::format("{:.1e}", a.largest_error), a.missed, a.spurious, s.late_events,
-                   s.steps, s.flow_calls, s.guard_calls, s.network_calls, s.checks_put_off,
+                   s.steps, s.flow_calls, s.guard_calls, s.network_calls, s.checks_deferred,
                    duration(method.timing.median), spread(method.timing));
     }
     for (const Published& published : system.published) {
@@ -349,7 +349,8 @@ std::string to_json(const SystemEntry& system, const std::vector<double>& exact,
         row["flow_calls"] = s.flow_calls;
         row["guard_calls"] = s.guard_calls;
         row["network_calls"] = s.network_calls;
-        row["checks_put_off"] = s.checks_put_off;
+        row["checks_deferred"] = s.checks_deferred;
+        row["checks_put_off"] = s.checks_deferred;  // its name before version 0.2
         row["seconds"] = {{"median", method.timing.median},
                           {"lower_quartile", method.timing.lower},
                           {"upper_quartile", method.timing.upper}};

@@ -68,7 +68,8 @@ Json json(const Statistics& s)
             {"false_alarms", s.false_alarms},
             {"missed_events", s.missed_events},
             {"late_events", s.late_events},
-            {"checks_put_off", s.checks_put_off},
+            {"checks_deferred", s.checks_deferred},
+            {"checks_put_off", s.checks_deferred},  // its name before version 0.2
             {"outside_domain", s.outside_domain},
             {"suppressed", s.suppressed},
             {"disabled", s.disabled},
@@ -276,7 +277,7 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
     if (s.network_calls > 0) {
         out += fmt::format(
             ",\n{} predictions: {} checks deferred, {} false alarms, {} missed events ({} late)",
-            s.network_calls, s.checks_put_off, s.false_alarms, s.missed_events, s.late_events);
+            s.network_calls, s.checks_deferred, s.false_alarms, s.missed_events, s.late_events);
     }
     if (s.outside_domain > 0) {
         out += fmt::format(",\n{} of them of states outside of the model's box, checked exactly",

@@ -57,10 +57,10 @@ protected:
           guarded_(system_->guarded),
           resets_any_(system_->resets()),
           timed_(system_->timed()),
-          puts_off_(puts_off(setup.detector, *setup.system)),
+          defers_(defers(setup.detector, *setup.system)),
           predicts_(setup.detector.clears != nullptr),
           options_(options),
-          meter_(puts_off_ ? nullptr : setup.detector.metering),
+          meter_(defers_ ? nullptr : setup.detector.metering),
           resolution_(options),
           backward_(options.t_end < options.t_start),
           step_(system_, *setup.kernel, options.t_start, x0, options.mode, backward_),
@@ -69,9 +69,9 @@ protected:
           resets_(x0)
     {
         const Screening screening = setup.detector.screening;
-        on_series_ = step_.has_guard_series() && !puts_off_ && !predicts_ &&
+        on_series_ = step_.has_guard_series() && !defers_ && !predicts_ &&
                      (screening == Screening::extremum || screening == Screening::every);
-        if (puts_off_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
+        if (defers_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
     }
 
     // --- set-up ---
@@ -125,10 +125,10 @@ protected:
     /// the step as well, and a second time if the first evaluation leaves doubts.
     [[nodiscard]] bool any_suspicious()
     {
-        if (bank_.on_series() || !bank_.looks() || !options_.look_inside)
+        if (bank_.on_series() || !bank_.checks_inside() || !options_.check_inside)
             return bank_.suspicious(step_.h());
         if (step_.is_hosts_cubic() && bank_.clear_as_cubics(step_.h())) return false;
-        look_inside();
+        check_inside();
         return is_suspicious(error_controlled_ && hardly_moves());
     }
 
@@ -145,7 +145,7 @@ protected:
         if (!bank_.on_series()) bank_.complete_rates(step_, calls());
     }
 
-    void look_inside();
+    void check_inside();
 
     /// Whether the state hardly changes in the step: error control then does not limit the step.
     [[nodiscard]] bool hardly_moves() const noexcept;
@@ -228,10 +228,10 @@ protected:
         end(Outcome::wrong_bound, run_.wrong_bound->guard);
     }
 
-    void count_put_off(std::size_t steps) noexcept
+    void count_deferred(std::size_t steps) noexcept
     {
-        run_.statistics.checks_put_off += steps;
-        add_evidence(finders_.detector.put_off, steps);
+        run_.statistics.checks_deferred += steps;
+        add_evidence(finders_.detector.deferred, steps);
     }
 
     /// Samples all guards at the start of the current step, in which every guard is examined.
@@ -438,7 +438,7 @@ protected:
     bool guarded_;     ///< has guards, even if their number is zero so far
     bool resets_any_;  ///< has resets
     bool timed_;
-    std::conditional_t<single, Never, bool> puts_off_;  ///< only the loop of any number plans
+    std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
     bool predicts_;
     bool on_series_ = false;  ///< guards are power series over each step
     Options options_;

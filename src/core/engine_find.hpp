@@ -14,7 +14,7 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
         asked_ = meter_.asks();
         if (asked_) cleared = ask_network();
         if (cleared && !finders_.detector.checks_every_step) {
-            ++run_.statistics.checks_put_off;
+            ++run_.statistics.checks_deferred;
             run_.statistics.evidence.add(Evidence::assumed);
             return false;
         }
@@ -30,26 +30,26 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
 template <class X, bool single>
 inline bool EventEngine<X, single>::is_suspicious(bool hardly_moves)
 {
-    if (!bank_.looked()) return bank_.suspicious(step_.h());
+    if (!bank_.checked()) return bank_.suspicious(step_.h());
     if (hardly_moves) {
         X& x = search_.space(step_.x0());
-        for (const double u : CubicLook::places) {
+        for (const double u : CubicCheck::places) {
             step_.peek(u * step_.h(), x);
             bank_.sample_place(step_, u, x, calls());
         }
         return bank_.suspicious(step_.h());
     }
     if (!bank_.doubtful(step_.h())) return false;
-    if (bank_.needs_second_look(step_.h())) {
+    if (bank_.needs_second_check(step_.h())) {
         X& x = search_.space(step_.x0());
-        step_.peek(CubicLook::further * step_.h(), x);
+        step_.peek(CubicCheck::further * step_.h(), x);
         bank_.sample_further(step_, x, calls());
     }
     return bank_.suspicious(step_.h());
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::look_inside()
+inline void EventEngine<X, single>::check_inside()
 {
     if constexpr (is_small<X> && std::is_trivially_copyable_v<X>) {
         // Components that no guard reads are not computed.

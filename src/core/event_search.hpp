@@ -250,7 +250,7 @@ private:
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
         if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
         if (bank.has_series(i)) return heed(bank, i, watch, next_on_series(probe, watch, bank, i));
-        if (!bank.looked()) return heed(bank, i, watch, finders_->examine(probe, watch));
+        if (!bank.checked()) return heed(bank, i, watch, finders_->examine(probe, watch));
         return heed(bank, i, watch, next_in_parts(probe, watch, bank, i));
     }
 
@@ -268,7 +268,7 @@ private:
     /// Finding of the detector on the parts of an interval, up to the first that is not clear.
     [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank, std::size_t i)
     {
-        parts_.resolve(probe, i, watch, bank[i].info.touch, bank.looked_everywhere());
+        parts_.resolve(probe, i, watch, bank[i].info.touch, bank.checked_everywhere());
         refined_ = refined_ || parts_.divided();
         unresolved_ = unresolved_ || parts_.unresolved();
         const Watch whole = watch;
@@ -296,8 +296,8 @@ private:
     static void judge_by_its_own_size(Watch& watch, const Bank& bank, std::size_t i) noexcept
     {
         const double width = watch.end.s - watch.start.s;
-        const CubicLook look(watch.start.value, watch.start.rate, watch.end.value, watch.end.rate,
-                             width);
+        const CubicCheck look(watch.start.value, watch.start.rate, watch.end.value, watch.end.rate,
+                              width);
         if (!std::isfinite(look.size())) return;
         watch.scale = look.size();
         watch.touch = bank.touch_of(i, look.size());
@@ -349,7 +349,7 @@ private:
     [[nodiscard]] bool stays_beyond(const Watch& whole, GuardSample node) const noexcept
     {
         const DetectorTable<X>& detector = finders_->detector;
-        if (!detector.looks_inside) return false;
+        if (!detector.checks_inside) return false;
         const double sign = sign_of(whole.side);
         if (std::fabs(whole.start.value) <= whole.touch) return false;
         if (!finders_->leaves_plainly(sign, whole.start, whole.end, whole.touch)) return false;

@@ -17,17 +17,17 @@ Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const
     if (!(sign * ahead > 0)) return finders_->examine(probe, watch);
     constexpr int most_doubts = 8;  // with more, the series determines nothing about the rest
     for (int doubts = 0; doubts <= most_doubts;) {
-        const SeriesStretch stretch =
+        const SeriesInterval found =
             first_leaving(bank.series(), i, sign, probe.step().h(), watch.start, end,
                           bank[i].info.touch, from_surface);
-        if (stretch.kind == SeriesStretch::Kind::clear) {
+        if (found.kind == SeriesInterval::Kind::clear) {
             if (!(sign * end.value > 0)) break;
             watch.side_after = watch.side;
             return Finding::clear(Evidence::proved);
         }
         const GuardSample lo =
-            stretch.lo > watch.start.s ? probe.value_and_rate(stretch.lo) : watch.start;
-        GuardSample hi = stretch.hi < end.s ? probe.value_and_rate(stretch.hi) : end;
+            found.lo > watch.start.s ? probe.value_and_rate(found.lo) : watch.start;
+        GuardSample hi = found.hi < end.s ? probe.value_and_rate(found.hi) : end;
         from_surface = from_surface && lo.s == watch.start.s;
         const auto turn = bank[i].info.touch == 0 ? turn_between(probe, lo, hi) : std::nullopt;
         const bool passes = turn && sign * turn->value > 0 && sign * lo.value > 0;
@@ -36,7 +36,7 @@ Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const
         const bool agrees = (from_surface || sign * lo.value > 0) && sign * hi.value < 0;
         watch.start = lo;
         watch.end = hi;
-        if (dips || (stretch.kind == SeriesStretch::Kind::crossing && agrees)) {
+        if (dips || (found.kind == SeriesInterval::Kind::crossing && agrees)) {
             if (counts(watch.side, crossing)) return Finding::leaving(watch.side, lo, hi);
             watch.side = opposite(watch.side);
         } else if (!passes) {

@@ -13,7 +13,7 @@
 
 #include "core/screened_guards.hpp"
 #include "core/step.hpp"
-#include "ricochet/detail/cubic_look.hpp"
+#include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/system_table.hpp"
@@ -50,16 +50,16 @@ public:
         for (double& size : sizes_) size = 0;
         waiting_ = false;
         forget_screening();
-        looked_ = Looked::not_at_all;
+        checked_ = Checked::not_at_all;
     }
 
-    [[nodiscard]] bool looks() const noexcept { return rules_.looks; }
+    [[nodiscard]] bool checks_inside() const noexcept { return rules_.checks_inside; }
     [[nodiscard]] bool backward() const noexcept { return backward_; }
 
     /// Samples all guards at the start of a step.
     void sample_start(const Step<X>& step, std::uint64_t& calls, double scale)
     {
-        if (rules_.puts_off) {
+        if (rules_.defers) {
             sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
             for (std::size_t i = 0; i < size(); ++i) {
                 rate0_[i] = std::numeric_limits<double>::quiet_NaN();  // until a rate is needed
@@ -143,9 +143,9 @@ public:
             rate1_[0] = rate_at(0, step, step.h(), step.x1(), step.rate1(), calls);
         }
         forget_screening();
-        if (!run.looks) return;
+        if (!run.checks_inside) return;
         inside_[0] = run.inside;
-        looked_ = Looked::inside;
+        checked_ = Checked::inside;
     }
 
     /// Starts a smooth phase at time t, whether or not guards are on their surfaces.
@@ -257,7 +257,7 @@ public:
     void begin_search(double h) noexcept
     {
         // A guard that wakes or leaves its plateau has to be screened again.
-        if (rules_.puts_off || waiting_) forget_screening();
+        if (rules_.defers || waiting_) forget_screening();
         if (!screened_) screen(h);
         for (const std::size_t i : suspects_) records_[i].next = records_[i].side;
     }
@@ -338,7 +338,7 @@ public:
             visit(record.turned);
             visit(record.departs);
             visit(record.awaited);
-            if (rules_.puts_off) visit(record.deferred);
+            if (rules_.defers) visit(record.deferred);
             record.intervals.visit(visit);
         }
         visit(waiting_);
@@ -380,11 +380,11 @@ private:
     using Guards::as_screened_;
     using Guards::backward_;
     using Guards::bands_;
+    using Guards::checked_;
     using Guards::forget_screening;
     using Guards::g0_;
     using Guards::g1_;
     using Guards::inside_;
-    using Guards::looked_;
     using Guards::rate0_;
     using Guards::rate1_;
     using Guards::records_;
@@ -399,12 +399,12 @@ private:
     using Guards::suspects_;
     using Guards::system_;
     using Guards::waiting_;
-    using typename Guards::Looked;
+    using typename Guards::Checked;
 
     /// Exchanges the samples at the end of a step with those at its start.
     void hand_over(Doubles& from, Doubles& to) const noexcept
     {
-        if (size() > 4 && !rules_.puts_off) {
+        if (size() > 4 && !rules_.defers) {
             from.swap(to);
         } else {
             for (std::size_t i = 0; i < size(); ++i) to[i] = from[i];

@@ -99,16 +99,16 @@ struct GuardRecord {
 /// Whether checks are deferred. Without bounds or a gate, a deferring detector is the exact
 /// detector that it wraps.
 template <class X>
-[[nodiscard]] bool puts_off(const DetectorTable<X>& detector, const SystemTable<X>& system)
+[[nodiscard]] bool defers(const DetectorTable<X>& detector, const SystemTable<X>& system)
 {
-    return detector.puts_off && system.guarded && (!detector.needs_bounds || system.bounded);
+    return detector.defers && system.guarded && (!detector.needs_bounds || system.bounded);
 }
 
 /// Requirements of a detector on all guards, of a system with bounds or without.
 struct BankRules {
     Screening screening = Screening::ends;
     bool uses_rates = false;
-    bool puts_off = false;
+    bool defers = false;
     /// Whether the scale of a guard is its largest value so far: for detectors that do
     /// not ask for the rounding of the state, so that neighbouring steps agree on which minimum
     /// counts as a touch.
@@ -117,7 +117,7 @@ struct BankRules {
     /// started, as for guards with declared bounds, which may be expensive.
     bool coarse = false;
     /// Whether guards can be examined inside a step.
-    bool looks = false;
+    bool checks_inside = false;
     bool (*suspects)(double, double, double, double, double, double) = nullptr;
 
     /// Whether sizes are kept from step to step.
@@ -129,10 +129,10 @@ struct BankRules {
         const bool bounded = system->bounded;
         return {.screening = detector.screening,
                 .uses_rates = detector.uses_rates,
-                .puts_off = detail::puts_off(detector, *system.operator->()),
-                .remembers = detector.uses_rates && !detector.looks_inside && !bounded,
+                .defers = detail::defers(detector, *system.operator->()),
+                .remembers = detector.uses_rates && !detector.checks_inside && !bounded,
                 .coarse = detector.uses_rates && bounded,
-                .looks = detector.looks_inside && !bounded,
+                .checks_inside = detector.checks_inside && !bounded,
                 .suspects = detector.suspects};
     }
 };

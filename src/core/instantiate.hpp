@@ -34,7 +34,7 @@ namespace ricochet::detail {
 template <class X>
 [[nodiscard]] bool has_single_guard(const RunSetup<X>& setup)
 {
-    return fixed_size<X>() > 0 && !puts_off(setup.detector, *setup.system) &&
+    return fixed_size<X>() > 0 && !defers(setup.detector, *setup.system) &&
            setup.system->guard_count(setup.door) == 1;
 }
 
@@ -168,8 +168,8 @@ QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
     if (!system.guarded) return named->unguarded;
     const DetectorTable<X>& detector = setup.detector;
     const bool alone = system.guard_alone && system.point;
-    const bool screened = detector.screening == Screening::extremum && !detector.clears &&
-                          !puts_off(detector, system);
+    const bool screened =
+        detector.screening == Screening::extremum && !detector.clears && !defers(detector, system);
     return alone && screened && has_single_guard(setup) ? named->screened : nullptr;
 }
 

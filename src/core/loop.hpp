@@ -95,7 +95,7 @@ public:
     /// Cost and savings of the network of a `Metered` detector so far.
     [[nodiscard]] MeterReading meter() const override
     {
-        return puts_off_ ? planner_->meter().reading() : meter_.reading();
+        return defers_ ? planner_->meter().reading() : meter_.reading();
     }
 
     /// Takes one step, with any events that it holds. False: the run has ended. A detector
@@ -112,7 +112,8 @@ public:
     /// everything that has happened in it was shown.
     bool advance() override;
 
-    /// One step. If it looks ahead, it may end in the middle of an interval of tentative steps.
+    /// One step. If it checks_inside ahead, it may end in the middle of an interval of tentative
+    /// steps.
     void advance_once(bool look_ahead) override { advance_one({.look_ahead = look_ahead}); }
 
     void run_to_end() override;
@@ -178,6 +179,7 @@ private:
     using Engine::backward_;
     using Engine::bank_;
     using Engine::calls;
+    using Engine::defers_;
     using Engine::end;
     using Engine::ended_;
     using Engine::error_controlled_;
@@ -192,7 +194,6 @@ private:
     using Engine::options_;
     using Engine::pending_;
     using Engine::planner_;
-    using Engine::puts_off_;
     using Engine::resolution_;
     using Engine::resting_;
     using Engine::run_;
@@ -333,7 +334,7 @@ private:
 
     // --- steps whose checks may be deferred ---
 
-    [[nodiscard]] bool is_tentative() const noexcept { return puts_off_ && planner_->in_stretch(); }
+    [[nodiscard]] bool is_tentative() const noexcept { return defers_ && planner_->in_interval(); }
 
     /// One step with a check of its end, where planning does not pay.
     void advance_with_check(double remaining);
@@ -347,7 +348,7 @@ private:
 
     /// The current step is the last of its interval: closes it, or goes back to the first step
     /// that could not be closed.
-    void close_stretch();
+    void close_interval();
 
     /// The exact detector examines the current step, for the guards in doubt.
     void judge();

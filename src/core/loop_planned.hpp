@@ -37,13 +37,13 @@ inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& ho
     if (planner_->covers(ends)) {
         planner_->sample_sleeper(step_, bank_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
-        this->count_put_off(1);
+        this->count_deferred(1);
         return pass();
     }
     remember_step(proposed, rejected);
     planner_->overrun(ends);
     if (may_go_on(ends, how)) return accept();
-    close_stretch();
+    close_interval();
 }
 
 template <class X, bool single>
@@ -73,7 +73,7 @@ inline bool Loop<X, single>::may_go_on(double ends, const Advance& how)
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::close_stretch()
+inline void Loop<X, single>::close_interval()
 {
     const std::size_t steps = planner_->steps().size();
     const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
@@ -82,11 +82,11 @@ inline void Loop<X, single>::close_stretch()
         return this->name_wrong_bound();
     }
     if (doubt == Planner<X, single>::none) {
-        this->count_put_off(steps);
+        this->count_deferred(steps);
         planner_->steps().clear();
         return pass();
     }
-    this->count_put_off(doubt);
+    this->count_deferred(doubt);
     if (doubt + 1 < steps) return take_back_to(doubt);
     planner_->steps().clear();
     judge();

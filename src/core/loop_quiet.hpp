@@ -15,16 +15,17 @@ template <class X, bool single>
 inline QuietRun Loop<X, single>::quiet_orders() const
 {
     const bool time_event_first = timed_ && step_.until(time_event_) <= step_.until(options_.t_end);
-    QuietRun quiet{.end = time_event_first ? time_event_ : options_.t_end,
-                   .rtol = options_.rtol,
-                   .atol = options_.atol,
-                   .h_min = options_.h_min,
-                   .h_max = options_.h_max,
-                   .looks = bank_.looks() && options_.look_inside && !this->on_series_,
-                   .most_steps = next_review_ - run_.statistics.steps,
-                   .cancelled = options_.cancelled,
-                   .system = system_.operator->(),
-                   .h_next = h_next_};
+    QuietRun quiet{
+        .end = time_event_first ? time_event_ : options_.t_end,
+        .rtol = options_.rtol,
+        .atol = options_.atol,
+        .h_min = options_.h_min,
+        .h_max = options_.h_max,
+        .checks_inside = bank_.checks_inside() && options_.check_inside && !this->on_series_,
+        .most_steps = next_review_ - run_.statistics.steps,
+        .cancelled = options_.cancelled,
+        .system = system_.operator->(),
+        .h_next = h_next_};
     bank_.lend(quiet, step_.time(0));
     return quiet;
 }

@@ -39,7 +39,7 @@ inline void Loop<X, single>::mark_step() noexcept
 {
     mark_->everything = false;
     mark_->h_next = h_next_;
-    if (puts_off_) {
+    if (defers_) {
         mark_->counts = run_.statistics;
     } else {
         mark_->counts.rejected = run_.statistics.rejected;
@@ -48,15 +48,15 @@ inline void Loop<X, single>::mark_step() noexcept
     mark_->samples = run_.trajectory.t.size();
     mark_->pieces = run_.solution.size();
     mark_->next_sample = next_sample_;
-    mark_->tentative = puts_off_ ? planner_->steps().size() : 0;
-    mark_->planned = puts_off_ && !watching_;
+    mark_->tentative = defers_ ? planner_->steps().size() : 0;
+    mark_->planned = defers_ && !watching_;
     mark_->newly_armed = newly_armed_;
 }
 
 template <class X, bool single>
 void Loop<X, single>::copy_to_mark()
 {
-    if (!puts_off_) {
+    if (!defers_) {
         const std::uint64_t rejected = mark_->counts.rejected;
         mark_->counts = run_.statistics;
         mark_->counts.rejected = rejected;
@@ -78,7 +78,7 @@ void Loop<X, single>::go_back_to_mark()
     Mark& mark = *mark_;
     std::size_t samples = mark.samples;
     std::size_t pieces = mark.pieces;
-    std::uint64_t steps = puts_off_ ? mark.counts.steps : run_.statistics.steps;
+    std::uint64_t steps = defers_ ? mark.counts.steps : run_.statistics.steps;
     if (mark.everything) {
         steps = mark.counts.steps;
         step_.restart(mark.start);
@@ -108,7 +108,7 @@ void Loop<X, single>::go_back_to_mark()
         replans_ = true;
     }
     run_.statistics.rejected = mark.counts.rejected;
-    if (mark.everything || puts_off_) {
+    if (mark.everything || defers_) {
         const Statistics seen = std::exchange(run_.statistics, mark.counts);
         run_.statistics.guard_calls = seen.guard_calls;
         run_.statistics.network_calls = seen.network_calls;

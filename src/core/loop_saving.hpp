@@ -33,7 +33,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     next_review_ = 0;
     show_all();
     if (guarded_) search_.begin(step_.x0());
-    if (puts_off_) planner_->restore(bank_);
+    if (defers_) planner_->restore(bank_);
 }
 
 template <class X, bool single>
@@ -55,7 +55,7 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit(run_.outcome);
     visit_samples(visit);
     this->visit_guards(visit);
-    if (puts_off_) {
+    if (defers_) {
         visit(last_h_);
         visit(newly_armed_);
         planner_->visit(visit);

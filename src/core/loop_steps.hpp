@@ -54,7 +54,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     run_.mode = step_.mode();
     run_.statistics.flow_calls = step_.flow_calls();
     run_.statistics.resteps = step_.resteps();
-    if (puts_off_) planner_->add_counts(run_.statistics);
+    if (defers_) planner_->add_counts(run_.statistics);
     run_.statistics.disabled += std::exchange(search_.disabled, 0);
     if (ended_) emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
     return run_;
@@ -71,7 +71,7 @@ inline void Loop<X, single>::advance_from_here(const Advance& how)
         return end(Outcome::cancelled);
     }
     if (resting_) return hold(remaining);
-    if (puts_off_) return advance_by_plan(remaining, how);
+    if (defers_) return advance_by_plan(remaining, how);
     if (!take_step(remaining)) return;
     mark_what_lasts();
     if (guarded_ && handle_events()) return;
@@ -97,8 +97,8 @@ bool Loop<X, single>::may_take_more_steps()
 template <class X, bool single>
 inline void Loop<X, single>::reach_end()
 {
-    if (puts_off_) {
-        planner_->look_last(step_, bank_, run_.statistics);
+    if (defers_) {
+        planner_->check_last(step_, bank_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
     }
     end(Outcome::reached_end);
@@ -200,7 +200,7 @@ template <class X, bool single>
 inline auto Loop<X, single>::time_to_surface() -> Approach
 {
     Approach first;
-    if (puts_off_) return first;
+    if (defers_) return first;
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         const GuardRecord& record = bank_[i];
         if (!record.enabled || record.info.boolean) continue;
@@ -228,7 +228,7 @@ inline double Loop<X, single>::approach_rate(std::size_t i)
 template <class X, bool single>
 inline bool Loop<X, single>::happen_where_flow_ends(double h)
 {
-    if (puts_off_) return false;
+    if (defers_) return false;
     mark_everything();
     const Approach approach = time_to_surface();
     const std::size_t i = approach.guard;

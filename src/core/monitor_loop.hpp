@@ -142,7 +142,7 @@ public:
     [[nodiscard]] double quiet_until() const noexcept override
     {
         if (!guarded_) return backward_ ? -Engine::infinity : Engine::infinity;
-        const bool planned = puts_off_ && started_ && !ended_ && !resting_ && !newly_armed_ &&
+        const bool planned = defers_ && started_ && !ended_ && !resting_ && !newly_armed_ &&
                              this->pending_ == Pending::nothing;
         return planned ? clock(planner_->limit()) : step_.start().value;
     }
@@ -162,7 +162,7 @@ public:
         step_.restart(t, x, step_.mode());
         place_rate(dxdt);
         ++run_.statistics.steps;
-        this->count_put_off(1);
+        this->count_deferred(1);
     }
 
     [[nodiscard]] Side side(std::size_t guard) const override
@@ -202,12 +202,13 @@ public:
         this->pending_ = Pending::nothing;
         started_ = true;
         if (guarded_) search_.begin(step_.x0());
-        if (puts_off_) planner_->restore(bank_);
+        if (defers_) planner_->restore(bank_);
     }
 
 private:
     using Engine::backward_;
     using Engine::bank_;
+    using Engine::defers_;
     using Engine::ended_;
     using Engine::finders_;
     using Engine::guarded_;
@@ -215,7 +216,6 @@ private:
     using Engine::newly_armed_;
     using Engine::options_;
     using Engine::planner_;
-    using Engine::puts_off_;
     using Engine::resting_;
     using Engine::run_;
     using Engine::search_;
@@ -326,8 +326,8 @@ private:
     /// Whether a set of events cuts the step short. False, too, if the run has ended.
     [[nodiscard]] bool holds_set()
     {
-        if (puts_off_ && !planner_->steps_aside()) return holds_set_by_plan();
-        if (puts_off_) this->watch_all();
+        if (defers_ && !planner_->steps_aside()) return holds_set_by_plan();
+        if (defers_) this->watch_all();
         bool cleared = false;
         return this->deserves_search(cleared) && finds(cleared);
     }
@@ -349,14 +349,14 @@ private:
         bool found = false;
         if (planner_->covers(end)) {
             planner_->sample_sleeper(step_, bank_, run_.statistics);
-            this->count_put_off(1);
+            this->count_deferred(1);
         } else {
             step_.store(planner_->steps().add().start);
             planner_->overrun(end);
             const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
             planner_->steps().clear();
             if (doubt == Planner<X, single>::none) {
-                this->count_put_off(1);
+                this->count_deferred(1);
             } else if (!planner_->wrong()) {
                 found = this->judges_suspicious() && finds(false);
                 if (!found && !ended_) planner_->settle(step_, bank_);
@@ -385,7 +385,7 @@ private:
         cut_.mode_before = step_.mode();
         if (!this->settle()) {
             if (ended_) return Verdict::ended;
-            if (puts_off_ && !resting_) this->begin_plan();
+            if (defers_ && !resting_) this->begin_plan();
             return resting_ ? Verdict::rests : Verdict::stands;
         }
         cut_.s = 0;
@@ -451,7 +451,7 @@ private:
         visit(ended_);
         visit(run_.outcome);
         this->visit_guards(visit);
-        if (puts_off_) {
+        if (defers_) {
             visit(this->last_h_);
             visit(newly_armed_);
             planner_->visit(visit);

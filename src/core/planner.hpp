@@ -83,14 +83,14 @@ public:
           steps_(detector_->longest, like),
           checks_(guards),
           deadlines_(guards),
-          owing_(guards),
+          pending_(guards),
           judged_(guards)
     {
         for (std::size_t i = 0; i < guards; ++i) checks_.push_back({});
     }
 
     [[nodiscard]] Steps& steps() noexcept { return steps_; }
-    [[nodiscard]] bool in_stretch() const noexcept { return steps_.size() > 0; }
+    [[nodiscard]] bool in_interval() const noexcept { return steps_.size() > 0; }
 
     /// Whether no guard needs a check until the time `end`.
     [[nodiscard]] bool covers(double end) const noexcept { return end <= limit_; }
@@ -100,7 +100,7 @@ public:
 
     /// Whether planning is known to cost more than it saves, so that the exact detector is to
     /// examine every step. Intervals are closed first.
-    [[nodiscard]] bool steps_aside() const noexcept { return meter_.checks() && !in_stretch(); }
+    [[nodiscard]] bool steps_aside() const noexcept { return meter_.checks() && !in_interval(); }
     void review(const Statistics& counts) { meter_.review(counts); }
 
     /// Plans after every guard has been armed at the start of the step, and sampled there.
@@ -108,7 +108,7 @@ public:
     {
         steps_.clear();
         deadlines_.clear();
-        owing_.clear();
+        pending_.clear();
         judged_.clear();
         const double now = clock(step.time(0));
         for (std::size_t i = 0; i < bank.size(); ++i) {
@@ -138,7 +138,7 @@ public:
             const std::size_t i = pop();
             checks_[i].first = steps_.size() - 1;
             hoped_ = std::min(hoped_, checks_[i].verify ? -infinity : checks_[i].hoped);
-            owing_.push_back(i);
+            pending_.push_back(i);
         }
         limit_ = -infinity;
     }
@@ -155,7 +155,7 @@ public:
         meter_.review(counts);
         const std::size_t last = steps_.size() - 1;
         std::size_t doubt = none;
-        for (const std::size_t i : owing_) {
+        for (const std::size_t i : pending_) {
             checks_[i].verify = false;
             const std::size_t failed = close_one(i, step, bank, counts, h_next);
             checks_[i].first = failed;
@@ -164,7 +164,7 @@ public:
         // Beyond an event the flow is not the motion, and a bound may fail to hold.
         if (wrong_ && doubt != none && clock(wrong_->t) > place(doubt, step).time) wrong_.reset();
         judged_.clear();
-        for (const std::size_t i : owing_) {
+        for (const std::size_t i : pending_) {
             LastCheck& check = checks_[i];
             check.verify = doubt != none && check.first == doubt;
             if (check.verify && doubt == last) {
@@ -173,15 +173,15 @@ public:
                 schedule(i);
             }
         }
-        end_stretch();
+        end_interval();
         return doubt;
     }
 
     /// Rolls the interval back without a check.
     void abandon()
     {
-        for (const std::size_t i : owing_) schedule(i);
-        end_stretch();
+        for (const std::size_t i : pending_) schedule(i);
+        end_interval();
     }
 
     /// Guards that the exact detector verifies in the current step.
@@ -249,7 +249,7 @@ public:
 
     /// Checks the guards that are still deferred when the run ends, at the start of the step: a
     /// guard beyond its surface was covered by a bound that was wrong.
-    void look_last(const Step<X>& step, Bank& bank, Statistics& counts)
+    void check_last(const Step<X>& step, Bank& bank, Statistics& counts)
     {
         if (!bounded_) return;
         for (std::size_t i = 0; i < bank.size(); ++i) {
@@ -281,7 +281,7 @@ public:
     void restore(const Bank& bank)
     {
         deadlines_.clear();
-        owing_.clear();
+        pending_.clear();
         judged_.clear();
         steps_.clear();
         for (std::size_t i = 0; i < bank.size(); ++i) {
@@ -332,9 +332,9 @@ private:
 
     void find_limit() noexcept { limit_ = deadlines_.empty() ? infinity : deadlines_[0].deadline; }
 
-    void end_stretch() noexcept
+    void end_interval() noexcept
     {
-        owing_.clear();
+        pending_.clear();
         hoped_ = infinity;
         find_limit();
     }
@@ -572,7 +572,7 @@ private:
     Steps steps_;
     GuardList<LastCheck, single> checks_;
     GuardList<Deadline, single> deadlines_;
-    GuardList<std::size_t, single> owing_;
+    GuardList<std::size_t, single> pending_;
     GuardList<std::size_t, single> judged_;
     double limit_ = -infinity;
     double hoped_ = infinity;

@@ -15,7 +15,7 @@
 #include "core/sampled_guards.hpp"
 #include "core/step.hpp"
 #include "core/wide.hpp"
-#include "ricochet/detail/cubic_look.hpp"
+#include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/series_guard.hpp"
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/extremum.hpp"
@@ -33,7 +33,7 @@ protected:
     ScreenedGuards(const SystemAt<X>& system, const BankRules& rules, bool backward)
         : Guards(system, rules, backward), suspects_(size()), marks_(size())
     {
-        if (rules.looks) {
+        if (rules.checks_inside) {
             for (auto* numbers : {&inside_, &further_, &worst_}) numbers->resize(size());
         }
         for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_}) numbers->resize(size());
@@ -80,34 +80,37 @@ public:
     /// Evaluates all guards inside a step, at its state `x` there.
     void sample_inside(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
-        sample_values(step.mode(), step.time(CubicLook::inside * step.h()), x, calls, inside_);
-        looked_ = Looked::inside;
+        sample_values(step.mode(), step.time(CubicCheck::inside * step.h()), x, calls, inside_);
+        checked_ = Checked::inside;
         marked_ = false;
     }
 
-    /// Evaluates them a second time, at the part `CubicLook::further` of the step where the state
+    /// Evaluates them a second time, at the part `CubicCheck::further` of the step where the state
     /// is `x`.
     void sample_further(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
-        const double s = CubicLook::further * step.h();
+        const double s = CubicCheck::further * step.h();
         sample_values(step.mode(), step.time(s), x, calls, further_);
-        looked_ = Looked::further;
+        checked_ = Checked::further;
     }
 
-    /// Evaluates them once more, at the part `u` of the step, one of `CubicLook::places`.
+    /// Evaluates them once more, at the part `u` of the step, one of `CubicCheck::places`.
     void sample_place(const Step<X>& step, double u, const X& x, std::uint64_t& calls)
     {
         sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);
         const double h = step.h();
-        const bool first = looked_ != Looked::everywhere;
+        const bool first = checked_ != Checked::everywhere;
         for (std::size_t i = 0; i < size(); ++i) {
             const double e = cubic(i, h).deviation(u, further_[i]);
             worst_[i] = !first && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
         }
-        looked_ = Looked::everywhere;
+        checked_ = Checked::everywhere;
     }
 
-    [[nodiscard]] bool looked_everywhere() const noexcept { return looked_ == Looked::everywhere; }
+    [[nodiscard]] bool checked_everywhere() const noexcept
+    {
+        return checked_ == Checked::everywhere;
+    }
 
     /// Whether all guards are the cubics through their ends, since they are of degree 1 on a path
     /// that is a cubic, and have control points on their sides by more than rounding: then an
@@ -117,7 +120,7 @@ public:
         if (!linear_ || waiting_) return false;
         constexpr double rounding = 0x1p-20;  // of rates that are differences, with a reserve
         return !any_of([ this, h ](std::size_t i) __attribute__((always_inline)) {
-            const CubicLook look = cubic(i, h);
+            const CubicCheck look = cubic(i, h);
             const bool known = is_finite(look.b1 + look.b2);
             const bool clear = look.lowest(sign_[i]) > rounding * look.size();
             const bool armed = sign_[i] != 0;
@@ -128,7 +131,7 @@ public:
     /// Whether any guard needs a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
     {
-        if (looked() && !waiting_ && !bands_) {
+        if (checked() && !waiting_ && !bands_) {
             if (are_few()) {
                 return with_screen([&](auto screen) __attribute__((always_inline)) {
                     return any_of(in_doubt(screen, h));
@@ -142,11 +145,11 @@ public:
 
     /// Whether a second evaluation inside the step can change the decision on a guard: it cannot
     /// if the first agreed with the cubic to nine digits, which is no coincidence.
-    [[nodiscard]] bool needs_second_look(double h) const noexcept
+    [[nodiscard]] bool needs_second_check(double h) const noexcept
     {
         for (std::size_t i = 0; i < size(); ++i) {
-            const CubicLook look = cubic(i, h);
-            const double e = look.deviation(CubicLook::inside, inside_[i]);
+            const CubicCheck look = cubic(i, h);
+            const double e = look.deviation(CubicCheck::inside, inside_[i]);
             if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
         }
         return false;
@@ -169,8 +172,8 @@ public:
     /// Whether guard i may leave its side inside the step without a trace at the ends.
     [[nodiscard]] bool hides(std::size_t i, double h) const noexcept
     {
-        const CubicLook look = cubic(i, h);
-        return !(look.lowest(sign_[i]) > CubicLook::most * deviation(look, i));
+        const CubicCheck look = cubic(i, h);
+        return !(look.lowest(sign_[i]) > CubicCheck::most * deviation(look, i));
     }
 
     /// Whether guard i agrees in the step with the cubic through its ends, as far as it has
@@ -178,13 +181,13 @@ public:
     [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
     {
         if (has_series(i)) return false;
-        if (!looked()) return true;
-        const CubicLook look = cubic(i, h);
+        if (!checked()) return true;
+        const CubicCheck look = cubic(i, h);
         return 0x1p16 * deviation(look, i) <= look.size();
     }
 
     /// Whether the guards have been evaluated inside the step.
-    [[nodiscard]] bool looked() const noexcept { return looked_ != Looked::not_at_all; }
+    [[nodiscard]] bool checked() const noexcept { return checked_ != Checked::not_at_all; }
 
     /// Whether one of the `suspects` remains suspect after the findings of the search so far.
     [[nodiscard]] bool still_suspicious(std::size_t i, double h) const noexcept
@@ -200,7 +203,7 @@ public:
         const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
             return screen.suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
         });
-        return suspected || !is_finite(g1_[i]) || (looked() && hides(i, h));
+        return suspected || !is_finite(g1_[i]) || (checked() && hides(i, h));
     }
 
     /// The first guard that is not finite at the end of the step, or `no_guard`.
@@ -245,7 +248,7 @@ protected:
     using Guards::sample_values;
 
     /// Places in the current step at which the guards have been evaluated.
-    enum class Looked : std::uint8_t { not_at_all, inside, further, everywhere };
+    enum class Checked : std::uint8_t { not_at_all, inside, further, everywhere };
 
     [[gnu::noinline]] bool leaves_plateau() const noexcept
     {
@@ -310,7 +313,7 @@ protected:
         }
     }
 
-    [[nodiscard, gnu::always_inline]] CubicLook cubic(std::size_t i, double h) const noexcept
+    [[nodiscard, gnu::always_inline]] CubicCheck cubic(std::size_t i, double h) const noexcept
     {
         return {g0_[i], rate0_[i], g1_[i], rate1_[i], h};
     }
@@ -335,7 +338,7 @@ protected:
     {
         return [ this, h, u, factor, &values ](std::size_t i) __attribute__((always_inline))
         {
-            const CubicLook look = cubic(i, h);
+            const CubicCheck look = cubic(i, h);
             const bool clear = look.lowest(sign_[i]) > factor * look.deviation(u, values[i]);
             const bool armed = sign_[i] != 0;
             return !clear & armed;
@@ -348,7 +351,7 @@ protected:
     {
         return [
             shows = shows(screen, h),
-            strays = strays(h, CubicLook::inside, CubicLook::doubt, inside_)
+            strays = strays(h, CubicCheck::inside, CubicCheck::doubt, inside_)
         ](std::size_t i) __attribute__((always_inline))
         {
             const bool shown = shows(i);
@@ -387,17 +390,17 @@ protected:
             for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
             return;
         }
-        if (looked()) {
+        if (checked()) {
             // A guard that needs a search is in doubt already, or deviates elsewhere.
             if (!marked_) mark(h);
-            if (looked_ == Looked::inside)
+            if (checked_ == Checked::inside)
                 return screen_marked(h, [](std::size_t) { return false; });
-            if (looked_ == Looked::further) {
-                return screen_marked(h, strays(h, CubicLook::further, CubicLook::most, further_));
+            if (checked_ == Checked::further) {
+                return screen_marked(h, strays(h, CubicCheck::further, CubicCheck::most, further_));
             }
             return screen_marked(
                 h, [ this, h ](std::size_t i) __attribute__((always_inline)) {
-                    const bool clear = cubic(i, h).lowest(sign_[i]) > CubicLook::most * worst_[i];
+                    const bool clear = cubic(i, h).lowest(sign_[i]) > CubicCheck::most * worst_[i];
                     const bool armed = sign_[i] != 0;
                     return !clear & armed;
                 });
@@ -442,12 +445,12 @@ protected:
     }
 
     /// Largest deviation found of guard i from the cubic through its ends.
-    [[nodiscard]] double deviation(const CubicLook& look, std::size_t i) const noexcept
+    [[nodiscard]] double deviation(const CubicCheck& look, std::size_t i) const noexcept
     {
-        const double e = look.deviation(CubicLook::inside, inside_[i]);
-        if (looked_ == Looked::inside) return e;
+        const double e = look.deviation(CubicCheck::inside, inside_[i]);
+        if (checked_ == Checked::inside) return e;
         const double other =
-            looked_everywhere() ? worst_[i] : look.deviation(CubicLook::further, further_[i]);
+            checked_everywhere() ? worst_[i] : look.deviation(CubicCheck::further, further_[i]);
         return other <= e ? e : other;  // NaN stays
     }
 
@@ -472,7 +475,7 @@ protected:
     bool as_screened_ = false;  ///< and no guard has changed since then
     // A value does not lie beside its rate: both are written one by one, see `HostStepTable`.
     Doubles sign_{}, g0_{}, g1_{}, rate0_{}, rate1_{};
-    Looked looked_ = Looked::not_at_all;
+    Checked checked_ = Checked::not_at_all;
     bool marked_ = false;  ///< whether `marks_` belongs to the current step
     Doubles inside_{}, further_{};
     Doubles worst_{};  ///< deviations at further evaluations

@@ -153,7 +153,7 @@ Finding clear_if(bool known) noexcept
 }
 
 /// Determines whether the extremum between two ends on the armed side is on that side too.
-[[gnu::noinline]] Finding look_for_pair(GuardPath& path, Watch watch, GuardCubic cubic)
+[[gnu::noinline]] Finding search_for_pair(GuardPath& path, Watch watch, GuardCubic cubic)
 {
     GuardSample lo = watch.start;
     GuardSample hi = watch.end;
@@ -254,7 +254,7 @@ Finding Extremum::examine(GuardPath& path, Watch& watch) const
         return clear_if(known);
     }
     if (!known) return clear_if(false);
-    Finding finding = look_for_pair(path, watch, cubic);
+    Finding finding = search_for_pair(path, watch, cubic);
     if (std::isnan(cubic.v1)) finding.evidence = Evidence::assumed;
     return finding;
 }

@@ -193,10 +193,10 @@ void check_gate_kind(const gates::Gate& gate, bool horizon)
                 : "CalibratedBounds: expected a level gate, got one of horizons; see Calibrated");
 }
 
-void check_longest_stretch(std::size_t steps)
+void check_longest_interval(std::size_t steps)
 {
     if (steps == 0) {
-        throw std::invalid_argument("Calibrated: longest_stretch must be at least 1 step, got 0");
+        throw std::invalid_argument("Calibrated: longest_interval must be at least 1 step, got 0");
     }
 }
 

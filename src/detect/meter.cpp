@@ -104,7 +104,7 @@ double Meter::step_cost(Way way) const noexcept
 
 double Meter::cost_of(const Counts& piece) const noexcept
 {
-    return piece.looks * guard_.value() + piece.asked * network_.value() +
+    return piece.checks * guard_.value() + piece.asked * network_.value() +
            piece.work * step_cost(way_);
 }
 
@@ -135,11 +135,11 @@ void Meter::consider(const Statistics& counts)
 {
     const Counts now{.steps = static_cast<double>(counts.steps),
                      .work = static_cast<double>(counts.steps + counts.repeated_steps),
-                     .looks = static_cast<double>(counts.guard_calls),
+                     .checks = static_cast<double>(counts.guard_calls),
                      .asked = static_cast<double>(asked_)};
     const Counts piece{.steps = now.steps - then_.steps,
                        .work = now.work - then_.work,
-                       .looks = now.looks - then_.looks,
+                       .checks = now.checks - then_.checks,
                        .asked = now.asked - then_.asked};
     next_check_ = counts.guard_calls + asked_ + 4;
     if (counts.steps < next_steps_) {
@@ -160,7 +160,7 @@ void Meter::sample_step(const Counts& piece)
     const double now = seconds();
     const double spent = now - began_;
     began_ = now;
-    const double rest = spent - piece.looks * guard_.value() - piece.asked * network_.value();
+    const double rest = spent - piece.checks * guard_.value() - piece.asked * network_.value();
     const double enough = 0.25 * static_cast<double>(options_.piece);
     if (piece.work >= enough) step_of(way_).add(std::max(rest, 0.0) / piece.work);
 }

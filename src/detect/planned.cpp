@@ -14,10 +14,10 @@ void validate(const PlannerOptions& options)
     constexpr Require require{"Planned"};
     require(options.margin >= 0 && std::isfinite(options.margin),
             "margin must be zero or positive and finite", options.margin);
-    require(options.longest_stretch > 0, "longest_stretch must be at least 1 step", 0);
+    require(options.longest_interval > 0, "longest_interval must be at least 1 step", 0);
 }
 
-void throw_no_steps_between_looks()
+void throw_no_steps_between_checks()
 {
     throw std::invalid_argument("EveryK: steps must be at least 1, got 0");
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ricochet/detail/cubic_look.hpp"
+#include "ricochet/detail/cubic_check.hpp"
 
 namespace ricochet::detail {
 
@@ -26,7 +26,7 @@ void ResolvedParts::resolve(GuardPath& path, std::size_t i, const Watch& watch,
     if (!everywhere) return divide(path, start, end, smallest, 0);
     GuardSample from = start;
     const double width = end.s - start.s;
-    for (const double u : CubicLook::places) {
+    for (const double u : CubicCheck::places) {
         const GuardSample node = path.dense_value_and_rate(start.s + u * width);
         divide(path, from, node, smallest, 1);
         if (node.value != 0) keep(node);
@@ -40,14 +40,14 @@ void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const Guar
                            double smallest, int depth)
 {
     const double width = end.s - start.s;
-    const CubicLook look(start.value, start.rate, end.value, end.rate, width);
+    const CubicCheck look(start.value, start.rate, end.value, end.rate, width);
     double deviation = 0;
-    for (const double u : {CubicLook::inside, CubicLook::further}) {
+    for (const double u : {CubicCheck::inside, CubicCheck::further}) {
         const double e = look.deviation(u, path.dense_value(start.s + u * width).value);
         deviation = e <= deviation ? deviation : e;  // NaN stays
     }
     if (start.s == whole_.start.s && end.s == whole_.end.s) {
-        nearly_cubic_ = CubicLook::most * deviation <= look.size();
+        nearly_cubic_ = CubicCheck::most * deviation <= look.size();
     }
     if (look.stays_clear(deviation) || look.keeps_shape(deviation)) return;
     if (look.size() + deviation <= declared_touch_) return;

@@ -96,9 +96,10 @@ public:
 
     /// @param a, b  the interval of the coefficients, as offsets [s]
     /// @param root  whether there is a root at a, which does not count
-    [[nodiscard]] SeriesStretch first(const Coefficients& c, double a, double b, bool root) noexcept
+    [[nodiscard]] SeriesInterval first(const Coefficients& c, double a, double b,
+                                       bool root) noexcept
     {
-        using Kind = SeriesStretch::Kind;
+        using Kind = SeriesInterval::Kind;
         const int from = root ? 1 : 0;
         int changes = 0;
         bool sure = true;
@@ -120,12 +121,12 @@ public:
         const double middle = a + 0.5 * (b - a);
         Coefficients half = c;
         keep_left(half, 0.5);
-        const SeriesStretch left = first(half, a, middle, root);
+        const SeriesInterval left = first(half, a, middle, root);
         if (left.kind != Kind::clear) return left;
         half = c;
         keep_right(half, 0.5);
-        const SeriesStretch right = first(half, middle, b, false);
-        return right.kind == Kind::clear ? SeriesStretch{Kind::clear, a, b} : right;
+        const SeriesInterval right = first(half, middle, b, false);
+        return right.kind == Kind::clear ? SeriesInterval{Kind::clear, a, b} : right;
     }
 
 private:
@@ -146,7 +147,7 @@ private:
 bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign, double h,
                            double touch, bool from_surface) noexcept
 {
-    using Kind = SeriesStretch::Kind;
+    using Kind = SeriesInterval::Kind;
     Coefficients c;
     const int degree = degree_of(terms, i);
     // A root at the start is a root of the sum of all terms, not of the first.
@@ -162,9 +163,9 @@ bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign,
     return search.first(c, 0, h, from_surface).kind == Kind::clear;
 }
 
-SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign, double h,
-                            const GuardSample& start, const GuardSample& end, double touch,
-                            bool from_surface) noexcept
+SeriesInterval first_leaving(const SeriesTerms& terms, std::size_t i, double sign, double h,
+                             const GuardSample& start, const GuardSample& end, double touch,
+                             bool from_surface) noexcept
 {
     SeriesSearch search(degree_of(terms, i), h, touch);
     Coefficients c;

@@ -8,7 +8,7 @@
 namespace ricochet::geometry::detail {
 
 /// Segments in one check; columns are a multiple of it long.
-inline constexpr std::size_t segments_per_look = 64;
+inline constexpr std::size_t segments_per_block = 64;
 
 struct SegmentColumns {
     const double* ax;
@@ -20,7 +20,7 @@ struct SegmentColumns {
 };
 
 /// The first check that holds the least, and the least; `squared` is as given if none is less.
-struct LeastLook {
+struct LeastBlock {
     double squared;
     std::size_t look;
 };
@@ -49,30 +49,30 @@ template <class T>
     return ex * ex + ey * ey;
 }
 
-using LeastLookFunction = LeastLook (*)(const SegmentColumns& columns, double px, double py,
-                                        double above) noexcept;
+using LeastBlockFunction = LeastBlock (*)(const SegmentColumns& columns, double px, double py,
+                                          double above) noexcept;
 
-[[gnu::always_inline]] inline LeastLook least_look(const SegmentColumns& columns, double px,
-                                                   double py, double above) noexcept
+[[gnu::always_inline]] inline LeastBlock least_block(const SegmentColumns& columns, double px,
+                                                     double py, double above) noexcept
 {
     const auto load = [](const double* from) { return *reinterpret_cast<const Lanes*>(from); };
-    LeastLook best{above, 0};
-    for (std::size_t i = 0; i < columns.count; i += segments_per_look) {
+    LeastBlock best{above, 0};
+    for (std::size_t i = 0; i < columns.count; i += segments_per_block) {
         Lanes least = Lanes{} + best.squared;
-        for (std::size_t j = i; j < i + segments_per_look; j += lanes) {
+        for (std::size_t j = i; j < i + segments_per_block; j += lanes) {
             const Lanes square = squared_distance<Lanes>(load(columns.ax + j), load(columns.ay + j),
                                                          load(columns.dx + j), load(columns.dy + j),
                                                          load(columns.inverse + j), px, py);
             least = square < least ? square : least;
         }
         for (std::size_t k = 0; k < lanes; ++k) {
-            if (least[k] < best.squared) best = {least[k], i / segments_per_look};
+            if (least[k] < best.squared) best = {least[k], i / segments_per_block};
         }
     }
     return best;
 }
 
 /// Null where the file is compiled for another processor.
-extern const LeastLookFunction least_look_v3;
+extern const LeastBlockFunction least_block_v3;
 
 }  // namespace ricochet::geometry::detail

@@ -6,17 +6,17 @@ namespace ricochet::geometry::detail {
 #if defined(__AVX2__)
 namespace {
 
-LeastLook least_look_avx2(const SegmentColumns& columns, double px, double py,
-                          double above) noexcept
+LeastBlock least_block_avx2(const SegmentColumns& columns, double px, double py,
+                            double above) noexcept
 {
-    return least_look(columns, px, py, above);
+    return least_block(columns, px, py, above);
 }
 
 }  // namespace
 
-const LeastLookFunction least_look_v3 = least_look_avx2;
+const LeastBlockFunction least_block_v3 = least_block_avx2;
 #else
-const LeastLookFunction least_look_v3 = nullptr;
+const LeastBlockFunction least_block_v3 = nullptr;
 #endif
 
 }  // namespace ricochet::geometry::detail

@@ -58,21 +58,21 @@ BoxTree<2> tree_of(const std::vector<Segment2>& segments)
     return BoxTree<2>(std::move(boxes));
 }
 
-detail::LeastLook least_look_baseline(const detail::SegmentColumns& columns, double px, double py,
-                                      double above) noexcept
+detail::LeastBlock least_block_baseline(const detail::SegmentColumns& columns, double px, double py,
+                                        double above) noexcept
 {
-    return detail::least_look(columns, px, py, above);
+    return detail::least_block(columns, px, py, above);
 }
 
-detail::LeastLookFunction chosen_look()
+detail::LeastBlockFunction chosen_block_function()
 {
 #if defined(__x86_64__)
     __builtin_cpu_init();
-    if (detail::least_look_v3 != nullptr && __builtin_cpu_supports("avx2")) {
-        return detail::least_look_v3;
+    if (detail::least_block_v3 != nullptr && __builtin_cpu_supports("avx2")) {
+        return detail::least_block_v3;
     }
 #endif
-    return least_look_baseline;
+    return least_block_baseline;
 }
 
 /// The point of a segment nearest to p, and the square of its distance.
@@ -97,7 +97,7 @@ Segments::Segments(const std::vector<Segment2>& segments)
     for (const Segment2& s : segments_) given_.append(s);
     for (const std::uint32_t i : tree_.order()) sorted_.append(segments_[i]);
     while (sorted_.ax.size() % 4 != 0) sorted_.append(segments_.back());
-    while (given_.ax.size() % detail::segments_per_look != 0) given_.append(segments_.back());
+    while (given_.ax.size() % detail::segments_per_block != 0) given_.append(segments_.back());
 }
 
 void Segments::Columns::append(const Segment2& s)
@@ -166,12 +166,12 @@ NearestOnSegment Segments::nearest(Point2 p, std::uint32_t hint) const noexcept
 
 NearestOnSegment Segments::nearest_brute(Point2 p) const noexcept
 {
-    static const detail::LeastLookFunction look = chosen_look();
-    const detail::LeastLook found =
+    static const detail::LeastBlockFunction look = chosen_block_function();
+    const detail::LeastBlock found =
         look({given_.ax.data(), given_.ay.data(), given_.dx.data(), given_.dy.data(),
               given_.inverse.data(), given_.ax.size()},
              p.x, p.y, largest);
-    std::size_t which = found.look * detail::segments_per_look;
+    std::size_t which = found.look * detail::segments_per_block;
     if (found.squared < largest) {
         while (given_.squared_distance(which, p) != found.squared) ++which;
     }

@@ -198,7 +198,7 @@ std::vector<RunProperty> properties_of_run(const RunParts& parts, const Options&
     out.push_back({"event_rtol", text(o.event_rtol)});
     out.push_back({"event_window", text(o.event_window)});
     out.push_back({"stop_at_event", text(o.stop_at_event)});
-    out.push_back({"look_inside", o.look_inside ? "true" : "false"});
+    out.push_back({"check_inside", o.check_inside ? "true" : "false"});
     return out;
 }
 
@@ -207,6 +207,10 @@ void require_same_run(const std::vector<RunProperty>& saved, const std::vector<R
     if (saved.empty()) refuse_snapshot("it does not say of which run it is");
     for (std::size_t i = 0; i < std::min(saved.size(), here.size()); ++i) {
         if (saved[i] == here[i]) continue;
+        // the name of `check_inside` before version 0.2
+        if (saved[i].name == "look_inside" && here[i].name == "check_inside" &&
+            saved[i].value == here[i].value)
+            continue;
         refuse_snapshot(fmt::format("it is of a run with {} = {}, and this one has {} = {}",
                                     saved[i].name, saved[i].value, here[i].name, here[i].value));
     }

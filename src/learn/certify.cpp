@@ -182,11 +182,11 @@ private:
     /// Descends from inexpensive thresholds to expensive ones.
     /// @returns nothing if even the least expensive is above the limit, or the logits do not
     ///          separate the states within the margin from the others
-    std::optional<Begun> search(double margin, const Attempt& attempt)
+    std::optional<Started> search(double margin, const Attempt& attempt)
     {
         constexpr double first = 0.9;
         constexpr double factor = 0.7;
-        std::optional<Begun> best;
+        std::optional<Started> best;
         for (double gap = std::max(first, attempt.closest);;
              gap = std::max(attempt.closest, gap * factor)) {
             double threshold = attempt.highest - gap * attempt.spread;
@@ -200,7 +200,7 @@ private:
                 if (!best) last_estimate_ = e;
                 break;
             }
-            best = Begun{.threshold = threshold, .estimate = e};
+            best = Started{.threshold = threshold, .estimate = e};
             if (gap <= attempt.closest) break;
         }
         if (best) {
@@ -231,8 +231,8 @@ private:
             CertifyOutcome outcome = CertifyOutcome::proved;
             if (all_.current) {
                 outcome = prove(margin);
-            } else if (const auto begun = search(margin, *all_.attempt)) {
-                outcome = begin(*begun, margin);
+            } else if (const auto started = search(margin, *all_.attempt)) {
+                outcome = begin(*started, margin);
             } else {
                 all_.estimates.push_back(last_estimate_);
                 return last_estimate_.seconds > o_.limit ? CertifyOutcome::too_long
@@ -251,16 +251,16 @@ private:
         }
     }
 
-    CertifyOutcome begin(const Begun& begun, double margin)
+    CertifyOutcome begin(const Started& started, double margin)
     {
         all_.estimates.resize(all_.levels.size());
-        all_.estimates.push_back(begun.estimate);
-        if (begun.estimate.seconds > o_.limit) return CertifyOutcome::too_long;
-        all_.current = begun;
+        all_.estimates.push_back(started.estimate);
+        if (started.estimate.seconds > o_.limit) return CertifyOutcome::too_long;
+        all_.current = started;
         return prove(margin);
     }
 
-    [[nodiscard]] Stop report(const Begun& begun, double margin, std::uint64_t boxes,
+    [[nodiscard]] Stop report(const Started& started, double margin, std::uint64_t boxes,
                               double seconds)
     {
         if (seconds_since(start_) > o_.time_limit) return Stop::out_of_time;
@@ -268,39 +268,39 @@ private:
         CertifyProgress now{.level = all_.levels.size(),
                             .levels = o_.levels,
                             .margin = margin,
-                            .threshold = begun.threshold,
-                            .estimate = begun.estimate,
+                            .threshold = started.threshold,
+                            .estimate = started.estimate,
                             .boxes = boxes,
-                            .seconds = begun.seconds + seconds};
+                            .seconds = started.seconds + seconds};
         const auto done = static_cast<double>(boxes);
         now.rate = now.seconds > 0 ? done / now.seconds : 0;
-        now.seconds_left = now.rate > 0 ? std::max(0.0, begun.estimate.boxes - done) / now.rate
-                                        : begun.estimate.seconds;
-        now.share = std::min(1.0, done / std::max(begun.estimate.boxes, 1.0));
+        now.seconds_left = now.rate > 0 ? std::max(0.0, started.estimate.boxes - done) / now.rate
+                                        : started.estimate.seconds;
+        now.share = std::min(1.0, done / std::max(started.estimate.boxes, 1.0));
         return progress_(now) ? Stop::none : Stop::interrupted;
     }
 
     CertifyOutcome prove(double margin)
     {
-        Begun& begun = *all_.current;
-        if (const Stop stop = report(begun, margin, 0, 0); stop != Stop::none) {
+        Started& started = *all_.current;
+        if (const Stop stop = report(started, margin, 0, 0); stop != Stop::none) {
             return outcome_of(stop);
         }
         const auto start = Clock::now();
-        const Statement statement = state(margin, begun.threshold);
-        Proof proof(statement, grow(statement, frontier_boxes), o_.max_unproved, begun);
+        const Statement statement = state(margin, started.threshold);
+        Proof proof(statement, grow(statement, frontier_boxes), o_.max_unproved, started);
         auto saved = Clock::now();
         proof.run(o_.threads, [&](std::uint64_t boxes) {
             if (seconds_since(saved) > checkpoint_every) {
-                const double before = begun.seconds;
-                begun.seconds += seconds_since(start);
+                const double before = started.seconds;
+                started.seconds += seconds_since(start);
                 keep_([this] { save(all_, key_, o_.checkpoint); });
-                begun.seconds = before;
+                started.seconds = before;
                 saved = Clock::now();
             }
-            return report(begun, margin, boxes, seconds_since(start));
+            return report(started, margin, boxes, seconds_since(start));
         });
-        begun.seconds += seconds_since(start);
+        started.seconds += seconds_since(start);
         if (proof.stopped() != Stop::none) return outcome_of(proof.stopped());
         if (proof.refuted()) {
             counterexample_ = proof.total().counterexample;
@@ -318,15 +318,15 @@ private:
     /// Every box is proved or has no logit below `lowest`: with this threshold all are proved.
     void finish(const Tally& total, double margin)
     {
-        const Begun& begun = *all_.current;
+        const Started& started = *all_.current;
         CertificateLevel level{.margin = margin,
-                               .threshold = begun.threshold,
+                               .threshold = started.threshold,
                                .boxes = total.boxes,
-                               .seconds = begun.seconds,
+                               .seconds = started.seconds,
                                .unproved = total.unproved};
-        const double lowest = std::min(total.lowest, begun.threshold);
+        const double lowest = std::min(total.lowest, started.threshold);
         // A gate has no list of exceptions.
-        if (begun.threshold - lowest <= begun.lowering ||
+        if (started.threshold - lowest <= started.lowering ||
             (model_.kind == level_gate && std::isfinite(lowest))) {
             level.threshold = lowest;
             level.unproved.clear();
@@ -418,7 +418,7 @@ std::string_view describe(CertifyOutcome outcome) noexcept
             return "too many boxes are left over; lower the threshold or the margin, or train the "
                    "network further";
         case CertifyOutcome::too_long:
-            return "the estimate is above the limit and nothing was begun; raise the limit, or "
+            return "the estimate is above the limit and nothing was started; raise the limit, or "
                    "lower the threshold";
         case CertifyOutcome::out_of_time:
             return "the time is up; what is done is kept in the checkpoint, to be resumed";

@@ -79,19 +79,19 @@ Attempt attempt_of(const nlohmann::json& from)
 }
 
 /// Omits parts with a counterexample, which is found again.
-Json json(const Begun& begun)
+Json json(const Started& started)
 {
     Json done = Json::array();
-    for (std::size_t i = 0; i < begun.done.size(); ++i) {
-        if (!begun.done[i] || !begun.done[i]->counterexample.empty()) continue;
-        const Tally& tally = *begun.done[i];
+    for (std::size_t i = 0; i < started.done.size(); ++i) {
+        if (!started.done[i] || !started.done[i]->counterexample.empty()) continue;
+        const Tally& tally = *started.done[i];
         done.push_back(
             Json::array({i, tally.boxes, tally.unproved.empty() ? Json() : Json(tally.lowest),
                          json(tally.unproved)}));
     }
-    return {{"threshold", begun.threshold},     {"lowering", begun.lowering},
-            {"estimate", json(begun.estimate)}, {"seconds", begun.seconds},
-            {"parts", begun.done.size()},       {"done", done}};
+    return {{"threshold", started.threshold},     {"lowering", started.lowering},
+            {"estimate", json(started.estimate)}, {"seconds", started.seconds},
+            {"parts", started.done.size()},       {"done", done}};
 }
 
 [[noreturn]] void refuse_certification(const std::filesystem::path& file, std::string_view what)
@@ -103,12 +103,12 @@ constexpr int deepest = 8;  ///< levels of JSON: lists of boxes in lists of part
 
 constexpr std::string_view checkpoint_format = "ricochet certification 1";
 
-Begun begun_of(const nlohmann::json& from)
+Started started_of(const nlohmann::json& from)
 {
-    Begun out{.threshold = from.at("threshold").get<double>(),
-              .lowering = from.at("lowering").get<double>(),
-              .estimate = estimate_of(from.at("estimate")),
-              .seconds = from.at("seconds").get<double>()};
+    Started out{.threshold = from.at("threshold").get<double>(),
+                .lowering = from.at("lowering").get<double>(),
+                .estimate = estimate_of(from.at("estimate")),
+                .seconds = from.at("seconds").get<double>()};
     out.done.resize(std::min<std::size_t>(count_of(from.at("parts")), 2 * frontier_boxes));
     for (const nlohmann::json& part : from.at("done")) {
         Tally tally;
@@ -185,7 +185,7 @@ Progressed load(const std::string& key, const std::filesystem::path& file)
         for (const nlohmann::json& e : from.at("estimates"))
             out.estimates.push_back(estimate_of(e));
         if (!from.at("attempt").is_null()) out.attempt = attempt_of(from.at("attempt"));
-        if (!from.at("current").is_null()) out.current = begun_of(from.at("current"));
+        if (!from.at("current").is_null()) out.current = started_of(from.at("current"));
         return out;
     } catch (const ricochet::detail::JsonTrouble&) {
         refuse_certification(file, "is cut short or has been altered");

@@ -15,7 +15,7 @@ namespace ricochet::learn {
 constexpr std::size_t frontier_boxes = 2048;
 
 /// A level whose proof has started.
-struct Begun {
+struct Started {
     double threshold = 0;
     double lowering = 0;  ///< allowed lowering of the threshold, to include unproved boxes
     Estimate estimate{};
@@ -35,7 +35,7 @@ struct Progressed {
     std::vector<CertificateLevel> levels{};
     std::vector<Estimate> estimates{};
     std::optional<Attempt> attempt{};  ///< at the level after these
-    std::optional<Begun> current{};
+    std::optional<Started> current{};
 };
 
 /// Writes to a neighbouring file and renames it. Of a started level the finished parts are

@@ -101,7 +101,7 @@ struct Rates {
 struct State {
     std::uint64_t generations = 0;
     std::uint64_t evaluations = 0;
-    std::uint64_t fruitless = 0;  ///< generations in a row
+    std::uint64_t stagnant = 0;  ///< generations in a row
     double seconds = 0;
     Random::State random{};
     double spread = 0;
@@ -118,7 +118,7 @@ void fields(Member&& member, Stream&& s)
 {
     member(s.generations);
     member(s.evaluations);
-    member(s.fruitless);
+    member(s.stagnant);
     member(s.seconds);
     for (auto& word : s.random) member(word);
     member(s.spread);
@@ -232,10 +232,10 @@ private:
         rank();
         for (const std::size_t k : order_) keep_if_best(tried_[k], scores_[k]);
         if (scores_[order_.front()] < infinity) {
-            s_.fruitless = 0;
+            s_.stagnant = 0;
             move();
         } else {
-            ++s_.fruitless;
+            ++s_.stagnant;
             s_.spread /= 2;
             s_.mean = s_.best;
         }
@@ -331,7 +331,7 @@ private:
     [[nodiscard]] std::optional<EvolutionOutcome> ended() const
     {
         if (s_.best_score <= options_.target) return EvolutionOutcome::target;
-        if (s_.fruitless >= fruitless_generations) return EvolutionOutcome::none_allowed;
+        if (s_.stagnant >= stagnant_generations) return EvolutionOutcome::none_allowed;
         if (s_.evaluations >= options_.max_evaluations) return EvolutionOutcome::max_evaluations;
         if (s_.seconds >= options_.max_seconds) return EvolutionOutcome::max_seconds;
         if (largest_spread() < options_.least_spread) return EvolutionOutcome::converged;

@@ -26,15 +26,15 @@ enum class Stop { none, interrupted, out_of_time, out_of_memory };
 /// does not depend on the speed of the threads.
 class Proof {
 public:
-    Proof(const Statement& statement, Frontier frontier, std::size_t max_unproved, Begun& begun)
+    Proof(const Statement& statement, Frontier frontier, std::size_t max_unproved, Started& started)
         : statement_(statement),
           frontier_(std::move(frontier)),
           max_unproved_(max_unproved),
-          begun_(begun),
+          started_(started),
           total_(frontier_.tally)
     {
-        begun_.done.resize(frontier_.open.size());
-        for (const auto& part : begun_.done) {
+        started_.done.resize(frontier_.open.size());
+        for (const auto& part : started_.done) {
             if (part) boxes_ += part->boxes;
         }
         boxes_ += total_.boxes;
@@ -74,7 +74,7 @@ public:
 private:
     [[nodiscard]] bool finished() const noexcept
     {
-        return refuted() || too_many() || settled_ == begun_.done.size();
+        return refuted() || too_many() || settled_ == started_.done.size();
     }
     [[nodiscard]] bool idle() const noexcept
     {
@@ -85,8 +85,8 @@ private:
     /// Adds up the finished parts without a gap.
     void advance()
     {
-        while (!finished() && begun_.done[settled_]) {
-            const Tally& part = *begun_.done[settled_];
+        while (!finished() && started_.done[settled_]) {
+            const Tally& part = *started_.done[settled_];
             total_.boxes += part.boxes;
             total_.lowest = std::min(total_.lowest, part.lowest);
             total_.unproved.insert(total_.unproved.end(), part.unproved.begin(),
@@ -100,8 +100,8 @@ private:
     {
         const std::scoped_lock lock(mutex_);
         if (finished() || stop_ != Stop::none || error_) return std::nullopt;
-        while (next_ < begun_.done.size() && begun_.done[next_]) ++next_;
-        if (next_ >= begun_.done.size()) return std::nullopt;
+        while (next_ < started_.done.size() && started_.done[next_]) ++next_;
+        if (next_ >= started_.done.size()) return std::nullopt;
         ++running_;
         return next_++;
     }
@@ -130,7 +130,7 @@ private:
             if (failed != Stop::none && stop_ == Stop::none) stop_ = failed;
             if (error && !error_) error_ = error;
             if (whole) {
-                begun_.done[*part] = std::move(tally);
+                started_.done[*part] = std::move(tally);
                 advance();
             }
             wake_.notify_all();
@@ -142,7 +142,7 @@ private:
     const Statement& statement_;
     Frontier frontier_;
     std::size_t max_unproved_;
-    Begun& begun_;
+    Started& started_;
     Tally total_;  ///< of the frontier and of the first `settled_` parts
     std::size_t settled_ = 0;
     std::size_t next_ = 0;  ///< next part that is not claimed

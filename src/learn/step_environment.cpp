@@ -35,7 +35,7 @@ struct Attempt {
 /// A fault whose steps are chosen by the caller.
 class FaultRun {
 public:
-    FaultRun(const StrikeSlipFault& fault, double t_end, const StepWorldOptions& options)
+    FaultRun(const StrikeSlipFault& fault, double t_end, const StepEnvironmentOptions& options)
         : t_end_(t_end),
           options_(options),
           reference_(detail::reference_of(fault, t_end, 0, options.watch)),
@@ -109,7 +109,7 @@ public:
 
 private:
     double t_end_;
-    StepWorldOptions options_;
+    StepEnvironmentOptions options_;
     detail::FaultReference reference_;
     std::optional<detail::Comparison> comparison_;
     BatheOptions bathe_;
@@ -125,7 +125,7 @@ public:
     using State = StateOf<System>;
 
     SmallRun(const System& system, const State& start, double t_end,
-             detail::Reference<System> reference, const StepWorldOptions& options)
+             detail::Reference<System> reference, const StepEnvironmentOptions& options)
         : system_(system), start_(start), t_end_(t_end), reference_(std::move(reference))
     {
         for (const State& w : reference_) of_all_ += w.squaredNorm();
@@ -241,7 +241,7 @@ template <class Run>
 class Episodes {
 public:
     template <class... Parts>
-    Episodes(const StepWorldOptions& options, Parts&&... parts)
+    Episodes(const StepEnvironmentOptions& options, Parts&&... parts)
         : options_(options), run_(std::forward<Parts>(parts)...)
     {
     }
@@ -261,7 +261,7 @@ public:
         const Attempt attempt = run_.step(length_of(action));
         ++attempts_;
         failures_ = attempt.solved ? 0 : failures_ + 1;
-        ended_ = attempt.ended || failures_ >= step_world_failures;
+        ended_ = attempt.ended || failures_ >= step_environment_failures;
         const double squares = run_.squares(ended_);
         Reaction out;
         out.reward =
@@ -320,7 +320,7 @@ private:
         }
     }
 
-    StepWorldOptions options_;
+    StepEnvironmentOptions options_;
     Run run_;
     std::uint64_t attempts_ = 0;
     int failures_ = 0;
@@ -329,9 +329,9 @@ private:
 };
 
 template <class Run>
-StepWorld world_of(std::shared_ptr<Episodes<Run>> episodes)
+StepEnvironment environment_of(std::shared_ptr<Episodes<Run>> episodes)
 {
-    StepWorld out;
+    StepEnvironment out;
     out.environment = {
         .observations = observations,
         .actions = 1,
@@ -344,9 +344,9 @@ StepWorld world_of(std::shared_ptr<Episodes<Run>> episodes)
     return out;
 }
 
-StepWorldOptions checked(StepWorldOptions o, double longest)
+StepEnvironmentOptions checked(StepEnvironmentOptions o, double longest)
 {
-    constexpr ricochet::detail::Require require{"StepWorldOptions"};
+    constexpr ricochet::detail::Require require{"StepEnvironmentOptions"};
     if (o.h_max == 0) o.h_max = longest;
     require(o.alpha >= 0 && std::isfinite(o.alpha), "alpha must be zero or positive", o.alpha);
     require(o.expensive > 1, "expensive must be above 1", o.expensive);
@@ -361,7 +361,7 @@ StepWorldOptions checked(StepWorldOptions o, double longest)
 
 }  // namespace
 
-StepWorldOptions published_step_world(double alpha)
+StepEnvironmentOptions published_step_environment(double alpha)
 {
     return {.alpha = alpha,
             .scale = StepScale::linear,
@@ -369,36 +369,37 @@ StepWorldOptions published_step_world(double alpha)
             .first_stage = FirstStage::at_end};
 }
 
-StepWorld step_world(const StrikeSlipFault& fault, double t_end, const StepWorldOptions& options)
+StepEnvironment step_environment(const StrikeSlipFault& fault, double t_end,
+                                 const StepEnvironmentOptions& options)
 {
-    const StepWorldOptions o = checked(options, t_end / 5);
-    return world_of(std::make_shared<Episodes<FaultRun>>(o, fault, t_end, o));
+    const StepEnvironmentOptions o = checked(options, t_end / 5);
+    return environment_of(std::make_shared<Episodes<FaultRun>>(o, fault, t_end, o));
 }
 
-StepWorld step_world(const SlidingMode& system, double from, double t_end,
-                     const StepWorldOptions& options)
+StepEnvironment step_environment(const SlidingMode& system, double from, double t_end,
+                                 const StepEnvironmentOptions& options)
 {
-    const StepWorldOptions o =
+    const StepEnvironmentOptions o =
         checked(options, 2 * std::numbers::pi / (10 * system.parameters().frequency));
     using Run = SmallRun<SlidingMode>;
-    return world_of(std::make_shared<Episodes<Run>>(o, system, SlidingMode::Vector::Constant(from),
-                                                    t_end,
-                                                    detail::reference_of(system, from, t_end), o));
+    return environment_of(
+        std::make_shared<Episodes<Run>>(o, system, SlidingMode::Vector::Constant(from), t_end,
+                                        detail::reference_of(system, from, t_end), o));
 }
 
-StepWorld step_world(const DiodeCircuit& system, const Eigen::Vector3d& start, double t_end,
-                     const StepWorldOptions& options)
+StepEnvironment step_environment(const DiodeCircuit& system, const Eigen::Vector3d& start,
+                                 double t_end, const StepEnvironmentOptions& options)
 {
-    const StepWorldOptions o = checked(options, t_end / 10);
+    const StepEnvironmentOptions o = checked(options, t_end / 10);
     using Run = SmallRun<DiodeCircuit>;
-    return world_of(std::make_shared<Episodes<Run>>(o, system, start, t_end,
-                                                    detail::reference_of(system, start, t_end), o));
+    return environment_of(std::make_shared<Episodes<Run>>(
+        o, system, start, t_end, detail::reference_of(system, start, t_end), o));
 }
 
-StepTrial follow(const StepWorld& world, const Model& policy)
+StepTrial follow(const StepEnvironment& runs, const Model& policy)
 {
     const Mlp<double> network(policy);
-    const Environment& environment = world.environment;
+    const Environment& environment = runs.environment;
     if (network.inputs() != environment.observations || network.outputs() != environment.actions) {
         throw std::invalid_argument(fmt::format(
             "a policy of steps has {} inputs and {} output, not {} and {}",
@@ -411,7 +412,7 @@ StepTrial follow(const StepWorld& world, const Model& policy)
         network.forward(o.data(), &action);
         action = std::tanh(action);
         const Reaction reaction = environment.step({&action, 1}, o);
-        if (reaction.terminal || reaction.truncated) return world.trial();
+        if (reaction.terminal || reaction.truncated) return runs.trial();
     }
 }
 

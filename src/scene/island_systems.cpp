@@ -137,7 +137,7 @@ void Islands::record_system(Island& island)
 const std::vector<double>& Islands::state(std::uint32_t which, const Instant& t) const
 {
     const Island& island = islands_[which];
-    if (!island.begun) return island.x;
+    if (!island.started) return island.x;
     look_at(island, t);
     return at_;
 }

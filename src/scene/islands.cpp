@@ -310,10 +310,10 @@ bool Islands::record(Island& island)
 bool Islands::advance(std::uint32_t which)
 {
     Island& island = islands_[which];
-    if (!island.begun) {
+    if (!island.started) {
         flow(island, island.x, island.rate, 0);
         island.next = first_step(island);
-        island.begun = true;
+        island.started = true;
         if (island.events) {
             const StepVerdict verdict =
                 island.events->start(island.start, island.x, island.next, island.mode);
@@ -410,8 +410,8 @@ bool Islands::resume(std::uint32_t which, const Instant& t,
     island.start = t;
     seen_ = nullptr;
     flow(island, island.x, island.rate, 0);
-    if (!island.begun) island.next = first_step(island);
-    island.begun = true;
+    if (!island.started) island.next = first_step(island);
+    island.started = true;
     return attempt(which) && record(island);
 }
 

@@ -95,7 +95,7 @@ private:
         Instant start{}, end{};
         double h = 0;     ///< of the current step
         double next = 0;  ///< length that the error allows
-        bool begun = false;
+        bool started = false;
         bool unseen = false;  ///< one body that can meet nothing: its record has no polynomial
         std::uint32_t short_steps = 0;         ///< in a row
         State x, remainder, rate;              ///< at the start of the current step

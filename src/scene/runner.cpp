@@ -45,7 +45,7 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
     }
     calendar_.clear(members_.size() >= world_.tuning.ring_from);
     now_ = {world_.options.t_start, 0};
-    fruitless_ = 0;
+    unmoved_ = 0;
     idle_ = 0;
     next_sample_ = 0;
     result_ = {};

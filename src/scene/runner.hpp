@@ -182,8 +182,8 @@ private:
     };
     OfGroup<Series> series_;  ///< of impacts of a body
     Instant now_{};
-    std::uint32_t fruitless_ = 0;  ///< consecutive predicted impacts that moved nothing
-    std::uint64_t idle_ = 0;       ///< consecutive acts at one time
+    std::uint32_t unmoved_ = 0;  ///< consecutive predicted impacts that moved nothing
+    std::uint64_t idle_ = 0;     ///< consecutive acts at one time
     std::size_t next_sample_ = 0;
     GroupResult result_;
 };

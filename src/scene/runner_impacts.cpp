@@ -22,9 +22,9 @@ constexpr double low = 1024;
 constexpr std::uint32_t most_low = 1024;
 
 /// Consecutive predicted impacts that change nothing.
-constexpr std::uint32_t most_fruitless = 1000;
+constexpr std::uint32_t most_unmoved = 1000;
 /// The same, before the cluster is joined to a group in lasting contact.
-constexpr std::uint32_t fruitless_to_join = 8;
+constexpr std::uint32_t unmoved_to_join = 8;
 
 /// Gaps, relative to the coordinates, that the steps of groups in contact leave.
 constexpr double loose = 1e-10;
@@ -345,18 +345,18 @@ void Runner::resolve_cluster(std::uint32_t i)
         if (const auto bodies = joining(-never, never); !bodies.empty()) {
             return hand_over(bodies, "");
         }
-        ++fruitless_;
-        if (contacts_.available() && fruitless_ > fruitless_to_join) {
-            fruitless_ = 0;
+        ++unmoved_;
+        if (contacts_.available() && unmoved_ > unmoved_to_join) {
+            unmoved_ = 0;
             return hand_over(std::vector(cluster_.bodies), "");
         }
-        if (fruitless_ > most_fruitless) {
+        if (unmoved_ > most_unmoved) {
             return fail(Outcome::endless_cascade, {i},
                         fmt::format("impacts of {} repeat without effect", called(i)));
         }
         return predict(i);
     }
-    fruitless_ = 0;
+    unmoved_ = 0;
     ++result_.event_count;
     if (result_.event_count >= world_.options.max_events) {
         fail(Outcome::step_limit, {},

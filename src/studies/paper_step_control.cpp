@@ -12,7 +12,7 @@
 #include <numbers>
 
 #include "interrupt.hpp"
-#include "learn/step_world.hpp"
+#include "learn/step_environment.hpp"
 #include "paper_step_control.hpp"
 #include "papers.hpp"
 #include "policy_lookup.hpp"
@@ -72,7 +72,7 @@ Exhibit table_2(const ExhibitSize& /*size*/)
 {
     const HeuristicStep rule;
     return of_parameters({{"integrator order p", static_cast<double>(rule.order), 1},
-                          {"shortest step [s]", learn::published_step_world().h_min, 1e-5},
+                          {"shortest step [s]", learn::published_step_environment().h_min, 1e-5},
                           {"increasing factor", rule.up, 2},
                           {"decreasing factor", rule.down, 0.6}});
 }
@@ -81,7 +81,7 @@ Exhibit table_3(const ExhibitSize& /*size*/)
 {
     const PrintedPiStep rule;
     return of_parameters({{"integrator order p", static_cast<double>(rule.order), 1},
-                          {"shortest step [s]", learn::published_step_world().h_min, 1e-5},
+                          {"shortest step [s]", learn::published_step_environment().h_min, 1e-5},
                           {"gamma 1", rule.gamma1, 1.0 / 6},
                           {"gamma 2", rule.gamma2, 1.0 / 6},
                           {"kappa", rule.kappa, 1.0 / 6},
@@ -154,29 +154,29 @@ Trace<System> trace(std::string name, const System& system, const StateOf<System
 /// Options of the published scheme, with the error by step doubling.
 SetValuedOptions published_scheme(double t_end, double h_max)
 {
-    const learn::StepWorldOptions world = learn::published_step_world();
+    const learn::StepEnvironmentOptions published = learn::published_step_environment();
     SetValuedOptions out{.t_end = t_end, .step = h_max / 100};
     out.estimate = ErrorEstimate::doubling;
-    out.rtol = world.tolerance;
-    out.atol = 1e-3 * world.tolerance;
+    out.rtol = published.tolerance;
+    out.atol = 1e-3 * published.tolerance;
     out.error_order = 1;
     out.h_max = h_max;
-    out.scheme.first_stage = world.first_stage;
+    out.scheme.first_stage = published.first_stage;
     out.max_attempts = 20'000;
     return out;
 }
 
 /// The runs that the paper trains on.
-learn::StepWorld training_world(const SlidingMode&, double t_end,
-                                const learn::StepWorldOptions& options)
+learn::StepEnvironment training_environment(const SlidingMode&, double t_end,
+                                            const learn::StepEnvironmentOptions& options)
 {
-    return learn::step_world(SlidingMode({.amplitude = 1.5}), 0.1, t_end, options);
+    return learn::step_environment(SlidingMode({.amplitude = 1.5}), 0.1, t_end, options);
 }
 
-learn::StepWorld training_world(const DiodeCircuit& system, double t_end,
-                                const learn::StepWorldOptions& options)
+learn::StepEnvironment training_environment(const DiodeCircuit& system, double t_end,
+                                            const learn::StepEnvironmentOptions& options)
 {
-    return learn::step_world(system, {0.15264, -0.02281, 0.38127}, t_end, options);
+    return learn::step_environment(system, {0.15264, -0.02281, 0.38127}, t_end, options);
 }
 
 /// The rules of the paper and one of ours on one system.
@@ -195,9 +195,10 @@ std::vector<Trace<System>> traces(const System& system, const StateOf<System>& s
     out.push_back(by("PI as coded, h211b", FilteredStep::h211b(4)));
     out.push_back(by("heuristic, eq. 5", HeuristicStep{}));
     const auto by_actor = [&](std::string name, const Model& actor,
-                              const learn::StepWorldOptions& judged_as) {
-        const learn::StepWorld world = source_world(std::string(System::name), judged_as);
-        const std::vector<double> lengths = lengths_of(world, actor);
+                              const learn::StepEnvironmentOptions& judged_as) {
+        const learn::StepEnvironment runs =
+            source_environment(std::string(System::name), judged_as);
+        const std::vector<double> lengths = lengths_of(runs, actor);
         if (lengths.empty()) return Trace<System>{.name = std::move(name)};
         SetValuedOptions options = scheme;
         options.step = lengths.front();
@@ -208,13 +209,14 @@ std::vector<Trace<System>> traces(const System& system, const StateOf<System>& s
     const Model tqc = shipped_actor(System::name);
     out.push_back(by_actor("TQC, the stored actor", tqc, judged(tqc)));
     if (trained_now) {
-        learn::StepWorldOptions options = learn::published_step_world();
+        learn::StepEnvironmentOptions options = learn::published_step_environment();
         options.max_attempts = 5000;
-        const learn::Environment world = training_world(system, t_end, options).environment;
+        const learn::Environment environment =
+            training_environment(system, t_end, options).environment;
         const auto goes_on = [](const auto&, const Model&) { return !Interrupts::any(); };
-        const Model by_tqc = learn::train_tqc(world, {}, goes_on).policy;
+        const Model by_tqc = learn::train_tqc(environment, {}, goes_on).policy;
         check_exhibit();
-        const Model by_td3 = learn::train_td3(world, {}, goes_on).policy;
+        const Model by_td3 = learn::train_td3(environment, {}, goes_on).policy;
         check_exhibit();
         out.push_back(by_actor("TQC, trained on the paper's run", by_tqc, options));
         out.push_back(by_actor("TD3, trained on the paper's run", by_td3, options));
@@ -391,10 +393,10 @@ Exhibit figure_3(const ExhibitSize& size)
 
 }  // namespace
 
-std::vector<double> lengths_of(const learn::StepWorld& world, const Model& actor)
+std::vector<double> lengths_of(const learn::StepEnvironment& runs, const Model& actor)
 {
     const Mlp<double> network(actor);
-    const learn::Environment& environment = world.environment;
+    const learn::Environment& environment = runs.environment;
     std::vector<double> observation(environment.observations);
     std::vector<double> out;
     environment.reset(0, observation);
@@ -402,12 +404,12 @@ std::vector<double> lengths_of(const learn::StepWorld& world, const Model& actor
         double action = 0;
         network.forward(observation.data(), &action);
         action = std::tanh(action);
-        const std::uint64_t before = world.trial().steps;
+        const std::uint64_t before = runs.trial().steps;
         const learn::Reaction reaction = environment.step({&action, 1}, observation);
-        if (world.trial().steps > before) out.push_back(world.length_of(action));
+        if (runs.trial().steps > before) out.push_back(runs.length_of(action));
         if (reaction.terminal || reaction.truncated) break;
     }
-    return world.trial().ended ? out : std::vector<double>{};
+    return runs.trial().ended ? out : std::vector<double>{};
 }
 
 Paper step_control_paper()

@@ -11,7 +11,8 @@ namespace ricochet::app {
 
 /// [s] The steps that an actor takes in an environment, without attempts that had no solution;
 /// empty if it does not reach the end.
-[[nodiscard]] std::vector<double> lengths_of(const learn::StepWorld& world, const Model& actor);
+[[nodiscard]] std::vector<double> lengths_of(const learn::StepEnvironment& runs,
+                                             const Model& actor);
 
 [[nodiscard]] Exhibit fault_figure_5(const ExhibitSize& size);
 [[nodiscard]] Exhibit fault_figure_6(const ExhibitSize& size);

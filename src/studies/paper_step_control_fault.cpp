@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "interrupt.hpp"
-#include "learn/step_world.hpp"
+#include "learn/step_environment.hpp"
 #include "paper_step_control.hpp"
 #include "policy_lookup.hpp"
 #include "ricochet/faults/fault_bathe.hpp"
@@ -143,10 +143,10 @@ FaultRun tqc(const StrikeSlipFault& fault, bool timed = true,
              const std::vector<double>& snapshots = {})
 {
     const Model actor = shipped_actor(StrikeSlipFault::name);
-    learn::StepWorldOptions options = judged(actor);
+    learn::StepEnvironmentOptions options = judged(actor);
     options.watch = [](double) { return !Interrupts::any(); };
     options.max_attempts = 500;  // ten times as many as a run takes
-    const auto lengths = lengths_of(learn::step_world(fault, end_of(fault), options), actor);
+    const auto lengths = lengths_of(learn::step_environment(fault, end_of(fault), options), actor);
     check_exhibit();
     const std::string name = fmt::format("TQC, alpha {}", actor.parameters.at("alpha"));
     if (lengths.empty()) {

@@ -18,7 +18,7 @@
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
-#include "learn/step_world.hpp"
+#include "learn/step_environment.hpp"
 #include "policy_advice.hpp"
 #include "policy_lookup.hpp"
 #include "registry.hpp"
@@ -38,17 +38,17 @@ namespace {
 RuleRow by_actor(const Case& of, LongRun& progress)
 {
     const Model actor = shipped_actor(of.system);
-    learn::StepWorldOptions options = judged(actor);
+    learn::StepEnvironmentOptions options = judged(actor);
     options.watch = [&](double done) {
         progress.show(fmt::format("{}: {}", of.system, reinforced), done);
         return true;
     };
-    const learn::StepWorld world = of.world(options);
+    const learn::StepEnvironment runs = of.runs(options);
     RuleRow out{.rule = std::string(reinforced),
                 .setting = fmt::format("alpha {}", actor.parameters.at("alpha")),
-                .trial = learn::follow(world, actor)};
+                .trial = learn::follow(runs, actor)};
     out.reached = out.trial.ended && out.trial.error <= of.target;
-    out.seconds = seconds_of([&] { (void)learn::follow(world, actor); }, 1);
+    out.seconds = seconds_of([&] { (void)learn::follow(runs, actor); }, 1);
     return out;
 }
 
@@ -221,9 +221,9 @@ Case sliding_mode_case(const std::vector<std::string>& set)
                  [set](double target, LongRun&) {
                      return by_hand_over(std::string(SlidingMode::name), set, target);
                  },
-             .world =
-                 [p, from](const learn::StepWorldOptions& options) {
-                     return learn::step_world(SlidingMode(p), from, t_end, options);
+             .runs =
+                 [p, from](const learn::StepEnvironmentOptions& options) {
+                     return learn::step_environment(SlidingMode(p), from, t_end, options);
                  }};
     if (set.empty()) {
         out.beyond = {{"frequency 400 rad/s", problem({.frequency = 400}, SlidingMode::start)},
@@ -256,9 +256,9 @@ Case diode_circuit_case(const std::vector<std::string>& set)
                  [set](double target, LongRun&) {
                      return by_hand_over(std::string(DiodeCircuit::name), set, target);
                  },
-             .world =
-                 [circuit, start](const learn::StepWorldOptions& options) {
-                     return learn::step_world(circuit, start, t_end, options);
+             .runs =
+                 [circuit, start](const learn::StepEnvironmentOptions& options) {
+                     return learn::step_environment(circuit, start, t_end, options);
                  }};
     if (set.empty()) {
         DiodeCircuit::Parameters more_current;
@@ -298,9 +298,9 @@ Case fault_case(const std::vector<std::string>& set, LongRun& progress)
                  [fault, t_end](double target, LongRun& run) {
                      return by_explicit_pair(fault, t_end, target, run);
                  },
-             .world =
-                 [fault, t_end](const learn::StepWorldOptions& options) {
-                     return learn::step_world(fault, t_end, options);
+             .runs =
+                 [fault, t_end](const learn::StepEnvironmentOptions& options) {
+                     return learn::step_environment(fault, t_end, options);
                  }};
     if (!set.empty()) return out;
     const auto beyond = [&](std::string what, StrikeSlipFault::Parameters p) {

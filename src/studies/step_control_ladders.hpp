@@ -16,7 +16,7 @@
 
 #include "faults/step_progress.hpp"
 #include "interrupt.hpp"
-#include "learn/step_world.hpp"
+#include "learn/step_environment.hpp"
 #include "policy_lookup.hpp"
 
 namespace ricochet::app {
@@ -80,7 +80,7 @@ struct Case {
     double constant_span = 8;  ///< its constant steps, over the usual one
     std::size_t evaluations = 6000;
     std::function<RuleRow(double target, LongRun& progress)> event_driven{};
-    std::function<learn::StepWorld(const learn::StepWorldOptions& options)> world{};
+    std::function<learn::StepEnvironment(const learn::StepEnvironmentOptions& options)> runs{};
     std::vector<Beyond> beyond{};
 };
 

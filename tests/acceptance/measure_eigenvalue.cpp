@@ -53,8 +53,8 @@ std::string ceilings(const LeastEigenvalue& system, const Options& options, cons
 {
     const OracleCalls oracle = count_oracle<Fixed>(system, system.start(), options);
     const std::uint64_t location = every.guard_calls - every.steps - 1;
-    return fmt::format("oracle {:.5f}, with the bounds {:.5f}", per_step(oracle.looks + location),
-                       per_step(oracle.bounded_looks + location));
+    return fmt::format("oracle {:.5f}, with the bounds {:.5f}", per_step(oracle.checks + location),
+                       per_step(oracle.bounded_checks + location));
 }
 
 void measure_level(double level, Measured& out)

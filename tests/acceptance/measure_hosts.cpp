@@ -204,11 +204,11 @@ struct FarGuard {
 
 /// [s] of `examine`, on the reference machine.
 template <class System>
-double examine_time(const System& system, const typename System::State& x0, bool look_inside)
+double examine_time(const System& system, const typename System::State& x0, bool check_inside)
 {
     RotatingHost host(x0);
     RotatingHost plain(x0);
-    EventMonitor monitor(system, x0, {.look_inside = look_inside});
+    EventMonitor monitor(system, x0, {.check_inside = check_inside});
     (void)monitor.start({0}, x0, host.h());
     const Work watched = [&](std::size_t n) {
         for (std::size_t i = 0; i < n; ++i) {

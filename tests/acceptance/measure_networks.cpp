@@ -83,7 +83,7 @@ std::vector<AnyGate> odd_gates(std::string_view system, std::size_t inputs, doub
     return gates;
 }
 
-std::vector<AnyGate> dear_gates(std::string_view system, std::size_t inputs, double step)
+std::vector<AnyGate> expensive_gates(std::string_view system, std::size_t inputs, double step)
 {
     std::mt19937_64 random(6);
     const auto next = [&] { return 0.3 * (static_cast<double>(random() >> 11U) * 0x1p-52 - 1); };

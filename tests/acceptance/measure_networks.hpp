@@ -31,8 +31,8 @@ struct AnyNetwork {
 [[nodiscard]] std::vector<AnyGate> odd_gates(std::string_view system, std::size_t inputs,
                                              double step);
 /// Gates that cost some 0.2 us per answer, and know nothing.
-[[nodiscard]] std::vector<AnyGate> dear_gates(std::string_view system, std::size_t inputs,
-                                              double step);
+[[nodiscard]] std::vector<AnyGate> expensive_gates(std::string_view system, std::size_t inputs,
+                                                   double step);
 /// Predictions for one step.
 [[nodiscard]] std::vector<AnyNetwork> odd_networks(std::string_view system, std::size_t inputs);
 
@@ -127,7 +127,7 @@ void time_metered(std::vector<MeteredRow>& rows, const std::string& name, const 
     const auto run = [&](const auto& detector) {
         return run_with<Stepping>(system, options, detector);
     };
-    const std::vector<AnyGate> gates = dear_gates(system.name, system.start().size(), step);
+    const std::vector<AnyGate> gates = expensive_gates(system.name, system.start().size(), step);
     const PlannerOptions planning{.check_bounds = false};
     const std::array<Metered<Foreseen<>>, 2> metered{Metered(Foreseen<>(gates[0].gate, planning)),
                                                      Metered(Foreseen<>(gates[1].gate, planning))};

@@ -14,39 +14,39 @@ namespace ricochet::bench {
 
 namespace {
 
+using learn::StepEnvironment;
+using learn::StepEnvironmentOptions;
 using learn::StepTrial;
-using learn::StepWorld;
-using learn::StepWorldOptions;
 
-StepWorld world_of(const StepWorldOptions& options, int elements = 1)
+StepEnvironment environment_of(const StepEnvironmentOptions& options, int elements = 1)
 {
-    return learn::step_world(StrikeSlipFault({.elements = elements}), 30, options);
+    return learn::step_environment(StrikeSlipFault({.elements = elements}), 30, options);
 }
 
 /// Assessment of runs: until rest, without an error estimate.
-StepWorldOptions judged(StepWorldOptions options)
+StepEnvironmentOptions judged(StepEnvironmentOptions options)
 {
     options.until_rest = true;
     options.max_attempts = 5000;
     return options;
 }
 
-StepTrial constant_steps(const StepWorldOptions& options, double h)
+StepTrial constant_steps(const StepEnvironmentOptions& options, double h)
 {
-    StepWorldOptions plain = judged(options);
+    StepEnvironmentOptions plain = judged(options);
     plain.estimate = ErrorEstimate::none;
-    const StepWorld world = world_of(plain);
+    const StepEnvironment runs = environment_of(plain);
     std::array<double, 9> observation{};
-    world.environment.reset(0, observation);
-    const double action = world.action_of(h);
+    runs.environment.reset(0, observation);
+    const double action = runs.action_of(h);
     for (;;) {
-        const learn::Reaction reaction = world.environment.step({&action, 1}, observation);
-        if (reaction.terminal || reaction.truncated) return world.trial();
+        const learn::Reaction reaction = runs.environment.step({&action, 1}, observation);
+        if (reaction.terminal || reaction.truncated) return runs.trial();
     }
 }
 
 /// The iterations with which constant steps of the same scheme reach the same error.
-double iterations_of_constant_steps(const StepWorldOptions& options, double error)
+double iterations_of_constant_steps(const StepEnvironmentOptions& options, double error)
 {
     for (double h = 1.5; h > 0.01; h *= 0.97) {
         const StepTrial trial = constant_steps(options, h);
@@ -60,13 +60,14 @@ struct Learned {
     double gain = 0;  ///< iterations of constant steps over its own, at its error
 };
 
-Learned learn_by(const std::string& name, const StepWorldOptions& options, double discount,
+Learned learn_by(const std::string& name, const StepEnvironmentOptions& options, double discount,
                  Measured& out)
 {
     const learn::TrainedPolicy trained = learn::train_tqc(
-        world_of(options).environment, {.training = {.steps = 10'000, .discount = discount}});
+        environment_of(options).environment, {.training = {.steps = 10'000, .discount = discount}});
     const auto told = [&](int elements) {
-        const StepTrial trial = learn::follow(world_of(judged(options), elements), trained.policy);
+        const StepTrial trial =
+            learn::follow(environment_of(judged(options), elements), trained.policy);
         out.details.push_back(fmt::format(
             "{}, {} x {}: {} attempts, {} solves, {} iterations, velocity off by {:.3g}, slip "
             "by {:.3g}{}",
@@ -87,7 +88,8 @@ Learned learn_by(const std::string& name, const StepWorldOptions& options, doubl
 Measured tqc_by_both_rewards()
 {
     Measured out;
-    const Learned published = learn_by("equation 7", learn::published_step_world(2), 0.99, out);
+    const Learned published =
+        learn_by("equation 7", learn::published_step_environment(2), 0.99, out);
     const Learned additive = learn_by("additive",
                                       {.reward = learn::StepReward::additive,
                                        .lambda = 1000,

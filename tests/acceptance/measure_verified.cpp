@@ -74,8 +74,8 @@ struct Comparison {
     std::size_t runs = 0;
     std::size_t differences = 0;
     std::uint64_t events = 0;
-    std::uint64_t cleared = 0;  ///< events in steps that the network had cleared
-    std::uint64_t put_off = 0;  ///< exact checks
+    std::uint64_t cleared = 0;   ///< events in steps that the network had cleared
+    std::uint64_t deferred = 0;  ///< exact checks
 };
 
 template <class Stepping, class Exact>
@@ -89,7 +89,7 @@ void compare(const BallProblem& problem, const Options& options, const Network& 
     if (bits_of(gated) != bits_of(exact)) ++result.differences;
     result.events += exact.statistics.events;
     result.cleared += gated.statistics.missed_events;
-    result.put_off += gated.statistics.checks_put_off;
+    result.deferred += gated.statistics.checks_deferred;
 }
 
 /// The ball, the step and the tolerance change with `i`.
@@ -120,7 +120,7 @@ Measured compare_verified()
             weights, part.runs, part.differences, part.events, part.cleared));
         total.runs += part.runs;
         total.differences += part.differences;
-        total.put_off += part.put_off;
+        total.deferred += part.deferred;
     };
     std::mt19937_64 random(20230605);
     Comparison part;
@@ -147,7 +147,7 @@ Measured compare_verified()
     add_special("never \"clear\"", network_of([] { return 0.0; }, -1));
     return {.pass = total.differences == 0 && total.runs >= 4000,
             .text = fmt::format("{} runs compared, {} differences, {} checks put off", total.runs,
-                                total.differences, total.put_off),
+                                total.differences, total.deferred),
             .details = std::move(details)};
 }
 

@@ -147,7 +147,7 @@ struct Runs {
             run.statistics.missed_events != 0) {
             ++wrong;
         }
-        cleared += run.statistics.checks_put_off;
+        cleared += run.statistics.checks_deferred;
         steps += run.statistics.steps;
         if (at.empty() || found.error > error) {
             error = found.error;

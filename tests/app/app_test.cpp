@@ -45,7 +45,7 @@ TEST_F(App, SimulatePrintsTheKeysOfARun)
     }
     for (const char* key :
          {"steps", "rejected", "flow_calls", "guard_calls", "network_calls", "false_alarms",
-          "missed_events", "late_events", "checks_put_off", "evidence"}) {
+          "missed_events", "late_events", "checks_deferred", "checks_put_off", "evidence"}) {
         EXPECT_TRUE(run["statistics"].contains(key)) << key;
     }
     for (const char* key : {"proved", "checked", "gated", "assumed"}) {
@@ -121,7 +121,7 @@ TEST_F(App, ParametersReachTheSystem)
     EXPECT_EQ(run["t"], 3.0);
 }
 
-TEST_F(App, NetworkIsAskedEveryStepAndLooksAtTheGuardLess)
+TEST_F(App, NetworkIsAskedEveryStepAndChecksTheGuardLess)
 {
     const nlohmann::json ends = json(simulate({"--json", "--step", "0.01", "--detector", "ends"}));
     const nlohmann::json network =
@@ -148,13 +148,13 @@ TEST_F(App, NetworkPutsChecksOffAndVerifiedDoesNot)
 {
     const nlohmann::json bare =
         json(simulate({"--json", "--step", "0.01", "--detector", "network"}))["statistics"];
-    EXPECT_GT(bare["checks_put_off"], 2000);
+    EXPECT_GT(bare["checks_deferred"], 2000);
     EXPECT_EQ(bare["missed_events"], 0);
 
     // The floor declares no bound on its rate: every step keeps its check.
     const nlohmann::json verified =
         json(simulate({"--json", "--step", "0.01", "--detector", "verified"}))["statistics"];
-    EXPECT_EQ(verified["checks_put_off"], 0);
+    EXPECT_EQ(verified["checks_deferred"], 0);
     EXPECT_EQ(verified["missed_events"], 0);
     EXPECT_EQ(verified["network_calls"], verified["steps"]);
     EXPECT_EQ(verified["evidence"]["assumed"], 0);
@@ -181,7 +181,7 @@ TEST_F(App, NumbersRoundTripToTheBit)
     EXPECT_EQ(run["state"][1].get<double>(), expected.x[1]);
 }
 
-TEST_F(App, SlopeThatNobodyComputedIsNull)
+TEST_F(App, ASlopeThatWasNotComputedIsNull)
 {
     // Neither the detector nor the locator needs the guard's rate.
     const nlohmann::json run =

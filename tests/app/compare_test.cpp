@@ -36,11 +36,11 @@ TEST_F(App, CompareFindsAllImpactsByEveryDetector)
         EXPECT_GT(method["seconds"]["median"].get<double>(), 0);
     }
     for (const nlohmann::json& method : table["methods"]) {
-        const bool asks_in_vain = method["detector"] == "verified";
+        const bool asks_without_gain = method["detector"] == "verified";
         const bool bare = method["detector"] == "network" || method["detector"] == "line";
-        EXPECT_EQ(method["checks_put_off"] > 0, bare);
-        EXPECT_EQ(method["network_calls"] > 0, bare || asks_in_vain);
-        if (!asks_in_vain) continue;
+        EXPECT_EQ(method["checks_deferred"] > 0, bare);
+        EXPECT_EQ(method["network_calls"] > 0, bare || asks_without_gain);
+        if (!asks_without_gain) continue;
         const auto extremum = std::find_if(
             table["methods"].begin(), table["methods"].end(), [&](const nlohmann::json& other) {
                 return other["detector"] == "extremum" && other["stepper"] == method["stepper"];

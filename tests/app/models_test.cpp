@@ -274,7 +274,7 @@ TEST_F(App, VerifiedFindsTheEventsOfExtremumWhateverTheNetworkSays)
             EXPECT_EQ(run["state"], exact["state"]);
             EXPECT_EQ(run["outcome"], exact["outcome"]);
             EXPECT_EQ(run["statistics"]["steps"], exact["statistics"]["steps"]);
-            EXPECT_EQ(run["statistics"]["checks_put_off"], 0);
+            EXPECT_EQ(run["statistics"]["checks_deferred"], 0);
         }
     }
 }
@@ -290,10 +290,10 @@ TEST_F(App, MissesAndFalseAlarmsOfAWrongNetworkAreCounted)
     EXPECT_EQ(statistics("verified", "clear")["missed_events"], 13);
     EXPECT_EQ(statistics("verified", "clear")["late_events"], 0);
     const nlohmann::json alarmed = statistics("network", "alarm");
-    EXPECT_EQ(alarmed["checks_put_off"], 0);
+    EXPECT_EQ(alarmed["checks_deferred"], 0);
     EXPECT_EQ(alarmed["false_alarms"], alarmed["steps"].get<int>() - 13);
     const nlohmann::json cleared = statistics("network", "clear");
-    EXPECT_EQ(cleared["checks_put_off"], cleared["steps"]);
+    EXPECT_EQ(cleared["checks_deferred"], cleared["steps"]);
 }
 
 }  // namespace

@@ -209,7 +209,7 @@ TEST_F(Robust, AFullDiskIsAnError)
     EXPECT_EQ(files(), Words{});
 }
 
-TEST_F(Robust, FilesAreWrittenThoughNobodyReadsWhatIsPrinted)
+TEST_F(Robust, FilesAreWrittenThoughNothingPrintedIsRead)
 {
     if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
     const std::string command = "\"" RICOCHET_APP "\" simulate bouncing-ball --csv \"" +

@@ -292,7 +292,7 @@ TEST_F(App, AccumulatingImpactsNameTheGuardThatEndsTheRun)
     EXPECT_EQ(run["ended_by"], "wall");
 }
 
-TEST_F(App, ScenesWithDearGuardsMeetThem)
+TEST_F(App, ScenesWithExpensiveGuardsMeetThem)
 {
     for (const char* scene : {"cavern", "zones", "eigenvalue", "arm"}) {
         SCOPED_TRACE(scene);

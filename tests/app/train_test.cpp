@@ -60,7 +60,7 @@ TEST_F(App, InterruptedTrainingKeepsTheBestAndResumesToTheSameBits)
 {
     const Words words = train({"--kind", "any-step", "--iterations", "60000"});
     const pid_t child = start(words);
-    // The first line of progress says that the training itself has begun.
+    // The first line of progress says that the training itself has started.
     const fs::path err = work().parent_path() / "err";
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (content(err).find("10 %") == std::string::npos &&

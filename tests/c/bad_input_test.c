@@ -117,7 +117,7 @@ static void refuses_options_that_are_none(void)
     CHECK_OPTION(options.detector = INT_MIN, "detector");
     CHECK_OPTION(options.locator = 3, "locator");
     CHECK_OPTION(options.fixed_step = 2, "fixed_step");
-    CHECK_OPTION(options.look_inside = -1, "look_inside");
+    CHECK_OPTION(options.check_inside = -1, "check_inside");
     CHECK_OPTION(options.stop_at_event = 255, "stop_at_event");
     CHECK_OPTION(options.record_events = 3, "record_events");
     CHECK_OPTION(options.event_states = 3, "event_states");

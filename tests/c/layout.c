@@ -56,7 +56,7 @@ int main(void)
     AT(rc_options, fixed_step);
     AT(rc_options, detector);
     AT(rc_options, locator);
-    AT(rc_options, look_inside);
+    AT(rc_options, check_inside);
     AT(rc_options, stop_at_event);
     AT(rc_options, record_events);
     AT(rc_options, event_states);
@@ -94,7 +94,7 @@ int main(void)
     AT(rc_statistics, guard_calls);
     AT(rc_statistics, network_calls);
     AT(rc_statistics, late_events);
-    AT(rc_statistics, checks_put_off);
+    AT(rc_statistics, checks_deferred);
     AT(rc_statistics, outside_domain);
     AT(rc_statistics, bound_calls);
     AT(rc_statistics, rollbacks);
@@ -129,7 +129,7 @@ int main(void)
     AT(rc_monitor_options, event_window);
     AT(rc_monitor_options, detector);
     AT(rc_monitor_options, locator);
-    AT(rc_monitor_options, look_inside);
+    AT(rc_monitor_options, check_inside);
     AT(rc_monitor_options, record_events);
     AT(rc_monitor_options, event_states);
     AT(rc_monitor_options, backward);

@@ -37,7 +37,7 @@ static void refuses_monitors_that_are_none(void)
     CHECK_OPTION(options.event_window = NAN, "event_window");
     CHECK_OPTION(options.detector = 7, "detector");
     CHECK_OPTION(options.locator = -1, "locator");
-    CHECK_OPTION(options.look_inside = 2, "look_inside");
+    CHECK_OPTION(options.check_inside = 2, "check_inside");
     CHECK_OPTION(options.record_events = 2, "record_events");
     CHECK_OPTION(options.event_states = 2, "event_states");
     CHECK_OPTION(options.backward = -1, "backward");

@@ -350,7 +350,7 @@ static void plans_by_bounds(void)
     callbacks.speed_bound = callbacks.acceleration_bound = NULL;
     planned = start_ball(&callbacks, &options); /* the exact detector */
     CHECK_STATUS(RC_OK, rc_run(planned));
-    CHECK(rc_event_count(planned) == 13 && statistics_of(planned).checks_put_off == 0);
+    CHECK(rc_event_count(planned) == 13 && statistics_of(planned).checks_deferred == 0);
     rc_simulation_free(planned);
 }
 

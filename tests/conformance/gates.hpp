@@ -121,12 +121,12 @@ struct GateCase {
     std::function<ShuttleRun(const Model&)> run;
     const ShuttleRun* exact;  ///< of the detector to which the gate leaves the other steps
     Model truth;
-    bool keeps_events = false;             ///< of the exact detector, with any weights
-    bool returns = false;                  ///< it finds the guard on its other side
-    bool saves = true;                     ///< exact calls, with a network that predicts correctly
-    bool plans = false;                    ///< by bounds in addition to the cleared intervals
-    bool refuses_other_weights = false;    ///< since its proof is for these
-    Evidence put_off = Evidence::checked;  ///< of the steps that it does not examine
+    bool keeps_events = false;              ///< of the exact detector, with any weights
+    bool returns = false;                   ///< it finds the guard on its other side
+    bool saves = true;                      ///< exact calls, with a network that predicts correctly
+    bool plans = false;                     ///< by bounds in addition to the cleared intervals
+    bool refuses_other_weights = false;     ///< since its proof is for these
+    Evidence deferred = Evidence::checked;  ///< of the steps that it does not examine
 };
 
 inline void PrintTo(const GateCase& gate, std::ostream* out)
@@ -163,7 +163,7 @@ protected:
         EXPECT_EQ(run.statistics.missed_events, 0U);
         if (GetParam().plans) return;
         EXPECT_EQ(run.statistics.evidence.gated, 0U);
-        EXPECT_EQ(run.statistics.checks_put_off, 0U);
+        EXPECT_EQ(run.statistics.checks_deferred, 0U);
     }
 
     /// The correct model with every weight from `next`.
@@ -246,7 +246,7 @@ TEST_P(GateSuite, TheTruthKeepsTheEventsAndSavesCalls)
     EXPECT_EQ(run.statistics.late_events, 0U);
     if (GetParam().saves) {
         EXPECT_LT(run.statistics.guard_calls, exact().statistics.guard_calls / 2);
-        EXPECT_GT(run.statistics.checks_put_off, run.statistics.steps / 2);
+        EXPECT_GT(run.statistics.checks_deferred, run.statistics.steps / 2);
     }
 }
 
@@ -272,18 +272,18 @@ TEST_P(GateSuite, AMissedEventIsNeverHiddenBehindEvidence)
     });
 }
 
-TEST_P(GateSuite, WhatIsNotLookedAtIsNamed)
+TEST_P(GateSuite, WhatIsNotCheckedIsNamed)
 {
     const auto check = [](const ShuttleRun& run) {
         const Statistics& s = run.statistics;
         const EvidenceCounts& e = s.evidence;
-        if (GetParam().put_off != Evidence::gated) {
+        if (GetParam().deferred != Evidence::gated) {
             EXPECT_EQ(e.gated, 0U);
         }
-        if (GetParam().put_off != Evidence::assumed) {
+        if (GetParam().deferred != Evidence::assumed) {
             EXPECT_EQ(e.assumed, 0U);
         }
-        if (GetParam().put_off != Evidence::proved) {
+        if (GetParam().deferred != Evidence::proved) {
             EXPECT_EQ(e.proved, 0U);
         }
         // Every step has its evidence or an event.
@@ -319,7 +319,7 @@ TEST_P(GateSuite, ANetworkThatNeverClearsOnlyCostsTime)
     EXPECT_EQ(run.statistics.missed_events, 0U);
     EXPECT_GT(run.statistics.network_calls, 0U);
     if (!GetParam().plans) {
-        EXPECT_EQ(run.statistics.checks_put_off, 0U);
+        EXPECT_EQ(run.statistics.checks_deferred, 0U);
     }
 }
 

@@ -19,7 +19,7 @@ void expect_exact(const Options& options)
     }
     EXPECT_EQ(line.statistics.missed_events, 0u);
     EXPECT_EQ(line.statistics.false_alarms, 0u);
-    EXPECT_EQ(line.statistics.checks_put_off + 13, line.statistics.steps);
+    EXPECT_EQ(line.statistics.checks_deferred + 13, line.statistics.steps);
 }
 
 TEST(BallisticLine, PredictsTheBallWithoutAMistake)

@@ -27,13 +27,13 @@ TEST(Cover, ADoubtCoversNothing)
 {
     for (const double bad : {nan, -inf, -1.0}) {
         EXPECT_EQ(time_covered({.distance = bad, .speed = 1, .acceleration = 1}), 0);
-        EXPECT_EQ(time_to_look({.distance = bad, .speed = 1, .acceleration = 1}, 0), 0);
+        EXPECT_EQ(time_to_check({.distance = bad, .speed = 1, .acceleration = 1}, 0), 0);
     }
     EXPECT_EQ(time_covered({.distance = 0, .speed = 0, .acceleration = 0}), 0);
     for (const double bad : {nan, inf, -inf, -1.0}) {
         EXPECT_EQ(time_covered({.distance = 1, .speed = bad, .acceleration = 1}), 0);
         EXPECT_EQ(time_covered({.distance = 1, .speed = 1, .acceleration = bad}), 0);
-        EXPECT_EQ(time_to_look({.distance = 1, .speed = 1, .acceleration = bad}, 0), 0);
+        EXPECT_EQ(time_to_check({.distance = 1, .speed = 1, .acceleration = bad}, 0), 0);
     }
     const GuardBound good{.distance = 1, .speed = 0.1, .acceleration = 0.1};
     ASSERT_TRUE(stays_clear(good, good, 1, 0.01, 1e-12));
@@ -114,7 +114,7 @@ TEST(Cover, TheForecastIsWhereTwoValuesJustCloseTheStretch)
     for (const double slope : {-0.9, -0.5, 0.0, 0.5}) {
         const double a = 0.25;
         const GuardBound at{.distance = 2, .speed = 1, .acceleration = a};
-        const double tau = time_to_look(at, slope);
+        const double tau = time_to_check(at, slope);
         const auto closes = [&](double time) {
             const double distance = 2 + slope * time - 0.5 * a * time * time;
             // The path between equal speeds, v tau + A tau^2 / 4; a distance need not be
@@ -125,8 +125,8 @@ TEST(Cover, TheForecastIsWhereTwoValuesJustCloseTheStretch)
         EXPECT_FALSE(closes(tau * (1 + 1e-9))) << slope;
     }
     // Moving away as fast as the bound: the interval is infinite.
-    EXPECT_EQ(time_to_look({.distance = 1, .speed = 1, .acceleration = 0}, 1), inf);
-    EXPECT_GT(time_to_look({.distance = 1, .speed = 1, .acceleration = 0}, nan), 0);
+    EXPECT_EQ(time_to_check({.distance = 1, .speed = 1, .acceleration = 0}, 1), inf);
+    EXPECT_GT(time_to_check({.distance = 1, .speed = 1, .acceleration = 0}, nan), 0);
 }
 
 }  // namespace

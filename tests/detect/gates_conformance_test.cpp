@@ -21,11 +21,11 @@ Model certified_levels()
         .model;
 }
 
-GateCase keeping(GateCase gate, Evidence put_off)
+GateCase keeping(GateCase gate, Evidence deferred)
 {
     gate.keeps_events = gate.returns = true;
-    gate.put_off = put_off;
-    gate.saves = gate.plans = put_off == Evidence::proved;
+    gate.deferred = deferred;
+    gate.saves = gate.plans = deferred == Evidence::proved;
     return gate;
 }
 
@@ -53,9 +53,9 @@ std::vector<GateCase> keeping_gates()
     return gates;
 }
 
-GateCase trusted(GateCase gate, Evidence put_off)
+GateCase trusted(GateCase gate, Evidence deferred)
 {
-    gate.put_off = put_off;
+    gate.deferred = deferred;
     return gate;
 }
 

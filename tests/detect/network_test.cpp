@@ -155,7 +155,7 @@ TEST(Network, AStepOutsideItsRangeIsNeverCleared)
     const Network network(linear_model(0, 0, -1));  // never "event"
     const auto run = integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 0.104, .step = 0.01},
                                FixedStep<Rk4>{}, network);
-    EXPECT_EQ(run.statistics.checks_put_off, 10u);
+    EXPECT_EQ(run.statistics.checks_deferred, 10u);
     EXPECT_EQ(run.statistics.false_alarms, 1u);
 }
 
@@ -218,7 +218,7 @@ TEST(Network, OutsideItsDomainNothingIsCleared)
     // it has come down that far, and by then it is too fast.
     const auto run = integrate(BouncingBall(), {1000.0, 0.0}, {.t_end = 14, .step = 0.01},
                                FixedStep<Rk4>{}, Network(paper_model()));
-    EXPECT_EQ(run.statistics.checks_put_off, 0u);
+    EXPECT_EQ(run.statistics.checks_deferred, 0u);
 }
 
 TEST(Network, AnUnknownRecipeIsRefused)

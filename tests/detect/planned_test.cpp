@@ -95,7 +95,7 @@ PlanRun expect_planned_same(const System& system, const X& start, const Options&
     for (const std::size_t longest : {1u, 3u, 64u}) {
         SCOPED_TRACE(longest);
         PlannerOptions plan;
-        plan.longest_stretch = longest;
+        plan.longest_interval = longest;
         plan.two_ended = longest > 1;
         plan.check_bounds = check_bounds;
         const auto planned =
@@ -430,12 +430,12 @@ TEST(Planned, AGuardThatIsNeverApproachedIsHardlyCalled)
         EXPECT_EQ(run.outcome, Outcome::reached_end);
         EXPECT_LE(run.statistics.guard_calls, 52u);
         EXPECT_EQ(run.statistics.evidence.proved, run.statistics.steps);
-        EXPECT_EQ(run.statistics.checks_put_off, run.statistics.steps);
+        EXPECT_EQ(run.statistics.checks_deferred, run.statistics.steps);
         EXPECT_EQ(run.statistics.rollbacks, 0u);
     }
 }
 
-TEST(Planned, LookingAheadSavesLooks)
+TEST(Planned, LookingAheadSavesChecks)
 {
     // When the point moves away from a wall at the full speed, two values cover any interval; one
     // covers a distance equal to that to the wall, which takes log2(1000) checks from 0.01 to 10.
@@ -445,7 +445,7 @@ TEST(Planned, LookingAheadSavesLooks)
         double speed_bound(double, const X&) const { return 1; }
     };
     const auto calls = [](bool two_ended) {
-        const PlannerOptions plan{.two_ended = two_ended, .longest_stretch = 100000};
+        const PlannerOptions plan{.two_ended = two_ended, .longest_interval = 100000};
         return integrate(Leaving{}, X{0.01, 0, 0, 0}, {.t_end = 10, .step = 0.001}, Fixed{},
                          Planned(plan))
             .statistics.guard_calls;
@@ -623,7 +623,7 @@ struct OutsideWithBound : Outside {
     [[nodiscard]] double upper_bound(double t, const X& x) const { return guard(t, x) + above; }
 };
 
-TEST(Planned, AnUpperBoundSavesLooksBelowTheSurfaceAndKeepsTheEvents)
+TEST(Planned, AnUpperBoundSavesChecksBelowTheSurfaceAndKeepsTheEvents)
 {
     const X start{-0.4, 0.1, 0, 0};
     const Options options{.t_end = 60, .step = 0.01};
@@ -660,7 +660,7 @@ struct TabulatedRoom : Room {
     }
 };
 
-TEST(Planned, ALowerBoundSavesLooksAndKeepsTheEvents)
+TEST(Planned, ALowerBoundSavesChecksAndKeepsTheEvents)
 {
     std::mt19937_64 random(27);
     std::uint64_t with = 0;
@@ -748,7 +748,7 @@ TEST(Planned, ASavedRunGoesOnToTheSameBits)
     }
 }
 
-TEST(Planned, NobodySeesWhatIsNotFinal)
+TEST(Planned, NothingIsShownThatIsNotFinal)
 {
     std::mt19937_64 random(29);
     X start;
@@ -871,7 +871,7 @@ TEST(Planned, RefusesPlansThatAreNone)
 {
     EXPECT_THROW(Planned({.margin = -0.1}), std::invalid_argument);
     EXPECT_THROW(Planned({.margin = nan}), std::invalid_argument);
-    EXPECT_THROW(Planned({.longest_stretch = 0}), std::invalid_argument);
+    EXPECT_THROW(Planned({.longest_interval = 0}), std::invalid_argument);
     EXPECT_THROW(EveryK(0), std::invalid_argument);
     EXPECT_THROW(SlopeSkip(0), std::invalid_argument);
     EXPECT_THROW(SlopeSkip(1.5), std::invalid_argument);

@@ -32,7 +32,7 @@ TEST(ResolvedGuards, OfThreeHundredMovingGuardsNoDipIsMissed)
     EXPECT_GT(roots, 20'000u);
 }
 
-TEST(ResolvedGuards, WithoutTheLookInsideMostAreLost)
+TEST(ResolvedGuards, WithoutTheCheckInsideMostAreLost)
 {
     std::size_t roots = 0;
     std::size_t missed = 0;

@@ -118,11 +118,11 @@ TEST(Verified, ANetworkThatNeverClearsOnlyCostsTime)
     EXPECT_EQ(verified.statistics.false_alarms + 13, verified.statistics.steps);
 }
 
-TEST(Verified, WithoutABoundNoCheckIsPutOff)
+TEST(Verified, WithoutABoundNoCheckIsDeferred)
 {
     const auto verified = run<FixedStep<Rk4>>(
         Verified<>{Network(load_model(RICOCHET_MODELS "/bouncing-ball.safetensors"))});
-    EXPECT_EQ(verified.statistics.checks_put_off, 0u);
+    EXPECT_EQ(verified.statistics.checks_deferred, 0u);
     EXPECT_EQ(verified.statistics.network_calls, verified.statistics.steps);
     EXPECT_EQ(verified.statistics.evidence.checked + 13, verified.statistics.steps);
 }

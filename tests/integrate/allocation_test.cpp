@@ -96,7 +96,7 @@ std::uint64_t allocations_of_guard(const System& system, typename System::State 
     return testing_support::allocations() - before;
 }
 
-TEST(Allocation, DearGuardsNeedNone)
+TEST(Allocation, ExpensiveGuardsNeedNone)
 {
     const Cavern cavern({.segments = 100});
     EXPECT_EQ(allocations_of_guard(cavern, cavern.start()), 0u);

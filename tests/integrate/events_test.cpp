@@ -358,7 +358,7 @@ struct Balls {
     [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.unilateral = true}; }
 };
 
-TEST(Events, OfIdenticalBallsNobodyIsLost)
+TEST(Events, OfIdenticalBallsNoneIsLost)
 {
     for (const std::size_t n : {std::size_t{2}, std::size_t{1000}}) {
         const Balls balls{.guard_count = n};

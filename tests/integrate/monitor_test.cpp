@@ -626,10 +626,10 @@ TEST(Monitor, BoundsSpareAHostsGuardAndChangeNothing)
         EXPECT_EQ(run.cuts[k].after, exact.cuts[k].after);
     }
     EXPECT_LT(5 * spared.calls, watched.calls);
-    EXPECT_GT(run.statistics.checks_put_off, 3000u);
+    EXPECT_GT(run.statistics.checks_deferred, 3000u);
 }
 
-TEST(Monitor, StepsThatNeedNoLookNeedNotBeShown)
+TEST(Monitor, StepsThatNeedNoCheckNeedNotBeShown)
 {
     const Arena system;
     EventMonitor monitor(system, X4{}, {}, Planned<>{});

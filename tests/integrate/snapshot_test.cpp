@@ -71,9 +71,19 @@ TEST(Snapshot, BelongsToOneKindOfRun)
               ours + "rtol = 1e-08, and this one has rtol = 1e-06");
     EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .event_tolerance = 1e-6}),
               ours + "event_tolerance = 0, and this one has event_tolerance = 1e-06");
-    EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .look_inside = false}),
-              ours + "look_inside = true, and this one has look_inside = false");
+    EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .check_inside = false}),
+              ours + "check_inside = true, and this one has check_inside = false");
     EXPECT_NE(refused_by(saved, Ball{}, {.t_end = 1e-3}).find("the time"), std::string::npos);
+
+    // Files of version 0.1 have another name for `check_inside`.
+    Snapshot former = saved;
+    for (RunProperty& property : former.run) {
+        if (property.name == "check_inside") property.name = "look_inside";
+    }
+    EXPECT_NE(former.run, saved.run);
+    EXPECT_EQ(refused_by(former, Ball{}, options), "accepted");
+    EXPECT_EQ(refused_by(former, Ball{}, {.t_end = 4, .step = 0.01, .check_inside = false}),
+              ours + "look_inside = true, and this one has check_inside = false");
 
     Snapshot nameless = saved;
     nameless.run.clear();

@@ -80,7 +80,7 @@ TEST(Evolution, GivesUpWhereEverythingIsRefused)
     const std::vector<double> start{1, 2};
     const EvolutionResult found = evolve(refuse, start, {});
     EXPECT_EQ(found.outcome, EvolutionOutcome::none_allowed);
-    EXPECT_EQ(found.generations, fruitless_generations);
+    EXPECT_EQ(found.generations, stagnant_generations);
     EXPECT_TRUE(std::isnan(found.score));
     EXPECT_EQ(found.x, start);
 }

@@ -276,7 +276,7 @@ TEST(Calibrated, FindsTheEventsOfTheExactDetectorInFewerCalls)
     const Statistics& s = gated.statistics;
     EXPECT_EQ(s.steps, exact.statistics.steps);
     EXPECT_GT(s.evidence.gated, 4000U);  // of 5000 steps
-    EXPECT_EQ(s.evidence.gated, s.checks_put_off);
+    EXPECT_EQ(s.evidence.gated, s.checks_deferred);
     EXPECT_EQ(s.evidence.proved, 0U);
     EXPECT_GT(s.network_calls, 100U);
     EXPECT_EQ(s.outside_domain, 0U);
@@ -299,7 +299,7 @@ TEST(Calibrated, ComesBackToAnEventThatTheGateDidNotSeeComing)
     EXPECT_GT(gated.statistics.rollbacks, 20U);
 }
 
-TEST(Calibrated, LooksAtEveryStepOutsideOfItsBoxAndCountsThem)
+TEST(Calibrated, ChecksEveryStepOutsideOfItsBoxAndCountsThem)
 {
     Model model = true_horizons({0.02, 0.04, 0.08});
     model.domain[0] = {-1, 0};  // half of the path
@@ -317,7 +317,7 @@ TEST(Calibrated, LooksAtEveryStepOutsideOfItsBoxAndCountsThem)
     EXPECT_EQ(outside.statistics.evidence.gated, 0U);
 }
 
-TEST(CalibratedBounds, LooksLessThanThePlannerAlone)
+TEST(CalibratedBounds, ChecksLessThanThePlannerAlone)
 {
     // Without looking ahead; otherwise the planner closes half a flight by two checks.
     const PlannerOptions planning{.two_ended = false};

@@ -27,52 +27,53 @@ struct Episode {
 
 /// An episode with a rule for actions.
 template <class Action>
-Episode act(const StepWorld& world, const Action& action)
+Episode act(const StepEnvironment& runs, const Action& action)
 {
     Episode out;
-    EXPECT_EQ(world.environment.observations, out.observation.size());
-    world.environment.reset(1, out.observation);
+    EXPECT_EQ(runs.environment.observations, out.observation.size());
+    runs.environment.reset(1, out.observation);
     for (;;) {
         const double a = action();
-        const Reaction reaction = world.environment.step({&a, 1}, out.observation);
+        const Reaction reaction = runs.environment.step({&a, 1}, out.observation);
         for (const double o : out.observation) EXPECT_LE(std::abs(o), 5);
         out.undiscounted += reaction.reward;
         ++out.attempts;
         if (!reaction.terminal && !reaction.truncated) continue;
         out.terminal = reaction.terminal;
-        out.trial = world.trial();
+        out.trial = runs.trial();
         return out;
     }
 }
 
-Episode constant(const StepWorld& world, double length)
+Episode constant(const StepEnvironment& runs, double length)
 {
-    return act(world, [a = world.action_of(length)] { return a; });
+    return act(runs, [a = runs.action_of(length)] { return a; });
 }
 
-TEST(StepWorld, ActionsSpanTheSteps)
+TEST(StepEnvironment, ActionsSpanTheSteps)
 {
     for (const StepScale scale : {StepScale::linear, StepScale::logarithmic}) {
-        const StepWorld world =
-            step_world(SlidingMode{}, 0.15, 0.1, {.scale = scale, .h_min = 1e-4, .h_max = 1e-2});
-        EXPECT_NEAR(world.length_of(-1), 1e-4, 1e-18);
-        EXPECT_NEAR(world.length_of(1), 1e-2, 1e-16);
+        const StepEnvironment runs = step_environment(
+            SlidingMode{}, 0.15, 0.1, {.scale = scale, .h_min = 1e-4, .h_max = 1e-2});
+        EXPECT_NEAR(runs.length_of(-1), 1e-4, 1e-18);
+        EXPECT_NEAR(runs.length_of(1), 1e-2, 1e-16);
         const double middle = scale == StepScale::linear ? 5.05e-3 : 1e-3;
-        EXPECT_NEAR(world.length_of(0), middle, 1e-16);
-        EXPECT_NEAR(world.action_of(world.length_of(0.3)), 0.3, 1e-14);
+        EXPECT_NEAR(runs.length_of(0), middle, 1e-16);
+        EXPECT_NEAR(runs.action_of(runs.length_of(0.3)), 0.3, 1e-14);
     }
 }
 
 // The episode is the run, to the bit, for any estimate and scheme.
-TEST(StepWorld, AConstantActionIsAConstantStepOfAFault)
+TEST(StepEnvironment, AConstantActionIsAConstantStepOfAFault)
 {
     const StrikeSlipFault fault({.elements = 2});
     for (const bool published : {false, true}) {
-        StepWorldOptions options = published ? published_step_world() : StepWorldOptions{};
+        StepEnvironmentOptions options =
+            published ? published_step_environment() : StepEnvironmentOptions{};
         options.until_rest = true;
-        const StepWorld world = step_world(fault, 20, options);
-        const double h = world.length_of(world.action_of(0.2));
-        const Episode episode = constant(world, 0.2);
+        const StepEnvironment runs = step_environment(fault, 20, options);
+        const double h = runs.length_of(runs.action_of(0.2));
+        const Episode episode = constant(runs, 0.2);
         const Rupture run = simulate(fault, {.t_end = 20, .step = h},
                                      {.first_stage = options.first_stage,
                                       .estimate = options.estimate,
@@ -93,14 +94,14 @@ TEST(StepWorld, AConstantActionIsAConstantStepOfAFault)
     }
 }
 
-TEST(StepWorld, AConstantActionIsAConstantStepOfAnInclusion)
+TEST(StepEnvironment, AConstantActionIsAConstantStepOfAnInclusion)
 {
     // The problem's rule for changes of branch.
-    const StepWorld world = step_world(DiodeCircuit{}, DiodeCircuit::start(), 5,
-                                       {.first_stage = FirstStage::switch_aware});
+    const StepEnvironment runs = step_environment(DiodeCircuit{}, DiodeCircuit::start(), 5,
+                                                  {.first_stage = FirstStage::switch_aware});
     const StepProblem problem = diode_circuit_problem(DiodeCircuit{}, DiodeCircuit::start(), 5);
-    const double h = world.length_of(world.action_of(0.02));
-    const Episode episode = constant(world, 0.02);
+    const double h = runs.length_of(runs.action_of(0.02));
+    const Episode episode = constant(runs, 0.02);
     const StepTrial run =
         problem.run({.controller = ConstantStep{}, .step = h / problem.usual_step});
     EXPECT_EQ(episode.trial.steps, run.steps);
@@ -111,20 +112,20 @@ TEST(StepWorld, AConstantActionIsAConstantStepOfAnInclusion)
 
 // Without a discount equation 7 rewards the time covered, independently of the number of steps: the
 // sum of (h - h_min) / (h_max - h_min) is (T - n h_min) / (h_max - h_min).
-TEST(StepWorld, ThePublishedReturnTelescopes)
+TEST(StepEnvironment, ThePublishedReturnTelescopes)
 {
     const double t_end = 0.5;
-    const StepWorldOptions options{
+    const StepEnvironmentOptions options{
         .alpha = 0, .scale = StepScale::linear, .h_min = 1e-4, .h_max = 1e-2};
-    const StepWorld world = step_world(SlidingMode{}, 0.15, t_end, options);
+    const StepEnvironment runs = step_environment(SlidingMode{}, 0.15, t_end, options);
     const auto expected = [&](const Episode& episode) {
         return (t_end - static_cast<double>(episode.attempts) * options.h_min) /
                (options.h_max - options.h_min);
     };
     Random random(3);
-    const Episode wild = act(world, [&] { return random.uniform(-1, 1); });
-    const Episode large = act(world, [] { return 1.0; });
-    const Episode small = act(world, [] { return -0.9; });
+    const Episode wild = act(runs, [&] { return random.uniform(-1, 1); });
+    const Episode large = act(runs, [] { return 1.0; });
+    const Episode small = act(runs, [] { return -0.9; });
     // Each term is off by roundings of times of order 1 over a range of 1e-2.
     for (const Episode& episode : {wild, large, small}) {
         EXPECT_TRUE(episode.terminal);
@@ -136,13 +137,13 @@ TEST(StepWorld, ThePublishedReturnTelescopes)
 }
 
 // So the error alone decides: among constant steps the smallest have the largest return.
-TEST(StepWorld, ThePublishedReturnIsLargestForTheSmallestSteps)
+TEST(StepEnvironment, ThePublishedReturnIsLargestForTheSmallestSteps)
 {
-    StepWorldOptions options = published_step_world();
+    StepEnvironmentOptions options = published_step_environment();
     options.expensive = 1e9;  // solves cost nothing
-    const StepWorld world = step_world(StrikeSlipFault({.elements = 1}), 30, options);
-    const double coarse = constant(world, 0.3).undiscounted;
-    const double fine = constant(world, 0.003).undiscounted;
+    const StepEnvironment runs = step_environment(StrikeSlipFault({.elements = 1}), 30, options);
+    const double coarse = constant(runs, 0.3).undiscounted;
+    const double fine = constant(runs, 0.003).undiscounted;
     EXPECT_GT(fine, coarse + 1);
     EXPECT_LT(fine, 5);
 }
@@ -150,12 +151,12 @@ TEST(StepWorld, ThePublishedReturnIsLargestForTheSmallestSteps)
 template <class World>
 void sums_to_cost(const World& make, double t)
 {
-    StepWorldOptions options{
+    StepEnvironmentOptions options{
         .reward = StepReward::additive, .lambda = 70, .work_unit = 3, .h_min = 1e-3 * t};
     options.h_max = 0.03 * t;
-    const StepWorld world = make(options);
+    const StepEnvironment runs = make(options);
     Random random(5);
-    const Episode episode = act(world, [&] { return random.uniform(-1, 1); });
+    const Episode episode = act(runs, [&] { return random.uniform(-1, 1); });
     EXPECT_TRUE(episode.trial.ended);
     const double error = episode.trial.error;
     const double cost = episode.trial.work / 3 + 70 * error * error;
@@ -164,41 +165,44 @@ void sums_to_cost(const World& make, double t)
     EXPECT_NEAR(episode.undiscounted, -cost, 1e-11 * cost);
 }
 
-TEST(StepWorld, AdditiveRewardsAreMinusTheCostOfTheRun)
+TEST(StepEnvironment, AdditiveRewardsAreMinusTheCostOfTheRun)
 {
-    sums_to_cost([](const auto& o) { return step_world(SlidingMode{}, 0.15, 0.5, o); }, 0.5);
+    sums_to_cost([](const auto& o) { return step_environment(SlidingMode{}, 0.15, 0.5, o); }, 0.5);
     sums_to_cost(
-        [](const auto& o) { return step_world(DiodeCircuit{}, DiodeCircuit::start(), 20, o); }, 20);
+        [](const auto& o) {
+            return step_environment(DiodeCircuit{}, DiodeCircuit::start(), 20, o);
+        },
+        20);
     for (const bool until_rest : {false, true}) {
         sums_to_cost(
-            [&](StepWorldOptions o) {
+            [&](StepEnvironmentOptions o) {
                 o.until_rest = until_rest;
-                return step_world(StrikeSlipFault({.elements = 1}), 30, o);
+                return step_environment(StrikeSlipFault({.elements = 1}), 30, o);
             },
             30);
     }
 }
 
 // Steps of a fault that are too long have no solution: nothing moves, and finally the episode ends.
-TEST(StepWorld, StepsWithoutASolutionArePunished)
+TEST(StepEnvironment, StepsWithoutASolutionArePunished)
 {
-    const StepWorldOptions options{.scale = StepScale::linear, .h_min = 0.01};
-    const StepWorld world = step_world(StrikeSlipFault({.elements = 1}), 30, options);
-    const Episode episode = act(world, [] { return 1.0; });
+    const StepEnvironmentOptions options{.scale = StepScale::linear, .h_min = 0.01};
+    const StepEnvironment runs = step_environment(StrikeSlipFault({.elements = 1}), 30, options);
+    const Episode episode = act(runs, [] { return 1.0; });
     EXPECT_TRUE(episode.terminal);
-    EXPECT_EQ(episode.attempts, static_cast<std::uint64_t>(step_world_failures));
-    EXPECT_DOUBLE_EQ(episode.undiscounted, -step_world_failures);
+    EXPECT_EQ(episode.attempts, static_cast<std::uint64_t>(step_environment_failures));
+    EXPECT_DOUBLE_EQ(episode.undiscounted, -step_environment_failures);
     EXPECT_FALSE(episode.trial.ended);
     EXPECT_EQ(episode.trial.steps, 0U);
 }
 
 // Sums of a state of 1e308 overflow: infinity minus infinity.
-TEST(StepWorld, ANotANumberEndsTheEpisode)
+TEST(StepEnvironment, ANotANumberEndsTheEpisode)
 {
     for (const ErrorEstimate estimate : {ErrorEstimate::none, ErrorEstimate::embedded}) {
-        const StepWorld world = step_world(SlidingMode{}, 1e308, 0.005,
-                                           {.h_min = 1e-3, .h_max = 2e-3, .estimate = estimate});
-        const Episode episode = constant(world, 2e-3);
+        const StepEnvironment runs = step_environment(
+            SlidingMode{}, 1e308, 0.005, {.h_min = 1e-3, .h_max = 2e-3, .estimate = estimate});
+        const Episode episode = constant(runs, 2e-3);
         EXPECT_TRUE(episode.terminal);
         EXPECT_EQ(episode.attempts, 1U);
         EXPECT_TRUE(std::isfinite(episode.undiscounted));
@@ -207,36 +211,37 @@ TEST(StepWorld, ANotANumberEndsTheEpisode)
     }
 }
 
-TEST(StepWorld, AttemptsAreLimited)
+TEST(StepEnvironment, AttemptsAreLimited)
 {
-    const StepWorld world = step_world(SlidingMode{}, 0.15, 0.5, {.max_attempts = 7});
-    const Episode episode = act(world, [] { return 0.0; });
+    const StepEnvironment runs = step_environment(SlidingMode{}, 0.15, 0.5, {.max_attempts = 7});
+    const Episode episode = act(runs, [] { return 0.0; });
     EXPECT_FALSE(episode.terminal);
     EXPECT_EQ(episode.attempts, 7U);
 }
 
 // A policy with a constant output.
-TEST(StepWorld, PoliciesAreFollowed)
+TEST(StepEnvironment, PoliciesAreFollowed)
 {
-    const StepWorld world = step_world(SlidingMode{}, 0.15, 0.5, {.h_min = 1e-4});
+    const StepEnvironment runs = step_environment(SlidingMode{}, 0.15, 0.5, {.h_min = 1e-4});
     Model policy;
     policy.layers.push_back(
         {.inputs = 9, .outputs = 1, .weight = std::vector<double>(9, 0), .bias = {0.5}});
-    const StepTrial trial = follow(world, policy);
-    const Episode episode = act(world, [] { return std::tanh(0.5); });
+    const StepTrial trial = follow(runs, policy);
+    const Episode episode = act(runs, [] { return std::tanh(0.5); });
     EXPECT_TRUE(trial.ended);
     EXPECT_EQ(trial.steps, episode.trial.steps);
     EXPECT_EQ(trial.error, episode.trial.error);
     policy.layers[0].inputs = 8;
     policy.layers[0].weight.pop_back();
-    EXPECT_THROW((void)follow(world, policy), std::invalid_argument);
+    EXPECT_THROW((void)follow(runs, policy), std::invalid_argument);
 }
 
-TEST(StepWorld, RefusesOptionsThatCannotBe)
+TEST(StepEnvironment, RefusesOptionsThatCannotBe)
 {
     const double nan = std::nan("");
-    const auto refused = [](const StepWorldOptions& options) {
-        EXPECT_THROW((void)step_world(SlidingMode{}, 0.15, 0.5, options), std::invalid_argument);
+    const auto refused = [](const StepEnvironmentOptions& options) {
+        EXPECT_THROW((void)step_environment(SlidingMode{}, 0.15, 0.5, options),
+                     std::invalid_argument);
     };
     for (const double bad : {-1.0, nan}) {
         refused({.alpha = bad});

@@ -300,7 +300,7 @@ TEST(LeastEigenvalue, ItsTableBoundsItFromBothSidesAndClosely)
     EXPECT_EQ(system.upper_bound(0, outside), std::numeric_limits<double>::infinity());
 }
 
-TEST(LeastEigenvalue, ItsTableSavesLooksOnBothSidesAndKeepsTheEvents)
+TEST(LeastEigenvalue, ItsTableSavesChecksOnBothSidesAndKeepsTheEvents)
 {
     const Options options{.t_end = 20, .step = 2e-3};
     const auto planned = [&](const LeastEigenvalue& system) {

@@ -117,6 +117,18 @@ class Thermostat(ricochet.System):
         return Room.OFF, x
 
 
+def test_former_names_of_options_and_counts():
+    ball = ricochet.BouncingBall()
+    now, former = (ricochet.integrate(ball, [10.0, 0.0], 3.0, **{name: False})
+                   for name in ("check_inside", "look_inside"))
+    always = ricochet.integrate(ball, [10.0, 0.0], 3.0)
+    assert former.statistics.guard_calls == now.statistics.guard_calls
+    assert former.statistics.guard_calls < always.statistics.guard_calls
+    assert now.statistics.checks_put_off == now.statistics.checks_deferred
+    monitor = ricochet.Monitor(ball, [10.0, 0.0], look_inside=False)
+    assert monitor.start(0.0, [10.0, 0.0], 0.1) == ricochet.Verdict.STANDS
+
+
 def test_modes_of_a_thermostat():
     ready = ricochet.Thermostat()
     exact = [ready.switch_time(n) for n in range(16)]

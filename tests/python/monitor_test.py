@@ -150,7 +150,7 @@ def test_hosts_that_change_the_state_themselves_are_cut_at_every_crossing():
         monitor.resume(1.0, after=[[1.0]])
 
 
-def test_a_host_may_skip_to_where_no_guard_needs_a_look():
+def test_a_host_may_skip_to_where_no_guard_needs_a_check():
     def speed(t, x):
         return 2.0
 

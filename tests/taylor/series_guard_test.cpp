@@ -18,8 +18,8 @@ namespace {
 
 using detail::first_leaving;
 using detail::series_clears;
-using detail::SeriesStretch;
-using Kind = SeriesStretch::Kind;
+using detail::SeriesInterval;
+using Kind = SeriesInterval::Kind;
 
 /// The coefficients of the product of (s - root) over all roots, times `factor`, up to order 12.
 [[nodiscard]] std::vector<double> with_roots(const std::vector<double>& roots, double factor)
@@ -43,7 +43,7 @@ using Kind = SeriesStretch::Kind;
 }
 
 /// The first event of the polynomial in a step of length 1.
-[[nodiscard]] SeriesStretch first_of(const std::vector<double>& c, double sign, bool from_surface)
+[[nodiscard]] SeriesInterval first_of(const std::vector<double>& c, double sign, bool from_surface)
 {
     double end = 0;
     for (const double term : c) end += term;
@@ -67,7 +67,7 @@ TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
         const bool clear = series_clears(terms_of(c), 0, sign, 1, 0, false);
         EXPECT_FALSE(clear && inside > 0);
         cleared += clear;
-        const SeriesStretch first = first_of(c, sign, false);
+        const SeriesInterval first = first_of(c, sign, false);
         EXPECT_TRUE(inside > 0 || first.kind == Kind::clear);
         if (inside == 1) {
             EXPECT_EQ(first.kind, Kind::crossing);
@@ -89,7 +89,7 @@ TEST(SeriesGuard, ARootAtTheStartIsDividedOut)
     const std::vector<double> c = with_roots({0, 0.75}, -1);
     EXPECT_FALSE(series_clears(terms_of(c), 0, 1, 1, 0, true));
     EXPECT_TRUE(series_clears(terms_of(c), 0, 1, 0.5, 0, true));
-    const SeriesStretch first = first_of(c, 1, true);
+    const SeriesInterval first = first_of(c, 1, true);
     EXPECT_EQ(first.kind, Kind::crossing);
     EXPECT_LE(first.lo, 0.75);
     EXPECT_GE(first.hi, 0.75);

@@ -13,7 +13,7 @@ class Around {
 public:
     static constexpr bool uses_rates = Exact::uses_rates;
     static constexpr Screening screening = screening_of<Exact>;
-    static constexpr bool looks_inside = LooksInside<Exact>;
+    static constexpr bool checks_inside = ChecksInside<Exact>;
     static constexpr Evidence evidence = Exact::evidence;  ///< about a step it has examined
 
     explicit Around(const Exact& exact) : exact_(exact) {}

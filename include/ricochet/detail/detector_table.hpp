@@ -32,7 +32,7 @@ struct DetectorTable {
     const char* type = "";  ///< as the compiler writes it
     Screening screening = Screening::ends;
     bool uses_rates = false;
-    bool looks_inside = false;
+    bool checks_inside = false;
     Evidence evidence = Evidence::assumed;  ///< of a step not suspected
     bool (*suspects)(double sign, double g0, double rate0, double g1, double rate1,
                      double h) = nullptr;
@@ -49,9 +49,9 @@ struct DetectorTable {
     bool checks_every_step = true;
 
     // --- deferred checks ---
-    bool puts_off = false;
+    bool defers = false;
     bool needs_bounds = false;
-    Evidence put_off = Evidence::assumed;  ///< of a step without a check
+    Evidence deferred = Evidence::assumed;  ///< of a step without a check
     std::size_t longest = 1;
     bool checks_bounds = false;
     double margin = 0;

@@ -48,11 +48,11 @@ class DetectorTableOf {
     }
     [[nodiscard]] static D& at(void* door) noexcept { return *static_cast<D*>(door); }
 
-    static void add_putting_off(DetectorTable<C>& table, const Detector& detector)
+    static void add_deferral(DetectorTable<C>& table, const Detector& detector)
     {
-        table.puts_off = true;
+        table.defers = true;
         table.needs_bounds = Detector::needs_bounds;
-        table.put_off = Detector::put_off;
+        table.deferred = Detector::deferred;
         table.longest = detector.longest();
         table.checks_bounds = detector.checks_bounds();
         table.margin = detector.margin();
@@ -107,7 +107,7 @@ public:
         table.type = written_type<Detector>();
         table.screening = screening_of<Detector>;
         table.uses_rates = Detector::uses_rates;
-        table.looks_inside = LooksInside<Detector>;
+        table.checks_inside = ChecksInside<Detector>;
         table.evidence = Detector::evidence;
         table.suspects = [](double sign, double g0, double rate0, double g1, double rate1,
                             double h) { return Detector::suspects(sign, g0, rate0, g1, rate1, h); };
@@ -127,7 +127,7 @@ public:
             table.clears = &clears;
             table.checks_every_step = Detector::checks_every_step;
         }
-        if constexpr (puts_off_checks<Detector, System, X>()) add_putting_off(table, detector);
+        if constexpr (defers_checks<Detector, System, X>()) add_deferral(table, detector);
         if constexpr (Metering<Detector>) table.metering = &detector.metering();
         return table;
     }

@@ -12,9 +12,9 @@ namespace ricochet {
 /// A detector that requests one evaluation of every guard inside each step, so that a guard
 /// that the step does not resolve is discovered.
 template <class Detector>
-concept LooksInside = requires
+concept ChecksInside = requires
 {
-    requires Detector::looks_inside;
+    requires Detector::checks_inside;
 };
 
 /// How steps are screened for guards that need a check, as a detector declares it; by default

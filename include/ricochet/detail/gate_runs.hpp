@@ -167,7 +167,7 @@ public:
     void check_bounds(std::size_t steps, std::uint64_t seed)
     {
         Random random(seed);
-        const Planned<> planned({.longest_stretch = 16, .check_bounds = true});
+        const Planned<> planned({.longest_interval = 16, .check_bounds = true});
         begin_stage("checking bounds", 0);
         for (std::size_t done = 0; done < steps && goes_on(0);) {
             const Exact exact = start(random);
@@ -261,7 +261,7 @@ private:
     {
         if (!progress_ || stopped_ || ++asked_ % 64 != 1) return !stopped_;
         const auto done = static_cast<std::size_t>(events);
-        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begun_;
+        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started_;
         stopped_ = !progress_({.iteration = std::min(done, wanted_),
                                .total = wanted_,
                                .loss = std::numeric_limits<double>::quiet_NaN(),
@@ -517,7 +517,7 @@ private:
     std::deque<Pending> pending_;
     std::vector<RunStart<X>> near_;  ///< states shortly before fatal events
     ProgressCallback progress_;
-    std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+    std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
     std::string_view stage_;
     std::size_t wanted_ = 0;  ///< events of this stage
     std::uint64_t asked_ = 0;

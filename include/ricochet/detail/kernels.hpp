@@ -21,7 +21,7 @@
 #include <optional>
 #include <type_traits>
 
-#include "ricochet/detail/cubic_look.hpp"
+#include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/flow_caller.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/step_control.hpp"
@@ -467,12 +467,12 @@ class KernelOf {
                     !std::isfinite(g1 + g_rate1)) {
                     why = QuietEnd::doubt;
                 }
-                if (rates && run.looks) {
+                if (rates && run.checks_inside) {
                     const X x = peeked(h, x0, rate0, remainder, k, w, w_rate, rate1);
-                    inside = guard.value(caller.time(CubicLook::inside * h), x);
-                    const CubicLook look(g0, g_rate0, g1, g_rate1, h);
-                    const double e = look.deviation(CubicLook::inside, inside);
-                    if (!(look.lowest(sign) > CubicLook::doubt * e)) why = QuietEnd::doubt;
+                    inside = guard.value(caller.time(CubicCheck::inside * h), x);
+                    const CubicCheck look(g0, g_rate0, g1, g_rate1, h);
+                    const double e = look.deviation(CubicCheck::inside, inside);
+                    if (!(look.lowest(sign) > CubicCheck::doubt * e)) why = QuietEnd::doubt;
                     if (controlled && hardly_moves(x0, x1)) why = QuietEnd::moving;
                 }
                 if (why != QuietEnd::due) {

@@ -115,7 +115,7 @@ public:
     template <class Call>
     auto time_guard(Call&& call)
     {
-        return timed(++looks_, guard_, call);
+        return timed(++checks_, guard_, call);
     }
     template <class Call>
     auto time_network(Call&& call)
@@ -158,7 +158,7 @@ private:
     struct Counts {
         double steps = 0;  ///< number of accepted steps
         double work = 0;   ///< including steps taken back
-        double looks = 0;
+        double checks = 0;
         double asked = 0;
     };
 
@@ -200,7 +200,7 @@ private:
     SampledCost guard_, network_;
     SampledCost checked_step_, planned_step_;  ///< without checks and inferences
     std::array<Account, 3> accounts_;
-    std::uint64_t looks_ = 0;
+    std::uint64_t checks_ = 0;
     std::uint64_t asked_ = 0;
     std::uint64_t cleared_ = 0;
     std::uint64_t most_asked_ = std::numeric_limits<std::uint64_t>::max();  ///< in this piece

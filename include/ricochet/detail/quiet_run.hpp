@@ -28,10 +28,10 @@ struct QuietRun {
     double end = 0;  ///< [s] end of the run, or the next time event: no step reaches it
     double rtol = 0;
     double atol = 0;
-    double h_min = 0;      ///< [s]
-    double h_max = 0;      ///< [s]
-    bool looks = false;    ///< guards are evaluated once inside each step
-    bool departs = false;  ///< the guard starts on its surface
+    double h_min = 0;            ///< [s]
+    double h_max = 0;            ///< [s]
+    bool checks_inside = false;  ///< guards are evaluated once inside each step
+    bool departs = false;        ///< the guard starts on its surface
     std::uint64_t most_steps = 0;
     const std::atomic<bool>* cancelled = nullptr;
     const void* system = nullptr;  ///< the SystemTable, for kernels that call by pointer
@@ -39,7 +39,7 @@ struct QuietRun {
     // --- the guard, and the next step; brought up to date ---
     double sign = 0;
     double g0 = 0, rate0 = 0, g1 = 0, rate1 = 0;
-    double inside = 0;  ///< at `CubicLook::inside`
+    double inside = 0;  ///< at `CubicCheck::inside`
     double h_next = 0;  ///< [s]
 
     // --- results ---

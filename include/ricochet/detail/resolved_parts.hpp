@@ -19,10 +19,10 @@ namespace ricochet::detail {
 class ResolvedParts {
 public:
     /// Forgets the nodes, for another step.
-    void clear() noexcept { guard_ = nobody; }
+    void clear() noexcept { guard_ = none; }
 
     /// Divides the interval in which guard i is watched, unless it is divided already.
-    /// `everywhere`: starts with all fractions of `CubicLook::places`.
+    /// `everywhere`: starts with all fractions of `CubicCheck::places`.
     void resolve(GuardPath& path, std::size_t i, const Watch& watch, double declared_touch,
                  bool everywhere);
 
@@ -43,7 +43,7 @@ public:
     [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
 
 private:
-    static constexpr std::size_t nobody = static_cast<std::size_t>(-1);
+    static constexpr std::size_t none = static_cast<std::size_t>(-1);
     static constexpr double smallest_part = 0x1p-12;  ///< of the step
     /// Fraction at which an interval is divided, which no symmetry of the guard singles out.
     static constexpr double cut = 0.4142135;
@@ -53,7 +53,7 @@ private:
                 int depth);
     void keep(const GuardSample& node);
 
-    std::size_t guard_ = nobody;
+    std::size_t guard_ = none;
     Watch whole_;                      ///< the interval that is divided
     std::size_t count_ = 0;            ///< of nodes
     std::array<GuardSample, 32> few_;  ///< the first of them, without allocation

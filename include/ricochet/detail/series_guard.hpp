@@ -21,7 +21,7 @@ namespace ricochet::detail {
 
 /// First event of the polynomial of a guard in an interval of a step, apart from a root at its
 /// start.
-struct SeriesStretch {
+struct SeriesInterval {
     enum class Kind {
         clear,     ///< stays on its side
         crossing,  ///< has one root between `lo` and `hi`, and leaves its side there
@@ -98,9 +98,9 @@ struct SeriesStretch {
 /// First event of guard i, times `sign`, between the samples `start` and `end` in a step of length
 /// h. Where the samples differ from the series, which omits its last terms, nothing smaller than
 /// the difference is certain.
-[[nodiscard]] SeriesStretch first_leaving(const SeriesTerms& terms, std::size_t i, double sign,
-                                          double h, const GuardSample& start,
-                                          const GuardSample& end, double touch,
-                                          bool from_surface) noexcept;
+[[nodiscard]] SeriesInterval first_leaving(const SeriesTerms& terms, std::size_t i, double sign,
+                                           double h, const GuardSample& start,
+                                           const GuardSample& end, double touch,
+                                           bool from_surface) noexcept;
 
 }  // namespace ricochet::detail

@@ -2,9 +2,9 @@
 //
 // Steps chosen by reinforcement learning: a run as an environment, an action as a step.
 //
-//     const StepWorld world = step_world(StrikeSlipFault({.elements = 1}), 30);
-//     const TrainedPolicy trained = train_tqc(world.environment);
-//     const StepTrial trial = follow(world, trained.policy);   // its true errors
+//     const StepEnvironment runs = step_environment(StrikeSlipFault({.elements = 1}), 30);
+//     const TrainedPolicy trained = train_tqc(runs.environment);
+//     const StepTrial trial = follow(runs, trained.policy);   // its true errors
 //
 // An episode is one run of one problem. The action is the length of the next step, which is taken
 // if its stages can be solved, however large its error, as in
@@ -44,7 +44,7 @@ enum class StepScale {
     logarithmic,  ///< equal factors
 };
 
-struct StepWorldOptions {
+struct StepEnvironmentOptions {
     StepReward reward = StepReward::published;
     double alpha = 2;       ///< zero or positive
     double expensive = 10;  ///< iterations per solve that earn nothing; above 1
@@ -66,13 +66,13 @@ struct StepWorldOptions {
 };
 
 /// The options of the source.
-[[nodiscard]] StepWorldOptions published_step_world(double alpha = 2);
+[[nodiscard]] StepEnvironmentOptions published_step_environment(double alpha = 2);
 
 /// Number of consecutive unsolvable steps after which an episode ends.
-inline constexpr int step_world_failures = 10;
+inline constexpr int step_environment_failures = 10;
 
 /// An environment and the state of the run in it. Copies share the run.
-struct StepWorld {
+struct StepEnvironment {
     /// Nine observations of order one: the error, length and fraction of switches of the last step,
     /// and the state as in the system's `StepLayout`. Every episode is the same run.
     Environment environment{};
@@ -82,15 +82,16 @@ struct StepWorld {
 };
 
 /// @throws std::invalid_argument naming the option, or as the systems' runs do.
-[[nodiscard]] StepWorld step_world(const StrikeSlipFault& fault, double t_end,
-                                   const StepWorldOptions& options = {});
-[[nodiscard]] StepWorld step_world(const SlidingMode& system, double from, double t_end,
-                                   const StepWorldOptions& options = {});
-[[nodiscard]] StepWorld step_world(const DiodeCircuit& system, const Eigen::Vector3d& start,
-                                   double t_end, const StepWorldOptions& options = {});
+[[nodiscard]] StepEnvironment step_environment(const StrikeSlipFault& fault, double t_end,
+                                               const StepEnvironmentOptions& options = {});
+[[nodiscard]] StepEnvironment step_environment(const SlidingMode& system, double from, double t_end,
+                                               const StepEnvironmentOptions& options = {});
+[[nodiscard]] StepEnvironment step_environment(const DiodeCircuit& system,
+                                               const Eigen::Vector3d& start, double t_end,
+                                               const StepEnvironmentOptions& options = {});
 
 /// One episode by a deterministic policy as the trainers make it: action = tanh(network).
 /// @throws std::invalid_argument if the model does not have the environment's inputs.
-[[nodiscard]] StepTrial follow(const StepWorld& world, const Model& policy);
+[[nodiscard]] StepTrial follow(const StepEnvironment& runs, const Model& policy);
 
 }  // namespace ricochet::learn

@@ -59,7 +59,7 @@ struct Ends {
 struct Extremum {
     static constexpr bool uses_rates = true;
     static constexpr Screening screening = Screening::extremum;
-    static constexpr bool looks_inside = true;  ///< compares each step with the cubic of its ends
+    static constexpr bool checks_inside = true;  ///< compares each step with the cubic of its ends
     static constexpr Evidence evidence = Evidence::checked;  ///< evidence for a step not suspected
 
     /// Whether a step needs a check, in the guard times `sign`, positive on its armed side: the
@@ -68,7 +68,7 @@ struct Extremum {
     /// differ by less than a fifth of their largest: to reach the surface it would have to bend
     /// five times as much as its values and rates at the ends show.
     ///
-    /// The expression is free of branches, and in terms that `CubicLook` has as well, so that a
+    /// The expression is free of branches, and in terms that `CubicCheck` has as well, so that a
     /// loop over many guards is vectorised.
     [[nodiscard, gnu::always_inline]] static constexpr bool suspects(double sign, double g0,
                                                                      double rate0, double g1,

@@ -87,7 +87,7 @@ namespace detail {
 /// @throws std::invalid_argument unless the gate is of the required kind.
 void check_gate_kind(const gates::Gate& gate, bool horizon);
 /// @throws std::invalid_argument because no step would be kept.
-void check_longest_stretch(std::size_t steps);
+void check_longest_interval(std::size_t steps);
 
 /// A detector that holds a gate.
 template <class Base>
@@ -126,15 +126,15 @@ class Calibrated : public detail::AsksGate<detail::PutsOff<Exact>> {
 
 public:
     static constexpr bool needs_bounds = false;
-    static constexpr Evidence put_off = Evidence::gated;
+    static constexpr Evidence deferred = Evidence::gated;
 
-    /// @param longest_stretch  largest number of steps without a check; as many starts are kept
-    /// @throws std::invalid_argument for a level gate, or if `longest_stretch` is 0.
-    explicit Calibrated(gates::Gate gate, std::size_t longest_stretch = 256,
+    /// @param longest_interval  largest number of steps without a check; as many starts are kept
+    /// @throws std::invalid_argument for a level gate, or if `longest_interval` is 0.
+    explicit Calibrated(gates::Gate gate, std::size_t longest_interval = 256,
                         const Exact& exact = {})
-        : Base(std::move(gate), true, exact), longest_(longest_stretch)
+        : Base(std::move(gate), true, exact), longest_(longest_interval)
     {
-        detail::check_longest_stretch(longest_);
+        detail::check_longest_interval(longest_);
     }
 
     [[nodiscard]] std::size_t longest() const noexcept { return longest_; }
@@ -168,7 +168,7 @@ private:
 template <class Exact = Extremum>
 class CalibratedBounds : public detail::AsksGate<Planned<Exact>> {
 public:
-    static constexpr Evidence put_off = Evidence::gated;
+    static constexpr Evidence deferred = Evidence::gated;
 
     /// @throws std::invalid_argument for a horizon gate, or as `Planned`.
     explicit CalibratedBounds(gates::Gate gate, const PlannerOptions& options = {},

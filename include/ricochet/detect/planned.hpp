@@ -91,7 +91,7 @@ struct GuardBound {
 ///
 /// It is only an estimate: it decides when to check, not what is found. On a ball in a cavern the
 /// estimate without the bend was too long more often than not.
-[[nodiscard]] inline double time_to_look(const GuardBound& at, double slope) noexcept
+[[nodiscard]] inline double time_to_check(const GuardBound& at, double slope) noexcept
 {
     if (!(at.distance > 0) || !at.sound()) return 0;
     const double closing = std::max(at.speed - (std::isfinite(slope) ? slope : 0), 0.0);
@@ -123,7 +123,7 @@ struct PlannerOptions {
     /// them back if it could not be closed. Off: only as far as the bound covers with certainty.
     bool two_ended = true;
     /// Largest number of steps taken before they are closed; as many starts of steps are kept.
-    std::size_t longest_stretch = 256;
+    std::size_t longest_interval = 256;
     /// Fraction by which every bound is enlarged, since bounds hold for the motion and steps have
     /// errors. At least 0.
     double margin = 0.01;
@@ -140,14 +140,14 @@ namespace detail {
 /// @throws std::invalid_argument naming the option.
 void validate(const PlannerOptions& options);
 /// @throws std::invalid_argument because EveryK needs at least one step.
-[[noreturn]] void throw_no_steps_between_looks();
+[[noreturn]] void throw_no_steps_between_checks();
 /// @throws std::invalid_argument if SlopeSkip's fraction is not in (0, 1], or it has no steps.
 [[noreturn]] void throw_bad_slope_skip(double fraction, std::size_t longest);
 
 template <class Exact>
 class PutsOff : public Around<Exact> {
 public:
-    static constexpr bool puts_off = true;
+    static constexpr bool defers = true;
 
     using Around<Exact>::Around;
 };
@@ -179,10 +179,10 @@ template <class Exact = Extremum>
 class Planned : public detail::PutsOff<Exact> {
 public:
     static constexpr bool needs_bounds = true;
-    static constexpr Evidence put_off = Evidence::proved;  ///< evidence for a step without a check
+    static constexpr Evidence deferred = Evidence::proved;  ///< evidence for a step without a check
 
     Planned() : Planned(PlannerOptions{}) {}
-    /// @throws std::invalid_argument if the margin is negative or `longest_stretch` is 0.
+    /// @throws std::invalid_argument if the margin is negative or `longest_interval` is 0.
     explicit Planned(const PlannerOptions& options, const Exact& exact = {})
         : detail::PutsOff<Exact>(exact), options_(options)
     {
@@ -191,7 +191,7 @@ public:
 
     [[nodiscard]] std::size_t longest() const noexcept
     {
-        return options_.two_ended ? options_.longest_stretch : 1;
+        return options_.two_ended ? options_.longest_interval : 1;
     }
     [[nodiscard]] bool checks_bounds() const noexcept { return options_.check_bounds; }
     [[nodiscard]] double margin() const noexcept { return options_.margin; }
@@ -207,7 +207,7 @@ public:
     [[nodiscard]] double hoped(GuardBound at, double slope, double band) const noexcept
     {
         at.distance -= band;
-        return options_.two_ended ? time_to_look(at, slope) : 0;
+        return options_.two_ended ? time_to_check(at, slope) : 0;
     }
 
     [[nodiscard]] bool closes(const GuardBound& from, const GuardBound& to, double tau,
@@ -225,13 +225,13 @@ template <class Exact = Extremum>
 class EveryK : public detail::PutsOff<Exact> {
 public:
     static constexpr bool needs_bounds = false;
-    static constexpr Evidence put_off = Evidence::assumed;
+    static constexpr Evidence deferred = Evidence::assumed;
 
     /// @throws std::invalid_argument if `steps` is 0.
     explicit EveryK(std::size_t steps, const Exact& exact = {})
         : detail::PutsOff<Exact>(exact), steps_(steps)
     {
-        if (steps == 0) detail::throw_no_steps_between_looks();
+        if (steps == 0) detail::throw_no_steps_between_checks();
     }
 
     [[nodiscard]] std::size_t longest() const noexcept { return steps_; }
@@ -259,7 +259,7 @@ template <class Exact = Extremum>
 class SlopeSkip : public detail::PutsOff<Exact> {
 public:
     static constexpr bool needs_bounds = false;
-    static constexpr Evidence put_off = Evidence::assumed;
+    static constexpr Evidence deferred = Evidence::assumed;
 
     /// @throws std::invalid_argument unless `fraction` is in (0, 1] and `longest` above 0.
     explicit SlopeSkip(double fraction = 0.1, std::size_t longest = 20, const Exact& exact = {})
@@ -292,9 +292,9 @@ private:
 
 /// Whether a run of `System` on states X with this detector defers checks.
 template <class Detector, class System, class X>
-[[nodiscard]] constexpr bool puts_off_checks() noexcept
+[[nodiscard]] constexpr bool defers_checks() noexcept
 {
-    if constexpr (Guarded<System, X> && requires { Detector::puts_off; }) {
+    if constexpr (Guarded<System, X> && requires { Detector::defers; }) {
         return !Detector::needs_bounds || Bounded<System, X>;
     } else {
         return false;

@@ -44,7 +44,7 @@ struct Statistics {
     std::uint64_t false_alarms = 0;      ///< a network predicted an event and there was none
     std::uint64_t missed_events = 0;     ///< events in a step that a network had cleared
     std::uint64_t late_events = 0;       ///< missed events that only a later step found
-    std::uint64_t checks_put_off =
+    std::uint64_t checks_deferred =
         0;  ///< steps whose exact check a network or a plan deferred for good
     std::uint64_t outside_domain = 0;  ///< states outside the box of a gate: checked exactly
     std::uint64_t bound_calls = 0;     ///< evaluations of `lower_bound`, `upper_bound`

@@ -41,11 +41,11 @@ struct Options {
     /// last place of t) happen together: they form one set, applied once.
     double event_window = 0;
 
-    /// Whether detectors that can (`LooksInside`) evaluate every guard once inside each step as
+    /// Whether detectors that can (`ChecksInside`) evaluate every guard once inside each step as
     /// well, and divide a step if the cubic through its ends does not describe what the guard
     /// does. Without it a guard that moves faster than the state may be lost. Guards that
     /// declare bounds, and may be expensive, are never examined inside.
-    bool look_inside = true;
+    bool check_inside = true;
 
     bool stop_at_event = false;
     bool record_events = true;  ///< off: events are counted, not kept

@@ -78,7 +78,7 @@ class PartsOfRun {
                 return Kernel::template quiet<error_controlled, void>();
             } else if constexpr (fixed_guard_count<System, X>() == 1 && GuardAlone<System, X> &&
                                  !GuardsTogether<System, X> && !RatesTogether<System, X> &&
-                                 !D::predicts && !puts_off_checks<Detector, System, X>()) {
+                                 !D::predicts && !defers_checks<Detector, System, X>()) {
                 if constexpr (screening == Screening::extremum) {
                     return Kernel::template quiet<error_controlled, Extremum>();
                 } else if constexpr (screening == Screening::ends) {
@@ -90,7 +90,7 @@ class PartsOfRun {
             constexpr bool proves =
                 screening == Screening::extremum || screening == Screening::every;
             constexpr bool one = fixed_guard_count<System, X>() == 1 && !D::predicts &&
-                                 !puts_off_checks<Detector, System, X>();
+                                 !defers_checks<Detector, System, X>();
             if constexpr (!Guarded<System, X> ||
                           (proves && one && KernelOf<System, X, Method>::on_series)) {
                 return KernelOf<System, X, Method>::template quiet<error_controlled>();

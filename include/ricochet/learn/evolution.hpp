@@ -76,7 +76,7 @@ enum class EvolutionOutcome {
     target,        ///< the target score was reached
     converged,     ///< the spread fell below `least_spread`
     stopped,       ///< by the callback, or by `SearchStopped`
-    none_allowed,  ///< no x had a score below infinity in `fruitless_generations` in a row
+    none_allowed,  ///< no x had a score below infinity in `stagnant_generations` in a row
 };
 
 /// One sentence with the remedy.
@@ -84,7 +84,7 @@ enum class EvolutionOutcome {
 
 /// Number of consecutive generations without a score below infinity after which the search gives
 /// up. Each of them halves the spread and moves the mean to the best point so far.
-inline constexpr std::size_t fruitless_generations = 30;
+inline constexpr std::size_t stagnant_generations = 30;
 
 /// Result of a search.
 struct EvolutionResult {

@@ -122,7 +122,7 @@ public:
     void operator()(std::size_t done)
     {
         if (calls_++ % every_ != 0 || !*progress_) return;
-        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begun_;
+        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started_;
         if (!(*progress_)({.iteration = done,
                            .total = total_,
                            .loss = std::numeric_limits<double>::quiet_NaN(),
@@ -135,7 +135,7 @@ public:
 
 private:
     const ProgressCallback* progress_;
-    std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+    std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
     std::string_view stage_;
     std::size_t total_ = 0;
     std::uint64_t every_ = 64;
@@ -256,7 +256,7 @@ private:
 /// compares its cost with that of the exact detector, on runs with the same starts. The callback is
 /// that of `train`, and is also called before and after the training proper. If it stops the work,
 /// what was computed so far is returned as `stopped`, with an empty model if the training had not
-/// begun.
+/// started.
 ///
 /// @param options  event settings of the runs; times and the step come from `training`
 /// @throws std::invalid_argument if an option is outside its range, no run can be started, or the

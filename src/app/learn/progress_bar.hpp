@@ -49,7 +49,7 @@ public:
         const std::size_t percent =
             progress.total == 0 ? 100 : 100 * progress.iteration / progress.total;
         const bool trains = stage_ == learn::Progress{}.stage;
-        // A stage that has just begun may be refused, and some stages have no measure.
+        // A stage that has just started may be refused, and some stages have no measure.
         if (!trains && (progress.total == 0 || (!terminal_ && percent < 10))) return;
         const std::string figures =
             fmt::format("{:>3} %  {} of {}{}  {}", percent, progress.iteration, progress.total,

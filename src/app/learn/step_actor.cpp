@@ -17,7 +17,7 @@
 #include "report.hpp"
 #include "ricochet/learn/policies.hpp"
 #include "say.hpp"
-#include "step_world.hpp"
+#include "step_environment.hpp"
 #include "timing.hpp"
 #include "train.hpp"
 
@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using learn::PolicyOutcome;
-using learn::StepWorld;
+using learn::StepEnvironment;
 using learn::TrainedPolicy;
 
 learn::PolicyTraining training_of(const TrainPolicyRequest& request)
@@ -57,15 +57,15 @@ TrainedPolicy trained_by(const std::string& trainer, const learn::Environment& e
 }
 
 Model named(Model actor, const std::string& system, double alpha, std::uint64_t seed,
-            const StepWorld& world)
+            const StepEnvironment& runs)
 {
     actor.kind = step_actor_kind;
     actor.system = system;
     actor.recipe = step_actor_recipe;
     actor.parameters = {{"alpha", alpha}};
     actor.seed = seed;
-    actor.step_min = world.length_of(-1);
-    actor.step_max = world.length_of(1);
+    actor.step_min = runs.length_of(-1);
+    actor.step_max = runs.length_of(1);
     return actor;
 }
 
@@ -78,9 +78,10 @@ int train_actor(const TrainPolicyRequest& request)
         throw unknown("trainer", request.trainer, known);
     }
     const double alpha = request.alpha.value_or(2);
-    const StepWorld world = source_world(request.system, learn::published_step_world(alpha));
+    const StepEnvironment runs =
+        source_environment(request.system, learn::published_step_environment(alpha));
     const learn::PolicyTraining training = training_of(request);
-    const TrainedPolicy trained = trained_by(request.trainer, world.environment, training);
+    const TrainedPolicy trained = trained_by(request.trainer, runs.environment, training);
     if (trained.outcome == PolicyOutcome::stopped) {
         say_what_is_kept(training.checkpoint, trained.checkpoint_trouble);
         return 1;
@@ -88,11 +89,12 @@ int train_actor(const TrainPolicyRequest& request)
     if (!trained.message.empty()) {
         throw std::runtime_error(fmt::format("{}, and no model was written", trained.message));
     }
-    const Model actor = named(trained.policy, request.system, alpha, training.seed, world);
+    const Model actor = named(trained.policy, request.system, alpha, training.seed, runs);
     keep_model(actor, request.out, training.checkpoint);
     std::error_code ignored;
     if (request.checkpoint.empty()) fs::remove(training.checkpoint, ignored);
-    const learn::StepTrial run = learn::follow(source_world(request.system, judged(actor)), actor);
+    const learn::StepTrial run =
+        learn::follow(source_environment(request.system, judged(actor)), actor);
     if (request.json) {
         print(json_text({{"system", request.system},
                          {"trainer", request.trainer},

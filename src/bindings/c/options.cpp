@@ -25,7 +25,7 @@ rc_options defaults<rc_options>() noexcept
     options.method = RC_DOPRI5;
     options.detector = RC_EXTREMUM;
     options.locator = RC_NEWTON;
-    options.look_inside = standard.look_inside;
+    options.check_inside = standard.check_inside;
     options.stop_at_event = standard.stop_at_event;
     options.record_events = standard.record_events;
     options.event_states = standard.event_states;
@@ -54,7 +54,7 @@ rc_monitor_options defaults<rc_monitor_options>() noexcept
     options.event_window = standard.event_window;
     options.detector = RC_EXTREMUM;
     options.locator = RC_NEWTON;
-    options.look_inside = standard.look_inside;
+    options.check_inside = standard.check_inside;
     options.record_events = standard.record_events;
     options.event_states = standard.event_states;
     return options;
@@ -118,7 +118,7 @@ public:
         options.event_tolerance = from.event_tolerance;
         options.event_rtol = from.event_rtol;
         options.event_window = from.event_window;
-        options.look_inside = flag("look_inside", from.look_inside);
+        options.check_inside = flag("check_inside", from.check_inside);
         options.record_events = flag("record_events", from.record_events);
         options.event_states = flag("event_states", from.event_states);
     }

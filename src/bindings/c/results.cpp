@@ -50,7 +50,7 @@ void write_statistics(rc_statistics* statistics, const Counts& counts)
                   .guard_calls = from.guard_calls,
                   .network_calls = from.network_calls,
                   .late_events = from.late_events,
-                  .checks_put_off = from.checks_put_off,
+                  .checks_deferred = from.checks_deferred,
                   .outside_domain = from.outside_domain,
                   .bound_calls = from.bound_calls,
                   .rollbacks = from.rollbacks,

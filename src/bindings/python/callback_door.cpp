@@ -206,7 +206,7 @@ private:
             return;
         }
         const Ref result = call(source_.guard_values_, mode, t, x_.show(x));
-        const Numbers numbers(result.get(), "guard_values", nobody_);
+        const Numbers numbers(result.get(), "guard_values", no_guard_);
         if (numbers.size() != g.size()) {
             raise(PyExc_ValueError, "guard_values returned " + std::to_string(numbers.size()) +
                                         " numbers for " + std::to_string(g.size()) + " guards");
@@ -323,12 +323,12 @@ private:
                             PyUnicode_FromString("time"));
         }
         const Ref result = call(source_.reset_set_, mode, t, x_.show(x), list.get());
-        return take_place(result.get(), "reset_set", nobody_, mode, x);
+        return take_place(result.get(), "reset_set", no_guard_, mode, x);
     }
 
     [[nodiscard]] Mode time_reset(Mode mode, double t, State& x)
     {
-        return edit(source_.time_reset_, "time_reset", nobody_, mode, t, x);
+        return edit(source_.time_reset_, "time_reset", no_guard_, mode, t, x);
     }
 
     /// A state; with modes a mode, or a tuple (mode, state).
@@ -390,7 +390,7 @@ private:
     ShownArray x_, dxdt_;
     State there_;
     std::vector<double> values_;
-    const std::string nobody_;
+    const std::string no_guard_;
 };
 
 void CallbackSource::fill_table()

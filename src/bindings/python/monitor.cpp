@@ -36,11 +36,11 @@ struct ShownStep {
 
     static void at(const void* step, double s, double* x, std::size_t n)
     {
-        static const std::string nobody;
+        static const std::string no_guard;
         const auto& self = *static_cast<const ShownStep*>(step);
         const Ref time = checked(PyFloat_FromDouble(self.t0 + self.sign * s));
         const Ref result = checked(PyObject_CallOneArg(self.interpolate, time.get()));
-        const Numbers numbers(result.get(), "interpolate", nobody);
+        const Numbers numbers(result.get(), "interpolate", no_guard);
         if (numbers.size() != n) {
             raise(PyExc_ValueError, "interpolate returned " + std::to_string(numbers.size()) +
                                         " numbers for a state of " + std::to_string(n));

@@ -67,7 +67,8 @@ void set(Request& request, const py::handle& value)
         {"event_tolerance", &set<&Options::event_tolerance>},
         {"event_rtol", &set<&Options::event_rtol>},
         {"event_window", &set<&Options::event_window>},
-        {"look_inside", &set<&Options::look_inside>},
+        {"check_inside", &set<&Options::check_inside>},
+        {"look_inside", &set<&Options::check_inside>},  // its name before version 0.2
         {"stop_at_event", &set<&Options::stop_at_event>},
         {"record_events", &set<&Options::record_events>},
         {"event_states", &set<&Options::event_states>},

@@ -81,7 +81,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     add("resteps", s.resteps);
     add("flow_calls", s.flow_calls);
     add("guard_calls", s.guard_calls);
-    add("checks_put_off", s.checks_put_off);
+    add("checks_deferred", s.checks_deferred);
+    add("checks_put_off", s.checks_deferred);  // its name before version 0.2
     add("bound_calls", s.bound_calls);
     add("rollbacks", s.rollbacks);
     add("repeated_steps", s.repeated_steps);

@@ -11,8 +11,8 @@ namespace ricochet::app {
 
 /// Runs of the source's problem of a system: one element of fault, its sliding mode, its circuit.
 /// @throws BadInput naming the systems that have one.
-[[nodiscard]] learn::StepWorld source_world(const std::string& system,
-                                            const learn::StepWorldOptions& options);
+[[nodiscard]] learn::StepEnvironment source_environment(
+    const std::string& system, const learn::StepEnvironmentOptions& options);
 
 /// The actor of the library for a system.
 /// @throws BadInput or ModelError if it does not exist or is no actor.
@@ -20,6 +20,6 @@ namespace ricochet::app {
 
 /// Options for assessing an actor: it takes the steps that it was trained with, until nothing
 /// moves.
-[[nodiscard]] learn::StepWorldOptions judged(const Model& actor);
+[[nodiscard]] learn::StepEnvironmentOptions judged(const Model& actor);
 
 }  // namespace ricochet::app

@@ -18,7 +18,7 @@
 namespace ricochet::detail {
 
 /// The guard at the ends of an interval, as a cubic over u in [0, 1].
-struct CubicLook {
+struct CubicCheck {
     /// Fraction of an interval at which the guard is evaluated: the golden section, so that no
     /// guard whose period has a simple ratio to the step escapes it, and a second one for cases of
     /// doubt.
@@ -41,7 +41,7 @@ struct CubicLook {
 
     double v0, b1, b2, v1;  ///< control points
 
-    CubicLook(double g0, double rate0, double g1, double rate1, double width) noexcept
+    CubicCheck(double g0, double rate0, double g1, double rate1, double width) noexcept
         : v0(g0), b1(g0 + rate0 * (width / 3)), b2(g1 - rate1 * (width / 3)), v1(g1)
     {
     }
@@ -77,9 +77,9 @@ struct CubicLook {
     }
 };
 
-/// `CubicLook::inside` as a compile-time constant.
+/// `CubicCheck::inside` as a compile-time constant.
 struct InsideOf {
-    static constexpr double u = CubicLook::inside;
+    static constexpr double u = CubicCheck::inside;
 };
 
 }  // namespace ricochet::detail

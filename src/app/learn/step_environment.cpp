@@ -1,4 +1,4 @@
-#include "step_world.hpp"
+#include "step_environment.hpp"
 
 #include <fmt/format.h>
 
@@ -16,21 +16,22 @@
 namespace ricochet::app {
 
 namespace fs = std::filesystem;
-using learn::StepWorld;
-using learn::StepWorldOptions;
+using learn::StepEnvironment;
+using learn::StepEnvironmentOptions;
 
-StepWorld source_world(const std::string& system, const StepWorldOptions& options)
+StepEnvironment source_environment(const std::string& system, const StepEnvironmentOptions& options)
 {
     const std::vector<std::string_view> known{"fault", SlidingMode::name, DiodeCircuit::name};
     if (system == known[0]) {
-        return learn::step_world(StrikeSlipFault({.elements = 1}), 30, options);
+        return learn::step_environment(StrikeSlipFault({.elements = 1}), 30, options);
     }
     if (system == known[1]) {
-        return learn::step_world(SlidingMode{}, SlidingMode::start, SlidingMode::t_end, options);
+        return learn::step_environment(SlidingMode{}, SlidingMode::start, SlidingMode::t_end,
+                                       options);
     }
     if (system == known[2]) {
-        return learn::step_world(DiodeCircuit{}, DiodeCircuit::start(), DiodeCircuit::t_end,
-                                 options);
+        return learn::step_environment(DiodeCircuit{}, DiodeCircuit::start(), DiodeCircuit::t_end,
+                                       options);
     }
     throw unknown("system for a step policy", system, known);
 }
@@ -51,9 +52,10 @@ Model shipped_actor(std::string_view system)
     return actor;
 }
 
-StepWorldOptions judged(const Model& actor)
+StepEnvironmentOptions judged(const Model& actor)
 {
-    StepWorldOptions options = learn::published_step_world(actor.parameters.at("alpha"));
+    StepEnvironmentOptions options =
+        learn::published_step_environment(actor.parameters.at("alpha"));
     options.h_min = actor.step_min;
     options.h_max = actor.step_max;
     options.until_rest = true;
