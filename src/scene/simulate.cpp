@@ -119,7 +119,9 @@ struct Key {
 /// with some 8 events each, as if their times were evenly spread, and then within each.
 std::vector<Key> keys_in_order(const std::vector<SceneEvent>& events)
 {
-    const auto [first, last] = std::ranges::minmax(events | std::views::transform(&SceneEvent::t));
+    const auto [earliest, latest] = std::ranges::minmax_element(events, {}, &SceneEvent::t);
+    const double first = earliest->t;
+    const double last = latest->t;
     const std::size_t count = events.size() / 8 + 1;
     const double scale = last > first ? static_cast<double>(count - 1) / (last - first) : 0;
     const auto bin_of = [&](double t) { return static_cast<std::size_t>((t - first) * scale); };
