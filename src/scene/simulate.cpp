@@ -7,7 +7,6 @@
 #include <compare>
 #include <numeric>
 #include <optional>
-#include <ranges>
 #include <utility>
 
 #include "checks/require.hpp"
