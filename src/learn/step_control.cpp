@@ -105,8 +105,9 @@ StepScore::StepScore(const StepFamily& family, unsigned threads) : family_(famil
     }
     const std::vector<double> fine = fine_tolerances();
     ricochet::detail::Workers team(threads);
-    for (auto& [number, group] : groups) {
-        group.number = number;
+    for (auto& numbered : groups) {
+        Group& group = numbered.second;  // a structured binding cannot be captured below
+        group.number = numbered.first;
         for (const bool constant : {false, true}) {
             std::vector<Mean> means(fine.size());
             team.run(fine.size(), [&](std::size_t i) {

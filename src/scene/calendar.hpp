@@ -122,8 +122,9 @@ private:
     bool turn()
     {
         std::erase_if(late_, [&](std::uint32_t body) {
-            is_late_[body] = times_[body].value < never;
-            return !is_late_[body];
+            const bool late = times_[body].value < never;
+            is_late_[body] = late ? 1 : 0;
+            return !late;
         });
         if (late_.empty()) return false;
         const std::size_t stride = late_.size() / 1024 + 1;

@@ -25,8 +25,7 @@ std::vector<std::uint32_t> Contacts::closure(const std::vector<std::uint32_t>& b
         }
     }
     std::ranges::sort(all);
-    const auto repeated = std::ranges::unique(all);
-    all.erase(repeated.begin(), repeated.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
     return all;
 }
 
@@ -49,8 +48,7 @@ IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
         if (body.island != none) islands.push_back(body.island);
     }
     std::ranges::sort(islands);
-    const auto repeated = std::ranges::unique(islands);
-    islands.erase(repeated.begin(), repeated.end());
+    islands.erase(std::unique(islands.begin(), islands.end()), islands.end());
     for (const std::uint32_t island : islands) {
         for (const auto& [a, b, rest, stiffness, damping] : world_.islands->springs(island)) {
             setup.springs.push_back({a, b, rest, stiffness, damping});

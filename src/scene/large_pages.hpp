@@ -24,6 +24,7 @@ void reserve_large(std::vector<T>& list, std::size_t count)
     const auto end = reinterpret_cast<std::uintptr_t>(list.data() + list.capacity()) & ~(page - 1);
     if (begin < end) {
         // Where this is refused the memory is usable, but slower.
+        // NOLINTNEXTLINE(performance-no-int-to-ptr): begin is rounded up to a page
         static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
     }
 #endif

@@ -38,8 +38,7 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
         if (world_.bodies[i].island != none) islands_.push_back(world_.bodies[i].island);
     }
     std::ranges::sort(islands_);
-    const auto repeated = std::ranges::unique(islands_);
-    islands_.erase(repeated.begin(), repeated.end());
+    islands_.erase(std::unique(islands_.begin(), islands_.end()), islands_.end());
     if (members_.size() == 1 && world_.faces.empty()) {
         for (const std::uint32_t island : islands_) world_.islands->set_unseen(island);
     }

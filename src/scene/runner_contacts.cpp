@@ -72,8 +72,7 @@ std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& 
                              [&](std::uint32_t face) { faces.push_back(face); });
     }
     std::ranges::sort(faces);
-    const auto repeated = std::ranges::unique(faces);
-    faces.erase(repeated.begin(), repeated.end());
+    faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
     return faces;
 }
 

@@ -346,7 +346,7 @@ TEST(ContactIsland, LabelsDoNotChangeABit)
     const IslandSetup setup = in_bin(10, 0.6, 0.4, 8);
     IslandSetup other = setup;
     std::ranges::reverse(other.bodies);
-    std::ranges::rotate(other.bodies, other.bodies.begin() + 3);
+    std::rotate(other.bodies.begin(), other.bodies.begin() + 3, other.bodies.end());
     std::ranges::reverse(other.walls);
     for (IslandBody& b : other.bodies) b.id = 1000 - 7 * b.id;
     ContactIsland a(setup, {.step = 1e-3}, 0);

@@ -90,7 +90,7 @@ TEST(LastingContact, LabelsDoNotChangeABit)
     std::vector<std::size_t> order(12);
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::ranges::reverse(order);
-    std::ranges::rotate(order, order.begin() + 5);
+    std::rotate(order.begin(), order.begin() + 5, order.end());
     const SceneOptions options{.t_end = 6, .contacts = scene_contacts()};
     for (const double friction : {0.0, 0.4}) {
         const SceneRun run = simulate(above_bin(0.3, friction), options);
