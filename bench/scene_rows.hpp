@@ -79,8 +79,8 @@ struct SceneRow {
 /// `built` and `brute` give the same bits; the second is null where there is one guard only.
 /// `budget` [s] for each way of running.
 template <class Stepping, class System>
-[[nodiscard]] SceneRow compare_scene(std::string name, const System& built, const System* brute,
-                                     const Options& options, double budget)
+[[nodiscard]] SceneRow compare_scene(const std::string& name, const System& built,
+                                     const System* brute, const Options& options, double budget)
 {
     using X = typename System::State;
     const X x0 = built.start();
@@ -90,7 +90,7 @@ template <class Stepping, class System>
     const auto planned = [&](const System& system) {
         return integrate(system, x0, options, Stepping{}, planner());
     };
-    SceneRow row{.name = std::move(name), .guards = guard_count_of<X>(built)};
+    SceneRow row{.name = name, .guards = guard_count_of<X>(built)};
     const System& slow = brute != nullptr ? *brute : built;
     const auto exact = every(slow);
     const auto plan = planned(built);

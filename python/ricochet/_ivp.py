@@ -14,10 +14,10 @@ from ._system import Guard, System
 
 _METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
 _WITHOUT = {
-    "RK23": "it has no method of order 3; take 'RK45'",
-    "Radau": "it has no implicit method",
-    "BDF": "it has no implicit method",
-    "LSODA": "it has no implicit method",
+    "RK23": "ricochet has no method of order 3; take 'RK45'",
+    "Radau": "the Python package has no implicit method",
+    "BDF": "the Python package has no implicit method",
+    "LSODA": "the Python package has no implicit method",
 }
 _IMPLICIT_OPTIONS = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 _KINDS = {kind.value: kind.name.lower() for kind in Kind}
@@ -141,8 +141,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     if isinstance(method, type):
         method = method.__name__
     if method in _WITHOUT:
-        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853': ricochet "
-                         f"integrates non-stiff phases, {_WITHOUT[method]}")
+        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853': "
+                         f"{_WITHOUT[method]}")
     if method not in _METHODS:
         raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853'")
     try:

@@ -290,6 +290,9 @@ class System:
                 def preceding(t, *_):
                     k = bisect_left(times, t)
                     return times[k - 1] if k > 0 else -inf
+        if self.time_reset is not None and following is None:
+            raise ValueError("time_reset: found one without time events, expected time_events or "
+                             "next_time_event beside it")
         guards = self._guard_list()
         flow = self.flow if self.formula is None else self._formulas(args, guards)
         source = _ricochet.callback_system(dict(

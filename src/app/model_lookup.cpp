@@ -20,8 +20,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The first of the files that exists.
-/// @throws BadInput
-fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates)
+/// @throws BadInput naming each of them, and `hint`.
+fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates,
+                  std::string_view hint = "")
 {
     std::vector<std::string> looked;
     std::error_code ignored;
@@ -30,7 +31,7 @@ fs::path first_of(std::string_view name, const std::vector<fs::path>& candidates
         looked.push_back(file.string());
     }
     throw BadInput(
-        fmt::format("model '{}' not found; searched for {}", name, joined(looked, ", ")));
+        fmt::format("model '{}' not found; searched for {}{}", name, joined(looked, ", "), hint));
 }
 
 /// The reason why the output of `model` is not an event of `system`; empty if it may be.
@@ -127,20 +128,30 @@ std::vector<fs::path> model_directories()
     if (!error) {
         directories.push_back(program.parent_path().parent_path() / "share/ricochet/models");
     }
-    directories.emplace_back(RICOCHET_INSTALLED_MODELS);
+    const fs::path installed(RICOCHET_INSTALLED_MODELS);
+    if (std::ranges::find(directories, installed) == directories.end()) {
+        directories.push_back(installed);
+    }
     return directories;
 }
 
 fs::path find_model(const std::string& given)
 {
     std::vector<fs::path> candidates{given};
-    if (!given.empty() && !fs::path(given).has_parent_path()) {
-        for (const fs::path& directory : model_directories()) {
-            candidates.push_back(directory / given);
+    std::string hint;
+    for (const fs::path& directory : model_directories()) {
+        if (fs::path(given).has_parent_path()) {
+            hint += fmt::format("{}{}", hint.empty() ? "; models given by name are in " : ", ",
+                                directory.string());
+            continue;
+        }
+        if (given.empty()) continue;
+        candidates.push_back(directory / given);
+        if (!given.ends_with(".safetensors")) {
             candidates.push_back(directory / (given + ".safetensors"));
         }
     }
-    return first_of(given, candidates);
+    return first_of(given, candidates, hint);
 }
 
 fs::path find_model(const OwnModel& own)

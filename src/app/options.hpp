@@ -45,11 +45,10 @@ CLI::Option* add_text(CLI::App& command, const std::string& option, std::optiona
         ->type_name(value);
 }
 
-inline void add_system(CLI::App& command, std::string& out)
+inline void add_system(CLI::App& command, std::string& out,
+                       const std::string& help = "its name; `ricochet systems` lists them")
 {
-    command.add_option("SYSTEM", out, "its name; `ricochet systems` lists them")
-        ->required()
-        ->type_name("");
+    command.add_option("SYSTEM", out, help)->required()->type_name("");
 }
 
 }  // namespace ricochet::app

@@ -1,8 +1,8 @@
 // The systems that the command line knows, as values.
 //
-// A system is added by one file in systems/ that defines its entry, and one line in
-// registry.cpp. If a system needs more than the core, its functions are in a file of the
-// program that simulates it.
+// A system is added by a function in a file of systems/ that returns its entry, which
+// systems/entries.hpp declares and lists. If a system needs more than the core, its functions are
+// in a file of the program that simulates it.
 #pragma once
 
 #include <cstddef>

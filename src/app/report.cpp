@@ -22,21 +22,6 @@ namespace {
 using PlainRun = Run<std::vector<double>>;
 using PlainEvent = Event<std::vector<double>>;
 
-std::string_view name(EventKind kind)
-{
-    switch (kind) {
-        case EventKind::crossing: break;
-        case EventKind::touch: return "touch";
-        case EventKind::time: return "time";
-        case EventKind::accumulation: return "accumulation";
-        case EventKind::mode: return "mode";
-        case EventKind::stick: return "stick";
-        case EventKind::slip: return "slip";
-        case EventKind::jump: return "jump";
-    }
-    return "crossing";
-}
-
 Json json(const SystemEntry& system, const PlainEvent& event)
 {
     Json guards = Json::array();

@@ -160,6 +160,13 @@ void choose_gate(const SystemEntry& system, const RunRequest& request, RunSettin
                         "a {}",
                         found.file.string(), found.model.kind));
     }
+    if (settings.detector == DetectorKind::calibrated && !settings.fixed_step &&
+        found.model.step_min == found.model.step_max) {
+        throw BadInput(
+            fmt::format("model '{}' is for fixed steps of {} s; expected --step {}, or a gate "
+                        "trained for error control",
+                        found.file.string(), found.model.step_min, found.model.step_min));
+    }
     settings.model = std::move(found.file);
     // The misses of an unverified gate are known only for such steps.
     if (settings.detector == DetectorKind::calibrated && !settings.fixed_step) {

@@ -79,7 +79,7 @@ protected:
     void refuse_bad_modes() const
     {
         const std::size_t modes = system_.modes();
-        if (modes > 0 && options_.mode >= modes) throw_unknown_mode(options_.mode, modes);
+        if (modes > 0 && options_.mode >= modes) throw_unknown_mode(who_, options_.mode, modes);
     }
 
     void refuse_bad_guards();
@@ -472,6 +472,7 @@ protected:
     double set_remainder_ = 0;
     int level_ = 0;  ///< number of sets so far at this instant
     Run<X> run_;
+    std::string_view who_ = "integrate";  ///< with which refusals begin
 };
 
 }  // namespace ricochet::detail

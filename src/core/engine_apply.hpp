@@ -86,7 +86,7 @@ inline void EventEngine<X, single>::find_time_event(bool at_start)
         time_event_ = system_->previous_time_event(system_.door(), t);
     }
     if (step_.until(time_event_) > 0) return;
-    if (at_start) throw_time_event_not_ahead(backward_, t, time_event_);
+    if (at_start) throw_time_event_not_ahead(who_, backward_, t, time_event_);
     end(Outcome::time_event_not_ahead);
 }
 

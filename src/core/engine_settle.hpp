@@ -78,11 +78,11 @@ inline void EventEngine<X, single>::arm_at_start()
         const double g = bank_.g0(i);
         if (!record.enabled) continue;
         if (!std::isfinite(g)) {
-            throw_start_guard_not_finite(i, record.info.name, options_.t_start, g);
+            throw_start_guard_not_finite(who_, i, record.info.name, options_.t_start, g);
         }
         const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
         if (record.info.unilateral && g < 0 && !on_surface) {
-            throw_start_outside_mode(i, record.info.name, options_.t_start, g);
+            throw_start_outside_mode(who_, i, record.info.name, options_.t_start, g);
         }
         if (on_surface) bank_[i].band = std::fabs(g);
         bank_[i].departs = on_surface;
@@ -280,13 +280,13 @@ inline void EventEngine<X, single>::refuse_bad_guards()
         record.acting = (resets_any_ && info.resets) || info.stop_after > 0 ||
                         options_.stop_at_event || cuts_at_all_;
         if (info.unilateral && !(resets_any_ && info.resets)) {
-            throw_no_reset(i, info.name);
+            throw_no_reset(who_, i, info.name);
         }
         if (info.unilateral && info.crossing != Crossing::falling) {
-            throw_unilateral_not_falling(i, info.name);
+            throw_unilateral_not_falling(who_, i, info.name);
         }
         if (!(info.touch >= 0 && std::isfinite(info.touch))) {
-            throw_bad_touch(i, info.name, info.touch);
+            throw_bad_touch(who_, i, info.name, info.touch);
         }
     }
 }

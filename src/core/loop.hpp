@@ -58,7 +58,7 @@ public:
         first_step_ = h_next_;
         flight_start_ = options_.t_start;
         this->refuse_bad_modes();
-        if (!step_.flow_fits()) throw_flow_does_not_fit(components_);
+        if (!step_.flow_fits()) throw_flow_does_not_fit("integrate", components_);
         if (guarded_) this->refuse_bad_guards();
         if (system_->forward_only && backward_) throw_forward_only();
         if (timed_) {

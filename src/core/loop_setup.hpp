@@ -10,10 +10,10 @@ inline const Options& Loop<X, single>::checked(const RunSetup<X>& setup, const O
                                                const X& x0)
 {
     validate(options, !setup.error_controlled);
-    if (x0.size() == 0) throw_start_empty();
+    if (x0.size() == 0) throw_start_empty("integrate");
     for_each_component(x0, [&](auto i) {
         if (!std::isfinite(x0[i])) {
-            throw_start_not_finite(static_cast<std::size_t>(i), x0[i]);
+            throw_start_not_finite("integrate", static_cast<std::size_t>(i), x0[i]);
         }
     });
     const std::size_t tolerances = options.component_atol.size();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/engine.hpp"
@@ -40,12 +41,14 @@ template <class X, bool single>
 class MonitorLoop : public AnyMonitor<X>, private EventEngine<X, single> {
     using Engine = EventEngine<X, single>;
     using typename Engine::Pending;
+    static constexpr std::string_view who = "EventMonitor";
 
 public:
     /// Keeps a reference to `setup`.
     MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options, bool cuts_at_all)
         : Engine(setup, like, options)
     {
+        this->who_ = who;
         this->cuts_at_all_ = cuts_at_all;
         if (!guarded_ && !timed_) {
             throw_without_events();
@@ -112,7 +115,7 @@ public:
         require_finite(step_.start(), after);
         require_length("the scale of `resume`", scale);
         const std::size_t modes = system_.modes();
-        if (modes > 0 && mode >= modes) throw_unknown_mode(mode, modes);
+        if (modes > 0 && mode >= modes) throw_unknown_mode(who, mode, modes);
         step_.restart(step_.start(), after, mode);
         return resume(dxdt, scale);
     }
@@ -245,9 +248,11 @@ private:
         if (!std::isfinite(t.value) || !std::isfinite(t.remainder)) {
             throw_no_length("the time", t.value);
         }
-        if (x.size() == 0) throw_start_empty();
+        if (x.size() == 0) throw_start_empty(who);
         for_each_component(x, [&](auto i) {
-            if (!std::isfinite(x[i])) throw_start_not_finite(static_cast<std::size_t>(i), x[i]);
+            if (!std::isfinite(x[i])) {
+                throw_start_not_finite(who, static_cast<std::size_t>(i), x[i]);
+            }
         });
     }
 
@@ -374,7 +379,7 @@ private:
     {
         if (dxdt) return step_.set_rate(dxdt);
         step_.refresh();
-        if (!step_.flow_fits()) throw_flow_does_not_fit(step_.x0().size());
+        if (!step_.flow_fits()) throw_flow_does_not_fit(who, step_.x0().size());
     }
 
     /// Arms the guards; a set that follows at the same instant is returned as another cut.

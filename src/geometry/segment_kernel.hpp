@@ -19,10 +19,11 @@ struct SegmentColumns {
     std::size_t count;
 };
 
-/// The first check that holds the least, and the least; `squared` is as given if none is less.
+/// The first block that holds the least distance, and its square; `squared` is as given if none is
+/// less.
 struct LeastBlock {
     double squared;
-    std::size_t look;
+    std::size_t block;
 };
 
 #if defined(__AVX__)
@@ -34,8 +35,8 @@ typedef double Lanes __attribute__((vector_size(lanes * sizeof(double)), may_ali
 
 /// |a + t d - p|² with t = (p - a) d / d² within [0, 1]; of numbers or of several together.
 template <class T>
-[[gnu::always_inline]] inline T squared_distance(const T& ax, const T& ay, const T& dx, const T& dy,
-                                                 const T& inverse, double px, double py) noexcept
+[[gnu::always_inline]] inline T squared_distance(T ax, T ay, T dx, T dy, T inverse, double px,
+                                                 double py) noexcept
 {
     const T zero{};
     const T one = zero + 1.0;
@@ -60,9 +61,9 @@ using LeastBlockFunction = LeastBlock (*)(const SegmentColumns& columns, double 
     for (std::size_t i = 0; i < columns.count; i += segments_per_block) {
         Lanes least = Lanes{} + best.squared;
         for (std::size_t j = i; j < i + segments_per_block; j += lanes) {
-            const Lanes square = squared_distance<Lanes>(load(columns.ax + j), load(columns.ay + j),
-                                                         load(columns.dx + j), load(columns.dy + j),
-                                                         load(columns.inverse + j), px, py);
+            const auto square = squared_distance<Lanes>(load(columns.ax + j), load(columns.ay + j),
+                                                        load(columns.dx + j), load(columns.dy + j),
+                                                        load(columns.inverse + j), px, py);
             least = square < least ? square : least;
         }
         for (std::size_t k = 0; k < lanes; ++k) {

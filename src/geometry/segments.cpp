@@ -124,7 +124,7 @@ std::array<double, 4> Segments::Columns::four_squared_distances(std::size_t firs
         const auto load = [&](const std::vector<double>& column) {
             return *reinterpret_cast<const detail::Lanes*>(column.data() + first + i);
         };
-        const detail::Lanes squares = detail::squared_distance<detail::Lanes>(
+        const auto squares = detail::squared_distance<detail::Lanes>(
             load(ax), load(ay), load(dx), load(dy), load(inverse), p.x, p.y);
         for (std::size_t k = 0; k < detail::lanes; ++k) out[i + k] = squares[k];
     }
@@ -171,7 +171,7 @@ NearestOnSegment Segments::nearest_brute(Point2 p) const noexcept
         look({given_.ax.data(), given_.ay.data(), given_.dx.data(), given_.dy.data(),
               given_.inverse.data(), given_.ax.size()},
              p.x, p.y, largest);
-    std::size_t which = found.look * detail::segments_per_block;
+    std::size_t which = found.block * detail::segments_per_block;
     if (found.squared < largest) {
         while (given_.squared_distance(which, p) != found.squared) ++which;
     }
@@ -230,9 +230,8 @@ struct Asked {
 
 /// Squares of distances between a segment and several; 0 where they cross.
 template <class T>
-[[gnu::always_inline]] inline T squared_distances(const Asked& s, const T& ax, const T& ay,
-                                                  const T& dx, const T& dy,
-                                                  const T& inverse) noexcept
+[[gnu::always_inline]] inline T squared_distances(const Asked& s, T ax, T ay, T dx, T dy,
+                                                  T inverse) noexcept
 {
     const T zero{};
     const T one = zero + 1.0;
@@ -303,8 +302,8 @@ std::array<double, 4> Segments::Columns::four_squared_distances(std::size_t firs
         const auto load = [&](const std::vector<double>& column) {
             return *reinterpret_cast<const detail::Lanes*>(column.data() + first + i);
         };
-        const detail::Lanes squares = squared_distances<detail::Lanes>(
-            asked, load(ax), load(ay), load(dx), load(dy), load(inverse));
+        const auto squares = squared_distances<detail::Lanes>(asked, load(ax), load(ay), load(dx),
+                                                              load(dy), load(inverse));
         for (std::size_t k = 0; k < detail::lanes; ++k) out[i + k] = squares[k];
     }
     return out;
@@ -336,8 +335,9 @@ NearestPair Segments::nearest(const Segment2& s, double limit, std::uint32_t hin
         best = square;
     };
     {
-        const std::uint32_t first = hint < segments_.size() ? hint : 0;
-        offer(first, given_.four_squared_distances(first / 4 * 4, s)[first % 4]);
+        const std::uint32_t at = hint < segments_.size() ? hint : 0;
+        const std::size_t first = at;
+        offer(at, given_.four_squared_distances(first / 4 * 4, s)[first % 4]);
     }
     const Asked asked(s);
     const std::array<double, 2> lower{std::min(s.a.x, s.b.x), std::min(s.a.y, s.b.y)};

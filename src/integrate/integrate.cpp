@@ -27,44 +27,44 @@ void throw_wrong_tolerances(std::size_t components, std::size_t tolerances)
                     components, tolerances));
 }
 
-void throw_start_empty()
+void throw_start_empty(std::string_view who)
 {
-    throw std::invalid_argument("integrate: the start must have components, got none");
+    throw std::invalid_argument(fmt::format("{}: the start must have components, got none", who));
 }
 
-void throw_no_reset(std::size_t which, std::string_view name)
+void throw_no_reset(std::string_view who, std::size_t which, std::string_view name)
 {
     throw std::invalid_argument(fmt::format(
-        "integrate: {} is unilateral and needs a reset: it defines how the motion continues there",
+        "{}: {} is unilateral and needs a reset: it defines how the motion continues there", who,
         guard_called(which, name)));
 }
 
-void throw_unilateral_not_falling(std::size_t which, std::string_view name)
+void throw_unilateral_not_falling(std::string_view who, std::size_t which, std::string_view name)
 {
     throw std::invalid_argument(fmt::format(
-        "integrate: {} is unilateral, so its crossing must be falling: g >= 0 bounds the motion",
+        "{}: {} is unilateral, so its crossing must be falling: g >= 0 bounds the motion", who,
         guard_called(which, name)));
 }
 
-void throw_bad_touch(std::size_t which, std::string_view name, double touch)
+void throw_bad_touch(std::string_view who, std::size_t which, std::string_view name, double touch)
 {
     throw std::invalid_argument(
-        fmt::format("integrate: {} needs a touch that is finite and not negative, got {}",
+        fmt::format("{}: {} needs a touch that is finite and not negative, got {}", who,
                     guard_called(which, name), touch));
 }
 
-void throw_unknown_mode(std::size_t mode, std::size_t modes)
+void throw_unknown_mode(std::string_view who, std::size_t mode, std::size_t modes)
 {
     throw std::invalid_argument(fmt::format(
-        "integrate: mode must be below the system's mode_count = {}, got {}", modes, mode));
+        "{}: mode must be below the system's mode_count = {}, got {}", who, modes, mode));
 }
 
-void throw_flow_does_not_fit(std::size_t components)
+void throw_flow_does_not_fit(std::string_view who, std::size_t components)
 {
     throw std::invalid_argument(
-        fmt::format("integrate: flow resized dxdt at the start; expected the {} components of the "
+        fmt::format("{}: flow resized dxdt at the start; expected the {} components of the "
                     "state, written in place",
-                    components));
+                    who, components));
 }
 
 void throw_no_error_estimate()
@@ -87,34 +87,35 @@ void throw_no_previous_time_event()
         "previous_time_event");
 }
 
-void throw_time_event_not_ahead(bool backward, double t, double found)
+void throw_time_event_not_ahead(std::string_view who, bool backward, double t, double found)
 {
     throw std::invalid_argument(fmt::format(
-        "integrate: {} must return a time {} t, t excluded, or {}infinity; at the start t = {} it "
+        "{}: {} must return a time {} t, t excluded, or {}infinity; at the start t = {} it "
         "returned {}",
-        backward ? "previous_time_event(t)" : "next_time_event(t)", backward ? "before" : "after",
-        backward ? "-" : "", t, found));
+        who, backward ? "previous_time_event(t)" : "next_time_event(t)",
+        backward ? "before" : "after", backward ? "-" : "", t, found));
 }
 
-void throw_start_not_finite(std::size_t component, double value)
-{
-    throw std::invalid_argument(fmt::format(
-        "integrate: the start must be finite, got {} in component {}", value, component));
-}
-
-void throw_start_outside_mode(std::size_t which, std::string_view name, double t, double guard)
+void throw_start_not_finite(std::string_view who, std::size_t component, double value)
 {
     throw std::invalid_argument(
-        fmt::format("integrate: the start lies behind {}, which bounds the motion: "
+        fmt::format("{}: the start must be finite, got {} in component {}", who, value, component));
+}
+
+void throw_start_outside_mode(std::string_view who, std::size_t which, std::string_view name,
+                              double t, double guard)
+{
+    throw std::invalid_argument(
+        fmt::format("{}: the start lies behind {}, which bounds the motion: "
                     "expected guard >= 0 at t = {}, got {}",
-                    guard_called(which, name), t, guard));
+                    who, guard_called(which, name), t, guard));
 }
 
-void throw_start_guard_not_finite(std::size_t which, std::string_view name, double t, double guard)
+void throw_start_guard_not_finite(std::string_view who, std::size_t which, std::string_view name,
+                                  double t, double guard)
 {
-    throw std::invalid_argument(
-        fmt::format("integrate: {} must be finite at the start, got {} at t = {}",
-                    guard_called(which, name), guard, t));
+    throw std::invalid_argument(fmt::format("{}: {} must be finite at the start, got {} at t = {}",
+                                            who, guard_called(which, name), guard, t));
 }
 
 }  // namespace ricochet::detail

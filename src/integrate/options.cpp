@@ -9,15 +9,10 @@
 
 namespace ricochet {
 
-namespace {
-
-constexpr detail::Refuse refuse_options{"integrate"};
-constexpr detail::Require require{"integrate"};
-
-}  // namespace
-
-void validate(const Options& options, bool step_required)
+void validate(const Options& options, bool step_required, std::string_view who)
 {
+    const detail::Refuse refuse_options{who};
+    const detail::Require require{who};
     const Options& o = options;
     require(std::isfinite(o.t_start), "t_start must be a finite time", o.t_start);
     require(std::isfinite(o.t_end), "t_end must be a finite time", o.t_end);

@@ -38,7 +38,8 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::stopped_by_event: return "an event ended the run, as asked";
         case Outcome::zeno:
             return "the motion presses on its guard, or its events accumulate there, and nothing "
-                   "stops it; declare a rest that leaves it at rest, or end the run earlier";
+                   "stops it; let it come to rest there (a system by its rest, a scene by its "
+                   "contacts), or end the run earlier";
         case Outcome::outside_mode:
             return "a reset left the state behind a guard that bounds the motion; "
                    "let the reset put it on the surface or in front of it";

@@ -9,10 +9,9 @@ namespace ricochet::learn {
 
 namespace {
 
-std::string lost(const Rival& rival, const Rival& exact)
+std::uint64_t lost(const Rival& rival, const Rival& exact)
 {
-    if (rival.events >= exact.events) return "no event lost";
-    return fmt::format("{} of {} events lost", exact.events - rival.events, exact.events);
+    return exact.events - std::min(rival.events, exact.events);
 }
 
 }  // namespace
@@ -52,17 +51,16 @@ std::string describe(const std::vector<Rival>& rivals)
     const Rival& fastest =
         *std::min_element(rivals.begin(), rivals.end(),
                           [](const Rival& a, const Rival& b) { return a.seconds < b.seconds; });
-    if (&fastest == &network) {
-        return fmt::format(
-            "the network is the fastest of {} ways to check: {:.2f} of the time of "
-            "every step, {}",
-            rivals.size(), share(network), lost(network, exact));
+    const bool wins = &fastest == &network;
+    std::string out = fmt::format(
+        "the network is {}the fastest of {} ways to check: with the network a run takes {:.2f} of "
+        "the time of checking every step with Extremum ({} of {} events lost)",
+        wins ? "" : "not ", rivals.size(), share(network), lost(network, exact), exact.events);
+    if (!wins) {
+        out += fmt::format("; checking {} takes {:.2f} ({} of {} lost)", fastest.name,
+                           share(fastest), lost(fastest, exact), exact.events);
     }
-    return fmt::format(
-        "the network is not the fastest of {} ways to check: it takes {:.2f} of the time of every "
-        "step ({}), looking at {} takes {:.2f} ({})",
-        rivals.size(), share(network), lost(network, exact), fastest.name, share(fastest),
-        lost(fastest, exact));
+    return out;
 }
 
 }  // namespace ricochet::learn

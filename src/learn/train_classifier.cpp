@@ -8,10 +8,13 @@ std::string ClassifierTrial::describe() const
 {
     const double ratio = network_seconds / std::max(exact_seconds, 1e-12);
     const std::string cost =
-        pays() ? fmt::format("the network takes {:.2f} of the time of a check of every step", ratio)
+        pays() ? fmt::format(
+                     "with the network a run takes {:.2f} of the time of checking the end of "
+                     "every step with Ends",
+                     ratio)
                : fmt::format(
-                     "a check of the end of every step is faster: the network takes {:.2f} "
-                     "times as long",
+                     "a check of the end of every step is faster: with the network a run takes "
+                     "{:.2f} times as long as with Ends",
                      ratio);
     const std::string verdict = learn::describe(rivals);
     return fmt::format(

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "../checks/require.hpp"
 
@@ -93,11 +94,12 @@ void ContactSolver::scale(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,
     q_ = units_.cwiseProduct(q);
 }
 
-/// f = p - P(p - rho u) with rho = 1, of which u_ keeps the velocities.
+/// f = p - P(p - rho u), of which u_ keeps rho u.
 void ContactSolver::defects(const Eigen::VectorXd& p, Eigen::VectorXd& f)
 {
     u_.noalias() = w_ * p;
     u_ += q_;
+    if (rho_ != 1) u_ *= rho_;
     f.resize(p.size());
     for (Eigen::Index i = 0; i < p.size(); i += components_) {
         const double coefficient = friction_[static_cast<std::size_t>(i / components_)];
@@ -128,7 +130,7 @@ void ContactSolver::jacobian(const Eigen::VectorXd& p)
         if (p[i] <= u_[i]) {
             v_(i, i) = 1;
         } else {
-            v_.row(i) = w_.row(i);
+            v_.row(i) = rho_ * w_.row(i);
         }
         const double bound = coefficient * std::max(0.0, p[i]);
         const double slope = p[i] > 0 ? coefficient : 0;
@@ -138,7 +140,7 @@ void ContactSolver::jacobian(const Eigen::VectorXd& p)
         const double z1 = tangents == 2 ? p[t + 1] - u_[t + 1] : 0;
         const double length = std::hypot(z0, z1);
         if (length <= bound) {
-            v_.middleRows(t, tangents) = w_.middleRows(t, tangents);
+            v_.middleRows(t, tangents) = rho_ * w_.middleRows(t, tangents);
             continue;
         }
         // p_t - bound z / |z|, and with two tangents the derivative of the direction of z.
@@ -153,8 +155,8 @@ void ContactSolver::jacobian(const Eigen::VectorXd& p)
             const double a = turn * (1 - e0 * e0);
             const double b = -turn * e0 * e1;
             const double c = turn * (1 - e1 * e1);
-            v_.row(t) += a * w_.row(t) + b * w_.row(t + 1);
-            v_.row(t + 1) += b * w_.row(t) + c * w_.row(t + 1);
+            v_.row(t) += rho_ * (a * w_.row(t) + b * w_.row(t + 1));
+            v_.row(t + 1) += rho_ * (b * w_.row(t) + c * w_.row(t + 1));
             v_(t, t) -= a, v_(t, t + 1) -= b;
             v_(t + 1, t) -= b, v_(t + 1, t + 1) -= c;
         }
@@ -170,13 +172,22 @@ void ContactSolver::polish()
     if (f_trial_.lpNorm<Eigen::Infinity>() < f_.lpNorm<Eigen::Infinity>()) trial_.swap(best_);
 }
 
+/// The residual of p with rho = 1.
+double ContactSolver::unscaled_residual(const Eigen::VectorXd& p)
+{
+    const double rho = std::exchange(rho_, 1.0);
+    defects(p, f_trial_);
+    rho_ = rho;
+    return measure(p, f_trial_);
+}
+
 /// Newton's method from p_. True: p_ is the solution; false: p_ is as before, or better.
 bool ContactSolver::newton(ContactReport& report)
 {
     trial_ = p_;
     defects(trial_, f_);
     for (int iteration = 0;; ++iteration) {
-        report.residual = measure(trial_, f_);
+        report.residual = rho_ == 1 ? measure(trial_, f_) : unscaled_residual(trial_);
         if (report.residual <= options_.tolerance) {
             if (iteration > 0) polish();
             p_ = trial_;
@@ -201,6 +212,35 @@ bool ContactSolver::newton(ContactReport& report)
         trial_.swap(best_);
         f_.swap(f_trial_);
     }
+}
+
+/// Newton's method on problems with W + softness I and q - softness p, where p is the solution of
+/// the one before: their solutions converge to one of the problem itself, if it has one.
+bool ContactSolver::proximal(ContactReport& report)
+{
+    diagonal_ = w_.diagonal();
+    free_ = q_;
+    start_ = p_;
+    bool solved = false;
+    for (const double softness : {1e-8, 1e-6, 1e-4}) {
+        p_ = start_;
+        for (int k = 0; k < 20 && !solved; ++k) {
+            w_.diagonal() = diagonal_.array() + softness;
+            q_ = free_ - softness * p_;
+            rho_ = 1 / softness;
+            const bool found = newton(report);
+            rho_ = 1;
+            w_.diagonal() = diagonal_;
+            q_ = free_;
+            if (!found) break;
+            defects(p_, f_);
+            report.residual = measure(p_, f_);
+            solved = report.residual <= options_.tolerance;
+        }
+        if (solved) return true;
+    }
+    p_ = start_;
+    return false;
 }
 
 /// Solves one contact with the others' impulses fixed: the normal impulse that stops the
@@ -297,7 +337,7 @@ void ContactSolver::iterate(Eigen::VectorXd& p, ContactReport& report)
     p_ = p.cwiseQuotient(units_);
     // Without a velocity no impulse is needed, and there is no scale to measure defects by.
     if (!p_.allFinite() || q_.isZero(0)) p_.setZero();
-    bool solved = newton(report);
+    bool solved = newton(report) || proximal(report);
     // Sweeps, with more of them each time between the attempts of Newton's method.
     for (int batch = 5; !solved && report.sweeps < options_.max_sweeps; batch = 2 * batch) {
         // Where full sweeps cycle, damped ones may converge.
@@ -305,7 +345,7 @@ void ContactSolver::iterate(Eigen::VectorXd& p, ContactReport& report)
         for (int k = 0; k < batch && report.sweeps < options_.max_sweeps; ++k, ++report.sweeps) {
             sweep(relaxation);
         }
-        solved = newton(report);
+        solved = newton(report) || proximal(report);
     }
     p = units_.cwiseProduct(p_);
     // Newton's method leaves the error of its regularisation; one factor corrects the normal

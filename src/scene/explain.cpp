@@ -54,7 +54,7 @@ std::string first_meeting(const World& world, std::span<const std::uint32_t> gro
         }
     }
     if (a == none || first.value > world.options.t_end) return "";
-    return fmt::format("; on their present flights {} meets {} first, at t = {:.6g} s",
+    return fmt::format("; on their present flights \"{}\" meets \"{}\" first, at t = {:.6g} s",
                        world.scene.name_of(BodyId{a}), world.scene.name_of(BodyId{b}), first.value);
 }
 
@@ -102,9 +102,10 @@ std::string explain(const Scene& scene, const SceneOptions& options)
                    plural(world.fixed_count - world.wall_count, "piece"));
     describe_islands(world, out);
     if (!world.motions.empty()) {
-        fmt::format_to(to,
-                       "  {} of surfaces that move: met where bounds on their motion let them\n",
-                       plural(world.motions.size(), "face"));
+        const bool one = world.motions.size() == 1;
+        fmt::format_to(to, "  {}; contacts with {} are searched for by bounds on {} motion\n",
+                       plural(world.motions.size(), "moving face"), one ? "it" : "them",
+                       one ? "its" : "their");
     }
     const auto groups = groups_of(world);
     std::size_t asleep = 0;

@@ -130,8 +130,8 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
     for (const std::uint32_t i : members) {
         if (segments && world_.bodies[i].radius == 0) {
             return fail(Outcome::zeno, {i},
-                        fmt::format("{} is a point in lasting contact near terrain, which discs "
-                                    "alone can have",
+                        fmt::format("'{}' is a point in lasting contact near terrain; only discs "
+                                    "can be in lasting contact there",
                                     called(i)));
         }
     }

@@ -136,14 +136,14 @@ Trace<System> trace(std::string name, const System& system, const StateOf<System
     Trace<System> out{.name = std::move(name)};
     const auto run = [&](bool recorded) {
         SetValuedMotion<System> motion(system, start, options);
-        const auto look = [&](const auto& state) {
+        const auto record = [&](const auto& state) {
             if (!recorded) return;
             if (!out.t.empty()) out.h.push_back(state.t - out.t.back());
             out.t.push_back(state.t);
             out.w.push_back(state.w);
             out.reaction.push_back(state.reaction[0]);
         };
-        out.ended = motion.run(look) == Outcome::reached_end;
+        out.ended = motion.run(record) == Outcome::reached_end;
         out.counts = motion.statistics();
     };
     run(true);

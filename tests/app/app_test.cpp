@@ -397,6 +397,7 @@ TEST_F(App, HelpHasAnExampleForEveryCommand)
         EXPECT_EQ(result.status, 0);
         EXPECT_NE(result.out.find("Example"), std::string::npos);
     }
+    EXPECT_NE(run({"simulate", "--help"}).out.find("scene file"), std::string::npos);
     EXPECT_TRUE(run({"--version"}).out.starts_with("ricochet "));
 }
 

@@ -165,6 +165,25 @@ TEST_F(App, ModelsForOtherStepsAndParametersAreRefused)
     expect_refused(simulate({"--model", fixed, "--detector", "line"}), {"--model", "line"});
 }
 
+TEST_F(App, AGateForFixedStepsIsRefusedUnderErrorControl)
+{
+    Model gate = load_model(RICOCHET_MODELS "/pendulum-gate.safetensors");
+    gate.step_min = gate.step_max;
+    write("gate", bytes_of(gate));
+    expect_refused({"simulate", "pendulum", "--gate", "calibrated", "--model", "gate"},
+                   {"model 'gate' is for fixed steps of 0.01 s; expected --step 0.01, or a gate "
+                    "trained for error control"});
+}
+
+TEST_F(App, AModelThatIsNotFoundNamesEveryPlaceOnce)
+{
+    expect_refused({"inspect", "models/none.safetensors"},
+                   {"searched for models/none.safetensors;", "share/ricochet/models"});
+    const std::string places = run({"inspect", "none.safetensors"}).err;
+    EXPECT_NE(places.find("share/ricochet/models/none.safetensors"), std::string::npos) << places;
+    EXPECT_EQ(places.find(".safetensors.safetensors"), std::string::npos) << places;
+}
+
 // --- files that are no models, or not to be believed ---
 
 TEST_F(App, FilesThatAreNoModelsAreRefused)

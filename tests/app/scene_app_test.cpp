@@ -1,5 +1,7 @@
 // `ricochet simulate SCENE.json` and `ricochet explain SCENE.json`.
+#include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -85,6 +87,40 @@ TEST_F(SceneApp, FilesHaveTheSamples)
     EXPECT_TRUE(svg.starts_with("<svg"));
     EXPECT_NE(svg.find("<animate attributeName=\"cx\""), std::string::npos);
     EXPECT_LT(svg.size(), 5000u);
+}
+
+TEST_F(SceneApp, WallsNearTheBodiesAreExplainedAndDrawn)
+{
+    std::ofstream(work() / "walls.json")
+        << R"({"gravity": [0, -9.81], "walls": [{"point": [0, 0], "normal": [0, 1]},
+            {"point": [-2, 0], "normal": [1, 0]},
+            {"point": [2, 0], "normal": [-1, 0], "motion": {"amplitude": [0.1, 0], "frequency": 2}},
+            {"point": [50, 0], "normal": [-1, 0]}],
+            "bodies": [{"name": "small", "disc": {"radius": 0.1}, "at": [-1.7, 0.8]},
+                       {"name": "big", "disc": {"radius": 0.3}, "at": [1, 0.8], "velocity": [-9, 0]}],
+            "run": {"t_end": 0.5}})";
+    const Result explained = run({"explain", "walls.json"});
+    EXPECT_NE(explained.out.find("1 moving face; contacts with it are searched for by bounds on "
+                                 "its motion"),
+              std::string::npos)
+        << explained.out;
+    EXPECT_NE(explained.out.find("\"small\" meets \"big\" first"), std::string::npos)
+        << explained.out;
+    ASSERT_EQ(run({"simulate", "walls.json", "--t-end", "0.1", "--animate", "w.svg"}).status, 0);
+    // All but the wall far away.
+    const std::string svg = content(work() / "w.svg");
+    int walls = 0;
+    for (std::size_t at = 0; (at = svg.find("<polyline", at)) != std::string::npos; ++at) ++walls;
+    EXPECT_EQ(walls, 3);
+    const Result drawn = run({"simulate", "walls.json", "--t-end", "0.1", "--plot", "walls.svg"});
+    if (drawn.err.find("gnuplot-nox") != std::string::npos) GTEST_SKIP() << drawn.err;
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    // Lines whose ends lie on the border of the picture; each moves the pen once.
+    const std::string plot = content(work() / "walls.svg");
+    const std::size_t path = plot.find(" d='", plot.find("'surfaces'</title>"));
+    ASSERT_LT(path, plot.size());
+    const std::string lines = plot.substr(path, plot.find("'/>", path) - path);
+    EXPECT_EQ(std::ranges::count(lines, 'M'), 3) << lines;
 }
 
 TEST_F(SceneApp, BadInputIsOneSentenceAndStatusTwo)

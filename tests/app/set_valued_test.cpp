@@ -142,6 +142,9 @@ TEST_F(App, RefusesWhatInclusionsHaveNot)
     expect_refused({"simulate", "sliding-mode", "--integrator", "bathe", "--controller", "best"},
                    {"best", "heuristic"});
     expect_refused({"simulate", "sliding-mode", "--controller", "pi"}, {"--integrator bathe"});
+    expect_refused({"simulate", "stick-slip", "--integrator", "bathe", "--controller", "learned"},
+                   {"--controller learned: found no policy for 'stick-slip'; expected one of "
+                    "sliding-mode, diode-circuit, fault"});
     expect_refused({"simulate", "sliding-mode", "--detector", "ends"}, {"extremum"});
     expect_refused({"simulate", "sliding-mode", "--integrator", "bathe", "--step", "0"},
                    {"--step", "positive"});

@@ -95,7 +95,7 @@ static void refuses_options_that_are_none(void)
     CHECK_REFUSED(RC_INVALID, rc_simulation_new(system, start, 2, &options, &simulation), text); \
     CHECK(simulation == NULL)
 
-    CHECK_OPTION(options.t_end = NAN, "t_end");
+    CHECK_OPTION(options.t_end = NAN, "rc_options: t_end: found nan, expected a finite time");
     CHECK_OPTION(options.t_end = INFINITY, "t_end");
     CHECK_OPTION(options.t_start = NAN, "t_start");
     CHECK_OPTION(options.rtol = NAN, "rtol");

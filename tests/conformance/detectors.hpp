@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -14,39 +16,10 @@
 #include <vector>
 
 #include "host_step.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate/methods.hpp"
 
 namespace ricochet::test {
-
-/// A detector behind functions, with its declared and promised properties.
-struct DetectorCase {
-    std::string name;
-    std::function<Finding(const HostStep&, Watch&, Crossing, std::uint64_t*)> look;
-    std::function<bool(double sign, double g0, double rate0, double g1, double rate1, double h)>
-        suspects;
-    std::function<bool(double sign, const GuardSample&, const GuardSample&, double touch)>
-        leaves_plainly;
-    Evidence unsuspected{};        ///< of a step that is not suspected
-    Evidence claims{};             ///< for a guard of unknown degree, once examined
-    bool sees_pairs = false;       ///< two crossings in one step, and touches
-    std::uint64_t most_calls = 1;  ///< of the guard in one check
-};
-
-inline void PrintTo(const DetectorCase& detector, std::ostream* out)
-{
-    *out << detector.name;
-}
-
-template <class Detector>
-[[nodiscard]] DetectorCase any_detector(const std::string& name, const Detector& detector)
-{
-    return {
-        .name = name,
-        .look = [=](const HostStep& step, Watch& watch, Crossing crossing,
-                    std::uint64_t* calls) { return look(detector, step, watch, crossing, calls); },
-        .suspects = &Detector::suspects,
-        .leaves_plainly = &Detector::leaves_plainly,
-        .unsuspected = Detector::evidence};
-}
 
 /// A guard over a step from 0 to 1: its values and its rates.
 struct Curve {
@@ -91,6 +64,63 @@ struct Cubic {
         return least;
     }
 };
+
+/// The curve as the guard of a system whose state is the offset: its step is the step of the curve.
+struct CurveSystem {
+    using State = std::array<double, 1>;
+
+    Curve curve;
+
+    void flow(double, const State&, State& dxdt) const { dxdt = {1}; }
+    [[nodiscard]] double guard(double, const State& x) const { return curve.value(x[0]); }
+    [[nodiscard]] double guard_rate(double, const State& x, const State& dxdt) const
+    {
+        return curve.rate(x[0]) * dxdt[0];
+    }
+};
+
+/// A detector behind functions, with its declared and promised properties.
+struct DetectorCase {
+    std::string name;
+    std::function<Finding(const HostStep&, Watch&, Crossing, std::uint64_t*)> look;
+    std::function<bool(double sign, double g0, double rate0, double g1, double rate1, double h)>
+        suspects;
+    std::function<bool(double sign, const GuardSample&, const GuardSample&, double touch)>
+        leaves_plainly;
+    Evidence unsuspected{};        ///< of a step that is not suspected
+    Evidence claims{};             ///< for a guard of unknown degree, once examined
+    bool sees_pairs = false;       ///< finds all pairs of crossings in a step, and all touches
+    std::uint64_t most_calls = 1;  ///< of the guard in one check
+    /// Number of events of `CurveSystem` in a run of one step; empty for a network, which predicts
+    /// the events of one system only.
+    std::function<std::size_t(const Curve&)> events_of_run{};
+};
+
+inline void PrintTo(const DetectorCase& detector, std::ostream* out)
+{
+    *out << detector.name;
+}
+
+template <class Detector>
+[[nodiscard]] DetectorCase any_detector(const std::string& name, const Detector& detector)
+{
+    DetectorCase out{
+        .name = name,
+        .look = [=](const HostStep& step, Watch& watch, Crossing crossing,
+                    std::uint64_t* calls) { return look(detector, step, watch, crossing, calls); },
+        .suspects = &Detector::suspects,
+        .leaves_plainly = &Detector::leaves_plainly,
+        .unsuspected = Detector::evidence};
+    using State = CurveSystem::State;
+    if constexpr (!detail::DetectorTableOf<Detector, CurveSystem, State>::predicts) {
+        out.events_of_run = [=](const Curve& curve) {
+            const Options options{.t_end = 1, .step = 1};
+            return integrate(CurveSystem{curve}, State{0}, options, FixedStep<Rk4>{}, detector)
+                .events.size();
+        };
+    }
+    return out;
+}
 
 class DetectorSuite : public testing::TestWithParam<DetectorCase> {
 protected:
@@ -138,6 +168,17 @@ protected:
         EXPECT_EQ(seen.hi.value, curve.value(seen.hi.s));
         EXPECT_TRUE(has_left(side, seen.hi.value));
         EXPECT_TRUE(seen.lo.s == 0 || !has_left(side, seen.lo.value));
+    }
+
+    /// Expects that a departure of which the detector promises nothing is bracketed, or that
+    /// its absence is only assumed.
+    static void expect_honest(const Seen& seen, const Curve& curve, Side side)
+    {
+        if (seen.hit) {
+            expect_bracket(seen, curve, side);
+        } else {
+            EXPECT_EQ(seen.evidence, Evidence::assumed);
+        }
     }
 
     /// Curves of many kinds that begin above the surface.
@@ -262,10 +303,10 @@ TEST_P(DetectorSuite, TwoCrossingsInOneStepAreFoundOrHonestlyAssumed)
         const Seen bump = look(dip.times(-1), Side::below, Crossing::rising);
         const Seen second = look(dip, Side::above, Crossing::rising);
         if (!GetParam().sees_pairs) {
-            for (const Seen& seen : {first, either, bump, second}) {
-                EXPECT_FALSE(seen.hit);
-                EXPECT_EQ(seen.evidence, Evidence::assumed);
-            }
+            expect_honest(first, dip, Side::above);
+            expect_honest(either, dip, Side::above);
+            expect_honest(bump, dip.times(-1), Side::below);
+            expect_honest(second, dip, Side::below);
             continue;
         }
         expect_bracket(first, dip, Side::above);
@@ -286,7 +327,7 @@ TEST_P(DetectorSuite, ATouchIsFoundOrHonestlyAssumed)
     const Seen below = look(touch.times(-1), Side::below, Crossing::rising);
     for (const Seen& one : {seen, below}) {
         EXPECT_FALSE(one.hit);
-        EXPECT_EQ(one.touch, GetParam().sees_pairs);
+        EXPECT_TRUE(one.touch || !GetParam().sees_pairs);
         if (one.touch) {
             EXPECT_NEAR(one.hi.s, 0.5, 1e-7);
         } else {
@@ -428,8 +469,7 @@ TEST_P(DetectorSuite, RandomCubicsAreDecidedByTheirLeastValue)
         const bool pair = least < 0 && g.b3 > 0;
         pairs += pair;
         if (pair && !GetParam().sees_pairs) {
-            EXPECT_FALSE(seen.hit);
-            EXPECT_EQ(seen.evidence, Evidence::assumed);
+            expect_honest(seen, g.curve(), Side::above);
         } else if (least < 0) {
             expect_bracket(seen, g.curve(), Side::above);
         } else {
@@ -463,8 +503,28 @@ TEST_P(DetectorSuite, AStepThatIsNotSuspectedHasNothingToFind)
         EXPECT_TRUE(GetParam().suspects(1, 1, -1, 1, 1, 1));
         EXPECT_TRUE(GetParam().suspects(-1, -1, 1, -1, -1, 1));
     }
-    // A detector that suspects every step is certain only of those without armed guards.
+    // A detector that suspects every step declares `proved`, which holds for the steps that are
+    // left: those without armed guards.
     EXPECT_TRUE(unsuspected > 1000 || GetParam().unsuspected == Evidence::proved);
+}
+
+TEST_P(DetectorSuite, ARunAsksTheDetectorAboutTheStepsThatItSuspects)
+{
+    if (!GetParam().events_of_run) return;
+    const Curve fall{[](double s) { return 0.4 - s; }, [](double) { return -1.0; }};
+    const Curve dip{[](double s) { return (s - 0.5) * (s - 0.5) - 0.01; },
+                    [](double s) { return 2 * s - 1; }};
+    // A dip so narrow that neither values nor rates show it at the ends: 1 - 1.5 exp(-u^2).
+    const auto u = [](double s) { return (s - 0.5) / 0.1; };
+    const Curve narrow{[=](double s) { return 1 - 1.5 * std::exp(-u(s) * u(s)); },
+                       [=](double s) { return 30 * u(s) * std::exp(-u(s) * u(s)); }};
+    for (const Curve& curve : {fall, dip, narrow}) {
+        const Seen seen = look(curve, Side::above, Crossing::falling);
+        if (!suspects(curve, 1) || !seen.hit) continue;
+        EXPECT_GT(GetParam().events_of_run(curve), 0U)
+            << "the detector suspects this step and finds an event in it, and a run does not: a "
+               "detector with a `suspects` of its own declares Screening::own";
+    }
 }
 
 TEST_P(DetectorSuite, WhatLeavesPlainlyIsFoundInTheWholeStep)

@@ -91,15 +91,14 @@ template <class Stepping, class Exact = Extremum, class System>
 PlanRun expect_planned_same(const System& system, const X& start, const Options& options,
                             bool check_bounds = true)
 {
-    const auto exact = integrate(system, start, options, Stepping{}, Exact{});
+    auto exact = integrate(system, start, options, Stepping{}, Exact{});
     for (const std::size_t longest : {1u, 3u, 64u}) {
         SCOPED_TRACE(longest);
         PlannerOptions plan;
         plan.longest_interval = longest;
         plan.two_ended = longest > 1;
         plan.check_bounds = check_bounds;
-        const auto planned =
-            integrate(system, start, options, Stepping{}, Planned<Exact>(plan, Exact{}));
+        auto planned = integrate(system, start, options, Stepping{}, Planned<Exact>(plan, Exact{}));
         expect_same(exact, planned);
         if (longest == 64) return planned;
     }
@@ -860,9 +859,10 @@ TEST(Planned, AnEventTakesFiveExactCallsToLocateOnAverage)
     const X start{0.5, 0, 1, 0.7};
     const Options options{.t_end = 200, .step = 0.01};
     const auto run = expect_planned_same<Fixed>(Rated{room}, start, options);
-    const auto looks = integrate(Rated{room}, start, options, Fixed{});
+    const auto checked = integrate(Rated{room}, start, options, Fixed{});
     // Without a plan every step has one call; the remaining calls belong to the events.
-    const double extra = static_cast<double>(looks.statistics.guard_calls - looks.statistics.steps);
+    const auto extra =
+        static_cast<double>(checked.statistics.guard_calls - checked.statistics.steps);
     EXPECT_GT(run.statistics.events, 30u);
     EXPECT_LE(extra / static_cast<double>(run.statistics.events), 5);
 }

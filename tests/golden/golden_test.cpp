@@ -163,6 +163,9 @@ TEST(Golden, RunsHaveTheirBits)
         for (const std::string& line : lines) out << line << '\n';
         return;
     }
+    SCOPED_TRACE(
+        "where these runs are meant to change, RICOCHET_WRITE_GOLDEN=1 golden_tests writes " +
+        file + " again, and git diff shows which of them did; a new system only adds lines");
     std::vector<std::string> stored;
     std::ifstream in(file);
     for (std::string line; std::getline(in, line);) stored.push_back(line);

@@ -654,6 +654,41 @@ TEST(Events, ABooleanGuardIsBisected)
     EXPECT_NEAR(run.events[1].t, 2 * std::sqrt(2.0), 1e-15);
 }
 
+TEST(Events, BooleanGuardsAreKnownInEveryForm)
+{
+    // From 0 at unit speed to the square root of 2, again and again; a crossing, not a jump.
+    struct Inside {
+        static void flow(double, const X1&, X1& dxdt) { dxdt = {1}; }
+    };
+    struct Counted : Inside {
+        std::size_t guard_count = 1;
+        [[nodiscard]] static bool guard(std::size_t, double, const X1& x)
+        {
+            return x[0] * x[0] < 2;
+        }
+        static void reset(std::size_t, double, X1& x) { x[0] = 0; }
+        [[nodiscard]] static GuardInfo guard_info(std::size_t) { return {.name = "edge"}; }
+    };
+    struct Switching : Inside {
+        std::size_t mode_count = 2;
+        [[nodiscard]] static bool guard(Mode, double, const X1& x) { return x[0] * x[0] < 2; }
+        static Mode reset(Mode mode, double, X1& x)
+        {
+            x[0] = 0;
+            return 1 - mode;
+        }
+    };
+    const auto check = [](const auto& system) {
+        const auto run = integrate(system, X1{0}, {.t_end = 3});
+        ASSERT_EQ(run.events.size(), 2u);
+        EXPECT_EQ(run.events[0].kind, EventKind::crossing);
+        EXPECT_NEAR(run.events[0].t, std::sqrt(2.0), 5e-16);
+        EXPECT_NEAR(run.events[1].t, 2 * std::sqrt(2.0), 1e-15);
+    };
+    check(Counted{});
+    check(Switching{});
+}
+
 TEST(Events, AGuardMayStopTheRunAfterSoManyEvents)
 {
     struct Third : HiddenPair {

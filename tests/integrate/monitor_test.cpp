@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "allocations.hpp"
+#include "refusal.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
@@ -871,11 +872,16 @@ TEST(MonitorRefusals, StartsAndArraysThatAreNone)
     EXPECT_THROW(monitor.start(Instant{0}, X{1, 0}, three, 0.1), std::invalid_argument);
     EXPECT_THROW(monitor.start(Instant{nan}, X{1, 0}, X{}, 0.1), std::invalid_argument);
     EXPECT_THROW(monitor.start(Instant{0}, X{nan, 0}, X{}, 0.1), std::invalid_argument);
-    EXPECT_THROW(monitor.start(Instant{0}, X{-1, 0}, X{}, 0.1), std::invalid_argument);  // inside
+    EXPECT_EQ(refusal([&] {
+                  monitor.start(Instant{0}, X{-1, 0}, X{}, 0.1);
+              }),
+              "EventMonitor: the start lies behind guard 0, which bounds the motion: expected "
+              "guard >= 0 at t = 0, got -1");
     EXPECT_THROW(monitor.start(Instant{0}, X{1, 0}, X{}, 0), std::invalid_argument);
     EXPECT_THROW(monitor.start(Instant{0}, X{1, 0}, X{}, inf), std::invalid_argument);
     EXPECT_THROW((void)monitor.side(1), std::out_of_range);
-    EXPECT_THROW((void)EventMonitor(ball, X{}, {.event_tolerance = -1}), std::invalid_argument);
+    EXPECT_EQ(refusal([&] { (void)EventMonitor(ball, X{}, {.event_tolerance = -1}); }),
+              "EventMonitor: event_tolerance must be zero or positive, got -1");
     struct Empty {
         void flow(double, const X1&, X1& dxdt) const { dxdt = {0}; }
     };

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
@@ -92,6 +94,16 @@ TEST(Stalled, ARunWhoseTimeStandsStillEnds)
     Options patient = options;
     patient.stall_steps = 0;
     EXPECT_EQ(integrate(Sawtooth{}, {0}, patient).outcome, Outcome::step_limit);
+}
+
+TEST(EventKinds, HaveTheNamesOfTheirEnumerators)
+{
+    const std::vector<std::string_view> names{"crossing", "touch", "time", "accumulation",
+                                              "mode",     "stick", "slip", "jump"};
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        EXPECT_EQ(name(static_cast<EventKind>(i)), names[i]);
+    }
+    EXPECT_EQ(name(static_cast<EventKind>(names.size())), "unknown");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "ricochet/systems/bouncing_ball.hpp"
 
@@ -34,6 +35,21 @@ ClassifierTraining small_training()
     training.training.hidden = {16, 16};
     training.training.iterations = 3000;
     return training;
+}
+
+TEST(Rivals, TheVerdictSaysWhatTakesWhichTimeAndWhatIsLost)
+{
+    std::vector<Rival> rivals{{.name = "every step", .seconds = 2, .events = 203},
+                              {.name = "every 8 steps", .seconds = 0.14, .events = 202},
+                              {.name = "the network", .seconds = 0.18, .events = 203}};
+    EXPECT_EQ(describe(rivals),
+              "the network is not the fastest of 3 ways to check: with the network a run takes "
+              "0.09 of the time of checking every step with Extremum (0 of 203 events lost); "
+              "checking every 8 steps takes 0.07 (1 of 203 lost)");
+    rivals[2].seconds = 0.1;
+    EXPECT_EQ(describe(rivals),
+              "the network is the fastest of 3 ways to check: with the network a run takes 0.05 "
+              "of the time of checking every step with Extremum (0 of 203 events lost)");
 }
 
 TEST(TrainClassifier, AnySystemGetsANetworkFromItsOwnRuns)

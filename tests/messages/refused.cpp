@@ -1,10 +1,14 @@
 // What is refused at compile time. A line `// CASE n: text` says what the first error of case n
-// contains; 0 compiles. `run.sh` looks.
+// contains; 0 compiles. Of a case `alone` no other error has a sentence of the library. `run.sh`
+// looks.
 
 #include <array>
 #include <cstddef>
+#include <span>
 
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/monitor.hpp"
 
 using namespace ricochet;
 using X = std::array<double, 2>;
@@ -101,6 +105,62 @@ private:
     {
         return x[1];
     }
+// CASE 22 alone: found a guard that is not const
+#elif CASE == 22
+    double guard(double, const X& x)
+    {
+        return x[0];
+    }
+    void reset(double, X& x) const
+    {
+        x[1] = -x[1];
+    }
+    void rest(double, X& x) const
+    {
+        x = {};
+    }
+// CASE 23 alone: found a guard whose parameters or result do not fit
+#elif CASE == 23
+    double guard(const X& x) const
+    {
+        return x[0];
+    }
+    void reset(double, X& x) const
+    {
+        x[1] = -x[1];
+    }
+// CASE 24 alone: found a next_time_event whose parameters or result do not fit
+#elif CASE == 24
+    double next_time_event(double t, const X&) const
+    {
+        return t + 1;
+    }
+    void time_reset(double, X& x) const
+    {
+        x[1] = -x[1];
+    }
+// CASE 25: found a member `timed_reset`, which nothing calls; rename it to `time_reset`
+#elif CASE == 25
+    double next_time_event(double t) const
+    {
+        return t + 1;
+    }
+    void timed_reset(double, X& x) const
+    {
+        x[1] = -x[1];
+    }
+#endif
+};
+
+/// The step of a host.
+struct Step : HermiteStep {
+    using HermiteStep::HermiteStep;
+// CASE 28 alone: found a step with a restep that does not fit; expected void restep(double s,
+#if CASE == 28
+    void restep(double, X&) const {}
+// CASE 29 alone: found a step with an interpolate_rate that does not fit
+#elif CASE == 29
+    void interpolate_rate(double, X&) const {}
 #endif
 };
 
@@ -122,6 +182,8 @@ int main()
     (void)integrate(falling, {10, 0}, {.t_end = 1, .rtol = 1e-6, .sample_times = {0.5}});
     (void)integrate(Allowed{}, x0, {.t_end = 1}, FixedStep<Rk4>{});
     (void)integrate(Unchecked{}, {}, {.t_end = 1});
+    EventMonitor monitor(falling, x0);
+    (void)monitor.examine(Step(Instant{0}, 1, x0, x0, x0, x0));
 #elif CASE == 12
     (void)integrate(OtherFlow{}, x0, {.t_end = 1});
 // CASE 13: found a start with another number of components than System::State
@@ -149,6 +211,21 @@ int main()
 // CASE 21: found a start of another type than System::State
 #elif CASE == 21
     (void)integrate(falling, std::vector<double>{10, 0}, {.t_end = 1});
+// CASE 26 alone: found a locator in the place of the detector; expected stepping, detector, locator
+#elif CASE == 26
+    (void)integrate(falling, x0, {.t_end = 1}, ErrorControlled<Fehlberg78>{}, Bisection{});
+// CASE 27 alone: found a locator in the place of the detector
+#elif CASE == 27
+    Simulation simulation(falling, x0, {.t_end = 1}, FixedStep<Rk4>{}, Toms748{});
+#elif CASE == 28 || CASE == 29
+    EventMonitor monitor(falling, x0);
+    return static_cast<int>(monitor.examine(Step(Instant{0}, 1, x0, x0, x0, x0)));
+// CASE 30 alone: found a detector that may miss events in Metered; expected one that keeps them all
+#elif CASE == 30
+    const auto measure = [](const Calibrated<>& gate) {
+        return Metered(gate).metering().piece > 0;
+    };
+    (void)measure;
 // CASE 18: compiled with -ffast-math or -ffinite-math-only
 #else
     (void)integrate(System{}, x0, {.t_end = 1});

@@ -12,6 +12,8 @@ trap 'rm -rf "$work"' EXIT
 compile() { "$@" -std=c++20 -Wall -Wextra -I"$source/include" $flags; }
 # first_error COMPILER FLAGS...: nothing where it compiles.
 first_error() { compile "$@" -fsyntax-only "$file" 2>&1 | grep -m 1 -E 'error:|warning:'; }
+# sentences COMPILER FLAGS...: the errors with a sentence of the library.
+sentences() { compile "$@" -fsyntax-only "$file" 2>&1 | grep -c -E 'error:.*ricochet: '; }
 expect() { # WHAT FOUND EXPECTED
     local fits=no
     if [ -n "$3" ]; then
@@ -34,12 +36,14 @@ for compiler in "$@"; do
         headers=(-include "$work/$name.hpp")
         expect "$compiler, $name, case 0" "$(first_error "$compiler" -DCASE=0 "${headers[@]}")" ''
         while IFS= read -r line; do
-            number=${line%%:*} text=${line#*: }
+            number=${line%%[: ]*} text=${line#*: }
             extra=("${headers[@]}")
             [[ $text == *fast-math* ]] && extra=(-ffast-math)
             expect "$compiler, $name, case $number" \
                 "$(first_error "$compiler" "-DCASE=$number" "${extra[@]}")" "$text"
-        done < <(sed -nE 's|^// CASE ([0-9]+: .*)|\1|p' "$file")
+            [[ $line == "$number alone:"* ]] && expect "$compiler, $name, case $number, sentences" \
+                "$(sentences "$compiler" "-DCASE=$number" "${extra[@]}")" 1
+        done < <(sed -nE 's|^// CASE ([0-9]+( alone)?: .*)|\1|p' "$file")
     done
     file="$source/tests/messages/refused.cpp"
     expect "$compiler, -ffinite-math-only" \

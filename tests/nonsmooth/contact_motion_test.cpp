@@ -120,6 +120,40 @@ TEST(ContactMotion, TheWoodpeckerDescendsAsUnderTimeSteppingAlone)
     EXPECT_NEAR(run.x[0], steps.state().q[0], 0.02 * std::abs(steps.state().q[0]));
 }
 
+/// A point of 1 kg that is pushed into the corner of a floor and a wall at x = 1, both with
+/// friction.
+struct Corner {
+    static constexpr int coordinates = 2;
+    static constexpr int contacts = 2;
+    static constexpr int tangents = 1;
+    using V = Eigen::Vector2d;
+    static void mass(const V&, Eigen::Matrix2d& m) { m.setIdentity(); }
+    static void force(double, const V&, const V&, V& f) { f << 2, -9.81; }
+    static void gaps(const V& q, V& g) { g << q[1], 1 - q[0]; }
+    static void directions(const V&, Eigen::Matrix<double, 4, 2>& h)
+    {
+        h << 0, 1, 1, 0, -1, 0, 0, 1;
+    }
+    static double restitution(int) { return 0.4; }
+    static double friction(int c) { return c == 0 ? 0.1 : 0.3; }
+};
+
+TEST(ContactMotion, APointComesToRestInACorner)
+{
+    for (const double step : {1e-3, 1e-4}) {
+        for (int k = 0; k < 40; ++k) {
+            const Eigen::Vector2d start(0.5, 0.3 + 0.01 * k);
+            const auto run = hand_over(Corner{}, start, Eigen::Vector2d(1, 0),
+                                       {.t_end = 3, .set_valued = {.step = step}});
+            ASSERT_EQ(run.outcome, Outcome::reached_end) << step << ' ' << start[1];
+            EXPECT_LT(std::abs(run.x[2]) + std::abs(run.x[3]), 1e-9);
+            // Steps leave a penetration of the order of the force times the step squared.
+            EXPECT_NEAR(run.x[0], 1, 20 * step * step);
+            EXPECT_NEAR(run.x[1], 0, 20 * step * step);
+        }
+    }
+}
+
 TEST(ContactMotion, StopsAfterSoManySteps)
 {
     const auto run = hand_over(Ball{}, {0, 0.8}, {4, 0},

@@ -140,6 +140,36 @@ TEST(ContactSolver, RandomProblemsAreSolvedOrReported)
 
 // A unit mass in a corner: a floor and a wall, each the other's tangent. Where both
 // stop the approach, p = 2 / (1 - friction) in each, which diverges towards friction 1.
+TEST(ContactSolver, ReboundsThatContradictFrictionALittleAreSolved)
+{
+    // A point in the corner of a floor and a wall, held there by its weight and a push: the wall
+    // asks for a rebound and the floor's friction for rest, and so the other way round. Such
+    // velocities decay from event to event, so each size of them is met; the impulses that they
+    // select differ by as much as friction allows.
+    Eigen::Matrix<double, 4, 2> h;
+    h << 0, 1, 1, 0, -1, 0, 0, 1;
+    const Eigen::MatrixXd w = h * h.transpose();
+    const std::array friction = {0.1, 0.3};
+    const double restitution = 0.4;
+    for (const double step : {1e-3, 1e-4, 1e-6}) {
+        for (double speed = 1e-2; speed > 1e-19; speed /= 3) {
+            for (const Eigen::Vector2d& v :
+                 {Eigen::Vector2d(speed, 0), Eigen::Vector2d(0, -speed),
+                  Eigen::Vector2d(speed, -speed), Eigen::Vector2d(speed, -1e-3 * speed)}) {
+                Eigen::VectorXd q = h * (v + step * Eigen::Vector2d(2, -9.81));
+                q[0] += restitution * v[1];
+                q[2] -= restitution * v[0];
+                Eigen::VectorXd p = Eigen::VectorXd::Zero(4);
+                ContactSolver solver;
+                const ContactReport report = solver.solve(w, q, friction, 2, p);
+                ASSERT_TRUE(report.converged) << step << ' ' << v.transpose();
+                ASSERT_LE(std::abs(p[1]), friction[0] * p[0] * (1 + 1e-6));
+                ASSERT_LE(std::abs(p[3]), friction[1] * p[2] * (1 + 1e-6) + 1e-12);
+            }
+        }
+    }
+}
+
 TEST(ContactSolver, ACornerWithoutASolutionIsReported)
 {
     Eigen::Matrix<double, 4, 2> h;

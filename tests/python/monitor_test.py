@@ -136,6 +136,11 @@ def test_time_events_and_modes_by_name():
         monitor.start(0.0, [0.0], 0.1, mode="sideways")
 
 
+def test_a_start_behind_a_floor_is_refused_by_the_monitor():
+    with pytest.raises(ValueError, match="^EventMonitor: the start lies behind guard 0"):
+        Monitor(ricochet.BouncingBall(), [1.0, 0.0]).start(0.0, [-1.0, 0.0], 0.1)
+
+
 def test_hosts_that_change_the_state_themselves_are_cut_at_every_crossing():
     system = ricochet.System(fall, [ricochet.Guard(lambda t, x: x[0], name="floor")])
     for cuts in (False, True):

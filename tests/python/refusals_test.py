@@ -29,6 +29,22 @@ def test_time_events_that_are_none(times, error):
         ricochet.integrate(ricochet.System(decay, time_events=times), [1.0], 2.0)
 
 
+def test_a_time_reset_needs_time_events():
+    with pytest.raises(ValueError, match="time_reset: found one without time events, expected "
+                                         "time_events or next_time_event"):
+        ricochet.integrate(ricochet.System(decay, time_reset=lambda t, x: x), [1.0], 2.0)
+
+
+def test_a_reset_returns_the_mode_before_the_state():
+    system = ricochet.System(
+        lambda mode, t, x: [-1.0],
+        [ricochet.Guard(lambda mode, t, x: x[0], name="up", reset=lambda mode, t, x: (x, "b"))],
+        modes=("a", "b"))
+    with pytest.raises(ValueError, match=r"reset of up returned \(state, mode\), expected "
+                                         r"\(mode, state\)"):
+        ricochet.integrate(system, [1.0], 2.0)
+
+
 def test_a_solution_at_no_time():
     solution = ricochet.solve_ivp(decay, (0, 1), [1.0], dense_output=True).sol
     with pytest.raises(ValueError, match="nan"):
@@ -50,7 +66,8 @@ def test_starts_that_are_none(y0, error):
 
 
 @pytest.mark.parametrize("options, error, words", [
-    ({"method": "RK23"}, ValueError, "RK45"), ({"method": "Radau"}, ValueError, "implicit"),
+    ({"method": "RK23"}, ValueError, "RK45"),
+    ({"method": "Radau"}, ValueError, "the Python package has no implicit method"),
     ({"method": "BDF"}, ValueError, "implicit"), ({"method": "LSODA"}, ValueError, "implicit"),
     ({"method": "rk"}, ValueError, "'rk'"), ({"method": 3}, ValueError, "3"),
     ({"t_eval": [0.5, 2.0]}, ValueError, "2.0"), ({"t_eval": [-1.0]}, ValueError, "-1.0"),

@@ -169,6 +169,19 @@ TEST(LastingContact, ADiscIsPushedDownAnInclineByAnother)
     EXPECT_NEAR(std::hypot(apart[0], apart[1]), 2, 1e-8);
 }
 
+TEST(LastingContact, OfAPointNearTerrainIsNotFollowed)
+{
+    Scene scene({.gravity = {0, -g}});
+    const MaterialId clay = scene.material({.restitution = 0.2, .friction = 0.4});
+    scene.terrain({.points = {{-1, 1}, {0, 0}, {1, 1}}, .material = clay});
+    scene.point({.name = "dust", .at = {0.1, 1}, .material = clay});
+    const SceneRun run = simulate(scene, {.t_end = 5, .contacts = scene_contacts()});
+    EXPECT_EQ(run.outcome, Outcome::zeno);
+    EXPECT_EQ(run.message,
+              "'dust' is a point in lasting contact near terrain; only discs can be in lasting "
+              "contact there");
+}
+
 TEST(LastingContact, AChainOfSpringsSlidesOverAnEdge)
 {
     Scene scene({.gravity = {0, -g}});

@@ -344,7 +344,7 @@ private:
         Mode rest = mode;
         for (Eigen::Index j = 0; j < M; ++j, rest /= 3) {
             if (terms_.delassus(i, j) == 0 || rest % 3 == 1) continue;
-            const Branch at = static_cast<Branch>(static_cast<int>(rest % 3) - 1);
+            const auto at = static_cast<Branch>(static_cast<int>(rest % 3) - 1);
             size += std::abs(terms_.delassus(i, j) * bound(t, w, j, at));
         }
         return std::abs(rate) <= 64 * std::numeric_limits<double>::epsilon() * size ? 0 : rate;

@@ -49,9 +49,14 @@ struct ContactOptions {
 ///
 /// with a line search (P. Alart and A. Curnier, A mixed formulation for frictional contact
 /// problems prone to Newton like solution methods, Computer Methods in Applied Mechanics
-/// and Engineering 92, 1991); where that stalls, by sweeps that solve one contact after
-/// another (nonsmooth Gauss-Seidel), from which Newton's method is restarted from time to
-/// time. The work is bounded; a problem that is not solved by then is reported as unsolved.
+/// and Engineering 92, 1991) with rho = 1. Where redundant contacts ask for velocities that
+/// differ a little, impulses have to change by far more than u, and that stalls: then the same
+/// method solves problems with a softness s, W + s I, by rho = 1 / s, each from the impulses of
+/// the one before (the proximal point method; R. T. Rockafellar, Monotone operators and the
+/// proximal point algorithm, SIAM Journal on Control and Optimization 14, 1976). The last resort
+/// are sweeps that solve one contact after another (nonsmooth Gauss-Seidel), from which both
+/// are restarted from time to time. The work is bounded; a problem that is not solved by then is
+/// reported as unsolved.
 class ContactSolver {
 public:
     explicit ContactSolver(const ContactOptions& options = {});
@@ -74,6 +79,8 @@ private:
     void defects(const Eigen::VectorXd& p, Eigen::VectorXd& f);
     [[nodiscard]] double measure(const Eigen::VectorXd& p, const Eigen::VectorXd& f) const;
     [[nodiscard]] bool newton(ContactReport& report);
+    [[nodiscard]] double unscaled_residual(const Eigen::VectorXd& p);
+    [[nodiscard]] bool proximal(ContactReport& report);
     void polish();
     void iterate(Eigen::VectorXd& p, ContactReport& report);
     void jacobian(const Eigen::VectorXd& p);
@@ -82,10 +89,12 @@ private:
 
     ContactOptions options_;
     int components_ = 2;
+    double rho_ = 1;  // of the projections
     std::span<const double> friction_;
     Eigen::VectorXd units_;  // 1 / sqrt of the mean diagonal of W in each contact
     Eigen::MatrixXd w_;      // in these units, as are the following
     Eigen::VectorXd q_, p_, u_, f_, direction_, trial_, f_trial_, u_trial_, best_;
+    Eigen::VectorXd diagonal_, free_, start_;  // of the problem, while a softer one is solved
     Eigen::MatrixXd v_;
     Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
 };

@@ -296,10 +296,26 @@ template <class System, class X>
     }
 }
 
+/// A declaration that is refused. What needs it then fails to fit, and is not reported for that.
+template <class Name, class System, class X>
+[[nodiscard]] constexpr bool is_refused(Declaration found) noexcept
+{
+    return (found != Declaration::absent && found != Declaration::fits) || is_hidden<Name, System, X>();
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr bool refuses_guards() noexcept
+{
+    return is_refused<Name_guard, System, X>(guard_declaration<System, X>()) ||
+           is_refused<Name_guards, System, X>(guards_declaration<System, X>());
+}
+
 template <class System, class X>
 [[nodiscard]] constexpr Declaration reset_declaration() noexcept
 {
-    if constexpr (!Resetting<System, X>) {
+    if constexpr (refuses_guards<System, X>()) {
+        return Declaration::absent;
+    } else if constexpr (!Resetting<System, X>) {
         return unfit<Name_reset, System, X>();
     } else if constexpr ((PlainSingleReset<System, X> && Name_reset::takes<const System, double, X>) ||
                          (PlainResetOf<System, X> && Name_reset::takes<const System, std::size_t, double, X>) ||
@@ -319,7 +335,9 @@ template <class System, class X>
 template <class System, class X>
 [[nodiscard]] constexpr Declaration rest_declaration() noexcept
 {
-    if constexpr (!Resting<System, X>) {
+    if constexpr (refuses_guards<System, X>()) {
+        return Declaration::absent;
+    } else if constexpr (!Resting<System, X>) {
         return unfit<Name_rest, System, X>();
     } else if constexpr ((PlainSingleRest<System, X> && Name_rest::takes<const System, double, X>) ||
                          (PlainRestOf<System, X> && Name_rest::takes<const System, std::size_t, double, X>) ||
@@ -372,7 +390,9 @@ template <class System, class X>
 template <class System, class X>
 [[nodiscard]] constexpr Declaration time_reset_declaration() noexcept
 {
-    if constexpr (!TimeResetting<System, X>) {
+    if constexpr (is_refused<Name_next_time_event, System, X>(next_time_event_declaration<System, X>())) {
+        return Declaration::absent;
+    } else if constexpr (!TimeResetting<System, X>) {
         return unfit<Name_time_reset, System, X>();
     } else if constexpr (!Timed<System>) {
         return Declaration::does_not_fit;

@@ -93,17 +93,8 @@ class DetectorTableOf {
         return self(detector).clears(guard, StepToCome<System, X>(at(door), step));
     }
 
-public:
-    static constexpr bool predicts =
-        requires(const Detector& detector, const StepToCome<System, X>& step,
-                 const GuardView<System, X>& guard)
+    static void fill(DetectorTable<C>& table, const Detector& detector)
     {
-        detector.clears(guard, step);
-    };
-
-    [[nodiscard]] static DetectorTable<C> make(const Detector& detector)
-    {
-        DetectorTable<C> table;
         table.type = written_type<Detector>();
         table.screening = screening_of<Detector>;
         table.uses_rates = Detector::uses_rates;
@@ -129,6 +120,27 @@ public:
         }
         if constexpr (defers_checks<Detector, System, X>()) add_deferral(table, detector);
         if constexpr (Metering<Detector>) table.metering = &detector.metering();
+    }
+
+public:
+    static constexpr bool predicts =
+        requires(const Detector& detector, const StepToCome<System, X>& step,
+                 const GuardView<System, X>& guard)
+    {
+        detector.clears(guard, step);
+    };
+
+    [[nodiscard]] static DetectorTable<C> make(const Detector& detector)
+    {
+        constexpr bool is_locator = requires
+        {
+            &Detector::locate;
+        };
+        static_assert(!is_locator,
+                      "ricochet: found a locator in the place of the detector; expected stepping, "
+                      "detector, locator");
+        DetectorTable<C> table;
+        if constexpr (!is_locator) fill(table, detector);
         return table;
     }
 };

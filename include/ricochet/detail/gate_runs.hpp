@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detail/components.hpp"
 #include "ricochet/detail/random.hpp"
 #include "ricochet/detail/rivals.hpp"
 #include "ricochet/detect/extremum.hpp"
@@ -474,10 +475,14 @@ private:
         if (a.size() != b.size()) return Agreement::none;
         if (a.size() == before) return Agreement::to_the_bit;
         const double apart = std::fabs(a.back().t - b.back().t);
-        if (a.back().guard != b.back().guard || !(apart <= a.back().error + b.back().error)) {
-            return Agreement::none;
-        }
-        return apart == 0 ? Agreement::to_the_bit : Agreement::to_the_error;
+        // The errors of location, and those of rounding each time to a double.
+        const double allowed = a.back().error + b.back().error +
+                               std::numeric_limits<double>::epsilon() * std::fabs(a.back().t);
+        if (a.back().guard != b.back().guard || !(apart <= allowed)) return Agreement::none;
+        // States that differ by rounding at one and the same time separate chaotic runs, too.
+        const bool same =
+            apart == 0 && ricochet::detail::same_state(a.back().after, b.back().after);
+        return same ? Agreement::to_the_bit : Agreement::to_the_error;
     }
 
     template <class Gated>

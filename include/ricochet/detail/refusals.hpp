@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Set-ups that `integrate` rejects, each with a sentence.
+// Set-ups that `integrate` or a monitor rejects, each with a sentence that begins with `who`.
 #pragma once
 
 #include <cstddef>
@@ -9,27 +9,29 @@
 namespace ricochet::detail {
 
 /// @throws std::invalid_argument: the start has no components.
-[[noreturn]] void throw_start_empty();
+[[noreturn]] void throw_start_empty(std::string_view who);
 /// @throws std::invalid_argument: the start is not finite.
-[[noreturn]] void throw_start_not_finite(std::size_t component, double value);
+[[noreturn]] void throw_start_not_finite(std::string_view who, std::size_t component, double value);
 /// @throws std::invalid_argument: the number of absolute tolerances is not that of components.
 [[noreturn]] void throw_wrong_tolerances(std::size_t components, std::size_t tolerances);
 /// @throws std::invalid_argument: the start is behind a unilateral guard.
-[[noreturn]] void throw_start_outside_mode(std::size_t which, std::string_view name, double t,
-                                           double guard);
+[[noreturn]] void throw_start_outside_mode(std::string_view who, std::size_t which,
+                                           std::string_view name, double t, double guard);
 /// @throws std::invalid_argument: a unilateral guard without a reset.
-[[noreturn]] void throw_no_reset(std::size_t which, std::string_view name);
+[[noreturn]] void throw_no_reset(std::string_view who, std::size_t which, std::string_view name);
 /// @throws std::invalid_argument: a unilateral guard that does not fall.
-[[noreturn]] void throw_unilateral_not_falling(std::size_t which, std::string_view name);
+[[noreturn]] void throw_unilateral_not_falling(std::string_view who, std::size_t which,
+                                               std::string_view name);
 /// @throws std::invalid_argument: a tolerance of touches that is none.
-[[noreturn]] void throw_bad_touch(std::size_t which, std::string_view name, double touch);
+[[noreturn]] void throw_bad_touch(std::string_view who, std::size_t which, std::string_view name,
+                                  double touch);
 /// @throws std::invalid_argument: a guard is not finite at the start.
-[[noreturn]] void throw_start_guard_not_finite(std::size_t which, std::string_view name, double t,
-                                               double guard);
+[[noreturn]] void throw_start_guard_not_finite(std::string_view who, std::size_t which,
+                                               std::string_view name, double t, double guard);
 /// @throws std::invalid_argument: the flow gives its rate another dimension at the start.
-[[noreturn]] void throw_flow_does_not_fit(std::size_t components);
+[[noreturn]] void throw_flow_does_not_fit(std::string_view who, std::size_t components);
 /// @throws std::invalid_argument: the start mode is none of the system's.
-[[noreturn]] void throw_unknown_mode(std::size_t mode, std::size_t modes);
+[[noreturn]] void throw_unknown_mode(std::string_view who, std::size_t mode, std::size_t modes);
 /// @throws std::invalid_argument: error control by a method without an estimate.
 [[noreturn]] void throw_no_error_estimate();
 /// @throws std::invalid_argument: a run backward in time of a system that allows only forward runs.
@@ -37,6 +39,7 @@ namespace ricochet::detail {
 /// @throws std::invalid_argument: no previous_time_event for a run backward in time.
 [[noreturn]] void throw_no_previous_time_event();
 /// @throws std::invalid_argument: the first time event is not ahead of the start.
-[[noreturn]] void throw_time_event_not_ahead(bool backward, double t, double found);
+[[noreturn]] void throw_time_event_not_ahead(std::string_view who, bool backward, double t,
+                                             double found);
 
 }  // namespace ricochet::detail

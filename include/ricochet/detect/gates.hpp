@@ -299,8 +299,12 @@ concept KeepsEvents = requires
 
 /// Detector that asks its network only while that saves time, measured on the run itself; the
 /// events are those of `Detector`.
-template <KeepsEvents Detector>
+template <class Detector>
 class Metered : public Detector {
+    static_assert(KeepsEvents<Detector>,
+                  "ricochet: found a detector that may miss events in Metered; expected one that "
+                  "keeps them all, such as Foreseen, Verified or Certified");
+
 public:
     /// @throws std::invalid_argument if a cost is negative, `trials` outside of [0, 1] or `piece`
     /// 0.

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
 
@@ -19,6 +20,9 @@ enum class EventKind : std::uint8_t {
     slip,          ///< a reaction that held met a bound
     jump,          ///< the guard changed sign without a zero: it jumped, or has a pole there
 };
+
+/// The enumerator's name, e.g. "crossing".
+[[nodiscard]] std::string_view name(EventKind kind) noexcept;
 
 /// Whether a guard is on its other side after an event of this kind.
 [[nodiscard]] constexpr bool changes_sign(EventKind kind) noexcept

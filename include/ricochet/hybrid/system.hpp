@@ -157,6 +157,13 @@ concept PlainSingleGuard = !CountsGuards<System> && requires(const System& syste
 template <class System, class X>
 concept GuardAlone = ModedGuardOf<System, X> || PlainGuardOf<System, X> || ModedSingleGuard<System, X> || PlainSingleGuard<System, X>;
 
+/// The guards of the system are bool: only their signs have a meaning.
+template <class System, class X>
+concept BooleanGuard = GuardAlone<System, X> &&
+    (requires(const System& system, Mode mode, double t, const X& x) { { system.guard(std::size_t{}, mode, t, x) } -> std::same_as<bool>; } ||
+     requires(const System& system, Mode mode, double t, const X& x) { { system.guard(mode, t, x) } -> std::same_as<bool>; } ||
+     requires(const System& system, double t, const X& x) { { system.guard(t, x) } -> std::same_as<bool>; });
+
 /// The system evaluates all guards in one call.
 template <class System, class X>
 concept GuardsTogether = ModedGuards<System, X> || PlainGuards<System, X>;
@@ -377,10 +384,8 @@ template <class X, class System>
         if constexpr (requires { { system.unilateral } -> std::convertible_to<bool>; }) {
             info.unilateral = system.unilateral;
         }
-        if constexpr (requires(double t, const X& x) { { system.guard(t, x) } -> std::same_as<bool>; }) {
-            info.boolean = true;
-        }
     }
+    if constexpr (detail::BooleanGuard<System, X>) info.boolean = true;
     if constexpr (detail::DegreeKnown<System, X>) {
         if (info.degree == 0 && !info.boolean) info.degree = detail::inferred_degree<X>(system, which);
     }

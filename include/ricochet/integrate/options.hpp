@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <limits>
+#include <string_view>
 #include <vector>
 
 #include "ricochet/hybrid/guard.hpp"
@@ -67,8 +68,8 @@ struct Options {
     const std::atomic<bool>* cancelled = nullptr;
 };
 
-/// @throws std::invalid_argument naming the option, what was given and what was
-/// expected.
-void validate(const Options& options, bool step_required);
+/// @throws std::invalid_argument beginning with `who` and naming the option, what was given and
+/// what was expected.
+void validate(const Options& options, bool step_required, std::string_view who = "integrate");
 
 }  // namespace ricochet

@@ -1,16 +1,18 @@
 // Training of a gate for any system, from its own runs.
 //
-//     GateTraining training;
+//     learn::GateTraining training;
 //     training.recipe = gate_recipe("state");
 //     training.levels = learn::horizons(0.001, {2, 4, 8, 16});
 //     training.step_min = training.step_max = 0.001;
-//     const TrainedGate gate = learn::train_gate(
+//     const learn::TrainedGate trained = learn::train_gate(
 //         system, learn::from_box<State>(lower, upper), FixedStep<Rk4>{}, {}, training);
-//     integrate(system, x0, options, FixedStep<Rk4>{}, Calibrated(Gate(gate.model)));
+//     integrate(system, x0, {.t_end = 20, .step = 0.001}, FixedStep<Rk4>{},
+//               Calibrated(gates::Gate(trained.model)));
 //
-// Runs with the exact detector provide the states. If the guard is expensive, train with a cheap
-// version of it, for example where a waiting time is a parameter. The same seed gives the same
-// gate, bit for bit on one machine.
+// All names are in the namespace `ricochet`; link `ricochet::learn`. A whole program is in
+// docs/expensive-guards.md. Runs with the exact detector provide the states. If the guard is
+// expensive, train with a cheap version of it, for example where a waiting time is a parameter.
+// The same seed gives the same gate, bit for bit on one machine.
 #pragma once
 
 #include <string_view>

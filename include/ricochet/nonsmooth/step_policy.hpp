@@ -82,6 +82,7 @@ private:
 [[nodiscard]] Model step_policy_model(const StepLayout& layout, const std::vector<double>& weights);
 
 /// Number of weights of that network.
-inline constexpr std::size_t step_policy_weights = (StepPolicy::inputs + 1) * 8 + 9 * 8 + 9;
+inline constexpr std::size_t step_policy_weights =
+    (StepPolicy::inputs + 1) * 8 + 9 * std::size_t{8} + 9;
 
 }  // namespace ricochet

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../input.hpp"
+#include "../joined.hpp"
 #include "../policy_lookup.hpp"
 #include "../registry.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
@@ -53,7 +54,8 @@ const StepLayout& layout_of(const SystemEntry& system)
     const std::vector<std::string_view> known{SlidingMode::name, DiodeCircuit::name, "fault"};
     if (system.name == known[0]) return SlidingMode::step_layout();
     if (system.name == known[1]) return DiodeCircuit::step_layout();
-    throw unknown("system for --controller learned", system.name, known);
+    throw BadInput(fmt::format("--controller learned: found no policy for '{}'; expected one of {}",
+                               system.name, joined(known, ", ")));
 }
 
 StepController controller(const SetValuedSettings& settings)

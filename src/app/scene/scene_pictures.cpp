@@ -34,7 +34,25 @@ std::vector<Vector2> displacements(const Scene::Surface& surface, const SceneRun
     return out;
 }
 
-/// A frame around all bodies and terrain shown, with a margin.
+/// Widens the frame by the walls along its sides that are near.
+void include_near_walls(const SceneFile& file, const SceneRun& run, Frame& frame)
+{
+    const double reach = 0.25 * std::max(frame.width(), frame.height());
+    const Frame inner = frame;
+    for (const Scene::Surface& surface : file.scene.surfaces()) {
+        for (std::size_t c = 0; c < 2; ++c) {
+            if (!surface.is_wall || surface.normal[1 - c] != 0) continue;
+            for (const Vector2& moved : displacements(surface, run)) {
+                const double at = surface.points[0][c] + moved[c];
+                if (at < inner.low[c] - reach || at > inner.high[c] + reach) continue;
+                frame.low[c] = std::min(frame.low[c], at);
+                frame.high[c] = std::max(frame.high[c], at);
+            }
+        }
+    }
+}
+
+/// A frame around all bodies and terrain shown, and the walls near them, with a margin.
 Frame frame_of(const SceneFile& file, const SceneRun& run)
 {
     constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -58,6 +76,7 @@ Frame frame_of(const SceneFile& file, const SceneRun& run)
         }
     }
     if (!(frame.low[0] <= frame.high[0])) frame = {{-1, -1}, {1, 1}};
+    include_near_walls(file, run, frame);
     const double margin = 0.04 * std::max({frame.width(), frame.height(), 1e-9});
     for (std::size_t c = 0; c < 2; ++c) {
         frame.low[c] -= margin;
@@ -215,7 +234,7 @@ void plot_scene(const SceneFile& file, const SceneRun& run, const std::filesyste
     std::string script = plot_head(picture, static_cast<int>(180 + scale * frame.width()),
                                    static_cast<int>(140 + scale * frame.height()));
     script += fmt::format(
-        "set size ratio -1\nset xrange [{}:{}]\nset yrange [{}:{}]\n"
+        "set size ratio -1\nset xrange [{}:{}]\nset yrange [{}:{}]\nset clip two\n"
         "set xlabel 'x [m]'\nset ylabel 'y [m]'\nset key off\n"
         "set style fill transparent solid 0.35 border rgb '#404040'\n",
         frame.low[0], frame.high[0], frame.low[1], frame.high[1]);

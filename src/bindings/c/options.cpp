@@ -152,6 +152,9 @@ RunOptions read_options(const rc_options* given)
     }
     Options& options = run.options;
     options.t_start = from.t_start;
+    if (!std::isfinite(from.t_end)) {
+        reader.refuse("t_end: found " + std::to_string(from.t_end) + ", expected a finite time");
+    }
     options.t_end = from.t_end;
     options.mode = from.mode;
     options.step = from.step;
@@ -181,8 +184,9 @@ MonitorOptions read_options(const rc_monitor_options* given)
     Options& options = monitor.options;
     reader.read_events(from, options);
     options.t_end = monitor.backward ? -1 : 1;
-    validate(options, false);
-    options.t_end *= std::numeric_limits<double>::infinity();
+    validate(options, false, "rc_monitor_options");
+    constexpr double forever = std::numeric_limits<double>::infinity();
+    options.t_end = monitor.backward ? -forever : forever;
     return monitor;
 }
 

@@ -340,6 +340,7 @@ private:
             return mode;
         }
         PyObject* name = result;
+        PyObject* state = nullptr;
         if (PyTuple_Check(result)) {
             if (PyTuple_GET_SIZE(result) != 2) {
                 raise(PyExc_ValueError, what + of + " returned a tuple of " +
@@ -347,10 +348,15 @@ private:
                                             ", expected (mode, state)");
             }
             name = PyTuple_GET_ITEM(result, 0);
-            take_state(PyTuple_GET_ITEM(result, 1), what, of, x);
+            state = PyTuple_GET_ITEM(result, 1);
         }
         PyObject* number = PyDict_GetItemWithError(source_.mode_numbers_.get(), name);
         if (!number) {
+            PyErr_Clear();
+            if (state && PyDict_GetItemWithError(source_.mode_numbers_.get(), state)) {
+                raise(PyExc_ValueError,
+                      what + of + " returned (state, mode), expected (mode, state)");
+            }
             PyErr_Clear();
             const Ref text = checked(PyObject_Repr(name));
             const Ref modes = checked(PyObject_Repr(source_.mode_list_.get()));
@@ -358,6 +364,7 @@ private:
                                         ", expected a mode or (mode, state), the modes being " +
                                         PyUnicode_AsUTF8(modes.get()));
         }
+        if (state) take_state(state, what, of, x);
         return static_cast<Mode>(PyLong_AsUnsignedLong(number));
     }
 

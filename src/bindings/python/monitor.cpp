@@ -72,7 +72,7 @@ public:
     {
         Request request = request_from(given);
         request.options.t_end = sign_;  // any finite time
-        validate(request.options, false);
+        validate(request.options, false, "Monitor");
         request.options.t_end = sign_ * std::numeric_limits<double>::infinity();
         start_mode_ = source_->start_mode();
         door_ = source_->open(like);
