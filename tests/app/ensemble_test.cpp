@@ -378,6 +378,11 @@ TEST_F(EnsembleApp, SharesOfDifferentSetUpsAreRefused)
     expect_refused(balls("200", {"--out", "out", "--share", "1/3"}), {"share 1/2", "share 1/3"});
     expect_refused(balls("200", {"--out", "out"}), {"share 1/2", "share 1/1"});
     expect_refused({"ensemble", "--merge", "out"}, {"share 2/2", "not complete"});
+    // Rows with other fields are not read.
+    write("t.csv", "height,restitution,gravity\n1,0.7,9.81\n2,0.8,9.81\n");
+    expect_refused(
+        {"ensemble", "bouncing-ball", "--table", "t.csv", "--out", "out", "--share", "1/2"},
+        {"another set-up"});
 
     expect_fine(balls("200", {"--out", "other", "--share", "2/2", "--rtol", "1e-10"}));
     fs::copy(work() / "other" / "share-2-of-2.rows", work() / "out" / "share-2-of-2.rows");

@@ -211,11 +211,13 @@ ShareFile::ShareFile(const fs::path& directory, const Share& share, const Json& 
                                        shortened(directory.string())));
         }
         begin(setup.dump() + '\n');
-        ShareContent content = read_share(file_, each);
-        if (const std::string other = difference(content.setup, setup); !other.empty()) {
+        // First the set-up: rows of another one have other fields.
+        std::ifstream kept(file_, std::ios::binary);
+        if (const std::string other = difference(setup_of(file_, kept), setup); !other.empty()) {
             throw BadInput(fmt::format("'{}' keeps an ensemble of another set-up: {}",
                                        shortened(directory.string()), other));
         }
+        ShareContent content = read_share(file_, each);
         blocks_ = std::move(content.blocks);
         end_ = content.end;
         const auto end = static_cast<off_t>(end_);
