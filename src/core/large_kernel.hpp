@@ -124,40 +124,42 @@ class LargeKernel {
         return reinterpret_cast<Four>(reinterpret_cast<Bits>(x) & all_but_sign);
     }
 
-    /// Takes a step. Returns the largest ratio of error, 0 without an estimate; NaN if not finite.
     template <bool with_error>
-    RICOCHET_WIDE static double go(void* door, State& step, double h, double rtol, double atol)
+    [[nodiscard, gnu::always_inline]] static auto error_weights([[maybe_unused]] double h) noexcept
     {
-        step.h = h;
-        step.has_middle = false;
-        step.asked_alone = 0;
-        depart(door, step, h, step.stages.data(), step.w, step.w_rate1);
-        const std::size_t n = step.x0.size();
-        if constexpr (!Method::fsal) {
-            for (std::size_t i = 0; i < n; ++i) {
-                step.at[i] = step.x0[i] + (h * step.rate0[i] + (step.w[i] + step.remainder[i]));
-            }
-            flow(door, step, h, step.rate1);
+        if constexpr (with_error) {
+            return Method::template weights_of<typename Method::Errors>(h);
+        } else {
+            return 0;
         }
-        const auto weights = [&] {
-            if constexpr (with_error)
-                return Method::template weights_of<typename Method::Errors>(h);
-            if constexpr (!with_error) return 0;
-        }();
-        const double* const x0 = step.x0.data();
-        const double* const rate0 = step.rate0.data();
-        const double* const w = step.w.data();
-        const double* const remainder = step.remainder.data();
-        double* const w_rate = step.w_rate1.data();
-        double* const x1 = step.x1.data();
-        double* const rate1 = step.rate1.data();
-        double* const remainder1 = step.large.remainder1.data();
-        const double* const each = step.component_atol;
-        std::array<const double*, last + 1> k{};
-        for (std::size_t j = 0; j < last; ++j) k[j] = step.stages[j].data();
-        const auto some = [&](std::size_t i, auto& worst, auto& lost) __attribute__((always_inline))
+    }
+
+    /// One pass over the components of a step that has been taken: its end, the rates there, and
+    /// the largest ratio of error.
+    template <bool with_error>
+    struct Pass {
+        Pass(State& step, double length, double relative, double absolute)
+            : x0(step.x0.data()),
+              rate0(step.rate0.data()),
+              w(step.w.data()),
+              remainder(step.remainder.data()),
+              w_rate(step.w_rate1.data()),
+              x1(step.x1.data()),
+              rate1(step.rate1.data()),
+              remainder1(step.large.remainder1.data()),
+              each(step.component_atol),
+              h(length),
+              rtol(relative),
+              atol(absolute),
+              weights(error_weights<with_error>(length))
         {
-            using V = std::remove_cvref_t<decltype(worst)>;
+            for (std::size_t j = 0; j < last; ++j) k[j] = step.stages[j].data();
+        }
+
+        /// Components i to i + 3, or i alone.
+        template <class V>
+        [[gnu::always_inline]] void operator()(std::size_t i, V& worst, V& lost) const
+        {
             const V start = load<V>(x0 + i);
             const V rate = load<V>(rate0 + i);
             const V change = h * rate + (load<V>(w + i) + load<V>(remainder + i));
@@ -177,23 +179,62 @@ class LargeKernel {
             }
             lost += 0 * end + 0 * rate_there;  // NaN if one of them is not finite
             if constexpr (with_error) {
-                const V error = magnitude(
-                    Method::template sum_of<typename Method::Errors>(weights, [&](auto j) {
-                        if constexpr (j <= last) {
-                            return load<V>(k[j - 1] + i);
-                        } else {
-                            return departing;
-                        }
-                    }));
-                const V size0 = magnitude(start);
-                const V size1 = magnitude(end);
-                const V at_zero = each ? load<V>(each + i) : V{} + atol;
-                V ratio = error / (at_zero + rtol * (size0 > size1 ? size0 : size1));
-                if (each || atol == 0) ratio = error == 0 ? V{} : ratio;
+                const V ratio = ratio_of(i, start, end, departing);
                 worst = ratio > worst ? ratio : worst;
                 lost += 0 * ratio;
             }
-        };
+        }
+
+        template <class V>
+        [[nodiscard, gnu::always_inline]] V ratio_of(std::size_t i, const V& start, const V& end,
+                                                     const V& departing) const
+        {
+            const V error =
+                magnitude(Method::template sum_of<typename Method::Errors>(weights, [&](auto j) {
+                    if constexpr (j <= last) {
+                        return load<V>(k[j - 1] + i);
+                    } else {
+                        return departing;
+                    }
+                }));
+            const V size0 = magnitude(start);
+            const V size1 = magnitude(end);
+            const V at_zero = each ? load<V>(each + i) : V{} + atol;
+            V ratio = error / (at_zero + rtol * (size0 > size1 ? size0 : size1));
+            if (each || atol == 0) ratio = error == 0 ? V{} : ratio;
+            return ratio;
+        }
+
+        const double* x0;
+        const double* rate0;
+        const double* w;
+        const double* remainder;
+        double* w_rate;
+        double* x1;
+        double* rate1;
+        double* remainder1;
+        const double* each;
+        double h, rtol, atol;
+        std::array<const double*, last + 1> k{};
+        decltype(error_weights<with_error>(0.0)) weights;
+    };
+
+    /// Takes a step. Returns the largest ratio of error, 0 without an estimate; NaN if not finite.
+    template <bool with_error>
+    RICOCHET_WIDE static double go(void* door, State& step, double h, double rtol, double atol)
+    {
+        step.h = h;
+        step.has_middle = false;
+        step.asked_alone = 0;
+        depart(door, step, h, step.stages.data(), step.w, step.w_rate1);
+        const std::size_t n = step.x0.size();
+        if constexpr (!Method::fsal) {
+            for (std::size_t i = 0; i < n; ++i) {
+                step.at[i] = step.x0[i] + (h * step.rate0[i] + (step.w[i] + step.remainder[i]));
+            }
+            flow(door, step, h, step.rate1);
+        }
+        const Pass<with_error> some(step, h, rtol, atol);
         Four worst{};
         Four lost{};
         std::size_t i = 0;

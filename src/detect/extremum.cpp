@@ -152,6 +152,27 @@ Finding clear_if(bool known) noexcept
     return clear_if(!std::isnan(lowest.value) && !std::isnan(highest.value));
 }
 
+/// Searches between ends that have no turn between them: for a dip in a slope.
+[[nodiscard]] Finding search_in_slope(GuardPath& path, const Watch& watch, const GuardCubic& cubic)
+{
+    if (cubic.v0 + cubic.r0 / 3 > 0 && cubic.v1 - cubic.r1 / 3 > 0) {
+        return Finding::clear(Evidence::checked);
+    }
+    const double lo = watch.start.s;
+    const GuardSample dip = path.value_and_rate(lo + (watch.end.s - lo) * cubic.critical(true));
+    if (is_on_surface(path, watch, dip)) {
+        // If an end lies in the band, the guard touches there; and if it continues to
+        // fall, it has not turned.
+        const double nearest = std::min(std::fabs(cubic.v0), std::fabs(cubic.v1));
+        return nearest <= watch.touch || cubic.v1 <= std::fabs(dip.value) ||
+                       !counts(watch.side, path.crossing())
+                   ? Finding::clear(Evidence::checked)
+                   : Finding::touching(watch.side, dip);
+    }
+    if (!has_left(watch.side, dip.value)) return clear_if(!std::isnan(dip.value));
+    return pair(path, watch, dip);
+}
+
 /// Determines whether the extremum between two ends on the armed side is on that side too.
 [[gnu::noinline]] Finding search_for_pair(GuardPath& path, Watch watch, GuardCubic cubic)
 {
@@ -160,25 +181,7 @@ Finding clear_if(bool known) noexcept
     if (std::fabs(cubic.v0) <= watch.touch && turns_now(cubic.v0, cubic.r0, cubic.curvature0())) {
         return Finding::clear(Evidence::checked);  // the step before has found the turn
     }
-    if (!(cubic.r0 <= 0 && cubic.r1 > 0)) {
-        // No turn between the ends, but perhaps a dip in a slope.
-        if (cubic.v0 + cubic.r0 / 3 > 0 && cubic.v1 - cubic.r1 / 3 > 0) {
-            return Finding::clear(Evidence::checked);
-        }
-        const double width = hi.s - lo.s;
-        const GuardSample dip = path.value_and_rate(lo.s + width * cubic.critical(true));
-        if (is_on_surface(path, watch, dip)) {
-            // If an end lies in the band, the guard touches there; and if it continues to
-            // fall, it has not turned.
-            const double nearest = std::min(std::fabs(cubic.v0), std::fabs(cubic.v1));
-            return nearest <= watch.touch || cubic.v1 <= std::fabs(dip.value) ||
-                           !counts(watch.side, path.crossing())
-                       ? Finding::clear(Evidence::checked)
-                       : Finding::touching(watch.side, dip);
-        }
-        if (!has_left(watch.side, dip.value)) return clear_if(!std::isnan(dip.value));
-        return pair(path, watch, dip);
-    }
+    if (!(cubic.r0 <= 0 && cubic.r1 > 0)) return search_in_slope(path, watch, cubic);
     const double sign = watch.side == Side::above ? 1 : -1;
     // A kink has its extremum at a single point, which only the polynomial gives exactly.
     const double resolution = path.on_polynomial() ? path.finest(hi.s) : 1e-9 * (hi.s - lo.s);

@@ -54,8 +54,7 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::step_underflow:
             return "the step fell below h_min without meeting the tolerance; "
                    "loosen rtol and atol, or lower h_min";
-        case Outcome::step_limit:
-            return "as many steps were taken as the run may take; allow more or end earlier";
+        case Outcome::step_limit: return "all allowed steps were taken: allow more, or end earlier";
         case Outcome::non_finite:
             return "the flow, the guard or the reset returned NaN or infinity; "
                    "the last finite state is kept";

@@ -11,8 +11,8 @@
 #include <cmath>
 #include <limits>
 
+#include "bracket.hpp"
 #include "jump.hpp"
-#include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet::detail {
 
@@ -61,9 +61,14 @@ struct PowerRoot {
 /// Narrows the bracket by values alone, to `tolerance` or neighbouring doubles; only to
 /// `handed_back` if the guard turns out to be a straight line there. Interpolation
 /// that does not shrink the bracket is replaced by bisection.
-inline void narrow_by_values(GuardPath& path, GuardSample& lo, GuardSample& hi, GuardSample recent,
-                             double tolerance, double handed_back, double& size)
+///
+/// @param recent  the end that was replaced last
+/// @return the largest |g| among the samples, at least 0
+[[nodiscard]] inline double narrow_by_values(GuardPath& path, Bracket& bracket, GuardSample recent,
+                                             double tolerance, double handed_back)
 {
+    auto& [lo, hi] = bracket;
+    double size = 0;
     int patience = 8;
     int zeros = 0;
     double past = 0;
@@ -72,9 +77,9 @@ inline void narrow_by_values(GuardPath& path, GuardSample& lo, GuardSample& hi, 
     for (int count = 1;; ++count) {
         const double width = hi.s - lo.s;
         const double finest = path.finest(hi.s);
-        if (width <= std::max(tolerance, finest)) return;
+        if (width <= std::max(tolerance, finest)) return size;
         const PowerRoot guess = patience > 0 ? power_root({lo, recent, hi}) : PowerRoot{};
-        if (guess.power == 1 && width <= handed_back) return;
+        if (guess.power == 1 && width <= handed_back) return size;
         double s = lo.s + width / 2;
         if (hi.value == 0 && zeros < 2) {  // an exact zero: is it the only one?
             s = hi.s - (++zeros == 1 ? 1 : 64) * finest;
@@ -92,7 +97,7 @@ inline void narrow_by_values(GuardPath& path, GuardSample& lo, GuardSample& hi, 
             }
         }
         if (s <= lo.s || s >= hi.s) s = lo.s + width / 2;
-        if (s <= lo.s || s >= hi.s) return;  // neighbouring doubles
+        if (s <= lo.s || s >= hi.s) return size;  // neighbouring doubles
         const GuardSample sample = path.value(s);
         size = larger(size, sample.value);
         GuardSample& end = path.has_left(sample) ? hi : lo;

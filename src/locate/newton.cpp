@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "bracket.hpp"
 #include "flat.hpp"
 #include "jump.hpp"
 #include "noise.hpp"
@@ -44,47 +45,6 @@ constexpr double straight_part = 3e-8;
 /// Number of consecutive corrections that may fail to halve the one before.
 constexpr int most_linear = 4;
 
-/// A guard that jumps has no slope there, and its root is the offset just beyond the jump.
-[[gnu::noinline]] void mark_jump(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
-                                 double size, double end, Location& where)
-{
-    const double slope = (hi.value - lo.value) / (hi.s - lo.s);
-    for (const double rate : {lo.rate, hi.rate}) {
-        if (slope / rate > 0 && slope / rate <= 16) return;  // as steep as its rate
-    }
-    if (!detail::jumps(path, lo, hi, size)) return;
-    where = detail::jump_at(path, lo, hi, end);
-}
-
-[[nodiscard]] Location located(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
-                               const TwoSum& root, double size, double end)
-{
-    const double rounding = std::fabs(hi.value / hi.rate);
-    Location where{.lo = lo.s,
-                   .hi = hi.s,
-                   .root = root.value,
-                   .root_remainder = root.remainder,
-                   .slope = hi.rate,
-                   .error = rounding > hi.s - lo.s ? rounding : hi.s - lo.s};
-    if (detail::may_jump(lo, hi, size)) [[unlikely]]
-        mark_jump(path, lo, hi, size, end, where);
-    return where;
-}
-
-/// A root that the noise of the guard hides for as long as `noise` [s]. Extrapolated along the
-/// flow the guard has left its side at `hi`; `hi` is moved until it has at the state there, too.
-[[nodiscard]] Location hidden(GuardPath& path, const GuardSample& lo, GuardSample hi, double end,
-                              double rate, double noise)
-{
-    const double width = std::max(hi.s - lo.s, noise / 4);
-    for (int i = 0; i < 8 && hi.s < end; ++i) {
-        if (path.has_left(path.value(hi.s))) break;
-        hi.s = std::min(hi.s + width, end);
-    }
-    return {
-        .lo = lo.s, .hi = hi.s, .root = hi.s, .slope = rate, .error = std::max(noise, hi.s - lo.s)};
-}
-
 /// Estimate of |g| in the bracket from its ends and their rates.
 [[nodiscard]] double size_of(const GuardSample& lo, const GuardSample& hi) noexcept
 {
@@ -102,42 +62,127 @@ constexpr int most_linear = 4;
     return std::fabs((b.rate - a.rate) / (b.s - a.s));
 }
 
-[[nodiscard]] double first_guess(GuardPath& path, GuardSample& lo, GuardSample& hi)
+/// Newton's method in a bracket that every sample narrows.
+class Search {
+public:
+    Search(GuardPath& path, const detail::Bracket& bracket, double tolerance)
+        : path_(path), bracket_(bracket), tolerance_(tolerance), end_(bracket.hi.s)
+    {
+        path_.complete(bracket_.lo);
+        path_.complete(bracket_.hi);
+        size_ = detail::larger(detail::larger(0, bracket_.lo.value), bracket_.hi.value);
+        scale_ = {.size = size_of(bracket_.lo, bracket_.hi), .h = bracket_.width()};
+        curvature_ = bend(bracket_.lo, bracket_.hi);
+    }
+
+    [[nodiscard]] Location run();
+
+private:
+    /// Where to sample next: s, moved into the bracket; NaN between neighbouring doubles.
+    [[nodiscard]] double inside(double s, double finest) const noexcept
+    {
+        const auto& [lo, hi] = bracket_;
+        // A root at one end may be followed by another one beside it.
+        const double beside = std::max(finest, reach() / 4);
+        if (s >= hi.s && slow_ == 0) s = hi.s - beside;
+        if (s <= lo.s && slow_ == 0) s = lo.s + beside;
+        if (!bracket_.contains(s)) s = lo.s + bracket_.width() / 2;
+        return bracket_.contains(s) ? s : std::numeric_limits<double>::quiet_NaN();
+    }
+    [[nodiscard]] double reach() const noexcept { return straight_part * scale_.h; }
+
+    /// Whether the curvature that a straight line neglects over the correction shifts the root by
+    /// less than is asked for.
+    [[nodiscard]] bool is_straight(const GuardSample& sample, double distance, double width,
+                                   double finest) const noexcept
+    {
+        return distance <= std::min(width, std::max(reach(), finest)) &&
+               distance * distance * curvature_ <=
+                   std::fabs(sample.rate) * std::max(finest, tolerance_) / 2;
+    }
+    [[nodiscard]] bool ends_straight(const GuardSample& sample, double correction, Location& where);
+    [[nodiscard]] bool close_in(const GuardSample& sample, double s, double& noise);
+    void halve_along(const GuardSample& sample);
+    [[nodiscard]] Location located(const TwoSum& root);
+    void mark_jump(Location& where);
+    [[nodiscard]] Location hidden(double rate, double noise);
+
+    GuardPath& path_;
+    detail::Bracket bracket_;
+    double tolerance_;
+    double end_;       ///< of the bracket at the start
+    double size_ = 0;  ///< largest |g| among the samples at ends and by values
+    detail::NoiseScale scale_;
+    double curvature_ = 0;  ///< largest change of the rate per second, between samples
+    int slow_ = 0;          ///< consecutive samples that have not halved the bracket
+};
+
+/// A guard that jumps has no slope there, and its root is the offset just beyond the jump.
+[[gnu::noinline]] void Search::mark_jump(Location& where)
 {
-    path.complete(lo);
-    path.complete(hi);
-    const double width = hi.s - lo.s;
-    const double u = detail::hermite_root(lo.value, lo.rate * width, hi.value, hi.rate * width,
-                                          path.side() == Side::above ? 1 : -1);
-    return lo.s + u * width;
+    const auto& [lo, hi] = bracket_;
+    const double slope = (hi.value - lo.value) / (hi.s - lo.s);
+    for (const double rate : {lo.rate, hi.rate}) {
+        if (slope / rate > 0 && slope / rate <= 16) return;  // as steep as its rate
+    }
+    if (!detail::jumps(path_, lo, hi, size_)) return;
+    where = detail::jump_at(path_, lo, hi, end_);
+}
+
+Location Search::located(const TwoSum& root)
+{
+    const auto& [lo, hi] = bracket_;
+    const double rounding = std::fabs(hi.value / hi.rate);
+    Location where{.lo = lo.s,
+                   .hi = hi.s,
+                   .root = root.value,
+                   .root_remainder = root.remainder,
+                   .slope = hi.rate,
+                   .error = rounding > hi.s - lo.s ? rounding : hi.s - lo.s};
+    if (detail::may_jump(lo, hi, size_)) [[unlikely]]
+        mark_jump(where);
+    return where;
+}
+
+/// A root that the noise of the guard hides for as long as `noise` [s]. Extrapolated along the
+/// flow, the guard has left its side at the end of the bracket; that end is moved until the guard
+/// has left at the state there, too.
+Location Search::hidden(double rate, double noise)
+{
+    auto& [lo, hi] = bracket_;
+    const double width = std::max(hi.s - lo.s, noise / 4);
+    for (int i = 0; i < 8 && hi.s < end_; ++i) {
+        if (path_.has_left(path_.value(hi.s))) break;
+        hi.s = std::min(hi.s + width, end_);
+    }
+    return {
+        .lo = lo.s, .hi = hi.s, .root = hi.s, .slope = rate, .error = std::max(noise, hi.s - lo.s)};
 }
 
 /// Halves a bracket that had to be widened far from the root predicted by the slope at `sample`,
 /// which a kink may have spoilt.
-void halve_along(GuardPath& path, const GuardSample& sample, double tolerance, GuardSample& lo,
-                 GuardSample& hi)
+void Search::halve_along(const GuardSample& sample)
 {
-    const double narrow = std::max(tolerance, 2 * path.finest(hi.s));
+    auto& [lo, hi] = bracket_;
+    const double narrow = std::max(tolerance_, 2 * path_.finest(hi.s));
     while (hi.s - lo.s > narrow) {
         const double s = lo.s + (hi.s - lo.s) / 2;
-        if (!(s > lo.s && s < hi.s)) return;
-        const GuardSample at = path.along_the_flow(sample, s);
-        (path.has_left(at) ? hi : lo) = at;
+        if (!bracket_.contains(s)) return;
+        const GuardSample at = path_.along_the_flow(sample, s);
+        (path_.has_left(at) ? hi : lo) = at;
     }
 }
 
-/// Brackets the root predicted from `sample` as narrowly as rounding in the
-/// guard allows: from the predicted root outwards until the side changes. False
-/// if it does not change within the bracket: either the prediction was wrong, or the guard is
-/// noise, which hides its root for as long as `noise` [s].
-[[nodiscard]] bool close_in(GuardPath& path, const GuardSample& sample, double correction,
-                            double tolerance, const detail::NoiseScale& scale, GuardSample& lo,
-                            GuardSample& hi, double& noise)
+/// Brackets the root predicted at s from `sample` as narrowly as rounding in the guard allows:
+/// from the predicted root outwards until the side changes. False if the side does not change
+/// within the bracket: either the prediction was wrong, or the guard is noise, which hides its
+/// root for as long as `noise` [s].
+bool Search::close_in(const GuardSample& sample, double s, double& noise)
 {
-    double s = sample.s + correction;
+    auto& [lo, hi] = bracket_;
     // Three quarters of the relative epsilon always reach the next double, and
     // never pass the one after it.
-    double margin = std::max(tolerance / 2, 0.75 * path.finest(s));
+    double margin = std::max(tolerance_ / 2, 0.75 * path_.finest(s));
     const double widest = 0x1p20 * margin;
     int direction = 0;
     GuardSample first;
@@ -149,22 +194,23 @@ void halve_along(GuardPath& path, const GuardSample& sample, double tolerance, G
         direction = -1;
         s = hi.s - margin;
     }
-    for (int count = 0; s > lo.s && s < hi.s; ++count) {
-        const GuardSample at = path.along_the_flow(sample, s);
-        const int toward = path.has_left(at) ? -1 : 1;
+    for (int count = 0; bracket_.contains(s); ++count) {
+        const GuardSample at = path_.along_the_flow(sample, s);
+        const int toward = path_.has_left(at) ? -1 : 1;
         if (count == 0) first = at;
         const bool repeats =
-            at.value == first.value && scale.resolves(sample.rate * (at.s - first.s));
-        if (count == 0 ? scale.may_be(at.value) : repeats && !tried) {
+            at.value == first.value && scale_.resolves(sample.rate * (at.s - first.s));
+        if (count == 0 ? scale_.may_be(at.value) : repeats && !tried) {
             tried = true;
-            const double residue =
-                scale.may_be(at.value) ? at.value : detail::tread_height(path, sample, at, scale);
-            noise = detail::close_in_noise(path, sample, s, residue, scale, lo, hi);
+            const double residue = scale_.may_be(at.value)
+                                       ? at.value
+                                       : detail::tread_height(path_, sample, at, scale_);
+            noise = detail::close_in_noise(path_, sample, {s, residue}, scale_, bracket_);
             if (noise > 0) return false;
         }
         (toward < 0 ? hi : lo) = at;
         if (toward == -direction) {
-            if (margin > widest / 256) halve_along(path, sample, tolerance, lo, hi);
+            if (margin > widest / 256) halve_along(sample);
             return true;
         }
         direction = toward;
@@ -175,58 +221,56 @@ void halve_along(GuardPath& path, const GuardSample& sample, double tolerance, G
     return false;
 }
 
-}  // namespace
-
-Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
+/// Ends the search where the guard is straight between `sample` and the root predicted from it.
+bool Search::ends_straight(const GuardSample& sample, double correction, Location& where)
 {
-    const double reach = straight_part * (hi.s - lo.s);
-    double s = first_guess(path, lo, hi);
-    const detail::NoiseScale scale{.size = size_of(lo, hi), .h = hi.s - lo.s};
-    double size = detail::larger(detail::larger(0, lo.value), hi.value);
-    const double end = hi.s;
-    double curvature = bend(lo, hi);
+    const auto& [lo, hi] = bracket_;
+    double noise = 0;
+    if (close_in(sample, sample.s + correction, noise)) {
+        const TwoSum predicted = two_sum(sample.s, correction);
+        const TwoSum root = predicted.value < lo.s   ? two_sum(lo.s, 0)
+                            : predicted.value > hi.s ? two_sum(hi.s, 0)
+                                                     : predicted;
+        path_.settle((root.value - sample.s) + root.remainder);
+        where = located(root);
+        return true;
+    }
+    if (noise > 0) where = hidden(sample.rate, noise);
+    return noise > 0;
+}
+
+Location Search::run()
+{
+    auto& [lo, hi] = bracket_;
+    double s = lo.s + scale_.h * detail::hermite_root(lo.value, lo.rate * scale_.h, hi.value,
+                                                      hi.rate * scale_.h,
+                                                      path_.side() == Side::above ? 1 : -1);
     double past = 0;
     double last_distance = std::numeric_limits<double>::infinity();
     double last_value = std::numeric_limits<double>::infinity();
     int linear = 0;
-    for (int slow = 0;;) {
-        const double width = hi.s - lo.s;
-        const double finest = path.finest(hi.s);
-        if (width <= std::max(tolerance, finest)) break;
-        // A root at one end may be followed by another one beside it.
-        const double beside = std::max(finest, reach / 4);
-        if (s >= hi.s && slow == 0) s = hi.s - beside;
-        if (s <= lo.s && slow == 0) s = lo.s + beside;
-        if (!(s > lo.s && s < hi.s)) s = lo.s + width / 2;
-        if (s <= lo.s || s >= hi.s) break;  // neighbouring doubles
+    Location where;
+    for (;;) {
+        const double width = bracket_.width();
+        const double finest = path_.finest(hi.s);
+        if (width <= std::max(tolerance_, finest)) break;
+        s = inside(s, finest);
+        if (std::isnan(s)) break;
 
-        const GuardSample sample = path.value_and_rate(s);
-        const bool beyond = path.has_left(sample);
-        curvature = std::max({curvature, bend(lo, sample), bend(sample, hi)});
+        const GuardSample sample = path_.value_and_rate(s);
+        const bool beyond = path_.has_left(sample);
+        curvature_ = std::max({curvature_, bend(lo, sample), bend(sample, hi)});
         const GuardSample replaced = beyond ? hi : lo;
         (beyond ? hi : lo) = sample;
         const double correction = -sample.value / sample.rate;
         const double distance = std::fabs(correction);
-        // The curvature that a straight line neglects over that distance, as a shift in time.
-        const bool straight = distance <= std::min(width, std::max(reach, finest)) &&
-                              distance * distance * curvature <=
-                                  std::fabs(sample.rate) * std::max(finest, tolerance) / 2;
-        if (straight) {
-            double noise = 0;
-            if (close_in(path, sample, correction, tolerance, scale, lo, hi, noise)) {
-                const TwoSum predicted = two_sum(sample.s, correction);
-                const TwoSum root = predicted.value < lo.s   ? two_sum(lo.s, 0)
-                                    : predicted.value > hi.s ? two_sum(hi.s, 0)
-                                                             : predicted;
-                path.settle((root.value - sample.s) + root.remainder);
-                return located(path, lo, hi, root, size, end);
-            }
-            if (noise > 0) return hidden(path, lo, hi, end, sample.rate, noise);
-        } else if (scale.may_be(sample.value) &&
+        if (is_straight(sample, distance, width, finest)) {
+            if (ends_straight(sample, correction, where)) return where;
+        } else if (scale_.may_be(sample.value) &&
                    std::fabs(last_value) < 16 * std::fabs(sample.value)) {
-            const double noise =
-                detail::close_in_noise(path, sample, s + correction, sample.value, scale, lo, hi);
-            if (noise > 0) return hidden(path, lo, hi, end, sample.rate, noise);
+            const double noise = detail::close_in_noise(
+                path_, sample, {s + correction, sample.value}, scale_, bracket_);
+            if (noise > 0) return hidden(sample.rate, noise);
         }
         last_value = sample.value;
         // Repeatedly not halved: a root of higher order, a pole, or no root.
@@ -234,24 +278,32 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double 
         last_distance = distance;
         if (linear == most_linear || !std::isfinite(correction)) {
             linear = 0;
-            detail::narrow_by_values(path, lo, hi, replaced, tolerance, 1e-3 * width, size);
-            path.complete(lo);
-            path.complete(hi);
+            size_ = std::max(size_, detail::narrow_by_values(path_, bracket_, replaced, tolerance_,
+                                                             1e-3 * width));
+            path_.complete(lo);
+            path_.complete(hi);
             s = hi.s - hi.value / hi.rate;
-            slow = 0;
+            slow_ = 0;
             continue;
         }
         // Converged from one side: sample the other side.
         past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
         s += correction + (beyond ? -past : past);
         // Three samples have not halved the bracket: bisect.
-        slow = hi.s - lo.s > width / 2 ? slow + 1 : 0;
-        if (slow == 3) {
-            s = lo.s + (hi.s - lo.s) / 2;
-            slow = 0;
+        slow_ = bracket_.width() > width / 2 ? slow_ + 1 : 0;
+        if (slow_ == 3) {
+            s = lo.s + bracket_.width() / 2;
+            slow_ = 0;
         }
     }
-    return located(path, lo, hi, {hi.s, 0}, size, end);
+    return located({hi.s, 0});
+}
+
+}  // namespace
+
+Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
+{
+    return Search(path, {lo, hi}, tolerance).run();
 }
 
 }  // namespace ricochet

@@ -11,7 +11,7 @@
 #include <array>
 #include <cmath>
 
-#include "ricochet/detect/step_probe.hpp"
+#include "bracket.hpp"
 
 namespace ricochet::detail {
 
@@ -64,44 +64,51 @@ struct NoiseScale {
                      (b.s - d.s));
 }
 
-/// Steps from a sample in noise, in multiples of `distance`, to the other side of the surface,
-/// and closes the bracket around the change of side; false if there is none nearby.
-[[nodiscard]] inline bool reach_across(GuardPath& path, const GuardSample& sample, GuardSample from,
-                                       double distance, GuardSample& lo, GuardSample& hi)
+/// Steps from an end of the bracket in noise, in multiples of `distance`, to the other side of
+/// the surface, and closes the bracket around the change of side; false if there is none nearby.
+[[nodiscard]] inline bool reach_across(GuardPath& path, const GuardSample& sample, bool left,
+                                       double distance, Bracket& bracket)
 {
-    const bool left = path.has_left(from);
+    GuardSample from = left ? bracket.hi : bracket.lo;
     for (int i = 0; i < 4; ++i) {
         const double s = from.s + (left ? -3 : 3) * distance;
-        if (!(s > lo.s && s < hi.s)) return false;
+        if (!bracket.contains(s)) return false;
         const GuardSample at = path.along_the_flow(sample, s);
-        (path.has_left(at) ? hi : lo) = at;
+        (path.has_left(at) ? bracket.hi : bracket.lo) = at;
         if (path.has_left(at) != left) return true;
         from = at;
     }
     return false;
 }
 
-/// If the guard near `place` is noise of about `residue`: narrows the bracket to a change of
+/// Where a guard may be noise, and of what height.
+struct NoisePlace {
+    double s = 0;
+    double residue = 0;
+};
+
+/// If the guard near `place` is noise of about its residue: narrows the bracket to a change of
 /// side there, and returns the time [s] over which the noise hides the root; else 0. `sample`
 /// is the last that `value_and_rate` took, and the motion is taken as straight from there.
 [[nodiscard, gnu::noinline]] inline double close_in_noise(GuardPath& path,
-                                                          const GuardSample& sample, double place,
-                                                          double residue, const NoiseScale& scale,
-                                                          GuardSample& lo, GuardSample& hi)
+                                                          const GuardSample& sample,
+                                                          const NoisePlace& place,
+                                                          const NoiseScale& scale, Bracket& bracket)
 {
+    auto& [lo, hi] = bracket;
     constexpr int places = 8;
     // Unevenly spaced, so that the steps of a staircase do not look like a line.
     constexpr std::array<double, places> offsets{-5, -3.9, -2.3, -0.8, 0.4, 2.1, 3.3, 4.9};
-    const double distance = std::fabs(residue / sample.rate);
-    const double first = place + offsets.front() * distance;
-    const double last = place + offsets.back() * distance;
+    const double distance = std::fabs(place.residue / sample.rate);
+    const double first = place.s + offsets.front() * distance;
+    const double last = place.s + offsets.back() * distance;
     if (!(distance > 0 && last > lo.s && first < hi.s)) return 0;
     const double part = distance / scale.h;
     const double smooth = std::max(1e7 * part * part * part, NoiseScale::finest) * scale.size;
 
     std::array<GuardSample, places> at;
     for (std::size_t i = 0; i < places; ++i) {
-        at[i] = path.along_the_flow(sample, place + offsets[i] * distance);
+        at[i] = path.along_the_flow(sample, place.s + offsets[i] * distance);
         if (!(std::fabs(at[i].value) <= 10 * NoiseScale::coarsest * scale.size)) return 0;
     }
     int rough = 0;
@@ -118,12 +125,14 @@ struct NoiseScale {
     for (const GuardSample& value : at) {
         const bool left = path.has_left(value);
         if (!left) returned = std::max(returned, value.s);
-        if (crossed || !(value.s > lo.s && value.s < hi.s)) continue;
+        if (crossed || !bracket.contains(value.s)) continue;
         crossed = left;
         (left ? hi : lo) = value;
     }
-    const bool near = hi.s - lo.s <= 4 * distance;
-    if (!near && !reach_across(path, sample, crossed ? hi : lo, distance, lo, hi)) return 0;
+    const bool near = bracket.width() <= 4 * distance;
+    if (!near && !reach_across(path, sample, path.has_left(crossed ? hi : lo), distance, bracket)) {
+        return 0;
+    }
     return std::max(returned - lo.s, noise / std::fabs(sample.rate));
 }
 

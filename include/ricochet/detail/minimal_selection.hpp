@@ -43,22 +43,154 @@ struct RICOCHET_ALIGNED SelectionProblem {
     }
 };
 
-/// Whether -y is in the normal cone of the set at r, to 1e-6: r = P(r - rho y), with
-/// rho y of the size of r. Where no reaction has -y in its normal cone, inside an obstacle, the r
-/// of an approximate problem is finite nevertheless, and wrong by its own size.
-template <int N, int M, class State, class Reaction>
-[[nodiscard]] bool opposes(const AnyInclusion<N, M>& inclusion, double t, const State& w,
-                           const Reaction& r, const Reaction& y, const Reaction& rate, double mean)
-{
-    const double length = y.template lpNorm<Eigen::Infinity>();
-    if (length == 0) return true;
-    double size = r.template lpNorm<Eigen::Infinity>();
-    if (mean > 0) size += rate.template lpNorm<Eigen::Infinity>() / mean;
-    if (size == 0) size = 1;
-    Reaction z = r - (size / length) * y;
-    inclusion.project(t, w, z, z);
-    return (z - r).template lpNorm<Eigen::Infinity>() <= 1e-6 * size;
-}
+/// What decides the reaction with which a motion starts from (t, w).
+template <int N, int M>
+struct RICOCHET_ALIGNED SelectionStart {
+    using Matrices = AnyMatrices<N, M>;
+    using State = typename Matrices::State;
+    using Reaction = typename Matrices::Reaction;
+
+    const Matrices& m;
+    double t;
+    const State& w;
+    Reaction y;                            ///< E w - s(t)
+    Reaction rate;                         ///< y' without the reaction
+    Reaction size;                         ///< of the terms of y, which bounds its rounding
+    typename Matrices::Delassus delassus;  ///< what a reaction adds to y': E A^-1 G
+
+    /// @throws std::invalid_argument where the set, the state or f is not what it has to be.
+    SelectionStart(const Matrices& matrices, double time, const State& state)
+        : m(matrices), t(time), w(state)
+    {
+        const auto& inclusion = m.inclusion();
+        if (!w.allFinite()) refuse_inclusion("the initial state is not finite");
+        if (const std::string fault = inclusion.fault(t, w); !fault.empty()) {
+            refuse_inclusion("the set at the start " + fault);
+        }
+        if (const std::size_t dimension = inclusion.set_dimension(t, w);
+            static_cast<Eigen::Index>(dimension) != m.reactions()) {
+            refuse_inclusion("the set must have the dimension of the reaction, not",
+                             static_cast<double>(dimension));
+        }
+        State f = w;
+        m.smooth(t, w, f);
+        if (!f.allFinite()) refuse_inclusion("f is not finite at the start");
+        Reaction s;
+        m.observed(t, w, y);
+        m.offset(t, s);
+        rate = m.observe() * (m.inverse_mass() * f);
+        if (m.traits().moves) {
+            const double step = 1e-5 * std::max(1.0, std::abs(t));
+            Reaction ahead, behind;
+            m.offset(t + step, ahead);
+            m.offset(t - step, behind);
+            rate -= (ahead - behind) / (2 * step);
+        }
+        delassus = m.observe() * (m.inverse_mass() * m.act());
+        size = m.observe().cwiseAbs() * w.cwiseAbs() + s.cwiseAbs();
+    }
+
+    [[nodiscard]] double rounding(Eigen::Index i) const
+    {
+        return 16 * std::numeric_limits<double>::epsilon() * size[i];
+    }
+
+    /// Narrows the bounds of reaction i to those that y allows: a nonzero y has its reaction at a
+    /// bound; at a stop of a set of states the reaction pushes inwards, elsewhere there is none.
+    void narrow(Eigen::Index i, double& lower, double& upper) const
+    {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        const double touch = rounding(i);
+        if (m.traits().of_reactions()) {
+            if (std::abs(y[i]) > touch) lower = upper = y[i] > 0 ? lower : upper;
+            if (std::isinf(lower) && lower == upper) {
+                refuse_inclusion("the initial state is inside an obstacle: y is", y[i]);
+            }
+            return;
+        }
+        const double near = touch + 16 * std::numeric_limits<double>::epsilon() *
+                                        std::min(std::abs(lower), std::abs(upper));
+        if (y[i] < lower - near || y[i] > upper + near) {
+            refuse_inclusion("the initial state is outside the set: y is", y[i]);
+        }
+        const bool at_lower = y[i] <= lower + near;
+        const bool at_upper = y[i] >= upper - near;
+        lower = at_upper ? -infinity : 0;
+        upper = at_lower ? infinity : 0;
+    }
+
+    /// The reaction where the set is a box, by its cases.
+    [[nodiscard]] Reaction in_box() const
+    {
+        Reaction reaction;
+        reaction.setZero(m.reactions());
+        LinearInequality<M> inequality;
+        inequality.w = delassus;
+        inequality.y0 = rate;
+        inequality.lower = inequality.upper = reaction;
+        m.inclusion().bounds(t, w, inequality.lower, inequality.upper);
+        for (Eigen::Index i = 0; i < reaction.size(); ++i) {
+            narrow(i, inequality.lower[i], inequality.upper[i]);
+            // A required reaction without influence on y' is at one bound or the other.
+            if (delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
+        }
+        typename LinearInequality<M>::Branches branches;
+        branches.setConstant(m.reactions(), Branch::inside);
+        Reaction unused = reaction;
+        if (!inequality.solve(reaction, unused, branches)) {
+            refuse_inclusion("no reaction at the start satisfies its law");
+        }
+        return reaction;
+    }
+
+    /// The reaction in any convex set: a nonzero y outweighs any y'.
+    [[nodiscard]] Reaction in_set()
+    {
+        Reaction reaction;
+        reaction.setZero(m.reactions());
+        double smallest = std::numeric_limits<double>::infinity();
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            if (std::abs(y[i]) <= rounding(i)) y[i] = 0;
+            if (y[i] != 0) smallest = std::min(smallest, std::abs(y[i]));
+        }
+        const double largest =
+            std::max(rate.template lpNorm<Eigen::Infinity>(), delassus.cwiseAbs().maxCoeff());
+        const double delta = std::isfinite(smallest) && largest > 0 ? 1e-9 * smallest / largest : 1;
+        const Reaction constant = y / delta + rate;
+        const double mean = delassus.diagonal().cwiseAbs().mean();
+        SelectionProblem<N, M> problem{m.inclusion(), t,        w,
+                                       delassus,      constant, mean > 0 ? 1 / mean : 1};
+        (void)semismooth_newton(problem, reaction, {.tolerance = 1e-13, .max_iterations = 100});
+        // Where Newton's method stalls at a kink the fixed point converges, more slowly.
+        const double rho = 1 / std::max(delassus.norm(), std::numeric_limits<double>::min());
+        for (int i = 0; i < 20000; ++i) {
+            Reaction z = reaction - rho * (constant + delassus * reaction);
+            m.inclusion().project(t, w, z, z);
+            const double moved = (z - reaction).template lpNorm<Eigen::Infinity>();
+            reaction = z;
+            if (moved <= 1e-15 * (1 + reaction.template lpNorm<Eigen::Infinity>())) break;
+        }
+        if (!reaction.allFinite() || !opposes(reaction, mean)) {
+            refuse_inclusion("the initial state needs an infinite reaction");
+        }
+        return reaction;
+    }
+
+    /// Whether -y is in the normal cone of the set at r, to 1e-6: r = P(r - rho y), with
+    /// rho y of the size of r. Inside an obstacle, where no reaction has -y in its normal cone,
+    /// the r of an approximate problem is finite nevertheless, and wrong by its own size.
+    [[nodiscard]] bool opposes(const Reaction& r, double mean) const
+    {
+        const double length = y.template lpNorm<Eigen::Infinity>();
+        if (length == 0) return true;
+        double scale = r.template lpNorm<Eigen::Infinity>();
+        if (mean > 0) scale += rate.template lpNorm<Eigen::Infinity>() / mean;
+        if (scale == 0) scale = 1;
+        Reaction z = r - (scale / length) * y;
+        m.inclusion().project(t, w, z, z);
+        return (z - r).template lpNorm<Eigen::Infinity>() <= 1e-6 * scale;
+    }
+};
 
 }  // namespace detail
 
@@ -78,113 +210,12 @@ template <int N, int M>
     const detail::AnyMatrices<N, M>& m, double t,
     const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w)
 {
-    using Matrices = detail::AnyMatrices<N, M>;
-    using Reaction = typename Matrices::Reaction;
-    const auto& inclusion = m.inclusion();
-    const bool of_reactions = m.traits().of_reactions();
-    if (!w.allFinite()) detail::refuse_inclusion("the initial state is not finite");
-    if (const std::string fault = inclusion.fault(t, w); !fault.empty()) {
-        detail::refuse_inclusion("the set at the start " + fault);
+    detail::SelectionStart<N, M> start(m, t, w);
+    if (m.traits().box && (m.reactions() <= most_cases || detail::has_dependent_reactions(m))) {
+        return start.in_box();
     }
-    if (const std::size_t dimension = inclusion.set_dimension(t, w);
-        static_cast<Eigen::Index>(dimension) != m.reactions()) {
-        detail::refuse_inclusion("the set must have the dimension of the reaction, not",
-                                 static_cast<double>(dimension));
-    }
-    typename Matrices::State f = w;
-    m.smooth(t, w, f);
-    if (!f.allFinite()) detail::refuse_inclusion("f is not finite at the start");
-    Reaction y, s;
-    m.observed(t, w, y);
-    m.offset(t, s);
-    // y' without the reaction, and what the reaction adds.
-    Reaction rate = m.observe() * (m.inverse_mass() * f);
-    if (m.traits().moves) {
-        const double step = 1e-5 * std::max(1.0, std::abs(t));
-        Reaction ahead, behind;
-        m.offset(t + step, ahead);
-        m.offset(t - step, behind);
-        rate -= (ahead - behind) / (2 * step);
-    }
-    const typename Matrices::Delassus delassus = m.observe() * (m.inverse_mass() * m.act());
-    const Reaction size = m.observe().cwiseAbs() * w.cwiseAbs() + s.cwiseAbs();
-
-    Reaction reaction;
-    reaction.setZero(m.reactions());
-    if (m.traits().box) {
-        if (m.reactions() <= most_cases || detail::has_dependent_reactions(m)) {
-            LinearInequality<M> inequality;
-            inequality.w = delassus;
-            inequality.y0 = rate;
-            inequality.lower = inequality.upper = reaction;
-            inclusion.bounds(t, w, inequality.lower, inequality.upper);
-            for (Eigen::Index i = 0; i < reaction.size(); ++i) {
-                double lower = inequality.lower[i];
-                double upper = inequality.upper[i];
-                const double touch = 16 * std::numeric_limits<double>::epsilon() * size[i];
-                constexpr double infinity = std::numeric_limits<double>::infinity();
-                if (of_reactions) {
-                    if (std::abs(y[i]) > touch) lower = upper = y[i] > 0 ? lower : upper;
-                    if (std::isinf(lower) && lower == upper) {
-                        detail::refuse_inclusion("the initial state is inside an obstacle: y is",
-                                                 y[i]);
-                    }
-                } else {
-                    const double near = touch + 16 * std::numeric_limits<double>::epsilon() *
-                                                    std::min(std::abs(lower), std::abs(upper));
-                    if (y[i] < lower - near || y[i] > upper + near) {
-                        detail::refuse_inclusion("the initial state is outside the set: y is",
-                                                 y[i]);
-                    }
-                    // At a stop the reaction pushes inwards; elsewhere there is none.
-                    const bool at_lower = y[i] <= lower + near;
-                    const bool at_upper = y[i] >= upper - near;
-                    lower = at_upper ? -infinity : 0;
-                    upper = at_lower ? infinity : 0;
-                }
-                inequality.lower[i] = lower;
-                inequality.upper[i] = upper;
-                // A required reaction without influence on y' is at one bound or the other.
-                if (delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
-            }
-            typename LinearInequality<M>::Branches branches;
-            branches.setConstant(m.reactions(), Branch::inside);
-            Reaction unused = reaction;
-            if (!inequality.solve(reaction, unused, branches)) {
-                detail::refuse_inclusion("no reaction at the start satisfies its law");
-            }
-            return reaction;
-        }
-    }
-    if (of_reactions) {
-        // A nonzero y outweighs any y'.
-        double smallest = std::numeric_limits<double>::infinity();
-        for (Eigen::Index i = 0; i < y.size(); ++i) {
-            if (std::abs(y[i]) <= 16 * std::numeric_limits<double>::epsilon() * size[i]) y[i] = 0;
-            if (y[i] != 0) smallest = std::min(smallest, std::abs(y[i]));
-        }
-        const double largest =
-            std::max(rate.template lpNorm<Eigen::Infinity>(), delassus.cwiseAbs().maxCoeff());
-        const double delta = std::isfinite(smallest) && largest > 0 ? 1e-9 * smallest / largest : 1;
-        const Reaction constant = y / delta + rate;
-        const double mean = delassus.diagonal().cwiseAbs().mean();
-        detail::SelectionProblem<N, M> problem{inclusion, t,        w,
-                                               delassus,  constant, mean > 0 ? 1 / mean : 1};
-        (void)semismooth_newton(problem, reaction, {.tolerance = 1e-13, .max_iterations = 100});
-        // Where Newton's method stalls at a kink the fixed point converges, more slowly.
-        const double rho = 1 / std::max(delassus.norm(), std::numeric_limits<double>::min());
-        for (int i = 0; i < 20000; ++i) {
-            Reaction z = reaction - rho * (constant + delassus * reaction);
-            inclusion.project(t, w, z, z);
-            const double moved = (z - reaction).template lpNorm<Eigen::Infinity>();
-            reaction = z;
-            if (moved <= 1e-15 * (1 + reaction.template lpNorm<Eigen::Infinity>())) break;
-        }
-        if (!reaction.allFinite() || !detail::opposes(inclusion, t, w, reaction, y, rate, mean)) {
-            detail::refuse_inclusion("the initial state needs an infinite reaction");
-        }
-    }
-    return reaction;
+    if (m.traits().of_reactions()) return start.in_set();
+    return detail::SelectionStart<N, M>::Reaction::Zero(m.reactions());
 }
 
 }  // namespace ricochet

@@ -37,6 +37,43 @@ template <int N, int M>
     return {.residual = scale > 0 ? worst / scale : worst};
 }
 
+/// f at `scratch.trial`, by its tangent at w where that is exact.
+template <int N, int M, class Factor>
+void smooth_at_trial(StageScratch<N, M>& scratch, double t, const Factor& factor,
+                     const typename AnyMatrices<N, M>::State& w)
+{
+    if (scratch.traits.affine) {
+        scratch.f_trial.noalias() = factor.jacobian * (scratch.trial - w);
+        scratch.f_trial += scratch.f;
+    } else {
+        scratch.m.smooth(t, scratch.trial, scratch.f_trial);
+    }
+}
+
+/// Solves the inequality with f replaced by its tangent at w: `scratch.reaction` and the state
+/// `scratch.trial` that it has. False where no reaction satisfies the law.
+template <int N, int M, class Factor>
+[[nodiscard]] bool solve_tangent(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
+                                 const Factor& factor, BranchesOf<M>& branches, bool frozen)
+{
+    const auto& m = scratch.m;
+    auto& inequality = scratch.inequality;
+    factor.solve(scratch.base, scratch.w0);
+    inequality.w = factor.delassus;
+    inequality.y0.noalias() = m.observe() * scratch.w0;
+    inequality.y0 -= scratch.s;
+    const bool found = frozen ? inequality.solve_on(branches, scratch.reaction, scratch.y)
+                              : inequality.solve(scratch.reaction, scratch.y, branches);
+    if (!found) return false;
+    scratch.trial.noalias() = factor.influence * scratch.reaction;
+    scratch.trial += scratch.w0;
+    for (Eigen::Index i = 0; i < branches.size(); ++i) {
+        if (inequality.held(branches[i])) m.hold(i, scratch.y[i], scratch.s[i], scratch.trial);
+    }
+    scratch.set_rho(factor);
+    return true;
+}
+
 /// Newton on f with the inequality solved exactly (Josephy, Newton's method for
 /// generalized equations, 1979); an affine f with a constant set takes one iteration.
 ///
@@ -49,47 +86,28 @@ template <int N, int M>
                                       typename AnyMatrices<N, M>::Reaction& reaction,
                                       BranchesOf<M>& branches, bool frozen = false)
 {
-    const auto& m = scratch.m;
     auto& inequality = scratch.inequality;
-    m.offset(stage.t, scratch.s);
-    m.smooth(stage.t, w, scratch.f);
+    scratch.m.offset(stage.t, scratch.s);
+    scratch.m.smooth(stage.t, w, scratch.f);
     StageReport best;
     for (int iteration = 1; iteration <= options.max_iterations; ++iteration) {
         const auto& factor = scratch.factor(stage, w);
         if (!scratch.inclusion.bounds(stage.t, w, inequality.lower, inequality.upper)) {
             return {.iterations = iteration, .set = std::max(0, inequality.faulty())};
         }
-        // w as a function of the reaction, f replaced by its tangent.
         scratch.base.noalias() = factor.jacobian * w;
         scratch.base = stage.q + stage.kappa * (scratch.f - scratch.base);
-        factor.solve(scratch.base, scratch.w0);
-        inequality.w = factor.delassus;
-        inequality.y0.noalias() = m.observe() * scratch.w0;
-        inequality.y0 -= scratch.s;
-        const bool found = frozen ? inequality.solve_on(branches, scratch.reaction, scratch.y)
-                                  : inequality.solve(scratch.reaction, scratch.y, branches);
-        if (!found) return {.iterations = iteration, .set = 0};
-        scratch.trial.noalias() = factor.influence * scratch.reaction;
-        scratch.trial += scratch.w0;
-        for (Eigen::Index i = 0; i < reaction.size(); ++i) {
-            if (inequality.held(branches[i])) {
-                m.hold(i, scratch.y[i], scratch.s[i], scratch.trial);
-            }
+        if (!solve_tangent(scratch, stage, factor, branches, frozen)) {
+            return {.iterations = iteration, .set = 0};
         }
 
-        scratch.set_rho(factor);
-        double share = 1;
+        double part = 1;
         for (int halving = 0;; ++halving) {
-            if (share < 1) {
-                scratch.trial = w + share * (scratch.trial - w);
-                scratch.reaction = reaction + share * (scratch.reaction - reaction);
+            if (part < 1) {
+                scratch.trial = w + part * (scratch.trial - w);
+                scratch.reaction = reaction + part * (scratch.reaction - reaction);
             }
-            if (scratch.traits.affine) {
-                scratch.f_trial.noalias() = factor.jacobian * (scratch.trial - w);
-                scratch.f_trial += scratch.f;
-            } else {
-                m.smooth(stage.t, scratch.trial, scratch.f_trial);
-            }
+            smooth_at_trial(scratch, stage.t, factor, w);
             StageReport now =
                 scratch.residual(stage, scratch.trial, scratch.f_trial, scratch.reaction);
             if (frozen) now = without_law(scratch, stage, branches);
@@ -98,7 +116,7 @@ template <int N, int M>
                 best = now;
                 break;
             }
-            share = 0.5;
+            part = 0.5;
         }
         w = scratch.trial;
         reaction = scratch.reaction;

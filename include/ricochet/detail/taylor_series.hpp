@@ -271,7 +271,7 @@ private:
         return slope_[a];
     }
 
-    /// The value of a function of a number at the start.
+    /// The value of an operation at the start.
     template <int i>
     [[gnu::always_inline]] void begin_op()
     {
@@ -280,10 +280,6 @@ private:
         const S c = has_constant(op.op) ? constants_[i] : S(0.0);
         const S a = op.a >= 0 ? c_[op.a][0] : S(0.0);
         const S b = op.b >= 0 ? c_[op.b][0] : S(0.0);
-        const auto of_a = [&](const auto& f) __attribute__((always_inline))
-        {
-            return map_lanes(a, f);
-        };
         if constexpr (op.op == TaylorOp::constant) {
             out = c;
         } else if constexpr (op.op == TaylorOp::sum) {
@@ -311,7 +307,21 @@ private:
         } else if constexpr (op.op == TaylorOp::constant_over) {
             out = c / a;
             inverse_[i] = -1 / a;
-        } else if constexpr (op.op == TaylorOp::square_root) {
+        } else {
+            begin_function<i>(a, b);
+        }
+    }
+
+    template <int i>
+    [[gnu::always_inline]] void begin_function(const S& a, const S& b)
+    {
+        constexpr TapeOp op = op_at(i);
+        S& out = c_[i][0];
+        const auto of_a = [&](const auto& f) __attribute__((always_inline))
+        {
+            return map_lanes(a, f);
+        };
+        if constexpr (op.op == TaylorOp::square_root) {
             out = of_a([](double v) { return std::sqrt(v); });
             inverse_[i] = 0.5 / out;
         } else if constexpr (op.op == TaylorOp::power) {
@@ -408,7 +418,25 @@ private:
             if constexpr (k <= da) return (a[k] - sum) * inverse_[i];
         } else if constexpr (op.op == TaylorOp::constant_over) {
             return Sum::template convolve<1, upto_a>(a, own) * inverse_[i];
-        } else if constexpr (op.op == TaylorOp::square_root) {
+        } else {
+            return coefficient_of_function<k, i>();
+        }
+    }
+
+    template <int k, int i>
+    [[nodiscard, gnu::always_inline]] S coefficient_of_function() const
+    {
+        using Sum = AtOrder<k>;
+        constexpr TapeOp op = op_at(i);
+        constexpr int da = degree(larger(op.a, 0));
+        constexpr int db = degree(larger(op.b, 0));
+        const S* const a = c_[larger(op.a, 0)];
+        const S* const b = c_[larger(op.b, 0)];
+        const S* const own = c_[i];
+        // Ranges of j in sums of a_j b_{k-j}; sums with coefficients of i itself go to k - 1.
+        constexpr int upto_a = smaller(da, k);
+        constexpr int upto_b = smaller(db, k);
+        if constexpr (op.op == TaylorOp::square_root) {
             const S sum = square<k, 1>(own);
             if constexpr (k > da) return -sum * inverse_[i];
             if constexpr (k <= da) return (a[k] - sum) * inverse_[i];
@@ -523,6 +551,19 @@ private:
         }
     }
 
+    /// c g' = a' b - b' a
+    template <int i>
+    [[nodiscard, gnu::always_inline]] double angle_at(int k) const
+    {
+        constexpr TapeOp op = op_at(i);
+        constexpr int a = larger(op.a, 0), b = larger(op.b, 0), c = larger(op.c, 0);
+        const S turn =
+            convolve(k, larger(1, k - degree(b)), smaller(degree(a), k), slope<a>(), c_[b]) -
+            convolve(k, larger(1, k - degree(a)), smaller(degree(b), k), slope<b>(), c_[a]);
+        const int from = larger(1, k - degree(c));
+        return (turn - convolve(k, from, k - 1, slope<i>(), c_[c])) * inverse_[i] / k;
+    }
+
     /// As `coefficient`; coefficients beyond a degree are zeros here.
     template <int i>
     [[nodiscard, gnu::always_inline]] double coefficient_at(int k) const
@@ -576,13 +617,7 @@ private:
             case TaylorOp::arc_cosine:
                 return (-a[k] - convolve(k, larger(1, k - db), k - 1, slope<i>(), b) / k) *
                        inverse_[i];
-            case TaylorOp::angle: {
-                const double* const c = c_[larger(op.c, 0)];
-                const S turn = convolve(k, larger(1, k - db), upto_a, slope<larger(op.a, 0)>(), b) -
-                               convolve(k, larger(1, k - da), upto_b, slope<larger(op.b, 0)>(), a);
-                const int from = larger(1, k - degree(larger(op.c, 0)));
-                return (turn - convolve(k, from, k - 1, slope<i>(), c)) * inverse_[i] / k;
-            }
+            case TaylorOp::angle: return angle_at<i>(k);
             case TaylorOp::input:
             case TaylorOp::constant: break;
         }
