@@ -207,7 +207,7 @@ protected:
     void transform(bool on_time)
     {
         const double t = on_time ? time_event_ : time_of_set();
-        resets_.apply(system_, bank_, search_.fired().span(), on_time, step_.mode(), t,
+        resets_.apply(system_, bank_, {search_.fired().span(), on_time, step_.mode(), t},
                       search_.before());
     }
 

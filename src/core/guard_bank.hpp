@@ -56,6 +56,15 @@ public:
     [[nodiscard]] bool checks_inside() const noexcept { return rules_.checks_inside; }
     [[nodiscard]] bool backward() const noexcept { return backward_; }
 
+    [[nodiscard]] static SamplePoint<X> start_of(const Step<X>& step, double scale)
+    {
+        return {step.mode(), step.time(0), step.x0(), step.rate0(), scale};
+    }
+    [[nodiscard]] static SamplePoint<X> end_of(const Step<X>& step)
+    {
+        return {step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h()};
+    }
+
     /// Samples all guards at the start of a step.
     void sample_start(const Step<X>& step, std::uint64_t& calls, double scale)
     {
@@ -66,7 +75,7 @@ public:
                 records_[i].deferred = false;
             }
         } else {
-            sample(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, g0_, rate0_);
+            sample(start_of(step, scale), calls, g0_, rate0_);
         }
         if (rules_.keeps_sizes()) {
             for (std::size_t i = 0; i < size(); ++i) {
@@ -81,7 +90,7 @@ public:
     void wake_all(const Step<X>& step, double scale, std::uint64_t& calls, bool sampled)
     {
         if (!sampled) sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
-        sample_rates(step.mode(), step.time(0), step.x0(), step.rate0(), scale, calls, rate0_);
+        sample_rates(start_of(step, scale), calls, rate0_);
         for (std::size_t i = 0; i < size(); ++i) {
             records_[i].deferred = false;
             arm(i, records_[i].side);
@@ -91,8 +100,7 @@ public:
     /// Samples all guards at the end of a step.
     void sample_end(const Step<X>& step, std::uint64_t& calls)
     {
-        sample(step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h(), calls, g1_,
-               rate1_);
+        sample(end_of(step), calls, g1_, rate1_);
         forget_screening();
     }
 
@@ -108,9 +116,8 @@ public:
     {
         if (!std::exchange(rates_left_out_, false)) return;
         for (std::size_t i = 0; i < size(); ++i) {
-            if (std::isnan(rate0_[i]))
-                rate0_[i] = rate_at(i, step, 0, step.x0(), step.rate0(), calls);
-            rate1_[i] = rate_at(i, step, step.h(), step.x1(), step.rate1(), calls);
+            if (std::isnan(rate0_[i])) rate0_[i] = rate_at(i, start_of(step, step.h()), calls);
+            rate1_[i] = rate_at(i, end_of(step), calls);
         }
     }
 
@@ -140,7 +147,7 @@ public:
         rate1_[0] = run.rate1;
         const bool stands = run.why == QuietEnd::doubt || run.why == QuietEnd::moving;
         if (stands && !std::isfinite(run.rate1)) {
-            rate1_[0] = rate_at(0, step, step.h(), step.x1(), step.rate1(), calls);
+            rate1_[0] = rate_at(0, end_of(step), calls);
         }
         forget_screening();
         if (!run.checks_inside) return;
@@ -369,11 +376,9 @@ private:
             rate1_[i] = std::numeric_limits<double>::quiet_NaN();
         }
     }
-    [[nodiscard]] double rate_at(std::size_t i, const Step<X>& step, double s, const X& x,
-                                 const X& dxdt, std::uint64_t& calls)
+    [[nodiscard]] double rate_at(std::size_t i, const SamplePoint<X>& at, std::uint64_t& calls)
     {
-        if (!records_[i].enabled) return 0;
-        return this->rate_of(i, step.mode(), step.time(s), x, dxdt, step.h(), calls);
+        return records_[i].enabled ? this->rate_of(i, at, calls) : 0;
     }
 
     using Guards::any_of;

@@ -17,17 +17,25 @@
 
 namespace ricochet::detail {
 
+/// What happens at one instant: the guards that fired, and a time event if it is on time.
+struct FiredSet {
+    std::span<const std::size_t> fired;
+    bool on_time;
+    Mode mode;
+    double t;
+};
+
 template <class X>
 class MergedResets {
 public:
     explicit MergedResets(const X& like) : after_(like), single_(like) {}
 
-    /// Applies the resets of the guards in `fired`, which all read the state `before`, and the
-    /// reset of a time event if the set happens on time. `bank` knows which guards have a reset.
+    /// Applies the resets of the guards that fired, which all read the state `before`, and the
+    /// reset of a time event. `bank` knows which guards have a reset.
     template <class Bank>
-    void apply(const SystemAt<X>& system, const Bank& bank, std::span<const std::size_t> fired,
-               bool on_time, Mode mode, double t, const X& before)
+    void apply(const SystemAt<X>& system, const Bank& bank, const FiredSet& set, const X& before)
     {
+        const auto& [fired, on_time, mode, t] = set;
         assign(after_, before);
         mode_ = mode;
         conflict_ = {no_guard, no_guard};

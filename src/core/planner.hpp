@@ -193,24 +193,21 @@ public:
     {
         for (const std::size_t i : judged()) {
             LastCheck& check = checks_[i];
-            const double value = value_at(i, clock(step.time(0)), step.time(0), step.x0(),
-                                          step.mode(), bank, counts);
-            if (!(check.rate == check.rate) || check.time != clock(step.time(0))) {
+            const double h = step.h();
+            const Check start = check_of(step.time(0), step.x0());
+            const Check end = check_of(step.time(h), step.x1());
+            const double value = value_at(i, start, step.mode(), bank, counts);
+            if (!(check.rate == check.rate) || check.time != start.time) {
                 check.rate = meter_.time_guard([&] {
-                    return bank.rate_of(i, step.mode(), step.time(0), step.x0(), step.rate0(),
-                                        last_h, counts.guard_calls);
+                    return bank.rate_of(i, Bank::start_of(step, last_h), counts.guard_calls);
                 });
             }
-            const double h = step.h();
-            const double end = value_at(i, clock(step.time(h)), step.time(h), step.x1(),
-                                        step.mode(), bank, counts);
-            const double rate = meter_.time_guard([&] {
-                return bank.rate_of(i, step.mode(), step.time(h), step.x1(), step.rate1(), h,
-                                    counts.guard_calls);
-            });
+            const double end_value = value_at(i, end, step.mode(), bank, counts);
+            const double rate = meter_.time_guard(
+                [&] { return bank.rate_of(i, Bank::end_of(step), counts.guard_calls); });
             bank.wake(i, {.s = 0, .value = value, .rate = check.rate},
-                      {.s = h, .value = end, .rate = rate});
-            remember(check, clock(step.time(h)), end);
+                      {.s = h, .value = end_value, .rate = rate});
+            remember(check, end.time, end_value);
             check.rate = rate;
         }
     }
@@ -243,8 +240,7 @@ public:
         if (!bounded_ || !detector_->checks_bounds) return;
         if (++covered_ % 64 != 0 || bank.size() == 0) return;
         const std::size_t i = covered_ / 64 % bank.size();
-        const double t = step.time(step.h());
-        watch_sleeper(i, t, step.x1(), step.mode(), bank, counts);
+        watch_sleeper(i, place(steps_.size(), step), step.mode(), bank, counts);
     }
 
     /// Checks the guards that are still deferred when the run ends, at the start of the step: a
@@ -253,7 +249,7 @@ public:
     {
         if (!bounded_) return;
         for (std::size_t i = 0; i < bank.size(); ++i) {
-            watch_sleeper(i, step.time(0), step.x0(), step.mode(), bank, counts);
+            watch_sleeper(i, check_of(step.time(0), step.x0()), step.mode(), bank, counts);
         }
     }
 
@@ -448,14 +444,14 @@ private:
     }
 
     /// The guard's exact value, unless it is known from the last check or another.
-    [[nodiscard]] double value_at(std::size_t i, double time, double t, const X& x, Mode mode,
-                                  const Bank& bank, Statistics& counts)
+    [[nodiscard]] double value_at(std::size_t i, const Check& at, Mode mode, const Bank& bank,
+                                  Statistics& counts)
     {
-        LastCheck& check = checks_[i];
-        if (check.exact && check.time == time) return check.value;
-        if (check.later_time == time) return check.later_value;
+        const LastCheck& check = checks_[i];
+        if (check.exact && check.time == at.time) return check.value;
+        if (check.later_time == at.time) return check.later_value;
         return meter_.time_guard(
-            [&] { return bank.view(i, mode, counts.guard_calls).value(t, x); });
+            [&] { return bank.view(i, mode, counts.guard_calls).value(at.t, *at.x); });
     }
 
     /// An exact check at the start of tentative step k; for k past the last, at the end of the
@@ -464,7 +460,7 @@ private:
                                  const Bank& bank, Statistics& counts)
     {
         Check check = place(k, step);
-        check.value = value_at(i, check.time, check.t, *check.x, step.mode(), bank, counts);
+        check.value = value_at(i, check, step.mode(), bank, counts);
         check.bound = bound(i, check, step.mode(), bank[i].side);
         if (detector_->checks_bounds) check_bound(i, check, step.mode(), bank);
         return check;
@@ -472,29 +468,32 @@ private:
 
     [[nodiscard]] Check place(std::size_t k, const Step<X>& step) const
     {
-        if (k == steps_.size()) {
-            const double t = step.time(step.h());
-            return {.time = clock(t), .t = t, .x = &step.x1()};
-        }
+        if (k == steps_.size()) return check_of(step.time(step.h()), step.x1());
         const StepStart<X>& start = steps_[k].start;
-        return {.time = clock(start.t.value), .t = start.t.value, .x = &start.x};
+        return check_of(start.t.value, start.x);
+    }
+    [[nodiscard]] Check check_of(double t, const X& x) const
+    {
+        return {.time = clock(t), .t = t, .x = &x};
     }
 
-    /// Covers by a lower bound there, or by an upper bound below the surface; false: by neither.
-    [[nodiscard]] bool bound_at(std::size_t i, std::size_t k, const Step<X>& step, const Bank& bank,
-                                Statistics& counts, Check& check)
+    /// A check that covers by a lower bound there, or by an upper bound below the surface, if one
+    /// of them does.
+    [[nodiscard]] std::optional<Check> bound_at(std::size_t i, std::size_t k, const Step<X>& step,
+                                                const Bank& bank, Statistics& counts)
     {
-        if (!bounded_) return false;
+        if (!bounded_) return std::nullopt;
+        Check check;
         if (system_->upper_bound && bank[i].side == Side::below) {
             check = place(k, step);
             check.exact = false;
             ++counts.bound_calls;
             check.value = system_->upper_bound(system_.door(), i, step.mode(), check.t, *check.x);
             check.bound = bound(i, check, step.mode(), Side::below);
-            return check.value < 0;
+            return check.value < 0 ? std::optional(check) : std::nullopt;
         }
-        if (!system_->lower_bound && !detector_->level) return false;
-        if (bank[i].side != Side::above) return false;
+        if (!system_->lower_bound && !detector_->level) return std::nullopt;
+        if (bank[i].side != Side::above) return std::nullopt;
         check = place(k, step);
         check.exact = false;
         check.value = 0;
@@ -506,7 +505,7 @@ private:
             check.value = std::max(check.value, ask_level(i, check, step.mode()));
         }
         check.bound = bound(i, check, step.mode(), Side::above);
-        return check.value > 0;
+        return check.value > 0 ? std::optional(check) : std::nullopt;
     }
 
     /// A lower bound of guard i from a gate; 0: none.
@@ -533,12 +532,19 @@ private:
     [[nodiscard]] std::size_t close_one(std::size_t i, const Step<X>& step, Bank& bank,
                                         Statistics& counts, double h_next);
 
-    /// Whether guard i stays clear between a check `from`, whose cover reaches the start of
+    /// A guard that is to be shown clear up to the end of the current step.
+    struct Closing {
+        std::size_t i;
+        const Step<X>& step;
+        const Bank& bank;
+        Statistics& counts;
+    };
+
+    /// Whether the guard stays clear between a check `from`, whose cover reaches the start of
     /// tentative step `lo`, and the check `end` at the start of step `hi`. If not, returns the
     /// first step that is in doubt, with `from` moved to its start.
-    [[nodiscard]] std::size_t narrow(std::size_t i, Check& from, std::size_t lo, std::size_t hi,
-                                     const Check& end, const Step<X>& step, const Bank& bank,
-                                     Statistics& counts);
+    [[nodiscard]] std::size_t narrow(const Closing& on, Check& from, std::size_t lo, std::size_t hi,
+                                     const Check& end);
 
     // --- tests of the bounds ---
 
@@ -553,8 +559,7 @@ private:
     void blame(std::size_t i, const Check& from, const Check& to, double allowed);
 
     /// Reports a deferred guard that is beyond its surface, whatever its bounds say there.
-    void watch_sleeper(std::size_t i, double t, const X& x, Mode mode, const Bank& bank,
-                       Statistics& counts);
+    void watch_sleeper(std::size_t i, Check now, Mode mode, const Bank& bank, Statistics& counts);
 
     /// Whether an exact value contradicts the bound that would have replaced it. Beyond the
     /// surface a bound may have ended at 0.

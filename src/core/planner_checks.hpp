@@ -51,14 +51,13 @@ inline void Planner<X, single>::blame(std::size_t i, const Check& from, const Ch
 }
 
 template <class X, bool single>
-inline void Planner<X, single>::watch_sleeper(std::size_t i, double t, const X& x, Mode mode,
-                                              const Bank& bank, Statistics& counts)
+inline void Planner<X, single>::watch_sleeper(std::size_t i, Check now, Mode mode, const Bank& bank,
+                                              Statistics& counts)
 {
     if (wrong_ || !bank[i].enabled || never_sleeps(bank[i])) return;
     const Check from = last_check(i);
-    Check now{.time = clock(t), .t = t, .x = &x};
     if (!(now.time > from.time)) return;
-    now.value = value_at(i, now.time, t, x, mode, bank, counts);
+    now.value = value_at(i, now, mode, bank, counts);
     now.bound = bound(i, now, mode, bank[i].side);
     const double tau = now.time - from.time;
     if (detector_->checks_bounds) check_bound(i, now, mode, bank);

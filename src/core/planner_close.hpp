@@ -13,7 +13,9 @@ inline std::size_t Planner<X, single>::close_one(std::size_t i, const Step<X>& s
     if (never_sleeps(bank[i]) || known.unclear) return steps_.size() - 1;
     Check from = last_check(i);
     Check end;
-    if (bound_at(i, steps_.size(), step, bank, counts, end) && closes(bank, i, from, end) &&
+    const auto bounded = bound_at(i, steps_.size(), step, bank, counts);
+    if (bounded) end = *bounded;
+    if (bounded && closes(bank, i, from, end) &&
         detector_->sure(self_, end.bound, band(bank, i, end.value, end.value)) >= h_next) {
         if (detector_->checks_bounds && ++lower_bounds_used_ % 8 == 0) {
             (void)check_at(i, steps_.size(), step, bank, counts);
@@ -22,7 +24,8 @@ inline std::size_t Planner<X, single>::close_one(std::size_t i, const Step<X>& s
         return none;
     }
     end = check_at(i, steps_.size(), step, bank, counts);
-    const std::size_t failed = narrow(i, from, known.first, steps_.size(), end, step, bank, counts);
+    const std::size_t failed =
+        narrow({i, step, bank, counts}, from, known.first, steps_.size(), end);
     const bool moved = from.time != known.time || failed == none;
     const double rate = known.rate;
     if (failed != none) remember(known, place(failed + 1, step).time, failing_value_);
@@ -32,10 +35,10 @@ inline std::size_t Planner<X, single>::close_one(std::size_t i, const Step<X>& s
 }
 
 template <class X, bool single>
-inline std::size_t Planner<X, single>::narrow(std::size_t i, Check& from, std::size_t lo,
-                                              std::size_t hi, const Check& end, const Step<X>& step,
-                                              const Bank& bank, Statistics& counts)
+inline std::size_t Planner<X, single>::narrow(const Closing& on, Check& from, std::size_t lo,
+                                              std::size_t hi, const Check& end)
 {
+    const auto& [i, step, bank, counts] = on;
     if (closes(bank, i, from, end)) {
         check_change(i, from, end, bank);
         from = end;
@@ -44,8 +47,8 @@ inline std::size_t Planner<X, single>::narrow(std::size_t i, Check& from, std::s
     if (hi - lo == 1) {
         failing_value_ = end.value;
         if (from.exact && from.time == place(lo, step).time) return lo;
-        if (Check start;
-            bound_at(i, lo, step, bank, counts, start) && closes(bank, i, start, end)) {
+        const auto bounded = bound_at(i, lo, step, bank, counts);
+        if (bounded && closes(bank, i, *bounded, end)) {
             from = end;
             return none;
         }
@@ -59,8 +62,8 @@ inline std::size_t Planner<X, single>::narrow(std::size_t i, Check& from, std::s
     }
     const std::size_t middle = lo + (hi - lo) / 2;
     const Check half = check_at(i, middle, step, bank, counts);
-    const std::size_t failed = narrow(i, from, lo, middle, half, step, bank, counts);
-    return failed != none ? failed : narrow(i, from, middle, hi, end, step, bank, counts);
+    const std::size_t failed = narrow(on, from, lo, middle, half);
+    return failed != none ? failed : narrow(on, from, middle, hi, end);
 }
 
 }  // namespace ricochet::detail

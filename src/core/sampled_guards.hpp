@@ -14,6 +14,16 @@
 
 namespace ricochet::detail {
 
+/// Where guards and their rates are sampled.
+template <class X>
+struct SamplePoint {
+    Mode mode;
+    double t;
+    const X& x;
+    const X& dxdt;
+    double scale;  ///< [s] over which the motion is taken as smooth
+};
+
 template <class X, bool single>
 class SampledGuards {
 protected:
@@ -45,14 +55,12 @@ public:
     }
 
     /// The rate of guard i, as `sample` computes it.
-    [[nodiscard]] double rate_of(std::size_t i, Mode mode, double t, const X& x, const X& dxdt,
-                                 double scale, std::uint64_t& calls)
+    [[nodiscard]] double rate_of(std::size_t i, const SamplePoint<X>& at, std::uint64_t& calls)
     {
         if (records_[i].info.boolean || !rules_.uses_rates) return 0;
-        if (!system_->rates) return view(i, mode, calls).rate(t, x, dxdt, scale);
-        rates_together(mode, t, x, dxdt, behind_);
-        if (std::isfinite(behind_[i])) return behind_[i];
-        return view(i, mode, calls).rate(t, x, dxdt, scale);
+        if (!system_->rates) return rate_alone(i, at, calls);
+        rates_together(at, behind_);
+        return std::isfinite(behind_[i]) ? behind_[i] : rate_alone(i, at, calls);
     }
 
     /// Updates which guards are enabled.
@@ -65,17 +73,16 @@ public:
     }
 
 protected:
-    void sample(Mode mode, double t, const X& x, const X& dxdt, double scale, std::uint64_t& calls,
-                Doubles& g, Doubles& rates)
+    void sample(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& g, Doubles& rates)
     {
         if (single && system_->point && rules_.uses_rates && !selective_) {
-            const GuardPoint at = view(0, mode, calls).point(t, x, dxdt, scale);
-            g[0] = at.value;
-            rates[0] = at.rate;
+            const GuardPoint both = view(0, at.mode, calls).point(at.t, at.x, at.dxdt, at.scale);
+            g[0] = both.value;
+            rates[0] = both.rate;
             return;
         }
-        sample_values(mode, t, x, calls, g);
-        sample_rates(mode, t, x, dxdt, scale, calls, rates);
+        sample_values(at.mode, at.t, at.x, calls, g);
+        sample_rates(at, calls, rates);
     }
 
     void sample_values(Mode mode, double t, const X& x, std::uint64_t& calls, Doubles& g)
@@ -85,44 +92,49 @@ protected:
         calls += size();
     }
 
-    void sample_rates(Mode mode, double t, const X& x, const X& dxdt, double scale,
-                      std::uint64_t& calls, Doubles& rates)
+    void sample_rates(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& rates)
     {
         if (!rules_.uses_rates || size() == 0) return;
         if (system_->rates) {
-            rates_together(mode, t, x, dxdt, rates);
+            rates_together(at, rates);
         } else if (system_->each_rate && !selective_ && !backward_) {
-            system_->each_rate(system_.door(), mode, t, x, dxdt, all(rates));
+            system_->each_rate(system_.door(), at.mode, at.t, at.x, at.dxdt, all(rates));
         } else if (!system_->each_rate && !system_->guard_alone) {
-            difference(mode, t, x, dxdt, scale, rates);
+            difference(at, rates);
             calls += 2 * size();
         } else {
             for (std::size_t i = 0; i < size(); ++i) {
-                rates[i] = is_rateless(i) ? 0 : view(i, mode, calls).rate(t, x, dxdt, scale);
+                rates[i] = is_rateless(i) ? 0 : rate_alone(i, at, calls);
             }
             return;
         }
-        if (!all_finite(rates)) replace_lost(mode, t, x, dxdt, scale, calls, rates);
+        if (!all_finite(rates)) replace_lost(at, calls, rates);
+    }
+
+    [[nodiscard]] double rate_alone(std::size_t i, const SamplePoint<X>& at, std::uint64_t& calls)
+    {
+        return view(i, at.mode, calls).rate(at.t, at.x, at.dxdt, at.scale);
     }
 
     /// Rates of all guards from the system in one call.
-    void rates_together(Mode mode, double t, const X& x, const X& dxdt, Doubles& rates)
+    void rates_together(const SamplePoint<X>& at, Doubles& rates)
     {
-        if (!backward_) return system_->rates(system_.door(), mode, t, x, dxdt, all(rates));
-        system_->rates(system_.door(), mode, t, x, negated(dxdt), all(rates));
+        void* const door = system_.door();
+        if (!backward_) return system_->rates(door, at.mode, at.t, at.x, at.dxdt, all(rates));
+        system_->rates(door, at.mode, at.t, at.x, negated(at.dxdt), all(rates));
         for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
     }
 
     /// Rates of all guards by the central difference along the flow, in two calls.
-    void difference(Mode mode, double t, const X& x, const X& dxdt, double scale, Doubles& rates)
+    void difference(const SamplePoint<X>& at, Doubles& rates)
     {
-        const double delta = 1e-5 * scale;
+        const double delta = 1e-5 * at.scale;
         const double ahead = backward_ ? -delta : delta;
-        if (there_.size() != x.size()) there_ = x;
-        detail::move(there_, x, delta, dxdt);
-        system_->guards(system_.door(), mode, t + ahead, there_, all(rates));
-        detail::move(there_, x, -delta, dxdt);
-        system_->guards(system_.door(), mode, t - ahead, there_, all(behind_));
+        if (there_.size() != at.x.size()) there_ = at.x;
+        detail::move(there_, at.x, delta, at.dxdt);
+        system_->guards(system_.door(), at.mode, at.t + ahead, there_, all(rates));
+        detail::move(there_, at.x, -delta, at.dxdt);
+        system_->guards(system_.door(), at.mode, at.t - ahead, there_, all(behind_));
         for (std::size_t i = 0; i < size(); ++i) {
             rates[i] = records_[i].info.boolean ? 0 : (rates[i] - behind_[i]) / (2 * delta);
         }
@@ -162,13 +174,12 @@ private:
 
     /// Evaluates guard by guard the rates that are not finite, since no conclusion follows from
     /// them.
-    [[gnu::cold, gnu::noinline]] void replace_lost(Mode mode, double t, const X& x, const X& dxdt,
-                                                   double scale, std::uint64_t& calls,
+    [[gnu::cold, gnu::noinline]] void replace_lost(const SamplePoint<X>& at, std::uint64_t& calls,
                                                    Doubles& rates)
     {
         for (std::size_t i = 0; i < size(); ++i) {
             if (std::isfinite(rates[i]) || is_rateless(i)) continue;
-            rates[i] = view(i, mode, calls).rate(t, x, dxdt, scale);
+            rates[i] = rate_alone(i, at, calls);
         }
     }
 

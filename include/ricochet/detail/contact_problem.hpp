@@ -93,7 +93,7 @@ private:
     std::span<const double> friction_;
     Eigen::VectorXd units_;  // 1 / sqrt of the mean diagonal of W in each contact
     Eigen::MatrixXd w_;      // in these units, as are the following
-    Eigen::VectorXd q_, p_, u_, f_, direction_, trial_, f_trial_, u_trial_, best_;
+    Eigen::VectorXd q_, p_, u_, f_, direction_, trial_, f_trial_, best_;
     Eigen::VectorXd diagonal_, free_, start_;  // of the problem, while a softer one is solved
     Eigen::MatrixXd v_;
     Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
