@@ -25,10 +25,24 @@ public:
     }
     BulletWorld(const BulletWorld&) = delete;
     BulletWorld& operator=(const BulletWorld&) = delete;
-    ~BulletWorld() { world_.removeRigidBody(&body_); }
+    ~BulletWorld()
+    {
+        world_.removeRigidBody(&beside_);
+        world_.removeRigidBody(&body_);
+    }
 
     [[nodiscard]] hosts::BulletBody host(double length) { return {{&world_, &body_}, 0, length}; }
     void move_up() { move_to(0, 0, 5); }
+    /// A body that falls beside the first.
+    void add_beside(double x)
+    {
+        world_.addRigidBody(&beside_);
+        beside_.setActivationState(DISABLE_DEACTIVATION);
+        btTransform place = beside_.getWorldTransform();
+        place.setOrigin({btScalar(x), 0, 10});
+        beside_.setCenterOfMassTransform(place);
+    }
+    [[nodiscard]] double velocity_beside() const { return beside_.getLinearVelocity().z(); }
 
     /// Rounding of ten metres in single precision.
     static constexpr double rounding = sizeof(btScalar) == 4 ? 2e-6 : 1e-12;
@@ -48,6 +62,7 @@ private:
     btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
     btSphereShape shape_{btScalar(0.1)};
     btRigidBody body_{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape_, {1, 1, 1})};
+    btRigidBody beside_{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape_, {1, 1, 1})};
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Bullet, InEngine, BulletWorld);

@@ -141,6 +141,22 @@ TYPED_TEST_P(InEngine, APassageThatChangesNothingLeavesTheMotionAsItIs)
     EXPECT_EQ(end(11, 2), end(100, 0));
 }
 
+TYPED_TEST_P(InEngine, AnotherBodyOfTheWorldMovesOnlyOnce)
+{
+    // The engine's v - g s is exact for any division of the time into steps: a body that repeated
+    // steps had moved, too, would be faster by g times their sum.
+    const FallingBody system;
+    const FallingBody::State x0{0, 0, 10, 0.5, 0, 0};
+    TypeParam world(x0);
+    world.add_beside(20);
+    auto host = world.host(0.01);
+    EventMonitor monitor(system, x0);
+    EXPECT_EQ(hosts::run(host, monitor, 8), Verdict::stands);
+    EXPECT_GE(monitor.events().size(), 3u);
+    // Rounding of 80 m/s in each of 800 steps, and the steps at cuts.
+    EXPECT_NEAR(world.velocity_beside(), -8 * FallingBody::gravity, 8e3 * TypeParam::rounding);
+}
+
 TYPED_TEST_P(InEngine, AStartOnTheFloorIsNoEvent)
 {
     const FallingBody system;
@@ -170,6 +186,7 @@ TYPED_TEST_P(InEngine, ABodyThatIsMovedBetweenStepsIsRefused)
 REGISTER_TYPED_TEST_SUITE_P(InEngine, ImpactsAreThoseOfTheEnginesOwnMap,
                             ImpactsAccumulateAndTheBodyRests,
                             APassageThatChangesNothingLeavesTheMotionAsItIs,
-                            AStartOnTheFloorIsNoEvent, ABodyThatIsMovedBetweenStepsIsRefused);
+                            AnotherBodyOfTheWorldMovesOnlyOnce, AStartOnTheFloorIsNoEvent,
+                            ABodyThatIsMovedBetweenStepsIsRefused);
 
 }  // namespace ricochet::hosts_test

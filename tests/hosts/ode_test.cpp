@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "hosts/engine_cases.hpp"
 
 namespace ricochet::hosts_test::ode_test {
@@ -29,7 +31,17 @@ public:
         dWorldDestroy(world_);
         dCloseODE();
     }
-    [[nodiscard]] hosts::OdeBody host(double length) const { return {{world_, body_}, 0, length}; }
+    [[nodiscard]] hosts::OdeBody host(double length) const
+    {
+        return {{world_, body_, dWorldQuickStep, others_}, 0, length};
+    }
+    /// A body that falls beside the first.
+    void add_beside(double x)
+    {
+        others_.push_back(dBodyCreate(world_));
+        dBodySetPosition(others_.back(), x, 0, 10);
+    }
+    [[nodiscard]] double velocity_beside() const { return dBodyGetLinearVel(others_.back())[2]; }
     void move_up() const { dBodySetPosition(body_, 0, 0, 5); }
 
     static constexpr double rounding = 1e-12;
@@ -37,6 +49,7 @@ public:
 private:
     dWorldID world_;
     dBodyID body_;
+    std::vector<dBodyID> others_;
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Ode, InEngine, OdeWorld);

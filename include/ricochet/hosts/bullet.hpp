@@ -4,14 +4,16 @@
 //     hosts::BulletBody host({&world, &body}, t, 0.01);
 //
 // Bullet computes in single precision unless it is built otherwise, and events are located to the
-// same precision. Repeated steps include gravity, but not the forces that the program has applied
-// for one step.
+// same precision. A repeated step moves the whole world, whose other bodies are put back with this
+// one. Repeated steps include gravity, but not the forces that the program has applied for one
+// step.
 #pragma once
 
 #include <btBulletDynamicsCommon.h>
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 #include "ricochet/hosts/detail/body_step.hpp"
 
@@ -31,19 +33,34 @@ struct BulletEngine {
     btDynamicsWorld* world;
     btRigidBody* body;
 
-    /// State of the body that a repeated step starts from.
+    /// Motion of another body of the world.
+    struct Other {
+        btRigidBody* body;
+        btTransform place;
+        btVector3 velocity, spin;
+    };
+    /// State of the world that a repeated step starts from.
     struct Body {
         std::array<double, 6> x{};
         btTransform place{};
         btVector3 spin{};
+        std::vector<Other> others{};
     };
     [[nodiscard]] RICOCHET_NOT_INLINED Body read() const
     {
         const btVector3 place = body->getCenterOfMassPosition();
         const btVector3 velocity = body->getLinearVelocity();
-        return {{place.x(), place.y(), place.z(), velocity.x(), velocity.y(), velocity.z()},
+        Body at{{place.x(), place.y(), place.z(), velocity.x(), velocity.y(), velocity.z()},
                 body->getWorldTransform(),
                 body->getAngularVelocity()};
+        const auto& all = world->getCollisionObjectArray();
+        for (int i = 0; i < all.size(); ++i) {
+            btRigidBody* const other = btRigidBody::upcast(all[i]);
+            if (!other || other == body || other->isStaticOrKinematicObject()) continue;
+            at.others.push_back({other, other->getWorldTransform(), other->getLinearVelocity(),
+                                 other->getAngularVelocity()});
+        }
+        return at;
     }
     RICOCHET_NOT_INLINED void write(Body at) const
     {
@@ -51,6 +68,11 @@ struct BulletEngine {
         body->setCenterOfMassTransform(at.place);
         body->setLinearVelocity({btScalar(at.x[3]), btScalar(at.x[4]), btScalar(at.x[5])});
         body->setAngularVelocity(at.spin);
+        for (const Other& other : at.others) {
+            other.body->setCenterOfMassTransform(other.place);
+            other.body->setLinearVelocity(other.velocity);
+            other.body->setAngularVelocity(other.spin);
+        }
     }
     void advance(double s) const { world->stepSimulation(btScalar(s), 0); }
     [[nodiscard]] double gravity(std::size_t i) const

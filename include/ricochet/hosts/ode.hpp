@@ -3,7 +3,12 @@
 //
 //     hosts::OdeBody host({world, body}, t, 0.01);
 //
-// Steps taken again see the forces of the world (gravity, joints), not those that the program has
+// A repeated step moves the whole world. The engine cannot list its bodies: those that move beside
+// this one are named, and are put back with it.
+//
+//     hosts::OdeBody host({world, body, dWorldQuickStep, {second, third}}, t, 0.01);
+//
+// Repeated steps include the forces of the world (gravity, joints), not those that the program has
 // added for one step.
 #pragma once
 
@@ -11,6 +16,7 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 #include "ricochet/hosts/detail/body_step.hpp"
 
@@ -22,27 +28,44 @@ struct OdeEngine {
     dBodyID body;
     int (*step)(dWorldID, dReal) = dWorldQuickStep;  ///< or dWorldStep
 
-    /// State of the body that a repeated step starts from.
-    struct Body {
+    std::vector<dBodyID> others{};  ///< that move in this world, too
+
+    /// Motion of one body.
+    struct Motion {
         std::array<double, 6> x{};
         std::array<dReal, 4> attitude{};
         std::array<dReal, 3> spin{};
     };
+    /// State of the world that a repeated step starts from.
+    struct Body : Motion {
+        std::vector<Motion> others{};
+    };
     [[nodiscard]] Body read() const
     {
-        Body at;
-        std::copy_n(dBodyGetPosition(body), 3, at.x.begin());
-        std::copy_n(dBodyGetLinearVel(body), 3, at.x.begin() + 3);
-        std::copy_n(dBodyGetQuaternion(body), 4, at.attitude.begin());
-        std::copy_n(dBodyGetAngularVel(body), 3, at.spin.begin());
+        Body at{read(body)};
+        for (const dBodyID other : others) at.others.push_back(read(other));
         return at;
     }
     void write(const Body& at) const
     {
-        dBodySetPosition(body, dReal(at.x[0]), dReal(at.x[1]), dReal(at.x[2]));
-        dBodySetLinearVel(body, dReal(at.x[3]), dReal(at.x[4]), dReal(at.x[5]));
-        dBodySetQuaternion(body, at.attitude.data());
-        dBodySetAngularVel(body, at.spin[0], at.spin[1], at.spin[2]);
+        write(body, at);
+        for (std::size_t i = 0; i < others.size(); ++i) write(others[i], at.others[i]);
+    }
+    [[nodiscard]] static Motion read(dBodyID of)
+    {
+        Motion at;
+        std::copy_n(dBodyGetPosition(of), 3, at.x.begin());
+        std::copy_n(dBodyGetLinearVel(of), 3, at.x.begin() + 3);
+        std::copy_n(dBodyGetQuaternion(of), 4, at.attitude.begin());
+        std::copy_n(dBodyGetAngularVel(of), 3, at.spin.begin());
+        return at;
+    }
+    static void write(dBodyID of, const Motion& at)
+    {
+        dBodySetPosition(of, dReal(at.x[0]), dReal(at.x[1]), dReal(at.x[2]));
+        dBodySetLinearVel(of, dReal(at.x[3]), dReal(at.x[4]), dReal(at.x[5]));
+        dBodySetQuaternion(of, at.attitude.data());
+        dBodySetAngularVel(of, at.spin[0], at.spin[1], at.spin[2]);
     }
     void advance(double s) const { step(world, dReal(s)); }
     [[nodiscard]] double gravity(std::size_t i) const
