@@ -146,9 +146,9 @@ public:
     /// Whether the interval is expected to be closed at the time `end`.
     [[nodiscard]] bool hopes(double end) const noexcept { return end <= hoped_; }
 
-    /// Checks every pending guard at the end of the current step, and at earlier starts if doubts
-    /// remain. Returns the first step that could not be closed, or `none`; the guards
-    /// to be assessed in it, if it is the current step, are in `assessed`.
+    /// Checks every pending guard at the end of the current step and, if doubts remain, at earlier
+    /// starts. Returns the first step that could not be closed, or `none`; if it is the current
+    /// step, `judged` has the guards that the exact detector examines in it.
     [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts,
                                     double h_next)
     {
@@ -447,7 +447,7 @@ private:
         check.later_value = value;
     }
 
-    /// The guard's exact value, unless it is known from the last check or another.
+    /// The guard's exact value: that of the last check or another at this time, or else evaluated.
     [[nodiscard]] double value_at(std::size_t i, double time, double t, const X& x, Mode mode,
                                   const Bank& bank, Statistics& counts)
     {
@@ -480,7 +480,7 @@ private:
         return {.time = clock(start.t.value), .t = start.t.value, .x = &start.x};
     }
 
-    /// Covers by a lower bound there, or by an upper bound below the surface; false: by neither.
+    /// Tries to cover guard i by its lower bound there or, below its surface, its upper bound.
     [[nodiscard]] bool bound_at(std::size_t i, std::size_t k, const Step<X>& step, const Bank& bank,
                                 Statistics& counts, Check& check)
     {

@@ -71,8 +71,8 @@ constexpr int most_linear = 4;
     return where;
 }
 
-/// A root that the noise of the guard hides for as long as `noise` [s]. Extrapolated along the
-/// flow the guard has left its side at `hi`; `hi` is moved until it has at the state there, too.
+/// Location of a root that noise of the guard hides for `noise` [s]. Along the flow the guard has
+/// left its side at `hi`; `hi` is moved until the guard of the state there has left it, too.
 [[nodiscard]] Location hidden(GuardPath& path, const GuardSample& lo, GuardSample hi, double end,
                               double rate, double noise)
 {
